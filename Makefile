@@ -1,0 +1,74 @@
+# `make study` runs the main job on a default wall, `make test` the tests; both set themselves up in .venv.
+# Another interpreter: make PYTHON=python3.12 test
+
+PYTHON ?= python3
+WALL ?= focusing-arcs
+
+VENV := .venv
+PY := $(VENV)/bin/python
+RUN := $(VENV)/.installed
+DEV := $(VENV)/.installed-dev
+
+.DEFAULT_GOAL := help
+.PHONY: help study test check format-check lint types docs bench build format clean distclean
+# two installs into one environment must not run side by side
+.NOTPARALLEL:
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 24
+
+study: $(RUN) ## study a wall and draw it into study/ (WALL=NAME or NAME:parameter=value for another)
+	$(VENV)/bin/asperity study $(WALL) --out study --force
+
+test: $(DEV) ## run the tests
+	$(PY) -m pytest
+
+check: format-check lint types docs test ## everything a change must pass
+
+format-check: $(DEV)
+	$(PY) -m ruff format --check .
+
+lint: $(DEV)
+	$(PY) -m ruff check .
+
+types: $(DEV)
+	$(PY) -m mypy
+
+docs: $(DEV) ## build the documentation into docs/_build/html, warnings are errors
+	$(PY) -m sphinx -b html -W --keep-going -q -d docs/_build/doctrees docs docs/_build/html
+	@echo "documentation: docs/_build/html/index.html"
+
+bench: $(RUN) ## measure the tracer's throughput
+	$(PY) -m benchmarks
+
+build: $(DEV) ## build the sdist and the wheel into dist/
+	$(PY) -m build
+
+format: $(DEV) ## rewrite the sources as `make check` wants them
+	$(PY) -m ruff format .
+	$(PY) -m ruff check --fix .
+
+clean: ## remove what the other targets wrote, except .venv
+	rm -rf build dist study docs/_build docs/api/generated src/asperity.egg-info
+	rm -rf .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find . -path ./$(VENV) -prune -o -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean ## remove .venv too
+	rm -rf $(VENV)
+
+# An environment that was left half made (no pip in it) is made again.
+define make_environment
+	@command -v $(PYTHON) >/dev/null || { echo "make: no '$(PYTHON)' here; name a Python 3.11 or later: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: asperity needs Python 3.11 or later, and '$(PYTHON)' is $$($(PYTHON) -V 2>&1); name another: make PYTHON=python3.12" >&2; exit 1; }
+	@$(PY) -c 'import pip' 2>/dev/null || $(PYTHON) -m venv --clear $(VENV) || { rm -rf $(VENV); echo "make: '$(PYTHON) -m venv' failed; on Debian and Ubuntu install the package python3-venv" >&2; exit 1; }
+endef
+
+$(RUN): pyproject.toml
+	$(make_environment)
+	$(PY) -m pip install --quiet --editable .
+	@touch $@
+
+$(DEV): pyproject.toml
+	$(make_environment)
+	$(PY) -m pip install --quiet --editable '.[dev]'
+	@touch $(RUN) $@

@@ -1,0 +1,15 @@
+"""Settings that every test shares."""
+
+import os
+
+from hypothesis import settings
+
+# The rooms are collected once, through src/asperity, under the names by which they are imported.
+collect_ignore = ["kernels", "geometry", "spectral"]
+
+# Pictures are drawn to files; no test may open a window.
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+# A first call may compile for seconds, which says nothing about the law under test.
+settings.register_profile("asperity", deadline=None, print_blob=True)
+settings.load_profile("asperity")

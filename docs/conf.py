@@ -1,0 +1,39 @@
+"""How Sphinx builds these pages; it needs asperity installed and no network."""
+
+import asperity
+
+project = "asperity"
+author = "The asperity developers"
+copyright = f"2026, {author}"
+version = release = asperity.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+]
+exclude_patterns = ["_build", "_templates"]
+templates_path = ["_templates"]
+
+html_theme = "furo"
+html_title = f"asperity {release}"
+
+myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_heading_anchors = 3
+
+# The rooms are listed by their __all__, whichever file a name was written in.
+autosummary_ignore_module_all = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+# by the names in the source, not by the unions behind them
+autodoc_type_aliases = {"ArrayLike": "ArrayLike", "Floats": "Floats"}
+python_use_unqualified_type_names = True
+python_maximum_signature_line_length = 88
+napoleon_google_docstring = False
+# as fields: an Attributes section would otherwise document a dataclass's fields a second time
+napoleon_use_ivar = True
+napoleon_use_rtype = False

@@ -1,0 +1,172 @@
+"""Do the pieces of a wall cross? Touching is allowed, and so are cusps and plates of zero thickness.
+
+The wall over one period is closed by a path above y = 0 and the winding number of the closed path is taken on every
+face that it cuts out of the plane. Around a crossing the winding number takes three consecutive values; around a
+touching it takes two. So pieces cross if and only if some face has a winding number other than 0 and 1. Faces that
+are thinner than the tolerance come from rounding and from flattening curves, and do not count.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import Floats
+from .curve import Curve
+from .segment import Segment
+
+# Curves become polylines within this distance, in coordinates where the wall is 1 wide and 1 deep. Polylines of
+# curves that only touch overlap by at most twice as much, and a face of thickness d has 2 area / perimeter <= d.
+FLATTENING = 1e-5
+CURVED_THICKNESS = 4.0 * FLATTENING
+
+# Vertices of polygons are given and noding them rounds by a few eps, but joints may have been moved together by 1e-9
+# (JOIN_TOLERANCE in conditions.py) on both sides of a touching.
+STRAIGHT_THICKNESS = 4e-9
+
+# Pieces this close to a crossing are named in the message.
+NEARBY = 1e-7
+
+# Edges times faces in one block of the winding count: 32 MB of booleans.
+WINDING_BLOCK = 4_000_000
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Where pieces cross: the place in the wall's coordinates and the labels of the pieces there."""
+
+    place: tuple[float, float]
+    labels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Loop:
+    """A closed polyline: points (n + 1, 2), and per edge the label's index (-1 for the closing path)."""
+
+    points: Floats
+    labels: NDArray[np.int64]
+
+
+def find_crossing(
+    pieces: Sequence[Curve], period: float, depth: float, islands: Sequence[Sequence[Curve]]
+) -> Crossing | None:
+    """Return the worst crossing of the pieces of a canonical wall and its islands, or None."""
+    import shapely
+
+    size = (period, depth if depth > 0.0 else period)
+    labels = [f"piece {i}" for i in range(len(pieces))]
+    labels += [f"piece {i} of island {k}" for k, loop in enumerate(islands) for i in range(len(loop))]
+    path = _flatten(pieces, size, 0)
+    loops = [_close(path, _copies(path.points))]
+    first = len(pieces)
+    for island in islands:
+        loops.append(_flatten(island, size, first))
+        first += len(island)
+    if len(loops) == 1 and shapely.LinearRing(_without_repeats(loops[0].points)).is_simple:
+        return None
+    faces, thickness = _faces(loops)
+    if not len(faces):
+        return None
+    inside = shapely.get_coordinates(shapely.point_on_surface(faces))
+    winding = np.sum([_winding_numbers(loop.points, inside) for loop in loops], axis=0)
+    bad = (winding < 0) | (winding > 1)
+    order = np.argsort(-thickness)
+    straight = np.array([isinstance(p, Segment) for loop in (pieces, *islands) for p in loop])
+    for i in order[bad[order]]:
+        if thickness[i] > CURVED_THICKNESS or _is_among_segments(faces[i], loops, straight):
+            return _describe(faces[i], loops, labels, size)
+    return None
+
+
+def _without_repeats(points: Floats) -> Floats:
+    """Drop points that equal the one before."""
+    keep = np.ones(len(points), dtype=bool)
+    keep[1:] = np.any(points[1:] != points[:-1], axis=1)
+    return points[keep]
+
+
+def _flatten(pieces: Sequence[Curve], size: tuple[float, float], first_label: int) -> _Loop:
+    chunks, labels = [], []
+    for i, piece in enumerate(pieces):
+        if isinstance(piece, Segment):
+            points = np.array([piece.start, piece.end]) / size
+        else:
+            points = piece.stretched(1.0 / size[0], 1.0 / size[1]).flattened(FLATTENING)
+            points[0], points[-1] = np.array(piece.start) / size, np.array(piece.end) / size
+        chunks.append(points[:-1])
+        labels += [first_label + i] * (len(points) - 1)
+    chunks.append(points[-1:])
+    return _Loop(np.concatenate(chunks), np.array(labels, dtype=np.int64))
+
+
+def _copies(points: Floats) -> int:
+    """How many periods side by side hold every pair of pieces that can meet."""
+    reach = max(-float(points[:, 0].min()), float(points[:, 0].max()) - 1.0)
+    return 1 + 2 * (math.ceil(reach) if reach > STRAIGHT_THICKNESS else 0)
+
+
+def _close(path: _Loop, copies: int) -> _Loop:
+    """Lay copies side by side and close the path above: up on the right, leftward at y = 1, down on the left."""
+    shifts = [path.points[:-1] + (k, 0.0) for k in range(copies)]
+    roof = np.array([(copies, path.points[-1, 1]), (copies, 1.0), (0.0, 1.0), path.points[0]])
+    labels = np.concatenate([np.tile(path.labels, copies), np.full(3, -1, dtype=np.int64)])
+    return _Loop(np.concatenate([*shifts, roof]), labels)
+
+
+def _faces(loops: Sequence[_Loop]) -> tuple[NDArray[np.object_], Floats]:
+    import shapely
+
+    lines = [shapely.LineString(loop.points) for loop in loops]
+    noded = shapely.get_parts(shapely.unary_union(lines))
+    faces = shapely.get_parts(shapely.polygonize(noded))
+    thickness = 2.0 * shapely.area(faces) / shapely.length(faces)
+    keep = thickness > STRAIGHT_THICKNESS
+    return faces[keep], thickness[keep]
+
+
+def _winding_numbers(points: Floats, places: Floats) -> NDArray[np.int64]:
+    """Count how often the closed polyline winds around each place, counterclockwise."""
+    start, end = points[:-1], points[1:]
+    winding = np.zeros(len(places), dtype=np.int64)
+    block = max(1, WINDING_BLOCK // len(start))
+    for low in range(0, len(places), block):
+        x, y = places[low : low + block, 0, np.newaxis], places[low : low + block, 1, np.newaxis]
+        up = (start[:, 1] <= y) & (end[:, 1] > y)
+        down = (start[:, 1] > y) & (end[:, 1] <= y)
+        side = (end[:, 0] - start[:, 0]) * (y - start[:, 1]) - (x - start[:, 0]) * (end[:, 1] - start[:, 1])
+        winding[low : low + block] = np.sum(up & (side > 0.0), axis=1) - np.sum(down & (side < 0.0), axis=1)
+    return winding
+
+
+def _is_among_segments(face: object, loops: Sequence[_Loop], straight: NDArray[np.bool_]) -> bool:
+    """Whether no curved piece comes near the face, so that flattening cannot have made it."""
+    import shapely
+
+    for loop in loops:
+        edges = shapely.linestrings(np.stack([loop.points[:-1], loop.points[1:]], axis=1))
+        curved = (loop.labels >= 0) & ~straight[loop.labels]
+        if curved.any() and shapely.dwithin(edges[curved], face, CURVED_THICKNESS).any():
+            return False
+    return True
+
+
+def _describe(
+    face: object, loops: Sequence[_Loop], labels: Sequence[str], size: tuple[float, float]
+) -> Crossing:
+    """Find the corner of the face where most pieces meet, and name them."""
+    import shapely
+
+    edges = np.concatenate([np.stack([loop.points[:-1], loop.points[1:]], axis=1) for loop in loops])
+    owner = np.concatenate([loop.labels for loop in loops])
+    corners = shapely.get_coordinates(shapely.get_exterior_ring(face))[:-1]
+    tree = shapely.STRtree(shapely.linestrings(edges))
+    corner_index, edge_index = tree.query(shapely.points(corners), predicate="dwithin", distance=NEARBY)
+    most = int(np.argmax(np.bincount(corner_index, minlength=len(corners))))
+    meeting = np.unique(owner[edge_index[corner_index == most]])
+    x, y = (float(v) for v in corners[most] * size)
+    place = (x if 0.0 <= x <= size[0] else x % size[0], y)
+    return Crossing(place, tuple(labels[k] for k in meeting if k >= 0))

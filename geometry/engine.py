@@ -1,0 +1,418 @@
+"""The compiled loop of the planar tracer. Only `tracing` imports this file, because it loads numba.
+
+Every optional table is an array or ``None``; numba compiles one version for each combination that occurs, and the
+branches of absent primitives are pruned from it. Layout of the tables: `primitives`.
+
+The formulas are stable by themselves; there is no epsilon that decides which piece is hit:
+
+* The side of a ray on which a joint V lies is the sign of c = (V - p) x v. A segment is hit from its free side exactly
+  if c goes from >= 0 at its start to <= 0 at its end. Neighbours share the number c, so that no ray slips between them.
+* A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0 with r measured from its first joint and n0 the unit normal
+  there, towards the free side; kappa > 0 is focusing. Its one front root is (B + sqrt(D)) / (kappa |v|^2), and
+  2 B / (kappa |v|^2) where the ray starts on the arc itself. An elliptic arc is the same in stretched coordinates.
+* A Bezier piece is hit where g(s) = (b(s) - p) x v falls through zero; the root at the ray's own start is divided out.
+* The hit point is put back on its piece, and the velocity is renormalised, once a bounce.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
+NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
+
+EPS = 2.0**-52
+# A joint that a ray meets, or a hit that a joint meets, within this share of the hollow's size is not resolved in
+# double precision: positions carry a few rounding errors of one ulp of the size each.
+JOINT_ULPS = 16.0
+# D = B^2 + 2 kappa |v|^2 F carries about eight rounding errors of B^2; below them hit and miss are not told apart.
+TANGENT_ULPS = 16.0
+# An arc run is worth its two arctangents and one sincos when it saves at least this many bounces.
+RUN_BOUNCES = 8.0
+ROOT_STEPS = 80
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def arc_time(arc, own, px, py, vx, vy, stretch):
+    """Flight time to the front of one arc, or inf; second value: 1 where the ray is tangent within rounding."""
+    rx, ry = px - arc[0], stretch * (py - arc[1])
+    wy = stretch * vy
+    curvature = arc[4]
+    b = arc[2] * vx + arc[3] * wy - curvature * (rx * vx + ry * wy)
+    speed2 = vx * vx + wy * wy
+    if own:
+        if curvature <= 0.0 or b <= 0.0:
+            return np.inf, 0
+        return 2.0 * b / (curvature * speed2), 0
+    f = arc[2] * rx + arc[3] * ry - 0.5 * curvature * (rx * rx + ry * ry)
+    d = b * b + 2.0 * curvature * speed2 * f
+    tangent = 0
+    if curvature < 0.0 and b < 0.0 and abs(d) <= TANGENT_ULPS * EPS * b * b:
+        tangent = 1
+        d = 0.0
+    if d < 0.0:
+        return np.inf, 0
+    root = math.sqrt(d)
+    if b >= 0.0:
+        if curvature <= 0.0:
+            return np.inf, 0
+        return (b + root) / (curvature * speed2), tangent
+    return 2.0 * f / (root - b), tangent
+
+
+@_compile
+def on_arc(arc, qx, qy, slack):
+    """Whether the point q on the full circle, measured from the first joint, belongs to the arc."""
+    if arc[7] > 0.0:
+        # up to a half angle of pi/4 the position along the chord decides, on the arc's own side of the circle
+        along = qx * arc[5] + qy * arc[6]
+        nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
+        facing = ny * arc[5] - nx * arc[6]
+        return -slack <= along <= arc[7] + slack and facing > 0.0
+    # beyond it the side of the chord decides; the arc bulges away from its free side exactly if it is focusing
+    height = qy * arc[5] - qx * arc[6]
+    return height <= slack if arc[4] > 0.0 else height >= -slack
+
+
+@_compile
+def arc_reflect(arc, t, px, py, vx, vy, stretch):
+    """Position on the arc after the time t and the velocity reflected there."""
+    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
+    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
+    f = arc[2] * qx + arc[3] * qy - 0.5 * arc[4] * (qx * qx + qy * qy)
+    # one Newton step on F puts the point back on the arc
+    qx -= f * nx
+    qy -= f * ny
+    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
+    scale = 1.0 / math.sqrt(nx * nx + ny * ny)
+    nx *= scale
+    ny *= scale
+    px, py = arc[0] + qx, arc[1] + qy / stretch
+    w = 2.0 * (vx * nx + vy * ny)
+    return px, py, vx - w * nx, vy - w * ny
+
+
+@_compile
+def skip_run(arc, px, py, vx, vy):
+    """Carry a ray along a circular arc by all whole hops of its run; returns the state and the number of hops."""
+    qx, qy = px - arc[0], py - arc[1]
+    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
+    sine = vx * nx + vy * ny
+    # the tangent in the direction of travel has the free side, and so the normal n, on its left
+    cosine = vx * ny - vy * nx
+    if sine <= 0.0 or sine > arc[10]:
+        return px, py, vx, vy, 0
+    hop = 2.0 * math.atan2(sine, abs(cosine))
+    # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
+    phi = 2.0 * math.atan2(qx * arc[2] + qy * arc[3], qx * arc[3] - qy * arc[2])
+    if phi < 0.0:
+        phi += 2.0 * math.pi
+    room = arc[11] - phi if cosine > 0.0 else phi
+    hops = math.floor(room / hop)
+    if hops < 1.0:
+        return px, py, vx, vy, 0
+    turn = hops * hop if cosine > 0.0 else -hops * hop
+    phi += turn
+    half = 0.5 * phi
+    chord = 2.0 * math.sin(half) / arc[4]
+    along, inward = chord * math.cos(half), chord * math.sin(half)
+    qx, qy = along * arc[3] + inward * arc[2], -along * arc[2] + inward * arc[3]
+    c, s = math.cos(turn), math.sin(turn)
+    return arc[0] + qx, arc[1] + qy, c * vx - s * vy, s * vx + c * vy, int(hops)
+
+
+@_compile
+def bezier_value(a0, a1, a2, a3, s):
+    return ((a3 * s + a2) * s + a1) * s + a0
+
+
+@_compile
+def falling_root(a0, a1, a2, a3, low, high):
+    """The root of the cubic in [low, high], where it falls monotonically from >= 0 to <= 0; safeguarded Newton."""
+    s = 0.5 * (low + high)
+    for _ in range(ROOT_STEPS):
+        value = bezier_value(a0, a1, a2, a3, s)
+        if value > 0.0:
+            low = s
+        elif value < 0.0:
+            high = s
+        else:
+            return s
+        slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
+        step = s - value / slope if slope != 0.0 else 0.5 * (low + high)
+        if not low < step < high:
+            step = 0.5 * (low + high)
+        if abs(step - s) <= EPS * abs(step) or step == low or step == high:
+            return step
+        s = step
+    return s
+
+
+@_compile
+def bezier_hit(curve, own_s, px, py, vx, vy, slack):
+    """First front hit of one Bezier piece: flight time (inf if none) and parameter; ``own_s`` < 0: not on it."""
+    share_slack = JOINT_ULPS * EPS
+    # b(s) - p in the power basis; columns 0-7 hold x and y coefficients of 1, s, s^2, s^3
+    a0 = (curve[0] - px) * vy - (curve[1] - py) * vx
+    a1 = curve[2] * vy - curve[3] * vx
+    a2 = curve[4] * vy - curve[5] * vx
+    a3 = curve[6] * vy - curve[7] * vx
+    if own_s >= 0.0:
+        # divide out the ray's own start: g(s) = (s - own) (b2 sigma^2 + b1 sigma + b0), sigma = s - own
+        b0 = (3.0 * a3 * own_s + 2.0 * a2) * own_s + a1
+        b1 = 3.0 * a3 * own_s + a2
+        b2 = a3
+        best_t, best_s = np.inf, 0.0
+        disc = b1 * b1 - 4.0 * b2 * b0
+        if disc < 0.0:
+            return best_t, best_s
+        q = -0.5 * (b1 + math.copysign(math.sqrt(disc), b1))
+        for root in range(2):
+            bottom, top = (b2, q) if root == 0 else (q, b0)
+            if bottom == 0.0:
+                continue
+            s = own_s + top / bottom
+            if -share_slack <= s <= 1.0 + share_slack:
+                s = min(max(s, 0.0), 1.0)
+                slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
+                dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
+                dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
+                t = dx * vx + dy * vy
+                if slope <= 0.0 and 0.0 < t < best_t:
+                    best_t, best_s = t, s
+        return best_t, best_s
+    n = curve.shape[0]
+    # split [0, 1] at the critical points of g; it can fall through zero once on each part
+    c1, c2 = 2.0, 2.0
+    disc = a2 * a2 - 3.0 * a3 * a1
+    if disc > 0.0:
+        q = -(a2 + math.copysign(math.sqrt(disc), a2))
+        if a3 != 0.0:
+            c1 = q / (3.0 * a3)
+        if q != 0.0:
+            c2 = a1 / q
+        if c1 > c2:
+            c1, c2 = c2, c1
+    best_t, best_s = np.inf, 0.0
+    low = 0.0
+    value_low = a0
+    for part in range(3):
+        high = 1.0 if part == 2 else (c1 if part == 0 else c2)
+        if high <= low or high > 1.0:
+            if part < 2:
+                continue
+            high = 1.0
+        if high == 1.0:
+            # the joint itself, so that the next piece sees the same number
+            value_high = (curve[n - 4] - px) * vy - (curve[n - 3] - py) * vx
+        else:
+            value_high = bezier_value(a0, a1, a2, a3, high)
+        if value_low >= 0.0 >= value_high and value_low > value_high:
+            s = falling_root(a0, a1, a2, a3, low, high)
+            dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
+            dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
+            t = dx * vx + dy * vy
+            if -slack <= t < best_t:
+                best_t, best_s = max(t, 0.0), s
+        low, value_low = high, value_high
+    return best_t, best_s
+
+
+@_compile
+def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, path):
+    """Follow one ray through one hollow; returns x, the outgoing velocity, bounces and status.
+
+    ``period`` is None for a closed hollow; for an open wall its sides are passed and x is unfolded by it.
+    ``path`` is None, or an array (limit + 2, 2) that receives the points of the trajectory.
+    """
+    left, right, size = hollow[0], hollow[1], hollow[2]
+    joint_low, joint_high = int(hollow[3]), int(hollow[4])
+    slack = JOINT_ULPS * EPS * size
+    px, py, vx, vy = x, 0.0, -math.cos(theta), -math.sin(theta)
+    shift = 0.0
+    bounces, steps = 0, 0
+    own_kind, own_index, own_s = LID, -1, -1.0
+    if path is not None:
+        path[0, 0], path[0, 1] = px, py
+    while True:
+        kind, index, hit_s, tangent = NO_PIECE, -1, 0.0, 0
+        time = np.inf
+        corner_time = np.inf
+
+        # segments, by the signs of the joints
+        dx, dy = joints[joint_low, 0] - px, joints[joint_low, 1] - py
+        c_before = dx * vy - dy * vx
+        if abs(c_before) <= slack and joints[joint_low, 2] > 0.0:
+            ahead = dx * vx + dy * vy
+            exact = bounces > 0 or abs(c_before) <= 4.0 * EPS * (abs(dx * vy) + abs(dy * vx))
+            if exact and ahead > slack:
+                corner_time = ahead
+        for j in range(joint_low + 1, joint_high):
+            dx, dy = joints[j, 0] - px, joints[j, 1] - py
+            c_after = dx * vy - dy * vx
+            if abs(c_after) <= slack and joints[j, 2] > 0.0:
+                ahead = dx * vx + dy * vy
+                exact = bounces > 0 or abs(c_after) <= 4.0 * EPS * (abs(dx * vy) + abs(dy * vx))
+                if exact and slack < ahead < corner_time:
+                    corner_time = ahead
+            if lines is not None:
+                if c_before >= 0.0 >= c_after and c_before > c_after and joints[j - 1, 3] > 0.0:
+                    if own_kind != LINE or own_index != j - 1:
+                        share = c_before / (c_before - c_after)
+                        hx = joints[j - 1, 0] + share * lines[j - 1, 0]
+                        hy = joints[j - 1, 1] + share * lines[j - 1, 1]
+                        t = (hx - px) * vx + (hy - py) * vy
+                        if -slack <= t < time:
+                            time, kind, index, hit_s = max(t, 0.0), LINE, j - 1, share
+            c_before = c_after
+
+        if circles is not None:
+            for k in range(int(hollow[5]), int(hollow[6])):
+                own = own_kind == CIRCLE and own_index == k
+                t, touch = arc_time(circles[k], own, px, py, vx, vy, 1.0)
+                if -slack <= t < time:
+                    t = max(t, 0.0)
+                    if on_arc(circles[k], px + t * vx - circles[k, 0], py + t * vy - circles[k, 1], slack):
+                        time, kind, index, tangent = t, CIRCLE, k, touch
+        if ellipses is not None:
+            for k in range(int(hollow[7]), int(hollow[8])):
+                own = own_kind == ELLIPSE and own_index == k
+                stretch = ellipses[k, 12]
+                t, touch = arc_time(ellipses[k], own, px, py, vx, vy, stretch)
+                if -slack <= t < time:
+                    t = max(t, 0.0)
+                    qx, qy = px + t * vx - ellipses[k, 0], stretch * (py + t * vy - ellipses[k, 1])
+                    if on_arc(ellipses[k], qx, qy, slack * max(1.0, stretch)):
+                        time, kind, index, tangent = t, ELLIPSE, k, touch
+        if beziers is not None:
+            for k in range(int(hollow[9]), int(hollow[10])):
+                start_s = own_s if own_kind == BEZIER and own_index == k else -1.0
+                t, s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
+                if t < time:
+                    time, kind, index, hit_s, tangent = t, BEZIER, k, s, 0
+
+        # the opening, an edge from right to left, and the sides of an open wall
+        if vy > 0.0:
+            c_right, c_left = (right - px) * vy + py * vx, (left - px) * vy + py * vx
+            t = max(-py / vy, 0.0)
+            if (c_right >= 0.0 >= c_left or period is not None) and own_kind != LID and t <= time:
+                time, kind = t, LID
+        if period is not None:
+            if vx != 0.0:
+                t = ((right if vx > 0.0 else left) - px) / vx
+                if t < time:
+                    time, kind = max(t, 0.0), SIDE
+
+        steps += 1
+        if kind == NO_PIECE or corner_time <= time + slack:
+            return shift + px, vx, vy, bounces, CORNER
+        if kind == LID:
+            if path is not None:
+                path[bounces + 1, 0], path[bounces + 1, 1] = px + time * vx, 0.0
+            return shift + px + time * vx, vx, vy, bounces, ESCAPED
+        if tangent != 0:
+            return shift + px, vx, vy, bounces, GRAZING
+        if bounces >= limit or steps >= 2 * limit + 2:
+            return shift + px, vx, vy, bounces, BOUNCE_LIMIT
+        if period is not None:
+            if kind == SIDE:
+                py += time * vy
+                px = left if vx > 0.0 else right
+                shift += (right - left) if vx > 0.0 else (left - right)
+                own_kind, own_index, own_s = SIDE, -1, -1.0
+                continue
+
+        if lines is not None and kind == LINE:
+            edge_x, edge_y = lines[index, 0], lines[index, 1]
+            px, py = joints[index, 0] + hit_s * edge_x, joints[index, 1] + hit_s * edge_y
+            if (hit_s * lines[index, 4] <= slack and joints[index, 2] > 0.0) or (
+                (1.0 - hit_s) * lines[index, 4] <= slack and joints[index + 1, 2] > 0.0
+            ):
+                return shift + px, vx, vy, bounces, CORNER
+            w = 2.0 * (vx * lines[index, 2] + vy * lines[index, 3])
+            vx -= w * lines[index, 2]
+            vy -= w * lines[index, 3]
+        if circles is not None and kind == CIRCLE:
+            px, py, nvx, nvy = arc_reflect(circles[index], time, px, py, vx, vy, 1.0)
+            if near_end(circles[index], px, py, slack):
+                return shift + px, vx, vy, bounces, CORNER
+            vx, vy = nvx, nvy
+            if circles[index, 10] > 0.0 and path is None:
+                px, py, vx, vy, hops = skip_run(circles[index], px, py, vx, vy)
+                bounces += hops
+        if ellipses is not None and kind == ELLIPSE:
+            px, py, nvx, nvy = arc_reflect(ellipses[index], time, px, py, vx, vy, ellipses[index, 12])
+            if near_end(ellipses[index], px, py, slack):
+                return shift + px, vx, vy, bounces, CORNER
+            vx, vy = nvx, nvy
+        if beziers is not None and kind == BEZIER:
+            curve = beziers[index]
+            px = bezier_value(curve[0], curve[2], curve[4], curve[6], hit_s)
+            py = bezier_value(curve[1], curve[3], curve[5], curve[7], hit_s)
+            if near_end(curve, px, py, slack):
+                return shift + px, vx, vy, bounces, CORNER
+            tx = (3.0 * curve[6] * hit_s + 2.0 * curve[4]) * hit_s + curve[2]
+            ty = (3.0 * curve[7] * hit_s + 2.0 * curve[5]) * hit_s + curve[3]
+            scale = 1.0 / math.sqrt(tx * tx + ty * ty)
+            w = 2.0 * scale * scale * (vy * tx - vx * ty)
+            vx += w * ty
+            vy -= w * tx
+            own_s = hit_s
+        own_kind, own_index = kind, index
+        if kind != BEZIER:
+            own_s = -1.0
+        # one Newton step on |v| = 1 keeps rounding errors of speed and place from feeding each other
+        scale = 1.5 - 0.5 * (vx * vx + vy * vy)
+        vx *= scale
+        vy *= scale
+        bounces += 1
+        if path is not None:
+            path[bounces, 0], path[bounces, 1] = px + shift, py
+
+
+@_compile
+def near_end(piece, px, py, slack):
+    """Whether a hit is within rounding of a joint that is a corner; both tables keep the ends in their last columns."""
+    n = piece.shape[0]
+    if piece[n - 2] > 0.0 and math.hypot(px - piece[n - 6], py - piece[n - 5]) <= slack:
+        return True
+    return piece[n - 1] > 0.0 and math.hypot(px - piece[n - 4], py - piece[n - 3]) <= slack
+
+
+@_compile
+def trace_rays(
+    x, theta, hollows, joints, lines, circles, ellipses, beziers, period, cell, limit, out_x, out_theta, bounces, status
+):
+    """Trace a block of rays; fills the four output arrays."""
+    for i in range(x.shape[0]):
+        base = math.floor(x[i] / cell) * cell
+        place = x[i] - base
+        # the last hollow whose left end is not beyond the place
+        low, high = 0, hollows.shape[0]
+        while low < high:
+            middle = (low + high) // 2
+            if hollows[middle, 0] <= place:
+                low = middle + 1
+            else:
+                high = middle
+        h = low - 1
+        if h < 0 or place >= hollows[h, 1] or (place == hollows[h, 0] and hollows[h, 11] > 0.0):
+            # a flat top, or an edge of it; the edges between two hollows are corners
+            out_x[i], out_theta[i], bounces[i] = x[i], math.pi - theta[i], 1
+            status[i] = ESCAPED
+            edge = h >= 0 and (
+                (place == hollows[h, 0] and hollows[h, 11] > 1.0) or (place == hollows[h, 1] and hollows[h, 12] > 1.0)
+            )
+            if edge:
+                out_theta[i], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
+            continue
+        place, vx, vy, bounces[i], status[i] = trace_ray(
+            place, theta[i], hollows[h], joints, lines, circles, ellipses, beziers, period, limit, None
+        )
+        out_x[i] = base + place
+        out_theta[i] = math.atan2(vy, vx)

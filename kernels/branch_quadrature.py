@@ -1,0 +1,121 @@
+"""Matrices of laws made of isometries, by quadrature between their kinks: exact to rounding."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..checks import Floats
+from .basis import Basis
+from .measure import gauss_on_intervals, gauss_rule
+
+# A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
+# misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
+# scale of the distance to grazing; NARROW is measured in both, and 6 nodes leave (0.05)^12 / 12! there.
+NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
+# Kinks that accumulate at grazing are followed until the omitted share is negligible or this many are listed.
+FEWEST_KINKS, MOST_KINKS = 2**10, 2**17
+# Numbers held at a time: nodes times basis functions, or times branches, of which there are rarely more than a few.
+CHUNK, BRANCHES_GUESS = 2**22, 16
+
+
+class Branching(Protocol):
+    """What is asked of a law here."""
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
+    def kinks(self, limit: int) -> tuple[Floats, float]: ...
+
+
+def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+    """<e_i, P e_j> for a law of isometries, and a bound of its Frobenius error apart from rounding.
+
+    The interval (0, pi) is cut at the kinks of the law, the edges of the basis and the angles that a branch maps to
+    edges. On each piece every integrand is smooth. Where the law leaves kinks near grazing out, a share m of the
+    measure, both the integral and its approximation are averages of e(theta) e(theta')^T over a measure of mass m, so
+    they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
+    """
+    worst = 2.0 * _largest_square_sum(basis)
+    limit = FEWEST_KINKS
+    kinks, omitted = law.kinks(limit)
+    while omitted * worst > tolerance and limit < MOST_KINKS:
+        limit *= 4
+        kinks, omitted = law.kinks(limit)
+    edges = np.unique(np.concatenate((basis.edges, kinks)))
+    edges = np.unique(np.concatenate((edges, _preimages(law, np.concatenate(([0.0], kinks, [np.pi])), basis.edges))))
+    total = np.zeros((basis.size, basis.size))
+    width, near = np.diff(edges), np.minimum(edges[1:], np.pi - edges[:-1])
+    narrow = (width < NARROW) & (width < NARROW * near)
+    smooth = NODES_NARROW if basis.is_partition else basis.nodes_per_interval
+    for chosen, order in ((narrow, max(NODES_NARROW, smooth)), (~narrow, max(NODES_WIDE, smooth))):
+        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], order, total)
+    return total, omitted * worst
+
+
+def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:
+    step = max(CHUNK // (order * (BRANCHES_GUESS if basis.is_partition else basis.size)), 1)
+    for start in range(0, low.size, step):
+        angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
+        _add_nodes(law, basis, angle, weight, total)
+
+
+def _add_nodes(law: Branching, basis: Basis, angle: Floats, weight: Floats, total: Floats) -> None:
+    mass = weight * basis.measure.density(angle)
+    probability, outgoing = law.branches(angle)
+    if basis.is_partition:
+        _add_masses(basis, angle, mass[:, None] * probability, outgoing, total)
+        return
+    image = np.zeros((angle.size, basis.size))
+    for slot in range(outgoing.shape[-1]):
+        image += probability[:, slot, None] * basis.evaluate(outgoing[:, slot])
+    total += basis.evaluate(angle).T @ (mass[:, None] * image)
+
+
+def _add_masses(basis: Basis, angle: Floats, mass: Floats, outgoing: Floats, total: Floats) -> None:
+    n = basis.size
+    cell = cell_index(basis, angle)[:, None] * n + cell_index(basis, outgoing)
+    heights = basis.heights
+    flux = np.bincount(cell.ravel(), weights=mass.ravel(), minlength=n * n).reshape(n, n)
+    total += heights[:, None] * flux * heights
+
+
+def cell_index(basis: Basis, angle: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
+    """The cell of each angle in a partition of (0, pi)."""
+    index = getattr(basis, "index", None)
+    if index is not None:
+        return np.asarray(index(angle), dtype=np.int64)
+    found = np.searchsorted(basis.edges, angle, side="right") - 1
+    return np.asarray(np.clip(found, 0, basis.size - 1), dtype=np.int64)
+
+
+def _preimages(law: Branching, kinks: Floats, edges: Floats) -> Floats:
+    """Angles that some branch maps to an edge, for every interval between kinks."""
+    low, high = kinks[:-1], kinks[1:]
+    proper = high > low
+    low, high = low[proper], high[proper]
+    probe = low + np.array([[0.25], [0.75]]) * (high - low)
+    # both probes in one call, so that a slot is the same isometry in both
+    probability, angle = law.branches(probe)
+    sign = np.sign(angle[1] - angle[0])
+    offset = angle[0] - sign * probe[0][:, None]
+    used = (probability.sum(axis=0) > 0.0) & (sign != 0.0)
+    piece, slot = np.nonzero(used)
+    sign, offset = sign[piece, slot], offset[piece, slot]
+    ends = sign * low[piece] + offset, sign * high[piece] + offset
+    first = np.searchsorted(edges, np.minimum(*ends), side="right")
+    last = np.searchsorted(edges, np.maximum(*ends), side="left")
+    number = np.maximum(last - first, 0)
+    owner = np.repeat(np.arange(piece.size), number)
+    edge = edges[first[owner] + np.arange(owner.size) - np.repeat(np.cumsum(number) - number, number)]
+    source = sign[owner] * (edge - offset[owner])
+    return np.asarray(source[(source > low[piece][owner]) & (source < high[piece][owner])])
+
+
+def _largest_square_sum(basis: Basis) -> float:
+    """sup over theta of the sum of e_i(theta)^2, from the nodes of the basis and points next to its edges."""
+    if basis.is_partition:
+        return float(np.max(basis.heights**2))
+    inside = np.clip(np.concatenate((basis.edges, basis.edges - 1e-12)), 0.0, np.pi)
+    angle, _ = gauss_rule(basis.edges, basis.nodes_per_interval)
+    return max(float(np.max(np.sum(basis.evaluate(part) ** 2, axis=-1))) for part in (inside, angle))

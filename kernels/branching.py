@@ -1,0 +1,85 @@
+"""Finite lists of branches: merging equal ones, chaining laws, and the kinks of a chain."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..checks import Floats
+from ..errors import InputError
+from .law import BranchLaw, Law
+from .stable_angles import kept_inside
+
+# Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
+SAME_ANGLE = 16.0 * np.finfo(np.float64).eps
+# Merging compares all pairs, and the number of branches of a chain grows exponentially unless they merge.
+MOST_BRANCHES = 64
+
+
+def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
+    """Add up branches with equal outgoing angles; slots left with probability 0 get the angle of the first used one.
+
+    The order of slots stays, so that a slot that was one isometry between two kinks remains so.
+    """
+    probability, outgoing = probability.copy(), kept_inside(outgoing)
+    slots = probability.shape[-1]
+    for late in range(1, slots):
+        for early in range(late):
+            same = np.abs(outgoing[..., late] - outgoing[..., early]) <= SAME_ANGLE
+            same &= (probability[..., early] > 0.0) & (probability[..., late] > 0.0)
+            probability[..., early] += np.where(same, probability[..., late], 0.0)
+            probability[..., late] = np.where(same, 0.0, probability[..., late])
+    first = np.take_along_axis(outgoing, np.argmax(probability > 0.0, axis=-1)[..., None], axis=-1)
+    return probability, np.where(probability > 0.0, outgoing, first)
+
+
+def chained(laws: Sequence[Law], theta: Floats) -> tuple[Floats, Floats]:
+    """The branches of laws applied one after the other, merged after each."""
+    probability, outgoing = np.ones((*theta.shape, 1)), theta[..., None]
+    for law in laws:
+        step, angle = law.branches(outgoing)
+        shape = (*theta.shape, -1)
+        probability = (probability[..., None] * step).reshape(shape)
+        outgoing = angle.reshape(shape)
+        probability, outgoing = _compressed(*merged(*_compressed(probability, outgoing)))
+        if probability.shape[-1] > MOST_BRANCHES:
+            raise InputError(
+                f"branches: expected at most {MOST_BRANCHES} of a composition, got {probability.shape[-1]} after "
+                f"{law!r}; use sample() or discretise()"
+            )
+    return probability, outgoing
+
+
+def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
+    """Kinks of a chain: those of the first law, and where its branches meet kinks of the rest."""
+    kinks, left_out = law_kinks(laws[0], limit)
+    for place in range(1, len(laws)):
+        target, more = law_kinks(laws[place], limit)
+        edges = np.concatenate([[0.0], kinks, [np.pi]])
+        low, high = edges[:-1], edges[1:]
+        # Both probes in one call, so that a slot is the same isometry in both.
+        probe = low + np.array([[0.25], [0.75]]) * (high - low)
+        probability, angle = chained(laws[:place], probe)
+        used, sign = np.all(probability > 0.0, axis=0), np.sign(angle[1] - angle[0])
+        offset = angle[0] - sign * probe[0][:, None]
+        source = sign[..., None] * (target - offset[..., None])
+        inside = used[..., None] & (source > low[:, None, None]) & (source < high[:, None, None])
+        kinks = np.unique(np.concatenate([kinks, source[inside]]))
+        left_out += more
+    return kinks, min(left_out, 1.0)
+
+
+def law_kinks(law: Law, limit: int) -> tuple[Floats, float]:
+    """``law.kinks(limit)``, or an InputError for a law that is not made of isometries."""
+    from .combination import CompoundLaw
+
+    if isinstance(law, (BranchLaw, CompoundLaw)):
+        return law.kinks(limit)
+    raise InputError(f"{law!r} is not a finite mixture of isometries, so it has no kinks")
+
+
+def _compressed(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
+    """Drop the slots that no incoming angle uses."""
+    used = np.any(probability > 0.0, axis=tuple(range(probability.ndim - 1)))
+    return probability[..., used], outgoing[..., used]

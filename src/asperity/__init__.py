@@ -1,0 +1,49 @@
+"""Reflection and collision laws of rough walls, with their spectra and errors.
+
+The three rooms are ``geometry`` (walls, disks, tracers), ``kernels`` (laws and their matrices) and ``spectral``
+(spectra and gaps); each is loaded when it is first used.
+
+Examples
+--------
+>>> import asperity
+>>> asperity.Estimate(0.5, 0.0, "bound", "closed form").value
+0.5
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import AccuracyError, AsperityError, FileExistsRefusal, InputError, WallError
+from .estimates import Estimate
+
+if TYPE_CHECKING:
+    from . import geometry, kernels, spectral
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "AccuracyError",
+    "AsperityError",
+    "Estimate",
+    "FileExistsRefusal",
+    "InputError",
+    "WallError",
+    "__version__",
+    "geometry",
+    "kernels",
+    "spectral",
+]
+
+_ROOMS = ("geometry", "kernels", "spectral")
+
+
+def __getattr__(name: str) -> Any:
+    if name in _ROOMS:
+        return import_module(f".{name}", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_ROOMS})

@@ -1,0 +1,88 @@
+"""Checks of what callers pass in: one line where it is used, one clear message when it fails."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+def finite_array(name: str, value: ArrayLike) -> Floats:
+    """Return ``value`` as float64, or raise an InputError that names the worst entry."""
+    try:
+        array = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as reason:
+        raise InputError(f"{name}: expected numbers, got {value!r}") from reason
+    bad = ~np.isfinite(array)
+    if bad.any():
+        where = tuple(int(i) for i in np.argwhere(bad)[0])
+        place = f" at index {where}" if where else ""
+        raise InputError(f"{name}: expected finite numbers, got {array[where]}{place} ({int(bad.sum())} such)")
+    return array
+
+
+def finite_number(name: str, value: Any) -> float:
+    """Return ``value`` as a finite float."""
+    array = finite_array(name, value)
+    if array.ndim:
+        raise InputError(f"{name}: expected one number, got an array of shape {array.shape}")
+    return float(array)
+
+
+def positive_number(name: str, value: Any) -> float:
+    """Return ``value`` as a finite float greater than zero."""
+    number = finite_number(name, value)
+    if number <= 0.0:
+        raise InputError(f"{name}: expected a number greater than 0, got {number!r}")
+    return number
+
+
+def number_between(name: str, value: Any, low: float, high: float, *, closed: str = "") -> float:
+    """Return ``value`` in (low, high); ``closed`` holds ``"low"`` and/or ``"high"`` for ends that are allowed."""
+    number = finite_number(name, value)
+    inside_low = number >= low if "low" in closed else number > low
+    inside_high = number <= high if "high" in closed else number < high
+    if not (inside_low and inside_high):
+        left, right = "[" if "low" in closed else "(", "]" if "high" in closed else ")"
+        raise InputError(f"{name}: expected a number in {left}{low:g}, {high:g}{right}, got {number!r}")
+    return number
+
+
+def whole_number(name: str, value: Any, low: int) -> int:
+    """Return ``value`` as an int of at least ``low``."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low:
+        raise InputError(f"{name}: expected a whole number of at least {low}, got {value!r}")
+    return int(value)
+
+
+def angles(name: str, value: ArrayLike) -> Floats:
+    """Return ``value`` as angles in radians, every one in the open interval (0, pi)."""
+    array = finite_array(name, value)
+    bad = ~((array > 0.0) & (array < np.pi))
+    if bad.any():
+        where = tuple(int(i) for i in np.argwhere(bad)[0])
+        place = f" at index {where}" if where else ""
+        raise InputError(
+            f"{name}: expected angles in the open interval (0, pi), in radians, got {array[where]!r}{place} "
+            f"({int(bad.sum())} such)"
+        )
+    return array
+
+
+def generator(rng: Any) -> np.random.Generator:
+    """Return ``rng`` if it is a numpy Generator, or raise an InputError that says how to make one."""
+    if not isinstance(rng, np.random.Generator):
+        raise InputError(f"rng: expected a numpy.random.Generator such as np.random.default_rng(0), got {rng!r}")
+    return rng
+
+
+def frozen(array: ArrayLike) -> Floats:
+    """Return a read-only float64 copy."""
+    copy = np.array(array, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy

@@ -1,0 +1,127 @@
+"""The command line: a whole study in one line."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from . import __version__
+from .errors import AsperityError
+
+WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file with
+the two columns x and height of a measured profile (which is mirrored to make it periodic)."""
+
+
+class OneLineErrors(click.Group):
+    """Turns an error of ours into one line on standard error and exit code 1; click's own usage errors exit with 2."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except AsperityError as reason:
+            click.echo(f"asperity: {' '.join(str(reason).split())}", err=True)
+            sys.exit(1)
+
+
+def with_disk(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of the disk."""
+    command = click.option("--mass", default=1.0, show_default=True, help="Mass m of the disk.")(command)
+    return click.option(
+        "--inertia", default=0.5, show_default=True, help="Moment of inertia J; 0.5 is a uniform disk of mass 1."
+    )(command)
+
+
+@click.group(cls=OneLineErrors, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="asperity")
+def main() -> None:
+    """Reflection and collision laws of rough walls: kernels, spectra and gaps, each with its error.
+
+    \b
+    Examples:
+      asperity walls
+      asperity study focusing-arcs --out study
+      asperity study triangular-teeth:angle=0.7 --mass 2 --inertia 1 --json
+      asperity study my-wall.toml --out my-study
+      asperity gap dispersing-arcs:curvature=0.333333 --specular
+    """
+
+
+@main.command(epilog=WALL_HELP)
+@click.argument("wall")
+@with_disk
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
+@click.option("--tolerance", default=1e-4, show_default=True, help="Error asked of the spectral gaps.")
+@click.option("--bins", default=128, show_default=True, help="Number of equal-measure bins of the matrix.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the random generator.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the summary.")
+@click.option("--force", is_flag=True, help="Replace the files of an earlier study in the folder.")
+def study(
+    wall: str, mass: float, inertia: float, out: Path | None, tolerance: float, bins: int, seed: int, as_json: bool,
+    force: bool,
+) -> None:  # fmt: skip
+    """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
+
+    \b
+    Examples:
+      asperity study focusing-arcs:half_angle=0.9 --out study
+      asperity study profile.txt --mass 1 --inertia 0.5 --json
+    """
+    import numpy as np
+
+    from .geometry import Disk, wall_from_text
+    from .study import prepare_folder, study_wall
+
+    disk = Disk(mass, inertia)
+    found_wall = wall_from_text(wall)
+    if out is not None:
+        # refuse before the work, not after it
+        prepare_folder(out, overwrite=force)
+    report = study_wall(
+        found_wall, Path(wall).name, disk, tolerance=tolerance, bins=bins, rng=np.random.default_rng(seed)
+    )
+    click.echo(report.to_json() if as_json else report.summary())
+    if out is not None:
+        for path in report.save(out, overwrite=force):
+            click.echo(f"wrote      {path}", err=as_json)
+
+
+@main.command(epilog=WALL_HELP)
+@click.argument("wall")
+@click.option("--specular", is_flag=True, help="In Feres' convention, where specular reflection is the identity.")
+@click.option("--tolerance", default=1e-6, show_default=True, help="Error asked for.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def gap(wall: str, specular: bool, tolerance: float, as_json: bool) -> None:
+    """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence."""
+    import json
+
+    from .geometry import wall_from_text
+    from .kernels import WallLaw
+    from .spectral import spectral_gap
+    from .study import gap_as_dict
+
+    law = WallLaw(wall_from_text(wall))
+    found = spectral_gap(law.in_specular_frame() if specular else law, tolerance)
+    if as_json:
+        click.echo(json.dumps(gap_as_dict(found), indent=2))
+    else:
+        click.echo("\n".join([str(found), *(f"  {line}" for line in found.evidence)]))
+
+
+@main.command()
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Draw them all into this picture file.")
+@click.option("--force", is_flag=True, help="Replace the picture if it exists.")
+def walls(out: Path | None, force: bool) -> None:
+    """List the named walls with their parameters and defaults, and draw them."""
+    from .geometry import named_walls
+    from .study_picture import draw_gallery
+
+    for entry in named_walls():
+        parameters = ", ".join(f"{key}={value:g}" for key, value in entry.defaults.items())
+        click.echo(f"{entry.name:20s} {entry.summary}" + (f" [{parameters}]" if parameters else ""))
+    if out is not None:
+        draw_gallery(out, overwrite=force)
+        click.echo(f"wrote {out}")

@@ -1,0 +1,45 @@
+"""A number together with its error: where the error comes from and how big it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+ErrorKind = Literal["bound", "estimate"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A quantity that carries its error.
+
+    Parameters
+    ----------
+    value : float
+        The quantity.
+    error : float
+        Half width of the interval around ``value``; ``inf`` where nothing is known.
+    kind : {"bound", "estimate"}
+        ``"bound"``: the true value is within ``error`` (to rounding). ``"estimate"``: the error is itself estimated,
+        as a standard error or from two resolutions; ``method`` says which.
+    method : str
+        How value and error were found, in words.
+
+    Examples
+    --------
+    >>> gap = Estimate(0.25, 0.0, "bound", "closed form")
+    >>> float(gap)
+    0.25
+    >>> print(gap)
+    0.25 +- 0 (bound: closed form)
+    """
+
+    value: float
+    error: float
+    kind: ErrorKind
+    method: str
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def __str__(self) -> str:
+        return f"{self.value:.10g} +- {self.error:.2g} ({self.kind}: {self.method})"

@@ -1,0 +1,137 @@
+"""The front door: what an import loads, what a wheel holds, what the pages say."""
+
+import doctest
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import asperity
+
+ROOT = Path(__file__).resolve().parent.parent
+HEAVY = {"numba", "sympy", "ot", "matplotlib", "shapely", "dask", "distributed"}
+PAGES = ["README.md", "docs/quickstart.md", "docs/errors.md"]
+
+
+def run_python(*arguments: str) -> str:
+    """Run a fresh interpreter that imports the same asperity as this one, and return what it prints."""
+    source = str(Path(asperity.__file__).parent.parent)
+    start = f"import sys; sys.path.insert(0, {source!r})\n"
+    command, *rest = arguments
+    done = subprocess.run(
+        [sys.executable, "-c", start + command, *rest], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def modules_loaded_by(statements: str) -> set[str]:
+    names = json.loads(run_python(f"{statements}\nimport json\nprint(json.dumps(sorted(sys.modules)))"))
+    return {name.partition(".")[0] for name in names}
+
+
+@pytest.mark.parametrize("statements", ["import asperity", "from asperity import geometry, kernels, spectral"])
+def test_an_import_loads_no_heavy_library(statements):
+    assert modules_loaded_by(statements) & HEAVY == set()
+
+
+def test_a_plain_trace_loads_only_the_compiler():
+    trace = "from asperity import geometry as g; g.trace(g.triangular_teeth(1.0), [0.2], [1.0])"
+    assert modules_loaded_by(trace) & HEAVY <= {"numba"}
+
+
+def test_the_front_door_opens_within_three_tenths_of_a_second():
+    clock = "import time; t = time.perf_counter(); import asperity; print(time.perf_counter() - t)"
+    # the least of five, because other processes may hold the machine
+    assert min(float(run_python(clock)) for _ in range(5)) < 0.3
+
+
+def test_the_three_rooms_are_attributes_and_nothing_else_is():
+    assert asperity.geometry.__name__ == "asperity.geometry"
+    assert set(asperity.__all__) <= set(dir(asperity))
+    with pytest.raises(AttributeError, match="no attribute 'attic'"):
+        asperity.attic  # noqa: B018 - the access is what is tested
+
+
+def test_every_public_name_of_a_room_exists():
+    for room in (asperity.geometry, asperity.kernels, asperity.spectral):
+        assert room.__all__, room.__name__
+        assert [name for name in room.__all__ if not hasattr(room, name)] == []
+
+
+def test_the_version_is_the_same_wherever_it_stands():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    cited = re.findall(r"^ *version: (\S+)$", (ROOT / "CITATION.cff").read_text(), flags=re.MULTILINE)
+    assert {project["version"], *cited} == {asperity.__version__}
+
+
+def test_the_module_runs_as_the_command():
+    out = run_python("import runpy; sys.argv[1:] = ['--help']; runpy.run_module('asperity', run_name='__main__')")
+    assert "Usage: python -m asperity" in out
+    assert "study" in out
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_examples_on_the_page_run(page):
+    blocks = re.findall(r"^```pycon\n(.*?)^```$", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
+    test = doctest.DocTestParser().get_doctest("".join(blocks), {}, page, page, 0)
+    assert test.examples
+    report: list[str] = []
+    failed, _ = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(test, out=report.append)
+    assert failed == 0, "".join(report)
+
+
+def test_every_relative_link_on_a_page_leads_to_a_file():
+    pages = list(ROOT.glob("*.md")) + [p for p in ROOT.glob("docs/**/*.md") if "_build" not in p.parts]
+    for page in pages:
+        for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert (page.parent / target).exists(), f"{page.relative_to(ROOT)} links to {target}"
+
+
+@pytest.fixture(scope="module")
+def distributions(tmp_path_factory):
+    """The sdist, and the wheel built from it, made from a copy so that the tree stays as it is."""
+    pytest.importorskip("build")
+    copy = tmp_path_factory.mktemp("tree") / "asperity"
+    ignore = shutil.ignore_patterns(
+        ".git", ".venv", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info", "build", "dist", "study", "_build"
+    )
+    shutil.copytree(ROOT, copy, symlinks=True, ignore=ignore)
+    done = subprocess.run(
+        [sys.executable, "-m", "build", "--no-isolation", str(copy)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    (sdist,) = (copy / "dist").glob("*.tar.gz")
+    (wheel,) = (copy / "dist").glob("*.whl")
+    return sdist, wheel
+
+
+def source_files() -> set[str]:
+    package = ROOT / "src" / "asperity"
+    folders = [package, *(package / room for room in ("geometry", "kernels", "spectral"))]
+    found = {path.relative_to(package.parent).as_posix() for folder in folders for path in folder.rglob("*.py")}
+    return found | {"asperity/py.typed"}
+
+
+def test_the_wheel_holds_the_package_and_nothing_else(distributions):
+    _, wheel = distributions
+    names = zipfile.ZipFile(wheel).namelist()
+    metadata = f"asperity-{asperity.__version__}.dist-info/"
+    assert {name for name in names if not name.startswith(metadata)} == source_files()
+
+
+def test_the_sdist_carries_tests_pages_and_the_rooms_as_real_files(distributions):
+    sdist, _ = distributions
+    with tarfile.open(sdist) as archive:
+        members = {member.name.partition("/")[2]: member for member in archive.getmembers()}
+    wanted = {"Makefile", "conftest.py", "LICENSE", ".ci/run", "tests/test_house.py", "docs/conf.py", "docs/index.md"}
+    wanted |= {f"src/{name}" for name in source_files()}
+    assert wanted - members.keys() == set()
+    assert all(members[name].isfile() for name in wanted)
