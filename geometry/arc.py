@@ -87,7 +87,8 @@ class Arc(Curve):
         span = abs(angles[1] - angles[0])
         if not 0.0 < span <= 2.0 * math.pi * (1.0 + 2.0 * EPS):
             raise WallError(
-                f"Arc start and end: expected angles in radians that differ by more than 0 and at most 2 pi, got {angles}"
+                "Arc start and end: expected angles in radians that differ by more than 0 and at most 2 pi, "
+                f"got {angles}"
             )
         points = [(middle[0] + axes[0] * math.cos(t), middle[1] + axes[1] * math.sin(t)) for t in angles]
         rounding = END_ROUNDING * max(abs(middle[0]) + axes[0], abs(middle[1]) + axes[1])
@@ -208,6 +209,15 @@ class Arc(Curve):
         turns = [(offset + k * math.pi - self.start_angle) / span for k in range(first, last + 1)]
         return sorted(s for s in turns if 0.0 < s < 1.0)
 
+    def turning_values(self, axis: int) -> list[float]:
+        """Return coordinate ``axis`` at its turning points: the centre's plus or minus the semi-axis."""
+        span = self.end_angle - self.start_angle
+        if abs(span) <= CHORD_SPAN:
+            return super().turning_values(axis)
+        wave = math.cos if axis == 0 else math.sin
+        angles = (self.start_angle + s * span for s in self.turning_points(axis))
+        return [self.center[axis] + math.copysign(self.semi_axes[axis], wave(t)) for t in angles]
+
     def reversed(self) -> Arc:
         """Return the arc run the other way."""
         angles = (self.end_angle, self.start_angle)
@@ -242,9 +252,7 @@ class Arc(Curve):
         angle = self.start_angle + s * (self.end_angle - self.start_angle)
         x, y = self.point(s)
         middle = (float(x), float(y))
-        before = self._with(
-            self.center, self.semi_axes, (self.start_angle, angle), self.start, middle, self.rounding
-        )
+        before = self._with(self.center, self.semi_axes, (self.start_angle, angle), self.start, middle, self.rounding)
         after = self._with(self.center, self.semi_axes, (angle, self.end_angle), middle, self.end, self.rounding)
         return before, after
 

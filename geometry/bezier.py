@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,7 @@ class Bezier(Curve):
 
         parts = [
             quad(speed, low, high, epsabs=1e-15, epsrel=1e-13, limit=200, full_output=1)[0]
-            for low, high in zip(breaks[:-1], breaks[1:], strict=True)
+            for low, high in pairwise(breaks)
         ]
         return size * math.fsum(parts)
 
@@ -157,7 +158,7 @@ def _bernstein(control: Floats, s: Floats) -> Floats:
     t = s[..., np.newaxis]
     level = [np.broadcast_to(p, (*s.shape, 2)) for p in control]
     while len(level) > 1:
-        level = [(1.0 - t) * p + t * q for p, q in zip(level[:-1], level[1:], strict=True)]
+        level = [(1.0 - t) * p + t * q for p, q in pairwise(level)]
     return np.array(level[0])
 
 

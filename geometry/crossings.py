@@ -111,7 +111,7 @@ def _copies(points: Floats) -> int:
 
 def _close(path: _Loop, copies: int) -> _Loop:
     """Lay copies side by side and close the path above: up on the right, leftward at y = 1, down on the left."""
-    shifts = [path.points[:-1] + (k, 0.0) for k in range(copies)]
+    shifts = [path.points[:-1] + np.array([k, 0.0]) for k in range(copies)]
     roof = np.array([(copies, path.points[-1, 1]), (copies, 1.0), (0.0, 1.0), path.points[0]])
     labels = np.concatenate([np.tile(path.labels, copies), np.full(3, -1, dtype=np.int64)])
     return _Loop(np.concatenate([*shifts, roof]), labels)
@@ -154,9 +154,7 @@ def _is_among_segments(face: object, loops: Sequence[_Loop], straight: NDArray[n
     return True
 
 
-def _describe(
-    face: object, loops: Sequence[_Loop], labels: Sequence[str], size: tuple[float, float]
-) -> Crossing:
+def _describe(face: object, loops: Sequence[_Loop], labels: Sequence[str], size: tuple[float, float]) -> Crossing:
     """Find the corner of the face where most pieces meet, and name them."""
     import shapely
 

@@ -52,6 +52,11 @@ class Curve(ABC):
     def turning_points(self, axis: int) -> list[float]:
         """Return the parameters in (0, 1) where coordinate ``axis`` has zero derivative, ascending."""
 
+    def turning_values(self, axis: int) -> list[float]:
+        """Return coordinate ``axis`` at its turning points."""
+        turns = self.turning_points(axis)
+        return [float(v) for v in self.point(turns)[:, axis]] if turns else []
+
     @abstractmethod
     def reversed(self) -> Self:
         """Return the same curve run the other way."""
@@ -81,10 +86,7 @@ class Curve(ABC):
         """The smallest upright box (xmin, ymin, xmax, ymax) that holds the curve."""
         bounds = []
         for axis in (0, 1):
-            values = [self.start[axis], self.end[axis]]
-            turns = self.turning_points(axis)
-            if turns:
-                values += [float(v) for v in self.point(turns)[:, axis]]
+            values = [self.start[axis], self.end[axis], *self.turning_values(axis)]
             bounds.append((min(values), max(values)))
         (xmin, xmax), (ymin, ymax) = bounds
         return xmin, ymin, xmax, ymax

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from ..checks import Floats
 from .curve import Curve
@@ -49,7 +50,7 @@ def hollows_between(tops: Sequence[int], vertices: Floats) -> tuple[Hollow, ...]
     count = len(vertices) - 1
     edges = [-1, *tops, count]
     touching = vertices[:, 1] == 0.0
-    for before, after in zip(edges[:-1], edges[1:], strict=True):
+    for before, after in pairwise(edges):
         first, last = before + 1, after
         if first == last:
             continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 from ..checks import finite_number, number_between, whole_number
 from ..errors import InputError
@@ -84,7 +85,7 @@ def _cells(left: float, right: float, count: int, s: float, a: float, deeper: li
     """Return ``count`` mushrooms side by side on [left, right]."""
     edges = [left + (right - left) * (k / count) for k in range(count)] + [right]
     pieces: list[Curve] = []
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         pieces += _cell(low, high, s, a, deeper)
     return pieces
 

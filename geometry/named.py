@@ -97,8 +97,8 @@ def focusing_arcs(half_angle: float) -> Wall:
 
     Examples
     --------
-    >>> focusing_arcs(math.pi / 2).depth
-    0.5
+    >>> focusing_arcs(math.pi / 2).arc_length == math.pi / 2
+    True
     """
     xi = number_between("half_angle", half_angle, 0.0, 0.5 * math.pi, closed="high")
     radius = 0.5 / math.sin(xi)
@@ -126,14 +126,11 @@ def dispersing_arcs(curvature: float) -> Wall:
     """
     k = number_between("curvature", curvature, 0.0, 2.0, closed="high")
     radius, span = 1.0 / k, math.asin(0.5 * k)
-    corner = (0.5, -2.0 * radius * math.sin(0.5 * span) ** 2)
+    # R - R cos(span) without cancellation
+    corner = (0.5, -0.5 * k * 0.5 / (1.0 + math.cos(span)))
     top = 0.5 * math.pi
     fall = Arc((0.0, -radius), radius, top, top - span).pinned((0.0, 0.0), corner)
     rise = Arc((1.0, -radius), radius, top + span, top).pinned(corner, (1.0, 0.0))
-    if k == 2.0:
-        # asin rounds sin(pi/4)^2; the cusp's depth is the radius
-        corner = (0.5, -0.5)
-        fall, rise = fall.pinned((0.0, 0.0), corner), rise.pinned(corner, (1.0, 0.0))
     return Wall([fall, rise])
 
 

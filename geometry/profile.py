@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 from ..checks import Floats, finite_array
 from ..errors import InputError
 
-
 Seam = Literal["mirror", "step"]
 
 
@@ -22,8 +21,7 @@ def vertices_of_profile(x: ArrayLike, height: ArrayLike, seam: Seam = "mirror") 
     x, height = finite_array("x", x), finite_array("height", height)
     if x.ndim != 1 or x.shape != height.shape or len(x) < 2:
         raise InputError(
-            "x and height: expected two arrays of the same length, at least 2, "
-            f"got shapes {x.shape} and {height.shape}"
+            f"x and height: expected two arrays of the same length, at least 2, got shapes {x.shape} and {height.shape}"
         )
     worst = int(np.argmin(np.diff(x)))
     if not x[worst + 1] > x[worst]:
@@ -53,7 +51,7 @@ def _rolled(x: Floats, height: Floats) -> Floats:
     inner = (down[1:-1] == 0.0) & (down[:-2] == 0.0) & (down[2:] == 0.0)
     keep = np.concatenate([[True], ~inner, [True]])
     # "+ 0.0" turns the -0.0 of a level profile into 0.0
-    return np.column_stack([along, down])[keep] + 0.0
+    return np.asarray(np.column_stack([along, down])[keep] + 0.0)
 
 
 def read_profile(path: str | PathLike[str], row: int | None = None) -> tuple[Floats, Floats]:
@@ -137,7 +135,7 @@ def _read_instrument(file: Path, row: int | None, why: str) -> tuple[Floats, Flo
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scan = read_topography(str(file))
-            heights = np.ma.masked_invalid(scan.heights())
+            heights = np.ma.filled(np.ma.asarray(scan.heights(), dtype=np.float64), np.nan)
             positions = scan.positions()
     except Exception as reason:  # every reader of that package fails in its own way on a file it cannot read
         first = (str(reason).splitlines() or [type(reason).__name__])[0]
@@ -148,7 +146,7 @@ def _read_instrument(file: Path, row: int | None, why: str) -> tuple[Floats, Flo
         if not 0 <= chosen < count:
             raise InputError(f"row: expected a whole number from 0 to {count - 1}, got {row!r}")
         heights, positions = heights[:, chosen], positions[0][:, chosen]
-    missing = int(np.ma.count_masked(heights))
+    missing = int(np.sum(~np.isfinite(heights)))
     if missing:
         raise InputError(f"{file}: {missing} of {heights.size} heights are undefined; fill or leave out those points")
-    return np.asarray(positions, dtype=np.float64), np.asarray(heights.data, dtype=np.float64)
+    return np.asarray(positions, dtype=np.float64), np.asarray(heights, dtype=np.float64)

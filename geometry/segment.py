@@ -55,7 +55,8 @@ class Segment(Curve):
         """Return the unit tangent, once for every parameter in ``s``, shape ``s.shape + (2,)``."""
         dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
         speed = math.hypot(dx, dy)
-        return np.tile(np.array([dx / speed, dy / speed]), (*np.shape(s), 1))
+        direction = np.array([dx / speed, dy / speed])
+        return np.array(np.broadcast_to(direction, (*np.shape(s), 2)), dtype=np.float64)
 
     @property
     def length(self) -> float:

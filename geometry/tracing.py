@@ -182,7 +182,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     >>> from math import pi
     >>> from asperity import geometry as geo
     >>> geo.trajectory(geo.flat(), 0.5, pi / 2).tolist()
-    [[0.5, 0.0], [0.5, 0.0]]
+    [[0.5, 0.0], [0.5, 0.0], [0.5, 0.0]]
     """
     from .engine import trace_ray
 
@@ -194,7 +194,8 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     left, right = scene.hollows[:, 0], scene.hollows[:, 1]
     inside = np.flatnonzero((left < place - base) & (place - base < right) | scene.is_open)
     if len(inside) == 0:
-        return np.array([[place, 0.0], [place, 0.0]])
+        # a flat top: entry, hit and exit are one point
+        return np.array([[place, 0.0]] * 3)
     path = np.full((limit + 2, 2), np.nan)
     trace_ray(
         place - base, incoming, scene.hollows[inside[0]], scene.joints, scene.lines, scene.circles,

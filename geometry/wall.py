@@ -6,20 +6,25 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from os import PathLike
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Floats, frozen, positive_number
 from ..errors import WallError
+from .arc import Arc
 from .conditions import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
 from .curve import EPS, Curve
 from .disk import Disk
 from .hollow import Hollow, flat_tops, hollows_between
 from .profile import Seam, vertices_of_profile
 from .segment import Segment
+
+if TYPE_CHECKING:
+    from .scene import Scene
 
 # Mirror images agree to rounding if their points differ by this much, relative to the wall's size: a mirrored point
 # rounds once, but the two halves of a wall may have been computed by formulas of some fifty operations.
@@ -72,9 +77,7 @@ class Wall:
     period: float = 1.0
     islands: tuple[tuple[Curve, ...], ...] = ()
 
-    def __init__(
-        self, pieces: Sequence[Curve], period: float = 1.0, islands: Sequence[Sequence[Curve]] = ()
-    ) -> None:
+    def __init__(self, pieces: Sequence[Curve], period: float = 1.0, islands: Sequence[Sequence[Curve]] = ()) -> None:
         width = positive_number("period", period)
         path = canonical_path(pieces, width)
         size = wall_size(path, width)
@@ -132,7 +135,7 @@ class Wall:
         if not points[-1, 0] > 0.0:
             raise WallError(f"vertices: expected the last x, the period, to be greater than 0, got {points[-1, 0]:g}")
         corners = [(x, y) for x, y in points.tolist()]
-        pieces = [Segment(p, q) for p, q in zip(corners[:-1], corners[1:], strict=True)]
+        pieces = [Segment(p, q) for p, q in pairwise(corners)]
         return cls(pieces, period=corners[-1][0])
 
     @classmethod
@@ -216,6 +219,13 @@ class Wall:
         return math.fsum(self.pieces[i].length for i in flat_tops(self.pieces, self.vertices))
 
     @cached_property
+    def scene(self) -> Scene:
+        """The tables that the tracer reads, made on first use."""
+        from .scene import scene_of
+
+        return scene_of(self)
+
+    @cached_property
     def hollows(self) -> tuple[Hollow, ...]:
         """The openings on y = 0 with the pieces below each; empty for a wall that does not close."""
         return hollows_between(flat_tops(self.pieces, self.vertices), self.vertices) if self.closes else ()
@@ -289,6 +299,9 @@ def _vertices(path: Sequence[Curve]) -> Floats:
 
 def _agree(path: Sequence[Curve], other: Sequence[Curve], tolerance: float) -> bool:
     """Whether two paths are the same piece by piece within ``tolerance``."""
+    if len(path) == len(other) == 1 and isinstance(path[0], Arc) and path[0].start == path[0].end:
+        # a whole ellipse is the same wherever it starts
+        return bool(np.abs(np.subtract(path[0].box, other[0].box)).max() <= tolerance)
     if len(path) != len(other) or [type(p) for p in path] != [type(p) for p in other]:
         return False
     if np.abs(_vertices(path) - _vertices(other)).max() > tolerance:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -39,7 +40,9 @@ def save_wall(wall: Wall, path: str | PathLike[str], overwrite: bool = False) ->
     except FileExistsError as reason:
         raise FileExistsRefusal(f"{file} exists; pass overwrite=True to replace it") from reason
     except OSError as reason:
-        raise InputError(f"{file}: cannot write there ({reason.strerror}); choose a folder that is writable") from reason
+        raise InputError(
+            f"{file}: cannot write there ({reason.strerror}); choose a folder that is writable"
+        ) from reason
 
 
 def load_wall(path: str | PathLike[str]) -> Wall:
@@ -103,7 +106,7 @@ def _wall(document: Table) -> Wall:
         raise InputError("expected exactly one of the keys 'vertices' and 'pieces'")
     if "vertices" in document:
         corners = _points("vertices", document["vertices"])
-        ends = zip(corners[:-1], corners[1:], strict=True)
+        ends = pairwise(corners)
         pieces = _pieces("vertices", [{"kind": "segment", "start": list(p), "end": list(q)} for p, q in ends])
     else:
         pieces = _pieces("pieces", document["pieces"])

@@ -15,8 +15,9 @@ from .measure import gauss_on_intervals, gauss_rule
 # misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
 # scale of the distance to grazing; NARROW is measured in both, and 6 nodes leave (0.05)^12 / 12! there.
 NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
-# Kinks that accumulate at grazing are followed until the omitted share is negligible or this many are listed.
-FEWEST_KINKS, MOST_KINKS = 2**10, 2**17
+# Kinks that accumulate at grazing are followed until the omitted share is negligible or listing and using them would
+# take more than about a second.
+FEWEST_KINKS, KINK_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
 # Numbers held at a time: nodes times basis functions, or times branches, of which there are rarely more than a few.
 CHUNK, BRANCHES_GUESS = 2**22, 16
 
@@ -26,6 +27,8 @@ class Branching(Protocol):
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
     def kinks(self, limit: int) -> tuple[Floats, float]: ...
+    @property
+    def fan_out(self) -> int: ...
 
 
 def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
@@ -36,10 +39,13 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     measure, both the integral and its approximation are averages of e(theta) e(theta')^T over a measure of mass m, so
     they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
     """
-    worst = 2.0 * _largest_square_sum(basis)
+    worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_KINKS
     kinks, omitted = law.kinks(limit)
-    while omitted * worst > tolerance and limit < MOST_KINKS:
+    most = KINK_WORK // law.fan_out**2
+    if not basis.is_partition:
+        most = min(most, FUNCTION_WORK // basis.size)
+    while omitted * worst > tolerance and 4 * limit <= most:
         limit *= 4
         kinks, omitted = law.kinks(limit)
     edges = np.unique(np.concatenate((basis.edges, kinks)))
@@ -47,9 +53,14 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     total = np.zeros((basis.size, basis.size))
     width, near = np.diff(edges), np.minimum(edges[1:], np.pi - edges[:-1])
     narrow = (width < NARROW) & (width < NARROW * near)
-    smooth = NODES_NARROW if basis.is_partition else basis.nodes_per_interval
-    for chosen, order in ((narrow, max(NODES_NARROW, smooth)), (~narrow, max(NODES_WIDE, smooth))):
-        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], order, total)
+    order, order_narrow = NODES_WIDE, NODES_NARROW
+    if not basis.is_partition:
+        # on a piece this short the functions of the basis are as smooth as the probabilities
+        order = max(order, basis.nodes_per_interval)
+        tame = width * basis.nodes_per_interval < np.diff(basis.edges).min()
+        narrow, order_narrow = narrow & tame, NODES_NARROW + 2
+    for chosen, nodes in ((narrow, order_narrow), (~narrow, order)):
+        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total)
     return total, omitted * worst
 
 
@@ -112,7 +123,7 @@ def _preimages(law: Branching, kinks: Floats, edges: Floats) -> Floats:
     return np.asarray(source[(source > low[piece][owner]) & (source < high[piece][owner])])
 
 
-def _largest_square_sum(basis: Basis) -> float:
+def largest_square_sum(basis: Basis) -> float:
     """sup over theta of the sum of e_i(theta)^2, from the nodes of the basis and points next to its edges."""
     if basis.is_partition:
         return float(np.max(basis.heights**2))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import InputError
-from .law import BranchLaw, Law
+from .law import Law
 from .stable_angles import kept_inside
 
 # Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
@@ -53,9 +53,9 @@ def chained(laws: Sequence[Law], theta: Floats) -> tuple[Floats, Floats]:
 
 def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
     """Kinks of a chain: those of the first law, and where its branches meet kinks of the rest."""
-    kinks, left_out = law_kinks(laws[0], limit)
+    kinks, left_out = laws[0].kinks(limit)
     for place in range(1, len(laws)):
-        target, more = law_kinks(laws[place], limit)
+        target, more = laws[place].kinks(limit)
         edges = np.concatenate([[0.0], kinks, [np.pi]])
         low, high = edges[:-1], edges[1:]
         # Both probes in one call, so that a slot is the same isometry in both.
@@ -68,15 +68,6 @@ def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
         kinks = np.unique(np.concatenate([kinks, source[inside]]))
         left_out += more
     return kinks, min(left_out, 1.0)
-
-
-def law_kinks(law: Law, limit: int) -> tuple[Floats, float]:
-    """``law.kinks(limit)``, or an InputError for a law that is not made of isometries."""
-    from .combination import CompoundLaw
-
-    if isinstance(law, (BranchLaw, CompoundLaw)):
-        return law.kinks(limit)
-    raise InputError(f"{law!r} is not a finite mixture of isometries, so it has no kinks")
 
 
 def _compressed(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:

@@ -38,12 +38,15 @@ class IsometryLaw(BranchLaw):
         return "retroreflection()" if self.retro else "specular()"
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, init=False, repr=False)
 class LambertianLaw(DensityLaw):
     """The law that forgets the incoming angle: theta' has the density sin(theta')/2."""
 
     reversible = True
     mirror_symmetric = True
+
+    def __init__(self) -> None:
+        """Takes no arguments."""
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """sin(theta')/2, in the shape to which the two arguments broadcast."""

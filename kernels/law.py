@@ -73,6 +73,14 @@ class Law(ABC):
             f"{self!r} is not a finite mixture of isometries, so it has no branches; use sample() or apply()"
         )
 
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """Increasing angles in (0, pi) between which rows vary smoothly with theta, at most about ``limit`` of them.
+
+        Also returns the probability under sin(theta)/2 d theta of the angles where more kinks were left out. Raises
+        an InputError for laws whose kinks are not known.
+        """
+        raise InputError(f"{self!r} has no list of kinks; use sample() or apply()")
+
     @abstractmethod
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         """`sample` for checked arguments."""
@@ -144,7 +152,7 @@ class BranchLaw(Law):
     @abstractmethod
     def kinks(self, limit: int) -> tuple[Floats, float]:
         """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the
-        probability under sin(theta)/2 d theta of the angles near grazing where more kinks were left out."""
+        probability under sin(theta)/2 d theta of the angles, mostly near grazing, where more were left out."""
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         probability, outgoing = self.branches(theta)
@@ -186,6 +194,12 @@ class DrivenLaw(Law):
         return np.asarray(np.mean(np.asarray(function(outgoing), dtype=np.float64), axis=0))
 
 
+def set_facts(law: Law, **facts: object) -> None:
+    """Set attributes of a law under construction; afterwards it is immutable."""
+    for name, value in facts.items():
+        object.__setattr__(law, name, value)
+
+
 def entry_points(x: ArrayLike) -> Floats:
     """Return ``x`` as float64, every one in the open interval (0, 1), or raise an InputError."""
     array = finite_array("x", x)
@@ -194,7 +208,7 @@ def entry_points(x: ArrayLike) -> Floats:
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         place = f" at index {where}" if where else ""
         raise InputError(
-            f"x: expected entry points in the open interval (0, 1), as shares of the period, got {array[where]!r}{place} "
-            f"({int(bad.sum())} such)"
+            f"x: expected entry points in the open interval (0, 1), as shares of the period, got {array[where]!r}"
+            f"{place} ({int(bad.sum())} such)"
         )
     return array

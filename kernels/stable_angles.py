@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..checks import Floats
-
-SMALLEST_ANGLE = float(np.finfo(np.float64).tiny)
-LARGEST_ANGLE = float(np.nextafter(np.pi, 0.0))
+from .measure import LARGEST_ANGLE, SMALLEST_ANGLE
 
 
 def kept_inside(angle: Floats) -> Floats:

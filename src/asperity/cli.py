@@ -116,10 +116,10 @@ def gap(wall: str, specular: bool, tolerance: float, as_json: bool) -> None:
 @click.option("--force", is_flag=True, help="Replace the picture if it exists.")
 def walls(out: Path | None, force: bool) -> None:
     """List the named walls with their parameters and defaults, and draw them."""
-    from .geometry import named_walls
+    from .geometry import WALLS
     from .study_picture import draw_gallery
 
-    for entry in named_walls():
+    for entry in WALLS.values():
         parameters = ", ".join(f"{key}={value:g}" for key, value in entry.defaults.items())
         click.echo(f"{entry.name:20s} {entry.summary}" + (f" [{parameters}]" if parameters else ""))
     if out is not None:

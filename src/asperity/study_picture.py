@@ -45,11 +45,11 @@ def draw_gallery(path: Path, *, overwrite: bool) -> None:
     """Draw every named wall with its default parameters into one picture file."""
     from matplotlib.figure import Figure
 
-    from .geometry import draw_wall, named_walls
+    from .geometry import WALLS, draw_wall
 
     if path.exists() and not overwrite:
         raise FileExistsRefusal(f"{path} exists; use another name or --force to replace it")
-    entries = named_walls()
+    entries = list(WALLS.values())
     rows = -(-len(entries) // GALLERY_COLUMNS)
     figure = Figure(figsize=(3.4 * GALLERY_COLUMNS, 2.7 * rows), layout="constrained")
     axes = np.ravel(figure.subplots(rows, GALLERY_COLUMNS))

@@ -1,0 +1,155 @@
+"""Matrices of laws by sampling rays: plain Monte Carlo and randomised quasi-Monte Carlo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import Floats
+from ..errors import AccuracyError, InputError
+from .basis import Basis
+from .branch_quadrature import largest_square_sum
+from .combination import SpecularFrame
+from .counting import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
+from .involution import InvolutionLaw
+from .law import BranchLaw, DrivenLaw, Law
+from .measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
+from .stable_angles import flipped
+
+SamplingMethod = Literal["qmc", "monte-carlo"]
+# Outgoing angles and, for traced rays, which of them escaped.
+Response: TypeAlias = tuple[Floats, "NDArray[np.bool_] | None"]
+
+# About a second of traced rays.
+DEFAULT_SAMPLES = 2**20
+# Independent randomisations: the spread of eight gives an error within a quarter.
+RANDOMISATIONS = 8
+# Rays at a time; a power of two, which keeps the balance of Sobol points.
+CHUNK = 2**16
+SOBOL_BITS = 52
+# A larger share of rays that did not escape shows in the matrix: see WallLaw.
+LOST_TOLERANCE = 1e-4
+SLOW_SECONDS = 2.0
+
+
+def sampled_array(
+    law: Law, basis: Basis, method: SamplingMethod, samples: int, rng: np.random.Generator, symmetrise: bool
+) -> tuple[SampledArray, int, float]:
+    """The matrix of a law from rays with incoming angles from the invariant measure.
+
+    Rays come in chunks. A chunk's rays depend on a number drawn from ``rng``, the randomisation and the chunk's own
+    index alone, and chunks are added as integers (as floats in a fixed order for bases without cells).
+
+    Returns
+    -------
+    array : SampledArray
+    samples : int
+        Rays used: for ``"qmc"`` rounded up to 8 times a power of two.
+    lost : float
+        Share of rays that did not escape; they were sent back, and twice their share times sup |e|^2 is in the error.
+    """
+    respond = responder(law) if method == "qmc" else None
+    if method == "qmc" and respond is None:
+        raise InputError(f"method: {law!r} is not driven by a uniform number, so it has no 'qmc'; use 'monte-carlo'")
+    root = [int(word) for word in rng.integers(0, 2**63, size=2)]
+    independent = method == "monte-carlo" and basis.is_partition
+    randomisations = 1 if independent else RANDOMISATIONS
+    each = max(-(-samples // randomisations), 1)
+    if method == "qmc":
+        each = 1 << (each - 1).bit_length()
+    parts: list[Any] = []
+    lost = 0
+    with _progress(randomisations * each) as bar:
+        for randomisation in range(randomisations):
+            total: Any = 0
+            for incoming, outgoing, escaped in _rays(law, respond, each, root, randomisation):
+                pair = count_pairs if basis.is_partition else sum_products
+                total = total + pair(basis, incoming, outgoing)
+                lost += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
+                bar.update(incoming.size)
+            parts.append(total)
+    used = randomisations * each
+    share = lost / used
+    if share > LOST_TOLERANCE:
+        raise AccuracyError(
+            f"{law!r}: {share:.2g} of {used} rays did not escape, more than {LOST_TOLERANCE:g}; geometry.trace(wall, "
+            "x, theta).counts() says how they ended",
+            share,
+        )
+    if basis.is_partition:
+        array = array_from_counts(parts, basis, symmetrise=symmetrise, invariant=True, independent=independent)
+    else:
+        means = [part / each for part in parts]
+        array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=bool(law.reversible))
+    if share > 0.0:
+        extra = 2.0 * share * largest_square_sum(basis)
+        array = SampledArray(array.symmetric, array.error + extra, array.replicates, array.raw_defect, array.counts)
+    return array, used, share
+
+
+def responder(law: Law) -> Callable[[Floats, Floats], Response] | None:
+    """The law as a function of a uniform number and the incoming angle; None for laws that need more randomness."""
+    if isinstance(law, SpecularFrame):
+        inner = responder(law.law)
+        if inner is None:
+            return None
+
+        def turned(x: Floats, theta: Floats) -> Response:
+            outgoing, escaped = inner(x, theta)
+            return flipped(outgoing), escaped
+
+        return turned
+    outcomes = getattr(law, "outcomes", None)
+    if outcomes is not None:
+        return lambda x, theta: outcomes(x, theta)
+    if isinstance(law, DrivenLaw):
+        return lambda x, theta: (law.respond(x, theta), None)
+    if isinstance(law, InvolutionLaw):
+        return lambda x, theta: (np.asarray(law.map(theta), dtype=np.float64), None)
+    if isinstance(law, BranchLaw):
+        return lambda x, theta: (_branch_taken(law, x, theta), None)
+    return None
+
+
+def _branch_taken(law: BranchLaw, x: Floats, theta: Floats) -> Floats:
+    probability, outgoing = law.branches(theta)
+    cumulative = np.cumsum(probability, axis=-1)
+    choice = np.argmax(x[..., None] * cumulative[..., -1:] < cumulative, axis=-1)
+    return np.asarray(np.take_along_axis(outgoing, choice[..., None], axis=-1)[..., 0])
+
+
+def _rays(
+    law: Law, respond: Callable[[Floats, Floats], Response] | None, number: int, root: list[int], randomisation: int
+) -> Iterator[tuple[Floats, Floats, NDArray[np.bool_] | None]]:
+    """Incoming angles, outgoing angles and escapes, chunk by chunk."""
+    if respond is not None:
+        from scipy.stats.qmc import Sobol
+
+        seed = np.random.default_rng(np.random.SeedSequence(root, spawn_key=(randomisation,)))
+        engine = Sobol(2, scramble=True, bits=SOBOL_BITS, rng=seed)
+        for start in range(0, number, CHUNK):
+            points = engine.random(min(CHUNK, number - start))
+            x = np.clip(points[:, 0], np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0))
+            theta = np.clip(SINE.quantile(points[:, 1]), SMALLEST_ANGLE, LARGEST_ANGLE)
+            outgoing, escaped = respond(x, theta)
+            yield theta, outgoing, escaped
+        return
+    traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None
+    for index, start in enumerate(range(0, number, CHUNK)):
+        chunk = np.random.default_rng(np.random.SeedSequence(root, spawn_key=(randomisation, index)))
+        theta = SINE.sample(min(CHUNK, number - start), chunk)
+        if traced is None:
+            yield theta, law.sample(theta, chunk), None
+        else:
+            outgoing, escaped = traced(np.clip(chunk.random(theta.shape), np.finfo(np.float64).tiny, None), theta)
+            yield theta, outgoing, escaped
+
+
+def _progress(total: int) -> AbstractContextManager[Any]:
+    from tqdm import tqdm
+
+    return tqdm(total=total, unit="ray", unit_scale=True, delay=SLOW_SECONDS, disable=None, leave=False)

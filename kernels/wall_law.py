@@ -1,0 +1,197 @@
+"""The law of a wall: in closed form where its hollows allow it, else by tracing rays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..checks import Floats, angles
+from ..errors import AccuracyError, InputError
+from .circular import CircularArcLaw
+from .combination import Combination
+from .ideal import specular
+from .law import AngleFunction, DrivenLaw, Law, entry_points
+from .rectangular import RectangularTeethLaw
+from .triangular import TriangularTeethLaw
+
+if TYPE_CHECKING:
+    from ..geometry import Wall
+    from ..geometry.curve import Curve
+    from ..geometry.hollow import Hollow
+
+# A hollow is symmetric, vertical or level to rounding if coordinates agree to this share of its size: named walls
+# place them by a handful of operations. A wall this close to a closed form has that law to rounding as well.
+SHAPE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
+# Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
+# error in total variation; above this it would show in a kernel estimated from a million rays.
+LOST_TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class WallLaw(DrivenLaw):
+    """The law P~ of a wall: a ray enters at a uniform point of the period.
+
+    `respond` and `outcomes` trace rays. `sample`, `apply`, `branches` and `kinks` use the closed form if there is
+    one, else `sample` and `apply` trace.
+
+    Parameters
+    ----------
+    wall : Wall
+
+    Attributes
+    ----------
+    closed_form : Law or None
+        The exact law if the wall consists of flat tops and hollows that are isosceles triangles, rectangles (not
+        wider, all together, than the flat tops), or circular arcs up to a semicircle; a Combination if there are
+        several different ones. Recognised by their shape, whatever constructor made the wall.
+    mirror_symmetric : bool or None
+        True if the wall's cell is; otherwise not known.
+
+    Raises
+    ------
+    AccuracyError
+        By `respond`, `sample` and `apply` if more than a share of 1e-4 of the rays did not escape; ``defect`` is the
+        share.
+
+    Notes
+    -----
+    A ray that does not escape (corner, grazing, bounce limit) is returned as retroreflected, theta' = theta: on a set
+    of rays that the true map takes to itself the identity preserves sin(theta) dx d theta and is an involution, so
+    the law stays Markov and reversible, and its error in total variation is at most the share of these rays.
+    `outcomes` says which they were.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> WallLaw(geo.rectangular_teeth(0.75)).closed_form
+    RectangularTeethLaw(height_to_width=0.75)
+    >>> WallLaw(geo.flat()).closed_form
+    specular()
+    """
+
+    wall: Wall
+
+    reversible = True
+    mirror_symmetric: bool | None = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not hasattr(self.wall, "hollows"):
+            raise InputError(f"wall: expected a Wall such as geo.focusing_arcs(0.9), got {self.wall!r}")
+        # An asymmetric cell may still have a symmetric law, so its absence proves nothing.
+        object.__setattr__(self, "mirror_symmetric", True if self.wall.is_mirror_symmetric else None)
+        if self.closed_form is not None:
+            object.__setattr__(self, "fan_out", self.closed_form.fan_out)
+            object.__setattr__(self, "mirror_symmetric", self.closed_form.mirror_symmetric)
+
+    @property
+    def is_polygonal(self) -> bool:
+        """Whether every piece of the wall is straight, so that the law is made of isometries."""
+        return self.wall.is_polygonal
+
+    @cached_property
+    def closed_form(self) -> Law | None:
+        return _closed_form(self.wall)
+
+    def outcomes(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+        """Outgoing angles by tracing, and the mask of the rays that escaped; the others are sent back.
+
+        ``x`` in (0, 1) is the entry point as a share of the period. Never raises an AccuracyError.
+        """
+        from ..geometry.tracing import trace
+
+        x, theta = np.broadcast_arrays(entry_points(x), angles("theta", theta))
+        traced = trace(self.wall, x * self.wall.period, theta)
+        escaped = np.asarray(traced.escaped)
+        return np.where(escaped, traced.theta, theta), escaped
+
+    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
+        outgoing, escaped = self.outcomes(x, theta)
+        lost = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
+        if lost > LOST_TOLERANCE:
+            raise AccuracyError(
+                f"{self!r}: {lost:.2g} of {escaped.size} rays did not escape, more than {LOST_TOLERANCE:g}; "
+                "geometry.trace(wall, x, theta).counts() says how they ended, outcomes() which they were",
+                lost,
+            )
+        return outgoing
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        return super().branches(theta) if self.closed_form is None else self.closed_form.branches(theta)
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """Those of the closed form."""
+        return super().kinks(limit) if self.closed_form is None else self.closed_form.kinks(limit)
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        return super()._sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
+
+    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+        if self.closed_form is None:
+            return super()._apply(function, theta)
+        return self.closed_form.apply(function, theta)
+
+
+def _closed_form(wall: Wall) -> Law | None:
+    """The sum of the laws of flat tops and hollows, by their share of the period, or None."""
+    if not wall.closes:
+        return None
+    terms: dict[Law, float] = {}
+    level = wall.period - math.fsum(hollow.width for hollow in wall.hollows)
+    for hollow in wall.hollows:
+        pieces = wall.pieces[hollow.first : hollow.last]
+        law = _triangle(hollow, pieces) or _arc(hollow, pieces) or _rectangle(hollow, pieces)
+        if law is None:
+            return None
+        width = hollow.width
+        if isinstance(law, RectangularTeethLaw):
+            # That law has a flat top as wide as its crevice.
+            level, width = level - width, 2.0 * width
+        terms[law] = terms.get(law, 0.0) + width
+    if level < -SHAPE_TOLERANCE * wall.period:
+        return None
+    if level > SHAPE_TOLERANCE * wall.period:
+        terms[specular()] = level
+    if len(terms) == 1:
+        return next(iter(terms))
+    total = math.fsum(terms.values())
+    return Combination(tuple((width / total, law) for law, width in terms.items()))
+
+
+def _triangle(hollow: Hollow, pieces: tuple[Curve, ...]) -> Law | None:
+    from ..geometry import Segment
+
+    if len(pieces) != 2 or not all(isinstance(piece, Segment) for piece in pieces):
+        return None
+    x, y = pieces[0].end
+    if abs(0.5 * (hollow.left + hollow.right) - x) > SHAPE_TOLERANCE * hollow.width:
+        return None
+    return TriangularTeethLaw(2.0 * math.atan2(0.5 * hollow.width, -y))
+
+
+def _rectangle(hollow: Hollow, pieces: tuple[Curve, ...]) -> Law | None:
+    from ..geometry import Segment
+
+    if len(pieces) != 3 or not all(isinstance(piece, Segment) for piece in pieces):
+        return None
+    (left, depth), (right, other) = pieces[0].end, pieces[1].end
+    tilt = max(abs(left - hollow.left), abs(right - hollow.right)) / hollow.width
+    if max(tilt, abs(depth - other) / abs(depth)) > SHAPE_TOLERANCE:
+        return None
+    return RectangularTeethLaw(-depth / hollow.width)
+
+
+def _arc(hollow: Hollow, pieces: tuple[Curve, ...]) -> Law | None:
+    from ..geometry import Arc
+
+    arc = pieces[0]
+    if len(pieces) != 1 or not isinstance(arc, Arc) or not arc.is_circular or arc.direction < 0:
+        return None
+    if arc.half_span > 0.5 * np.pi * (1.0 + SHAPE_TOLERANCE):
+        return None
+    return CircularArcLaw(min(arc.half_span, 0.5 * np.pi))

@@ -1,0 +1,121 @@
+"""The disk: its metric, frame and charts."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from asperity import geometry as geo
+from asperity.errors import InputError
+
+EPS = np.finfo(float).eps
+logs = st.floats(-6.0, 6.0)
+
+
+def disk_of(log_mass, log_inertia):
+    return geo.Disk(10.0**log_mass, 10.0**log_inertia)
+
+
+@given(logs, logs)
+def test_the_frame_is_orthonormal_and_right_handed(log_mass, log_inertia):
+    disk = disk_of(log_mass, log_inertia)
+    products = disk.inner(disk.frame[:, np.newaxis], disk.frame[np.newaxis])
+    assert np.allclose(products, np.eye(3), rtol=0, atol=8 * EPS)
+    # the corrected sign of chi makes a rotation
+    assert np.linalg.det(disk.frame * np.sqrt([disk.mass, disk.mass, disk.inertia])) == pytest.approx(1.0)
+    assert not disk.frame.flags.writeable
+
+
+def test_chi_carries_the_rolling_momentum():
+    disk = geo.Disk(mass=2.0, inertia=3.0)
+    w = np.random.default_rng(0).normal(size=(50, 3))
+    chi = np.array([-1.0, 0.0, 1.0]) / math.sqrt(5.0)
+    assert disk.frame[2] == pytest.approx(chi)
+    assert np.allclose(disk.rolling_momentum(w), -2.0 * w[:, 0] + 3.0 * w[:, 2], rtol=1e-15)
+    assert np.allclose(disk.inner(w, chi), disk.rolling_momentum(w) / math.sqrt(5.0))
+
+
+@given(logs, logs, st.floats(1e-9, math.pi - 1e-9), st.floats(1e-6, math.pi - 1e-6))
+def test_angles_come_back_from_velocities(log_mass, log_inertia, theta, psi):
+    disk = disk_of(log_mass, log_inertia)
+    w = disk.from_angles(theta, psi, speed=3.7)
+    assert disk.inner(w, w) == pytest.approx(3.7**2, rel=1e-12)
+    again = disk.to_angles(w)
+    # v1 + omega and -m v1 + J omega cancel when one of the two terms is far larger than their difference
+    w1, _, w3 = np.abs(w)
+    across = 1.0 / math.sqrt(1.0 / disk.mass + 1.0 / disk.inertia)
+    noise = EPS * (across * (w1 + w3) + (disk.mass * w1 + disk.inertia * w3) / math.sqrt(disk.mass + disk.inertia))
+    assert again[0] == pytest.approx(theta, rel=8 * EPS, abs=4 * noise / math.sin(psi))
+    assert again[1] == pytest.approx(psi, rel=8 * EPS, abs=4 * noise)
+
+
+@pytest.mark.parametrize("ratio", [1e-12, 1e-6, 0.3, 1.0, 2.0, 1e6, 1e12])
+def test_frame_and_angles_equal_fifty_digits_at_extreme_ratios(ratio):
+    mpmath.mp.dps = 50
+    disk = geo.Disk(mass=1.0, inertia=1.0 / ratio)
+    m, j = mpmath.mpf(disk.mass), mpmath.mpf(disk.inertia)
+    assert disk.foreshortening == pytest.approx(float(1 / mpmath.sqrt(1 + m / j)), rel=2 * EPS)
+    w = (0.3, 1e-9, 0.2)
+    v1, v2, omega = (mpmath.mpf(v) for v in w)
+    across = (v1 + omega) / mpmath.sqrt(1 / m + 1 / j)
+    upward, rolling = mpmath.sqrt(m) * v2, (-m * v1 + j * omega) / mpmath.sqrt(m + j)
+    theta, psi = disk.to_angles(w)
+    assert theta == pytest.approx(float(mpmath.atan2(upward, across)), rel=8 * EPS)
+    assert psi == pytest.approx(float(mpmath.atan2(mpmath.hypot(across, upward), rolling)), rel=32 * EPS)
+
+
+def test_grazing_directions_keep_all_their_digits():
+    disk = geo.Disk()
+    for angle in (1e-300, 1e-20, 1e-12):
+        theta, psi = disk.to_angles(disk.from_angles(angle, math.pi / 2))
+        assert theta == pytest.approx(angle, rel=8 * EPS)
+        assert psi == pytest.approx(math.pi / 2, rel=8 * EPS)
+        # near the pole psi = 0
+        assert disk.to_angles(disk.from_angles(1.0, angle))[1] == pytest.approx(angle, rel=1e-3, abs=4 * EPS)
+
+
+def test_the_speed_is_dropped_and_shapes_broadcast():
+    disk = geo.Disk(1.0, 1 / 3)
+    w = disk.from_angles(np.full((4, 1), 0.5), np.full(3, 1.0), speed=2.0)
+    assert w.shape == (4, 3, 3)
+    slow, fast = disk.to_angles(w), disk.to_angles(1e6 * w)
+    assert np.allclose(slow, fast, rtol=4 * EPS)
+    assert slow[0].shape == (4, 3)
+
+
+def test_the_definition_of_the_angles():
+    disk = geo.Disk(2.0, 0.7)
+    theta, psi = 0.4, 2.2
+    parts = np.array([math.cos(theta) * math.sin(psi), math.sin(theta) * math.sin(psi), math.cos(psi)])
+    assert disk.from_angles(theta, psi) == pytest.approx(parts @ disk.frame, rel=1e-14)
+
+
+def test_foreshortening_of_known_disks():
+    assert geo.Disk(1.0, 0.5).foreshortening == pytest.approx(3**-0.5, rel=2 * EPS)  # a uniform disk
+    assert geo.Disk(1.0, 1.0).foreshortening == pytest.approx(2**-0.5, rel=2 * EPS)  # a ring
+    assert geo.Disk(1.0, 4.0).foreshortening < 1.0  # no real disk, accepted
+    assert geo.Disk() == geo.Disk(1, 0.5) and hash(geo.Disk()) == hash(geo.Disk(1, 0.5))
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: geo.Disk(mass=0.0), "mass"),
+        (lambda: geo.Disk(inertia=-1.0), "inertia"),
+        (lambda: geo.Disk(mass=float("nan")), "mass"),
+        (lambda: geo.Disk().to_angles((1.0, -1.0, 0.0)), "v2 > 0"),
+        (lambda: geo.Disk().to_angles([(1.0, 1.0, 0.0), (1.0, 0.0, 0.0)]), r"index \(1,\)"),
+        (lambda: geo.Disk().to_angles((1.0, 1.0)), "shape"),
+        (lambda: geo.Disk().inner((1.0, 1.0, np.nan), (1, 1, 1)), "finite"),
+        (lambda: geo.Disk().from_angles(0.0, 1.0), "theta"),
+        (lambda: geo.Disk().from_angles(1.0, math.pi), "psi"),
+        (lambda: geo.Disk().from_angles(1.0, 1.0, speed=0.0), "speed"),
+        (lambda: geo.Disk().from_angles([1.0, 1.0], [1.0, 1.0, 1.0]), "broadcast"),
+    ],
+)
+def test_unsuitable_arguments_are_refused_in_words(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
