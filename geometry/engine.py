@@ -232,6 +232,9 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
     """
     left, right, size = hollow[0], hollow[1], hollow[2]
     joint_low, joint_high = int(hollow[3]), int(hollow[4])
+    circle_low, circle_high = int(hollow[5]), int(hollow[6])
+    ellipse_low, ellipse_high = int(hollow[7]), int(hollow[8])
+    bezier_low, bezier_high = int(hollow[9]), int(hollow[10])
     slack = JOINT_ULPS * EPS * size
     px, py, vx, vy = x, 0.0, -math.cos(theta), -math.sin(theta)
     shift = 0.0
@@ -272,7 +275,7 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
             c_before = c_after
 
         if circles is not None:
-            for k in range(int(hollow[5]), int(hollow[6])):
+            for k in range(circle_low, circle_high):
                 own = own_kind == CIRCLE and own_index == k
                 t, touch = arc_time(circles[k], own, px, py, vx, vy, 1.0)
                 if -slack <= t < time:
@@ -280,7 +283,7 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
                     if on_arc(circles[k], px + t * vx - circles[k, 0], py + t * vy - circles[k, 1], slack):
                         time, kind, index, tangent = t, CIRCLE, k, touch
         if ellipses is not None:
-            for k in range(int(hollow[7]), int(hollow[8])):
+            for k in range(ellipse_low, ellipse_high):
                 own = own_kind == ELLIPSE and own_index == k
                 stretch = ellipses[k, 12]
                 t, touch = arc_time(ellipses[k], own, px, py, vx, vy, stretch)
@@ -290,7 +293,7 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
                     if on_arc(ellipses[k], qx, qy, slack * max(1.0, stretch)):
                         time, kind, index, tangent = t, ELLIPSE, k, touch
         if beziers is not None:
-            for k in range(int(hollow[9]), int(hollow[10])):
+            for k in range(bezier_low, bezier_high):
                 start_s = own_s if own_kind == BEZIER and own_index == k else -1.0
                 t, s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
                 if t < time:

@@ -49,7 +49,8 @@ class Segment(Curve):
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
         along = np.asarray(s, dtype=np.float64)[..., np.newaxis]
-        return (1.0 - along) * np.array(self.start) + along * np.array(self.end)
+        points: Floats = (1.0 - along) * np.array(self.start) + along * np.array(self.end)
+        return points
 
     def tangent(self, s: ArrayLike) -> Floats:
         """Return the unit tangent, once for every parameter in ``s``, shape ``s.shape + (2,)``."""

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats
 from .basis import Basis
+from .combination import Combination, Composition, Power, SpecularFrame
 from .measure import gauss_on_intervals, gauss_rule
 
 # A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
@@ -18,6 +19,8 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # Kinks that accumulate at grazing are followed until the omitted share is negligible or listing and using them would
 # take more than about a second.
 FEWEST_KINKS, KINK_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
+# Kinks of a chain are found from all pairs of kinks of its parts.
+MOST_CHAINED_KINKS = 2**10
 # Numbers held at a time: nodes times basis functions, or times branches, of which there are rarely more than a few.
 CHUNK, BRANCHES_GUESS = 2**22, 16
 
@@ -42,7 +45,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_KINKS
     kinks, omitted = law.kinks(limit)
-    most = KINK_WORK // law.fan_out**2
+    most = MOST_CHAINED_KINKS if _has_chain(law) else KINK_WORK // law.fan_out**2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 4 * limit <= most:
@@ -62,6 +65,12 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     for chosen, nodes in ((narrow, order_narrow), (~narrow, order)):
         _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total)
     return total, omitted * worst
+
+
+def _has_chain(law: object) -> bool:
+    if isinstance(law, Combination):
+        return any(_has_chain(term) for _, term in law.terms)
+    return isinstance(law, (Composition, Power)) or (isinstance(law, SpecularFrame) and _has_chain(law.law))
 
 
 def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:

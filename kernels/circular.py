@@ -12,10 +12,10 @@ from .law import AngleFunction, DrivenLaw, entry_points
 from .measure import SINE, gauss_on_intervals
 from .stable_angles import flipped, kept_inside, mixed_arccos
 
-# Rows jump where the number of hits changes. Each of the first intervals gets its own Gauss rule; beyond this many
-# hits the outgoing angle stays within 1/MOST_HITS of pi - xi (or of xi) and its mean within 1/MOST_HITS^2, on a share
-# of rays of about 1/(4 MOST_HITS^2): what is neglected is below 1e-12 of the range of a smooth function.
-MOST_HITS = 1000
+# Rows jump where the number of hits N changes. Each of the first intervals gets its own Gauss rule; beyond MOST_HITS
+# hits, a share of rays of about 1/(4 N^2) and only for theta within xi/N of xi, the outgoing angle stays within xi/N of
+# pi - xi (or xi) and its mean within xi/N^2: for a smooth function what is neglected is below 1/(4 N^4) = 4e-12.
+MOST_HITS = 500
 NODES = 16
 # Evaluations of the function held in memory at a time.
 CHUNK = 2**14

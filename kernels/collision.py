@@ -13,12 +13,16 @@ from ..checks import Floats, angles, finite_array, generator
 from ..errors import InputError
 from .basis import Basis
 from .collision_matrices import isometry_matrix
+from .isometry import isometries
 from .law import Law
 
 if TYPE_CHECKING:
     from ..geometry import Disk, Wall
     from .collision_operator import CollisionOperator
     from .symmetry import SymmetryDefect
+
+# Pairs of angles count as a grid if the grid of their distinct values has at most this many times as many points.
+GRID_EXCESS = 4
 
 VelocityFunction = Callable[[Floats, Floats], Floats]
 
@@ -112,8 +116,18 @@ class CollisionLaw:
         ``theta`` and ``psi`` in (0, pi) are the angles of minus the incoming velocity; they broadcast.
         """
         theta_all, psi_all = np.broadcast_arrays(angles("theta", theta), angles("psi", psi))
-        rolled = np.pi - psi_all
-        return self.law.apply(lambda outgoing: function(outgoing, rolled), theta_all)
+        theta_values, theta_index = np.unique(theta_all, return_inverse=True)
+        psi_values, psi_index = np.unique(psi_all, return_inverse=True)
+        rolled = np.pi - psi_values
+        if theta_values.size * psi_values.size <= GRID_EXCESS * theta_all.size:
+            # a grid, or nearly: one call, with psi as a further axis of the function's values
+            grid = self.law.apply(lambda outgoing: function(outgoing[..., None], rolled), theta_values)
+            return np.asarray(grid[theta_index, psi_index].reshape(theta_all.shape))
+        value = np.empty(theta_all.shape)
+        for k, turned in enumerate(rolled):
+            here = psi_index.reshape(psi_all.shape) == k
+            value[here] = self.law.apply(lambda outgoing, turned=turned: function(outgoing, turned), theta_all[here])
+        return value
 
     def branches(self, theta: ArrayLike) -> list[tuple[Floats, Floats]]:
         """The law in the original coordinates, as a random choice among 3x3 matrices, for laws made of isometries.
@@ -134,7 +148,7 @@ class CollisionLaw:
         InputError
             If the law is not made of isometries.
         """
-        probability, sign, offset = self.law.isometries(theta)
+        probability, sign, offset = isometries(self.law, theta)
         matrices = isometry_matrix(self.disk, sign, offset)
         return [
             (probability[..., slot], matrices[..., slot, :, :])

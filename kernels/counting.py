@@ -81,35 +81,34 @@ def array_from_counts(
     AccuracyError
         If a bin has no pairs; ``defect`` is the measure of such bins.
     """
-    counts = np.sum(parts, axis=0)
+    counts = _summed(parts)
     weights, rows = basis.weights, counts.sum(axis=1)
     exposure = _exposure(counts, weights, invariant)
     _check_occupied(rows + counts.sum(axis=0) if symmetrise else rows, basis)
     scale = basis.heights[:, None] * basis.heights  # from fluxes to the orthonormal basis
     if symmetrise:
         whole = exposure[:, None] + exposure
-        array = _ratio(counts + counts.T, whole)
+        flux = _ratio(counts + counts.T, whole)
     else:
         whole = np.broadcast_to((rows / weights)[:, None], counts.shape)
-        array = counts / whole
-    differences = [
-        scale * _ratio(len(parts) * (_numerator(part, symmetrise) - _share(part, weights, invariant, symmetrise) * array), whole)
-        for part in parts
-    ] if len(parts) > 1 else []
+        flux = counts / whole
+    symmetric = scale * flux
+    replicates = _Replicates(symmetric, len(parts))
     if independent:
-        error = float(np.linalg.norm(scale * np.sqrt(_variances(counts, array, whole, weights, symmetrise, invariant))))
-    else:
-        error = float(np.sqrt(sum(float(np.sum(d**2)) for d in differences) / (len(parts) * (len(parts) - 1))))
-    raw = scale * _ratio(counts, exposure[:, None])
-    if independent:
+        variance = _variances(counts, flux, whole, weights, symmetrise, invariant)
+        error = float(np.linalg.norm(scale * np.sqrt(variance)))
         z_score = reversibility_z_score(counts, weights, invariant)
     else:
-        root = np.sqrt(np.maximum(counts + counts.T, 1))
-        z_score = replicate_z_score([(part - part.T) / root for part in parts])
-    symmetric = scale * array
-    return SampledArray(
-        symmetric, error, _kept(symmetric, differences), SymmetryDefect(relative_asymmetry(raw), z_score=z_score), counts
-    )
+        for part in parts:
+            # the part's influence on the estimate: its numerators minus its denominators times the whole estimate
+            excess = _numerator(part, symmetrise) - _denominator(part, weights, invariant, symmetrise) * flux
+            replicates.add(len(parts) * scale * _ratio(excess, whole))
+        error = replicates.standard_error()
+        pairs = np.nonzero(np.triu(counts + counts.T, 1))
+        root = np.sqrt((counts + counts.T)[pairs])
+        z_score = replicate_z_score([(part[pairs] - part.T[pairs]) / root for part in parts])
+    raw = relative_asymmetry(scale * _ratio(counts, exposure[:, None]))
+    return SampledArray(symmetric, error, replicates.kept(), SymmetryDefect(raw, z_score=z_score), counts)
 
 
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
@@ -124,16 +123,52 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
     fixed = [_with_constant(mean, basis.constant, keeps_measure or symmetrise) for mean in means]
     if symmetrise:
         fixed = [0.5 * (mean + mean.T) for mean in fixed]
-    symmetric = np.mean(fixed, axis=0)
-    differences = [mean - symmetric for mean in fixed]
-    error = float(np.sqrt(sum(float(np.sum(d**2)) for d in differences) / (len(means) * (len(means) - 1))))
+    symmetric = np.asarray(np.mean(fixed, axis=0))
+    replicates = _Replicates(symmetric, len(means))
+    for mean in fixed:
+        replicates.add(mean - symmetric)
     defect = SymmetryDefect(relative_asymmetry(raw), z_score=z_score)
-    return SampledArray(symmetric, error, _kept(symmetric, differences), defect, None)
+    return SampledArray(symmetric, replicates.standard_error(), replicates.kept(), defect, None)
+
+
+class _Replicates:
+    """The arrays of the randomisations, collected one by one; sparse where that is smaller, dropped if too large."""
+
+    def __init__(self, symmetric: Floats, number: int) -> None:
+        self.symmetric, self.number = symmetric, number
+        self.squares = 0.0
+        self.arrays: list[Replicate] = []
+
+    def add(self, difference: Floats) -> None:
+        self.squares += float(np.sum(difference**2))
+        if self.symmetric.nbytes * self.number > LARGEST_REPLICATES:
+            return
+        replicate = self.symmetric + difference
+        if 4 * np.count_nonzero(replicate) > replicate.size:
+            replicate.setflags(write=False)
+            self.arrays.append(replicate)
+            return
+        from scipy.sparse import csr_array
+
+        self.arrays.append(csr_array(replicate))
+
+    def standard_error(self) -> float:
+        return float(np.sqrt(self.squares / (self.number * (self.number - 1))))
+
+    def kept(self) -> tuple[Replicate, ...]:
+        return tuple(self.arrays)
 
 
 def _with_constant(array: Floats, constant: Floats, both: bool) -> Floats:
     array = array - np.outer(array @ constant - constant, constant)
     return array - np.outer(constant, constant @ array - constant) if both else array
+
+
+def _summed(parts: Sequence[Counts]) -> Counts:
+    total = np.zeros(parts[0].shape, dtype=np.int64)
+    for part in parts:
+        total += part
+    return total
 
 
 def _exposure(counts: Counts, weights: Floats, invariant: bool) -> Floats:
@@ -144,8 +179,7 @@ def _numerator(counts: Counts, symmetrise: bool) -> Counts:
     return counts + counts.T if symmetrise else counts
 
 
-def _share(part: Counts, weights: Floats, invariant: bool, symmetrise: bool) -> Floats:
-    """The part's own denominators, so that numerators minus these times the estimate are its influence on it."""
+def _denominator(part: Counts, weights: Floats, invariant: bool, symmetrise: bool) -> Floats:
     if not symmetrise:
         return np.asarray((part.sum(axis=1) / weights)[:, None])
     exposure = _exposure(part, weights, invariant)
@@ -182,16 +216,3 @@ def _check_occupied(rows: Counts, basis: Basis) -> None:
             float(basis.weights[empty].sum()),
         )
 
-
-def _kept(symmetric: Floats, differences: Sequence[Floats]) -> tuple[Replicate, ...]:
-    """The replicates as arrays, sparse where that is smaller."""
-    if not differences or symmetric.nbytes * len(differences) > LARGEST_REPLICATES:
-        return ()
-    replicates = [symmetric + difference for difference in differences]
-    if np.count_nonzero(replicates[0]) > symmetric.size // 4:
-        for replicate in replicates:
-            replicate.setflags(write=False)
-        return tuple(replicates)
-    from scipy.sparse import csr_array
-
-    return tuple(csr_array(replicate) for replicate in replicates)

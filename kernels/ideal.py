@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Floats, angles, number_between
-from .combination import Combination
+from .weighted_sum import Combination
 from .density import DensityLaw
 from .law import BranchLaw
 from .measure import SINE

@@ -16,7 +16,7 @@ from .measure import SINE, gauss_rule
 
 # Evaluations of a density, values of basis functions in `law.apply`, and points of a map that are affordable: each is
 # about a second or two.
-MOST_DENSITY_VALUES, MOST_APPLY_VALUES, MOST_MAP_POINTS = 2**25, 2**28, 2**20
+MOST_DENSITY_VALUES, MOST_APPLY_VALUES, MOST_MAP_POINTS = 2**25, 2**26, 2**20
 # Numbers held at a time.
 CHUNK = 2**21
 # Rows are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
@@ -147,12 +147,12 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
 
 def action_is_affordable(law: HasAction, basis: Basis) -> bool:
     """Whether the two coarsest levels of `action_matrix` take no more than about a second."""
-    return sum(_action_work(law, basis, level)[2] for level in (0, 1)) <= MOST_APPLY_VALUES
+    return sum(_action_rule(law, basis, level)[2] for level in (0, 1)) <= MOST_APPLY_VALUES
 
 
-def _action_work(law: HasAction, basis: Basis, level: int) -> tuple[Floats, int, int]:
+def _action_rule(law: HasAction, basis: Basis, level: int) -> tuple[Floats, int, int]:
     """Edges, order and number of values of basis functions of one level."""
-    share = np.arange(4) / 4
+    share = np.arange(1) if basis.is_partition else np.arange(4) / 4
     split = (basis.edges[:-1, None] + share * np.diff(basis.edges)[:, None]).ravel()
     try:
         kinks = law.kinks(32 * 4**level)[0]
@@ -161,24 +161,28 @@ def _action_work(law: HasAction, basis: Basis, level: int) -> tuple[Floats, int,
     edges = np.unique(np.concatenate((split, [np.pi], GRAZING_EDGES, np.pi - GRAZING_EDGES, kinks)))
     order = 2 if basis.is_partition else -(-basis.nodes_per_interval // 4)
     order += 4 * level
-    return edges, order, (edges.size - 1) * order * max(law.fan_out, 1) * basis.size
+    return edges, order, (edges.size - 1) * order * _fan_out(law) * basis.size
+
+
+def _fan_out(law: HasAction) -> int:
+    return max(int(law.fan_out), 1)
 
 
 def _action_levels(law: HasAction, basis: Basis) -> Iterator[Floats]:
     level, spent = 0, 0
+    step = max(1, CHUNK // (_fan_out(law) * basis.size))
     while True:
-        edges, order, work = _action_work(law, basis, level)
+        edges, order, work = _action_rule(law, basis, level)
         spent += work
         if level >= 2 and spent > MOST_APPLY_VALUES:
             return
         angle, weight = gauss_rule(edges, order)
         mass = weight * SINE.density(angle)
         total = np.zeros((basis.size, basis.size))
-        step = max(1, CHUNK // (max(law.fan_out, 1) * basis.size))
         for start in range(0, angle.size, step):
-            rows = slice(start, start + step)
-            image = law.apply(basis.evaluate, angle[rows])
-            total += basis.evaluate(angle[rows]).T @ (mass[rows, None] * image)
+            part = slice(start, start + step)
+            image = law.apply(basis.evaluate, angle[part])
+            total += basis.evaluate(angle[part]).T @ (mass[part, None] * image)
         yield total
         level += 1
 

@@ -13,7 +13,7 @@ from ..checks import Floats, angles, finite_array, generator, whole_number
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from .combination import Combination
+    from .weighted_sum import Combination
 
 Frame = Literal["paper", "specular"]
 AngleFunction = Callable[[Floats], Floats]
@@ -101,7 +101,7 @@ class Law(ABC):
 
     def in_specular_frame(self) -> Law:
         """P_F = P~ J: the law in Feres' convention, where specular reflection is the identity; twice gives it back."""
-        from .combination import SpecularFrame
+        from .specular_frame import SpecularFrame
 
         return SpecularFrame.of(self)
 
@@ -109,21 +109,21 @@ class Law(ABC):
         """First this law, then the other."""
         if not isinstance(other, Law):
             return NotImplemented
-        from .combination import Composition
+        from .composition import Composition
 
-        return Composition((self, other))
+        return Composition.of(self, other)
 
     def __pow__(self, exponent: int) -> Law:
         """The law applied ``exponent`` times, a whole number of at least 0."""
         whole_number("exponent", exponent, 0)
-        from .combination import Power
+        from .composition import Power
 
         return Power(self, int(exponent))
 
     def __rmul__(self, weight: float) -> Combination:
         if isinstance(weight, bool) or not isinstance(weight, (int, float, np.integer, np.floating)):
             return NotImplemented
-        from .combination import Combination
+        from .weighted_sum import Combination
 
         return Combination(((float(weight), self),))
 
@@ -132,7 +132,7 @@ class Law(ABC):
     def __add__(self, other: Law) -> Combination:
         if not isinstance(other, Law):
             return NotImplemented
-        from .combination import Combination
+        from .weighted_sum import Combination
 
         return Combination.of(self) + Combination.of(other)
 

@@ -28,8 +28,9 @@ Response: TypeAlias = tuple[Floats, "NDArray[np.bool_] | None"]
 DEFAULT_SAMPLES = 2**20
 # Independent randomisations: the spread of eight gives an error within a quarter.
 RANDOMISATIONS = 8
-# Rays at a time; a power of two, which keeps the balance of Sobol points.
-CHUNK = 2**16
+# Rays at a time, and more where adding up the matrix of counts would take longer than the rays themselves; a power of
+# two, which keeps the balance of Sobol points.
+SMALLEST_CHUNK = 2**16
 SOBOL_BITS = 52
 # A larger share of rays that did not escape shows in the matrix: see WallLaw.
 LOST_TOLERANCE = 1e-4
@@ -62,13 +63,14 @@ def sampled_array(
     if method == "qmc":
         each = 1 << (each - 1).bit_length()
     parts: list[Any] = []
+    add: Callable[[Basis, Floats, Floats], Any] = count_pairs if basis.is_partition else sum_products
+    chunk = max(SMALLEST_CHUNK, 1 << (basis.size**2 // 16).bit_length()) if basis.is_partition else SMALLEST_CHUNK
     lost = 0
     with _progress(randomisations * each) as bar:
         for randomisation in range(randomisations):
-            total: Any = 0
-            for incoming, outgoing, escaped in _rays(law, respond, each, root, randomisation):
-                pair = count_pairs if basis.is_partition else sum_products
-                total = total + pair(basis, incoming, outgoing)
+            total = np.zeros((basis.size, basis.size), dtype=np.int64 if basis.is_partition else np.float64)
+            for incoming, outgoing, escaped in _rays(law, respond, each, chunk, [*root, randomisation]):
+                total += add(basis, incoming, outgoing)
                 lost += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
                 bar.update(incoming.size)
             parts.append(total)
@@ -123,30 +125,27 @@ def _branch_taken(law: BranchLaw, x: Floats, theta: Floats) -> Floats:
 
 
 def _rays(
-    law: Law, respond: Callable[[Floats, Floats], Response] | None, number: int, root: list[int], randomisation: int
+    law: Law, respond: Callable[[Floats, Floats], Response] | None, number: int, chunk: int, key: list[int]
 ) -> Iterator[tuple[Floats, Floats, NDArray[np.bool_] | None]]:
     """Incoming angles, outgoing angles and escapes, chunk by chunk."""
+    smallest, largest = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
     if respond is not None:
         from scipy.stats.qmc import Sobol
 
-        seed = np.random.default_rng(np.random.SeedSequence(root, spawn_key=(randomisation,)))
-        engine = Sobol(2, scramble=True, bits=SOBOL_BITS, rng=seed)
-        for start in range(0, number, CHUNK):
-            points = engine.random(min(CHUNK, number - start))
-            x = np.clip(points[:, 0], np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0))
+        engine = Sobol(2, scramble=True, bits=SOBOL_BITS, rng=np.random.default_rng(key))
+        for start in range(0, number, chunk):
+            points = engine.random(min(chunk, number - start))
             theta = np.clip(SINE.quantile(points[:, 1]), SMALLEST_ANGLE, LARGEST_ANGLE)
-            outgoing, escaped = respond(x, theta)
-            yield theta, outgoing, escaped
+            yield theta, *respond(np.clip(points[:, 0], smallest, largest), theta)
         return
     traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None
-    for index, start in enumerate(range(0, number, CHUNK)):
-        chunk = np.random.default_rng(np.random.SeedSequence(root, spawn_key=(randomisation, index)))
-        theta = SINE.sample(min(CHUNK, number - start), chunk)
+    for index, start in enumerate(range(0, number, chunk)):
+        own = np.random.default_rng([*key, index])
+        theta = SINE.sample(min(chunk, number - start), own)
         if traced is None:
-            yield theta, law.sample(theta, chunk), None
+            yield theta, law.sample(theta, own), None
         else:
-            outgoing, escaped = traced(np.clip(chunk.random(theta.shape), np.finfo(np.float64).tiny, None), theta)
-            yield theta, outgoing, escaped
+            yield theta, *traced(np.clip(own.random(theta.shape), smallest, largest), theta)
 
 
 def _progress(total: int) -> AbstractContextManager[Any]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats, angles
 from ..errors import AccuracyError, InputError
 from .circular import CircularArcLaw
-from .combination import Combination
+from .weighted_sum import Combination
 from .ideal import specular
 from .law import AngleFunction, DrivenLaw, Law, entry_points
 from .rectangular import RectangularTeethLaw

@@ -98,7 +98,7 @@ def test_images_under_stretches_are_pointwise(curve, factors):
     image = curve.stretched(*factors)
     assert type(image) is type(curve)
     assert np.allclose(image.point(s), curve.point(s) * factors, rtol=0, atol=1e-12)
-    assert np.allclose(curve.moved(1.5, -2.5).point(s), curve.point(s) + [1.5, -2.5], rtol=0, atol=1e-13)
+    assert np.allclose(curve.moved(1.5, -2.5).point(s), curve.point(s) + np.array([1.5, -2.5]), rtol=0, atol=1e-13)
 
 
 @given(curves, st.floats(0.1, 0.9))

@@ -215,15 +215,15 @@ def study_wall(
         law = WallLaw(wall)
         matrix = discretise(law, Bins(bins), rng=rng)
         progress.update()
-        gap = spectralgap_as_dict(law, tolerance, rng)
+        gap = spectral_gap(law, tolerance, rng)
         progress.update()
-        specular_gap = spectralgap_as_dict(law.in_specular_frame(), tolerance, rng) if wall.is_mirror_symmetric else None
+        specular_gap = spectral_gap(law.in_specular_frame(), tolerance, rng) if wall.is_mirror_symmetric else None
         progress.update()
         found = gap.spectrum if gap.spectrum is not None else spectrum(matrix, k=10)
         collision = CollisionLaw.from_wall(wall, disk)
         collision_matrix = discretise(collision.law, Bins(bins), rng=rng)
         progress.update()
-        collision_gap = spectralgap_as_dict(collision.law, tolerance, rng)
+        collision_gap = spectral_gap(collision.law, tolerance, rng)
         progress.update()
     return Study(
         name, wall, disk, tracer, matrix, gap, specular_gap, found, collision, collision_matrix, collision_gap,

@@ -1,0 +1,127 @@
+"""Reflection laws and collision laws as Markov kernels: bases, laws and their algebra, matrices, estimation.
+
+Names are imported when they are first used, so that ``import asperity`` stays quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .basis import Basis
+    from .bins import Bins
+    from .circular import CircularArcLaw
+    from .collision import CollisionLaw
+    from .collision_matrices import no_slip_matrix, smooth_matrix
+    from .combination import Combination, Composition, Power, SpecularFrame, mixture
+    from .density import DensityLaw
+    from .discretisation import discretise
+    from .estimation import estimate
+    from .ideal import lambertian, maxwell, retroreflection, specular
+    from .involution import InvolutionLaw
+    from .law import BranchLaw, DrivenLaw, Law
+    from .legendre import Legendre
+    from .matrix import KernelMatrix
+    from .matrix_law import MatrixLaw
+    from .matrixfile import load_matrix
+    from .measure import SINE, SINE_SQUARED, AngularMeasure
+    from .panels import Panels
+    from .phase_function import henyey_greenstein
+    from .rectangular import RectangularTeethLaw
+    from .symmetry import Defect, SymmetryDefect
+    from .tensor import TensorBasis
+    from .triangular import TriangularTeethLaw
+    from .wall_law import WallLaw
+
+_HOMES = {
+    "AngularMeasure": "measure",
+    "Basis": "basis",
+    "Bins": "bins",
+    "BranchLaw": "law",
+    "CircularArcLaw": "circular",
+    "CollisionLaw": "collision",
+    "Combination": "combination",
+    "Composition": "combination",
+    "Defect": "symmetry",
+    "DensityLaw": "density",
+    "DrivenLaw": "law",
+    "InvolutionLaw": "involution",
+    "KernelMatrix": "matrix",
+    "Law": "law",
+    "Legendre": "legendre",
+    "MatrixLaw": "matrix_law",
+    "Panels": "panels",
+    "Power": "combination",
+    "RectangularTeethLaw": "rectangular",
+    "SINE": "measure",
+    "SINE_SQUARED": "measure",
+    "SpecularFrame": "combination",
+    "SymmetryDefect": "symmetry",
+    "TensorBasis": "tensor",
+    "TriangularTeethLaw": "triangular",
+    "WallLaw": "wall_law",
+    "discretise": "discretisation",
+    "estimate": "estimation",
+    "henyey_greenstein": "phase_function",
+    "lambertian": "ideal",
+    "load_matrix": "matrixfile",
+    "maxwell": "ideal",
+    "mixture": "combination",
+    "no_slip_matrix": "collision_matrices",
+    "retroreflection": "ideal",
+    "smooth_matrix": "collision_matrices",
+    "specular": "ideal",
+}
+
+__all__ = [
+    "SINE",
+    "SINE_SQUARED",
+    "AngularMeasure",
+    "Basis",
+    "Bins",
+    "BranchLaw",
+    "CircularArcLaw",
+    "CollisionLaw",
+    "Combination",
+    "Composition",
+    "Defect",
+    "DensityLaw",
+    "DrivenLaw",
+    "InvolutionLaw",
+    "KernelMatrix",
+    "Law",
+    "Legendre",
+    "MatrixLaw",
+    "Panels",
+    "Power",
+    "RectangularTeethLaw",
+    "SpecularFrame",
+    "SymmetryDefect",
+    "TensorBasis",
+    "TriangularTeethLaw",
+    "WallLaw",
+    "discretise",
+    "estimate",
+    "henyey_greenstein",
+    "lambertian",
+    "load_matrix",
+    "maxwell",
+    "mixture",
+    "no_slip_matrix",
+    "retroreflection",
+    "smooth_matrix",
+    "specular",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,332 @@
+"""The algebra of laws: what sums, compositions, powers, adjoints and frames do to functions and to samples."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from asperity.errors import InputError
+from asperity.kernels.circular import CircularArcLaw
+from asperity.kernels.combination import Combination, Composition, mixture
+from asperity.kernels.density import DensityLaw
+from asperity.kernels.ideal import lambertian, maxwell, retroreflection, specular
+from asperity.kernels.law import Law
+from asperity.kernels.matrix_law import MatrixLaw
+from asperity.kernels.measure import SINE
+from asperity.kernels.phase_function import henyey_greenstein
+from asperity.kernels.rectangular import RectangularTeethLaw
+from asperity.kernels.triangular import TriangularTeethLaw
+
+THETA = np.linspace(0.07, 3.05, 23)
+# A law that preserves the measure and is neither reversible nor mirror symmetric: a cycle of three equal bins.
+CYCLE = MatrixLaw([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+# Reversible and not mirror symmetric.
+LOPSIDED = MatrixLaw([[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
+PARTS = [
+    specular(),
+    retroreflection(),
+    lambertian(),
+    henyey_greenstein(0.6),
+    RectangularTeethLaw(0.8),
+    TriangularTeethLaw(0.9),
+    CircularArcLaw(1.1),
+    LOPSIDED,
+    CYCLE,
+]
+laws = st.sampled_from(PARTS)
+cheap = st.sampled_from([law for law in PARTS if law.fan_out <= 200])
+
+
+def smooth(angle: np.ndarray) -> np.ndarray:
+    return np.exp(np.cos(angle)) + np.sin(2.0 * angle)
+
+
+def agree(first: Law, second: Law, tolerance: float = 1e-13) -> bool:
+    return bool(np.max(np.abs(first.apply(smooth, THETA) - second.apply(smooth, THETA))) < tolerance)
+
+
+@settings(max_examples=40, deadline=None)
+@given(laws, laws, st.floats(0.0, 1.0))
+def test_sums_act_linearly(first: Law, second: Law, share: float) -> None:
+    law = share * first + (1.0 - share) * second
+    expected = share * first.apply(smooth, THETA) + (1.0 - share) * second.apply(smooth, THETA)
+    assert np.allclose(law.apply(smooth, THETA), expected, rtol=0.0, atol=1e-14)
+    assert np.allclose(law.apply(lambda a: 3.0 * smooth(a) - 2.0, THETA), 3.0 * expected - 2.0, rtol=0.0, atol=1e-13)
+
+
+@settings(max_examples=25, deadline=None)
+@given(cheap, cheap, laws)
+def test_composition_is_associative_and_the_first_law_acts_first(first: Law, second: Law, third: Law) -> None:
+    nested = first.apply(lambda a: second.apply(lambda b: third.apply(smooth, b), a), THETA[:5])
+    for law in ((first @ second) @ third, first @ (second @ third)):
+        assert isinstance(law, Composition) and len(law.laws) == 3
+        if law.fan_out < 20_000:
+            assert np.array_equal(law.apply(smooth, THETA[:5]), nested)
+
+
+def test_composition_distributes_over_sums() -> None:
+    first, second, last = TriangularTeethLaw(0.9), specular(), RectangularTeethLaw(1.4)
+    assert agree((0.3 * first + 0.7 * second) @ last, 0.3 * (first @ last) + 0.7 * (second @ last))
+    assert agree(last @ (0.3 * first + 0.7 * second), 0.3 * (last @ first) + 0.7 * (last @ second))
+
+
+def test_powers_are_repeated_compositions() -> None:
+    law = 0.5 * TriangularTeethLaw(0.9) + 0.5 * specular()
+    assert agree(law**3, law @ law @ law)
+    assert agree((law**2) ** 2, law**4)
+    assert agree(law**1, law)
+    assert np.array_equal((law**0).apply(smooth, THETA), smooth(THETA))
+    assert np.array_equal((law**0).sample(THETA, np.random.default_rng(0)), THETA)
+
+
+def test_specular_and_retroreflection_are_involutions() -> None:
+    assert agree(specular() @ specular(), retroreflection())
+    assert agree(specular() ** 2, specular() ** 0, 1e-14)
+    assert (specular() ** 1001).branches(1.0)[1].tolist() == [math.pi - 1.0]
+
+
+@settings(max_examples=40, deadline=None)
+@given(cheap, cheap)
+def test_adjoints_pass_to_the_other_side_of_the_inner_product(first: Law, second: Law) -> None:
+    for law in (first @ second, 0.4 * first + 0.6 * second, first**2, first.in_specular_frame()):
+        if law.fan_out < 2_000:
+            check_adjoint(law)
+
+
+def check_adjoint(law: Law) -> None:
+    """<f, P g> = <P* f, g> for indicators of unions of equal bins, by a rule that the breakpoints divide."""
+    cells = 300
+    angle = SINE.quantile((np.arange(cells) + 0.5) / cells)
+
+    def f(a: np.ndarray) -> np.ndarray:
+        return np.cos(a) ** 2 + 0.3 * np.cos(a)
+
+    def g(a: np.ndarray) -> np.ndarray:
+        return np.cos(3.0 * a)
+
+    there = np.mean(f(angle) * law.apply(g, angle))
+    back = np.mean(g(angle) * law.adjoint().apply(f, angle))
+    # midpoint rule: order 2 for continuous rows, order 1 where rows jump with theta
+    assert abs(there - back) < 4.0 / cells
+
+
+def test_adjoints_of_a_cycle_are_exact() -> None:
+    back = CYCLE.adjoint()
+    assert isinstance(back, MatrixLaw)
+    assert back.array.tolist() == CYCLE.array.T.tolist()
+    assert CYCLE.reversible is False
+    assert agree((CYCLE @ CYCLE).adjoint(), back @ back)
+    assert agree((CYCLE @ back), LambertianInBins())
+    frame = CYCLE.in_specular_frame()
+    assert frame.adjoint().frame == "specular"
+    # (P J)* P J = J P* P J, the conditional mean in the bins after a flip on both sides
+    assert agree(frame.adjoint() @ frame, (LambertianInBins() @ specular() @ specular()).in_specular_frame() @ flip())
+
+
+class LambertianInBins(MatrixLaw):
+    """Uniform in the own bin of three equal ones."""
+
+    def __init__(self) -> None:
+        super().__init__(np.eye(3))
+
+
+def flip() -> Law:
+    """J as a law of the specular frame."""
+    return retroreflection().in_specular_frame()
+
+
+def test_the_specular_frame_is_an_involution_that_turns_outgoing_angles_over() -> None:
+    for law in PARTS:
+        frame = law.in_specular_frame()
+        assert frame.frame == "specular" and law.frame == "paper"
+        assert frame.in_specular_frame() is law
+        assert np.allclose(
+            frame.apply(smooth, THETA), law.apply(lambda a: smooth(math.pi - a), THETA), rtol=0.0, atol=1e-14
+        )
+    identity = specular().in_specular_frame().sample(THETA, np.random.default_rng(0))
+    assert np.allclose(identity, THETA, rtol=0.0, atol=5e-16)
+
+
+def test_the_specular_frame_of_a_sum_is_the_sum_of_the_frames() -> None:
+    law = maxwell(0.3)
+    frame = law.in_specular_frame()
+    assert isinstance(frame, Combination)
+    assert repr(frame) == "0.3*lambertian().in_specular_frame() + 0.7*specular().in_specular_frame()"
+    assert repr(frame.in_specular_frame()) == repr(law)
+
+
+def test_reversibility_in_the_specular_frame_needs_the_mirror_symmetry() -> None:
+    assert TriangularTeethLaw(0.9).in_specular_frame().reversible is True
+    assert LOPSIDED.reversible is True and LOPSIDED.mirror_symmetric is False
+    assert LOPSIDED.in_specular_frame().reversible is False
+
+
+def test_promises_of_sums_and_compositions_follow_from_their_parts() -> None:
+    teeth, arcs = TriangularTeethLaw(0.9), CircularArcLaw(1.0)
+    assert (0.5 * teeth + 0.5 * arcs).reversible is True
+    assert (0.5 * teeth + 0.5 * CYCLE).reversible is False
+    assert (0.5 * CYCLE + 0.5 * CYCLE.adjoint()).reversible is None
+    assert (teeth @ arcs).reversible is None
+    assert (teeth @ arcs @ teeth).reversible is True
+    assert (teeth**3).reversible is True
+    assert (teeth @ arcs).mirror_symmetric is True
+
+
+# ---- weights and frames -------------------------------------------------------------------------------------------
+def test_weights_must_sum_to_one_before_a_sum_is_used() -> None:
+    law = 0.3 * specular() + 0.6 * lambertian()
+    with pytest.raises(InputError, match=r"expected a sum of 1, got 0\.89"):
+        law.apply(np.cos, 1.0)
+    with pytest.raises(InputError, match="expected a sum of 1"):
+        law.sample(1.0, np.random.default_rng(0))
+    with pytest.raises(InputError, match="expected a sum of 1"):
+        (0.3 * specular()).branches(1.0)
+    with pytest.raises(InputError, match="expected a sum of 1"):
+        (law @ specular()).apply(np.cos, 1.0)
+    assert (law + 0.1 * retroreflection()).apply(np.ones_like, 1.0) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_ten_tenths_are_one() -> None:
+    law = Combination(tuple((0.1, specular()) for _ in range(10)))
+    assert law.branches(1.0)[0].sum() == pytest.approx(1.0, abs=1e-15)
+    assert np.count_nonzero(law.branches(1.0)[0]) == 1
+
+
+def test_negative_weights_are_refused_by_name() -> None:
+    with pytest.raises(InputError, match=r"non-negative ones, got -0\.5 for term 1, lambertian\(\)"):
+        (1.5 * specular() + -0.5 * lambertian()).apply(np.cos, 1.0)
+    with pytest.raises(InputError, match="finite weights"):
+        math.nan * specular()
+
+
+def test_mixture_checks_at_construction() -> None:
+    law = mixture([specular(), lambertian()], [0.25, 0.75])
+    assert agree(law, 0.25 * specular() + 0.75 * lambertian())
+    with pytest.raises(InputError, match="sum of 1"):
+        mixture([specular(), lambertian()], [0.25, 0.7])
+    with pytest.raises(InputError, match="one for each of 2 laws"):
+        mixture([specular(), lambertian()], [1.0])
+
+
+def test_scalars_of_numpy_scale_and_other_things_do_not() -> None:
+    assert repr(np.float64(0.5) * specular()) == "0.5*specular()"
+    assert repr(2 * (0.25 * specular() + 0.25 * lambertian())) == "0.5*specular() + 0.5*lambertian()"
+    for nonsense in ("a", specular(), True, np.ones(2)):
+        with pytest.raises(TypeError):
+            nonsense * specular()
+    with pytest.raises(TypeError):
+        specular() + 1.0
+    with pytest.raises(TypeError):
+        specular() @ 1.0
+    with pytest.raises(InputError, match="exponent"):
+        specular() ** -1
+
+
+def test_laws_in_different_frames_neither_add_nor_compose() -> None:
+    with pytest.raises(InputError, match="cannot compose laws in different frames"):
+        specular() @ lambertian().in_specular_frame()
+    with pytest.raises(InputError, match="cannot add laws in different frames"):
+        0.5 * specular() + 0.5 * lambertian().in_specular_frame()
+    both = TriangularTeethLaw(0.9).in_specular_frame() @ RectangularTeethLaw(1.0).in_specular_frame()
+    assert both.frame == "specular"
+    assert both.in_specular_frame().frame == "paper"
+
+
+def test_names_read_like_the_expressions_that_made_them() -> None:
+    teeth = RectangularTeethLaw(height_to_width=1.0)
+    assert repr(teeth) == "RectangularTeethLaw(height_to_width=1.0)"
+    assert repr(0.3 * specular() + 0.7 * lambertian()) == "0.3*specular() + 0.7*lambertian()"
+    assert repr((0.3 * specular() + 0.7 * lambertian()) @ teeth) == (
+        "(0.3*specular() + 0.7*lambertian()) @ RectangularTeethLaw(height_to_width=1.0)"
+    )
+    assert repr((specular() @ teeth) ** 2) == "(specular() @ RectangularTeethLaw(height_to_width=1.0)) ** 2"
+    assert repr((specular() ** 2) ** 3) == "(specular() ** 2) ** 3"
+    assert repr(teeth.in_specular_frame()) == "RectangularTeethLaw(height_to_width=1.0).in_specular_frame()"
+    assert repr((teeth**2).in_specular_frame()) == (
+        "(RectangularTeethLaw(height_to_width=1.0) ** 2).in_specular_frame()"
+    )
+    assert repr(henyey_greenstein(0.5)) == "henyey_greenstein(0.5)"
+
+
+# ---- branches of compounds ------------------------------------------------------------------------------------------
+TEETH = TriangularTeethLaw(2.0 * math.pi / 7)
+COMPOUNDS = [
+    TEETH @ RectangularTeethLaw(0.8),
+    TEETH**3,
+    0.4 * TEETH + 0.6 * specular() @ TEETH,
+    (TEETH @ TEETH).in_specular_frame(),
+]
+
+
+@pytest.mark.parametrize("law", COMPOUNDS, ids=repr)
+def test_branches_of_compounds_are_merged_and_act_like_the_law(law: Law) -> None:
+    probability, outgoing = law.branches(THETA)
+    assert probability.shape == outgoing.shape and probability.shape[0] == THETA.size
+    assert np.all(probability >= 0.0)
+    assert np.allclose(probability.sum(axis=-1), 1.0, rtol=0.0, atol=1e-14)
+    assert np.allclose((probability * smooth(outgoing)).sum(axis=-1), law.apply(smooth, THETA), rtol=0.0, atol=1e-13)
+    for row, angle in zip(probability, outgoing, strict=True):
+        assert np.all(np.diff(np.sort(angle[row > 0.0])) > 1e-13)
+
+
+@pytest.mark.parametrize("law", COMPOUNDS[:3], ids=repr)
+def test_compounds_are_smooth_between_their_kinks(law: Law) -> None:
+    kinks, left_out = law.kinks(300)
+    edges = np.concatenate([[0.0], kinks, [math.pi]])
+    sums = []
+    for order in (8, 16):
+        angle, weight = SINE.quadrature(edges, order)
+        sums.append((weight * law.apply(smooth, angle)).reshape(-1, order).sum(axis=1))
+    wrong = np.abs(sums[0] - sums[1])
+    assert wrong.max() < 1e-13 + left_out
+    assert np.sort(wrong)[: -wrong.size // 50 - 2].max() < 1e-13
+
+
+def test_laws_with_a_density_have_no_branches() -> None:
+    for law in (lambertian(), maxwell(0.5), specular() @ lambertian(), CircularArcLaw(1.0)):
+        with pytest.raises(InputError, match="not a finite mixture of isometries"):
+            law.branches(1.0)
+    with pytest.raises(InputError, match="no list of kinks"):
+        lambertian().kinks(10)
+
+
+def test_powers_out_of_reach_say_what_to_do() -> None:
+    with pytest.raises(InputError, match="discretise"):
+        (henyey_greenstein(0.9) ** 5).apply(np.cos, 1.0)
+    with pytest.raises(InputError, match="power of at most 100"):
+        (specular() ** 500).apply(np.cos, 1.0)
+    with pytest.raises(InputError, match="at most 64"):
+        (TriangularTeethLaw(0.123) ** 6).branches(THETA)
+
+
+# ---- samples ----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    "law",
+    [
+        0.2 * specular() + 0.5 * TriangularTeethLaw(0.9) + 0.3 * lambertian(),
+        TriangularTeethLaw(0.9) @ henyey_greenstein(0.7),
+        RectangularTeethLaw(0.7) ** 4,
+        CircularArcLaw(0.8).in_specular_frame(),
+        CYCLE @ LOPSIDED,
+        DensityLaw(lambda a, b: (1.0 + 0.5 * np.cos(a) * np.cos(b)) * SINE.density(b)),
+    ],
+    ids=repr,
+)
+def test_samples_follow_the_operator(law: Law) -> None:
+    rng = np.random.default_rng(5)
+    for theta in (0.3, 1.4, 2.6):
+        outgoing = law.sample(np.full(20_000, theta), rng)
+        for function in (np.cos, smooth, lambda a: np.cos(5.0 * a)):
+            value = function(outgoing)
+            spread = value.std() / math.sqrt(value.size)
+            assert abs(value.mean() - float(law.apply(function, theta))) < 4.5 * spread + 1e-12
+
+
+def test_samples_depend_on_the_generator_alone() -> None:
+    law = 0.5 * specular() + 0.5 * CircularArcLaw(0.8)
+    first, second = (law.sample(THETA, np.random.default_rng(7)) for _ in range(2))
+    assert np.array_equal(first, second)

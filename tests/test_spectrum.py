@@ -1,0 +1,146 @@
+"""Spectra and gaps: exact kernels, published values, errors that hold, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AccuracyError, InputError
+
+
+@pytest.mark.parametrize("g", [-0.7, 0.5, 0.9])
+def test_henyey_greenstein_has_the_eigenvalues_g_to_the_l(g):
+    found = spec.spectrum(ker.henyey_greenstein(g), k=8)
+    expected = np.sort(g ** np.arange(8.0))[::-1]
+    assert np.max(np.abs(found.values - expected)) < 1e-11
+    assert found.gap == pytest.approx(1 - max(g, g * g), abs=1e-11)
+    assert found.slem == pytest.approx(abs(g), abs=1e-11)
+    assert np.all(np.abs(found.values - expected) <= found.errors.total() + 1e-13)
+
+
+@pytest.mark.parametrize(
+    ("basis", "order"), [(lambda n: ker.Bins(n), 2.0), (lambda n: ker.Panels(np.linspace(0, np.pi, n + 1), 1), 4.0)]
+)
+def test_eigenvalues_converge_with_the_declared_order(basis, order):
+    """Galerkin: twice the order of approximation of the eigenfunction, n^-2 for steps and n^-4 for linear pieces."""
+    sizes = np.array([16, 32, 64])
+    errors = [abs(spec.spectrum(ker.henyey_greenstein(0.5), k=2, basis=basis(int(n))).values[1] - 0.5) for n in sizes]
+    slope = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+    assert slope == pytest.approx(order, abs=0.15)
+
+
+def test_galerkin_eigenvalues_approach_from_below():
+    values = [spec.spectrum(ker.henyey_greenstein(0.8), k=2, basis=ker.Bins(n)).values[1] for n in (16, 32, 64)]
+    assert values[0] < values[1] < values[2] < 0.8
+
+
+def test_maxwell_has_the_eigenvalues_of_fact_five():
+    a = 0.3
+    found = spec.spectrum(ker.maxwell(a), k=9, basis=ker.Legendre(9))
+    assert np.allclose(found.values, [1, *[1 - a] * 4, *[-(1 - a)] * 4], atol=1e-12)
+    turned = spec.spectrum(ker.maxwell(a).in_specular_frame(), k=9, basis=ker.Legendre(9))
+    assert np.allclose(turned.values, [1, *[1 - a] * 8], atol=1e-12)
+    assert turned.convention == "specular" and found.convention == "paper"
+
+
+def test_published_gap_of_dispersing_bumps():
+    """Facts 8: .0373 (Feres and Zhang 2010) at K = 1/3 in Feres' convention; .0373305 by an independent tracer."""
+    law = ker.WallLaw(geo.dispersing_arcs(1 / 3)).in_specular_frame()
+    gap = spec.spectral_gap(law, tolerance=1e-5)
+    assert gap.convention == "specular"
+    assert abs(float(gap) - 0.0373) < 5e-5
+    assert abs(float(gap) - 0.0373305) < gap.error + 5e-8
+    assert gap.error < 1e-4
+
+
+@pytest.mark.parametrize(("half_angle", "ratio"), [(0.1, 0.9968), (0.2, 0.9876)])
+def test_gap_of_shallow_arcs_is_four_times_the_mean_squared_slope(half_angle, ratio):
+    """Facts 8: h = [ln(sec xi + tan xi) - sin xi]/sin xi, gap/(4h) = .9968 and .9876."""
+    h = (np.log(1 / np.cos(half_angle) + np.tan(half_angle)) - np.sin(half_angle)) / np.sin(half_angle)
+    law = ker.WallLaw(geo.focusing_arcs(half_angle)).in_specular_frame()
+    gap = spec.spectral_gap(law, tolerance=1e-6)
+    assert abs(float(gap) / (4 * h) - ratio) < 1e-4 + gap.error / (4 * h)
+    assert gap.error / (4 * h) < 2e-3
+
+
+def test_mirror_symmetric_walls_have_odd_eigenvalues_of_opposite_sign_in_the_two_conventions():
+    law = ker.CircularArcLaw(0.9)
+    paper = spec.spectrum(law, k=6, basis=ker.Legendre(24))
+    turned = spec.spectrum(law.in_specular_frame(), k=6, basis=ker.Legendre(24))
+    assert np.allclose(np.sort(np.abs(paper.values)), np.sort(np.abs(turned.values)), atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ker.specular(),
+        ker.retroreflection(),
+        ker.RectangularTeethLaw(1.0),
+        ker.TriangularTeethLaw(0.7),
+        ker.WallLaw(geo.koch(2)),
+        ker.WallLaw(geo.triangular_teeth(1.0)).in_specular_frame(),
+    ],
+    ids=repr,
+)
+def test_laws_made_of_isometries_have_no_gap(law):
+    gap = spec.spectral_gap(law)
+    assert gap.verdict == "no gap" and float(gap) == 0.0 and gap.kind == "bound"
+    assert gap.evidence
+
+
+def test_lambertian_has_gap_one():
+    gap = spec.spectral_gap(ker.lambertian())
+    assert float(gap) == pytest.approx(1.0, abs=1e-12)
+    assert gap.verdict == "isolated"
+
+
+def test_sampling_error_of_an_eigenvalue_is_calibrated():
+    """z-scores of 60 seeds for lambda_2 of a bins matrix against the exact matrix: standard normal by size."""
+    law, basis = ker.henyey_greenstein(0.5), ker.Bins(16)
+    exact = spec.spectrum(law, k=2, basis=basis).values[1]
+    scores = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        matrix = ker.discretise(law, basis, method="monte-carlo", samples=20_000, rng=rng)
+        found = spec.spectrum(matrix, k=2)
+        assert found.errors.sampling[1] > 0
+        scores.append((found.values[1] - exact) / found.errors.sampling[1])
+    mean_square = np.mean(np.square(scores))
+    # chi-square with 60 degrees of freedom over 60: 4.5 standard deviations
+    assert abs(mean_square - 1) < 4.5 * np.sqrt(2 / 60)
+
+
+def test_residuals_and_intervals_come_with_the_values():
+    found = spec.spectrum(ker.henyey_greenstein(0.5), k=5)
+    assert found.values.shape == found.residuals.shape == (5,)
+    assert found.intervals.shape == (5, 2)
+    assert np.all(found.intervals[:, 0] <= found.values) and np.all(found.values <= found.intervals[:, 1])
+    assert np.all(found.residuals < 1e-13)
+    theta = np.linspace(0.1, 3.0, 7)
+    assert np.allclose(np.abs(found.eigenfunction(1, theta)), np.sqrt(3) * np.abs(np.cos(theta)), atol=1e-11)
+
+
+def test_a_multiple_eigenvalue_one_is_not_mixed_up_with_constants():
+    found = spec.spectrum(ker.retroreflection(), k=6, basis=ker.Legendre(12))
+    assert np.allclose(found.values, 1.0, atol=1e-13)
+    assert found.gap == pytest.approx(0.0, abs=1e-13)
+
+
+def test_kernels_that_are_not_reversible_are_refused():
+    rotation = np.roll(np.eye(8), 1, axis=1)
+    with pytest.raises(AccuracyError, match="not symmetric"):
+        spec.spectrum(ker.discretise(ker.MatrixLaw(rotation), ker.Bins(8)))
+
+
+def test_bad_arguments_are_refused():
+    with pytest.raises(InputError, match="k: expected"):
+        spec.spectrum(ker.specular(), k=0)
+    with pytest.raises(InputError, match="size of the matrix"):
+        spec.spectrum(ker.specular(), k=9, basis=ker.Legendre(8))
+    with pytest.raises(InputError, match="kernel: expected"):
+        spec.spectrum(np.eye(3))
+    with pytest.raises(InputError, match="tolerance"):
+        spec.spectral_gap(ker.lambertian(), tolerance=0.0)
