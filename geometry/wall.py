@@ -17,7 +17,7 @@ from ..checks import Floats, frozen, positive_number
 from ..errors import WallError
 from .arc import Arc
 from .conditions import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
-from .curve import EPS, Curve
+from .curve import Curve
 from .disk import Disk
 from .hollow import Hollow, flat_tops, hollows_between
 from .profile import Seam, vertices_of_profile
@@ -25,11 +25,6 @@ from .segment import Segment
 
 if TYPE_CHECKING:
     from .scene import Scene
-
-# Mirror images agree to rounding if their points differ by this much, relative to the wall's size: a mirrored point
-# rounds once, but the two halves of a wall may have been computed by formulas of some fifty operations.
-MIRROR_TOLERANCE = 256.0 * EPS
-
 
 @dataclass(frozen=True, repr=False)
 class Wall:
@@ -203,15 +198,10 @@ class Wall:
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
-        """Whether the cell equals its mirror image in x = period/2, piece by piece and to rounding."""
-        tolerance = MIRROR_TOLERANCE * max(self.period, float(np.abs(self.vertices).max()), self.depth)
-        image = self.mirrored()
-        if not _agree(self.pieces, image.pieces, tolerance):
-            return False
-        return all(
-            any(_agree(loop[k:] + loop[:k], other, tolerance) for other in image.islands for k in range(len(loop)))
-            for loop in self.islands
-        )
+        """Whether the periodic wall has a mirror axis x = const, to rounding; with islands only x = period/2 is tried."""
+        from .mirror import has_mirror_axis
+
+        return has_mirror_axis(self)
 
     @cached_property
     def flat_top(self) -> float:
@@ -295,19 +285,3 @@ class Wall:
 
 def _vertices(path: Sequence[Curve]) -> Floats:
     return frozen([*(p.start for p in path), path[-1].end])
-
-
-def _agree(path: Sequence[Curve], other: Sequence[Curve], tolerance: float) -> bool:
-    """Whether two paths are the same piece by piece within ``tolerance``."""
-    if len(path) == len(other) == 1 and isinstance(path[0], Arc) and path[0].start == path[0].end:
-        # a whole ellipse is the same wherever it starts
-        return bool(np.abs(np.subtract(path[0].box, other[0].box)).max() <= tolerance)
-    if len(path) != len(other) or [type(p) for p in path] != [type(p) for p in other]:
-        return False
-    if np.abs(_vertices(path) - _vertices(other)).max() > tolerance:
-        return False
-    inside = np.array([0.25, 0.5, 0.75])
-    return all(
-        isinstance(p, Segment) or bool(np.abs(p.point(inside) - q.point(inside)).max() <= tolerance)
-        for p, q in zip(path, other, strict=True)
-    )

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from ..checks import Floats
 from .basis import Basis
-from .branch_quadrature import cell_index
 from .measure import LARGEST_ANGLE, SMALLEST_ANGLE, gauss_on_intervals
+from .panels import Panels
+from .products import add_blocks, cell_index
 from .reflection import is_mirror_symmetric, reflection_matrix
 
-# Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 2e-11; they enter at xi, leave at
+# Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
 # pi - xi, both within 2 xi / MOST_HITS, and are counted there.
-MOST_HITS = 2048
+MOST_HITS = 8192
 # Gauss nodes on pieces so short that functions of the basis are as smooth as sin(delta) there, and on other pieces of
 # bases without polynomials.
 NODES_SHORT, NODES_CELL = 5, 14
@@ -168,7 +169,7 @@ def _add_rows(
     short = 2.0 * strips.hits[row] * (high - low) * basis.nodes_per_interval < np.diff(edges).min()
     for chosen, order in ((short, NODES_SHORT), (~short, basis.nodes_per_interval)):
         selected = np.flatnonzero(chosen)
-        step = max(1, CHUNK // (order * basis.size))
+        step = max(1, CHUNK // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))
         for start in range(0, selected.size, step):
             part = selected[start : start + step]
             chord, share = gauss_on_intervals(low[part], high[part], order)
@@ -176,9 +177,16 @@ def _add_rows(
             each = np.repeat(owner, order)
             outgoing = np.pi + theta[each] - 2.0 * strips.hits[each] * chord
             outgoing = np.clip(np.pi - outgoing if mirrored else outgoing, SMALLEST_ANGLE, LARGEST_ANGLE)
-            values = basis.evaluate(outgoing) * (share * np.sin(chord) * weight[each])[:, None]
-            image = values.reshape(part.size, order, basis.size).sum(axis=1)
-            total += basis.evaluate(incoming[owner]).T @ image
+            share = (share * np.sin(chord) * weight[each])[:, None]
+            if isinstance(basis, Panels):
+                panel, values = basis.local(outgoing)
+                image = (values * share).reshape(part.size, order, -1).sum(axis=1)
+                source, own = basis.local(incoming[owner])
+                # a piece ends at edges, so all its nodes are on the panel of the middle one
+                add_blocks(total, basis, source, panel[order // 2 :: order], own, image)
+            else:
+                image = (basis.evaluate(outgoing) * share).reshape(part.size, order, -1).sum(axis=1)
+                total += basis.evaluate(incoming[owner]).T @ image
     return float(mass.sum())
 
 

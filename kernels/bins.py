@@ -42,7 +42,7 @@ class Bins(Basis):
     Examples
     --------
     >>> bins = Bins(4)
-    >>> bins.weights.tolist(), bins.index([0.1, 1.0, 1.6, 3.0]).tolist()
+    >>> bins.weights.round(14).tolist(), bins.index([0.1, 1.0, 1.6, 3.0]).tolist()
     ([0.25, 0.25, 0.25, 0.25], [0, 0, 2, 3])
     """
 

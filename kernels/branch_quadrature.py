@@ -11,6 +11,7 @@ from ..checks import Floats
 from .basis import Basis
 from .combination import Combination, Composition, Power, SpecularFrame
 from .measure import gauss_on_intervals, gauss_rule
+from .products import add_products
 
 # A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
 # misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
@@ -21,8 +22,8 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 FEWEST_KINKS, KINK_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
 # Kinks of a chain are found from all pairs of kinks of its parts.
 MOST_CHAINED_KINKS = 2**10
-# Numbers held at a time: nodes times basis functions, or times branches, of which there are rarely more than a few.
-CHUNK, BRANCHES_GUESS = 2**22, 16
+# Nodes times branches held at a time.
+CHUNK = 2**22
 
 
 class Branching(Protocol):
@@ -74,7 +75,8 @@ def _has_chain(law: object) -> bool:
 
 
 def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:
-    step = max(CHUNK // (order * (BRANCHES_GUESS if basis.is_partition else basis.size)), 1)
+    # large steps: every one adds up whole matrices
+    step = max(CHUNK // (order * law.fan_out), 1)
     for start in range(0, low.size, step):
         angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
         _add_nodes(law, basis, angle, weight, total)
@@ -83,30 +85,10 @@ def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: 
 def _add_nodes(law: Branching, basis: Basis, angle: Floats, weight: Floats, total: Floats) -> None:
     mass = weight * basis.measure.density(angle)
     probability, outgoing = law.branches(angle)
-    if basis.is_partition:
-        _add_masses(basis, angle, mass[:, None] * probability, outgoing, total)
-        return
-    image = np.zeros((angle.size, basis.size))
     for slot in range(outgoing.shape[-1]):
-        image += probability[:, slot, None] * basis.evaluate(outgoing[:, slot])
-    total += basis.evaluate(angle).T @ (mass[:, None] * image)
-
-
-def _add_masses(basis: Basis, angle: Floats, mass: Floats, outgoing: Floats, total: Floats) -> None:
-    n = basis.size
-    cell = cell_index(basis, angle)[:, None] * n + cell_index(basis, outgoing)
-    heights = basis.heights
-    flux = np.bincount(cell.ravel(), weights=mass.ravel(), minlength=n * n).reshape(n, n)
-    total += heights[:, None] * flux * heights
-
-
-def cell_index(basis: Basis, angle: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """The cell of each angle in a partition of (0, pi)."""
-    index = getattr(basis, "index", None)
-    if index is not None:
-        return np.asarray(index(angle), dtype=np.int64)
-    found = np.searchsorted(basis.edges, angle, side="right") - 1
-    return np.asarray(np.clip(found, 0, basis.size - 1), dtype=np.int64)
+        used = probability[:, slot] > 0.0
+        share = (mass * probability[:, slot])[used]
+        add_products(total, basis, angle[used], outgoing[used, slot], share)
 
 
 def _preimages(law: Branching, kinks: Floats, edges: Floats) -> Floats:

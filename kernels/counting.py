@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..checks import Floats
 from ..errors import AccuracyError
 from .basis import Basis
-from .branch_quadrature import cell_index
+from .products import add_products, cell_index
 from .symmetry import SymmetryDefect, relative_asymmetry, replicate_z_score, reversibility_z_score
 
 if TYPE_CHECKING:
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 Counts: TypeAlias = NDArray[np.int64]
 
-# Values of basis functions held at a time.
-CHUNK = 2**21
 # Beyond this the replicates are not kept: they serve error estimates of eigenvalues, for which counts do as well.
 LARGEST_REPLICATES = 2**28
 WORST_NAMED = 8
@@ -50,11 +48,7 @@ def count_pairs(basis: Basis, incoming: Floats, outgoing: Floats) -> Counts:
 def sum_products(basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats | None = None) -> Floats:
     """Sum over the pairs of e_i(theta) e_j(theta'), shape (n, n)."""
     total = np.zeros((basis.size, basis.size))
-    step = max(1, CHUNK // basis.size)
-    for start in range(0, incoming.size, step):
-        part = slice(start, start + step)
-        values = basis.evaluate(incoming[part])
-        total += (values if weight is None else weight[part, None] * values).T @ basis.evaluate(outgoing[part])
+    add_products(total, basis, incoming, outgoing, np.ones(incoming.size) if weight is None else weight)
     return total
 
 
@@ -198,12 +192,13 @@ def _variances(
         return np.asarray(weights[:, None] ** 2 * spread)
     trials = np.broadcast_to(counts.sum() if invariant else np.maximum(rows, 1)[:, None], counts.shape)
     single = counts * (1.0 - counts / trials)
-    return _ratio(np.where(np.eye(weights.size, dtype=bool), 4.0 * single, single + single.T), whole**2)
+    doubled = np.where(np.eye(weights.size, dtype=bool), 4.0 * single, single + single.T)
+    return _ratio(doubled, whole**2)
 
 
 def _ratio(numerator: NDArray[Any], denominator: Floats) -> Floats:
     denominator = np.broadcast_to(denominator, numerator.shape)
-    return np.divide(numerator, denominator, out=np.zeros(numerator.shape), where=denominator > 0.0)
+    return np.asarray(np.divide(numerator, denominator, out=np.zeros(numerator.shape), where=denominator > 0.0))
 
 
 def _check_occupied(rows: Counts, basis: Basis) -> None:

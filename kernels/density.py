@@ -28,7 +28,7 @@ PANEL_COUNTS = (16, 32, 64, 128, 256, 512, 1024)
 GAUSS_NODES = 16
 CHECK_NODES = 8
 # Rows sampled from a tabulated cdf use this many cells on each panel.
-CELLS_PER_PANEL = 8
+CELLS_PER_PANEL = 16
 PROBES = 24
 # Evaluations of the density held in memory at a time.
 CHUNK = 2**20

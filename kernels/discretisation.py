@@ -20,7 +20,8 @@ from .involution import InvolutionLaw
 from .kernel_quadrature import action_is_affordable, action_matrix, density_matrix, map_matrix
 from .law import DrivenLaw, Law
 from .legendre import Legendre
-from .matrix import KernelMatrix, frobenius_error
+from .matrix import KernelMatrix
+from .matrix_algebra import frobenius_error
 from .measure import SINE
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
@@ -274,9 +275,8 @@ class _Maker:
         A law driven by an entry point averages over a fixed rule, unless it has an `apply` of its own, which is then
         accurate for smooth functions: those of Legendre, not those with edges.
         """
-        closed_form = getattr(law, "closed_form", None)
-        if closed_form is not None:
-            return self._acts_accurately(closed_form)
+        if hasattr(law, "closed_form"):
+            return law.closed_form is not None and self._acts_accurately(law.closed_form)
         if isinstance(law, CircularArcLaw):
             return True
         if isinstance(law, DrivenLaw):

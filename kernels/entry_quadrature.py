@@ -8,9 +8,9 @@ import numpy as np
 
 from ..checks import Floats
 from .basis import Basis
-from .branch_quadrature import cell_index
 from .law import DrivenLaw
 from .measure import SINE, gauss_rule
+from .products import cell_index
 
 # Rays at a time.
 CHUNK = 2**18

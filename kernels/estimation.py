@@ -10,7 +10,8 @@ from ..errors import InputError
 from .basis import Basis
 from .bins import Bins
 from .counting import array_from_counts, array_from_sums, count_pairs, sum_products
-from .matrix import KernelMatrix, frobenius_error
+from .matrix import KernelMatrix
+from .matrix_algebra import frobenius_error
 from .measure import SINE
 from .symmetry import invariance_z_score
 
@@ -63,7 +64,7 @@ def estimate(
     Examples
     --------
     >>> P = estimate([0.5, 1.0, 2.0, 2.5], [0.5, 2.0, 1.0, 2.5], Bins(2))
-    >>> P.array.tolist(), P.counts.tolist()
+    >>> P.array.round(14).tolist(), P.counts.tolist()
     ([[0.5, 0.5], [0.5, 0.5]], [[1, 1], [1, 1]])
     """
     incoming, outgoing = angles("theta_in", theta_in), angles("theta_out", theta_out)

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Floats, angles, number_between
-from .weighted_sum import Combination
 from .density import DensityLaw
 from .law import BranchLaw
 from .measure import SINE
 from .stable_angles import flipped
+from .weighted_sum import Combination
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats
 from ..errors import InputError
 from .basis import Basis
-from .branch_quadrature import cell_index
 from .measure import SINE, gauss_rule
+from .products import add_products, cell_index
 
 # Evaluations of a density, values of basis functions in `law.apply`, and points of a map that are affordable: each is
 # about a second or two.
@@ -94,14 +94,14 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
             fine = np.unique(np.concatenate((fine, _crossings(map_angle, basis, fine))))
             angle, weight = gauss_rule(fine, 1)
             mass = SINE.mass(fine[:-1], fine[1:])
-            image = np.asarray(map_angle(angle), dtype=np.float64)
             total = np.zeros((basis.size, basis.size))
-            np.add.at(total, (cell_index(basis, angle), cell_index(basis, image)), mass)
-            yield basis.heights[:, None] * total * basis.heights
+            add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), mass)
+            yield total
         else:
             angle, weight = gauss_rule(fine, basis.nodes_per_interval)
-            weighted = (weight * SINE.density(angle))[:, None] * basis.evaluate(angle)
-            yield np.asarray(weighted.T @ basis.evaluate(np.asarray(map_angle(angle), dtype=np.float64)))
+            total = np.zeros((basis.size, basis.size))
+            add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), weight * SINE.density(angle))
+            yield total
         pieces *= 2
 
 

@@ -40,7 +40,7 @@ class Legendre(Basis):
     Examples
     --------
     >>> Legendre(3).evaluate(np.pi / 3).round(12)
-    array([ 1.        ,  0.8660254 , -0.2795085 ])
+    array([ 1.       ,  0.8660254, -0.2795085])
     """
 
     n: int

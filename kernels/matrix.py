@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,15 +15,8 @@ from ..errors import InputError
 from ..estimates import Estimate
 from .basis import Basis
 from .law import AngleFunction, Frame
-from .reflection import reflection_matrix, is_mirror_symmetric
-from .symmetry import (
-    STOCHASTIC_NORM,
-    STOCHASTIC_NORM_CELLS,
-    Defect,
-    SymmetryDefect,
-    relative_asymmetry,
-)
-from .tensor import TensorBasis
+from .matrix_algebra import added, flipped_frame, multiplied, scaled, tensor_product, to_power
+from .symmetry import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,14 +24,6 @@ if TYPE_CHECKING:
     from scipy.sparse.linalg import LinearOperator
 
     Replicate: TypeAlias = "Floats | csr_array[Any, tuple[int, int]]"
-
-
-def frobenius_error(error: float, kind: str, method: str) -> Estimate:
-    """The Estimate that `KernelMatrix.error` holds: value and error are both the Frobenius error.
-
-    So that the value itself and the half width of the interval around it are the same number.
-    """
-    return Estimate(error, error, "bound" if kind == "bound" else "estimate", method)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,8 +72,8 @@ class KernelMatrix:
     Examples
     --------
     >>> from .bins import Bins
-    >>> P = KernelMatrix([[0.75, 0.25], [0.25, 0.75]], Bins(2), frobenius_error(0.0, "bound", "given"))
-    >>> (P @ P).array.tolist(), float(P.symmetry_defect())
+    >>> P = KernelMatrix([[0.75, 0.25], [0.25, 0.75]], Bins(2), Estimate(0.0, 0.0, "bound", "given"))
+    >>> (P @ P).array.round(14).tolist(), float(P.symmetry_defect())
     ([[0.625, 0.375], [0.375, 0.625]], 0.0)
     """
 
@@ -186,7 +171,7 @@ class KernelMatrix:
         """``P @ Q``: first P, then Q. ``P @ f``: the operator on values in the cells (or coefficients), or on a
         function of the angle, which is projected."""
         if isinstance(other, KernelMatrix):
-            return _multiplied(self, other)
+            return multiplied(self, other)
         return np.asarray(self.array @ self._coordinates(other, "f"))
 
     def __rmatmul__(self, measure: ArrayLike | AngleFunction) -> Floats:
@@ -197,15 +182,7 @@ class KernelMatrix:
         return np.asarray(self._coordinates(measure, "mu", axis=-1) @ self.array)
 
     def __mul__(self, factor: float) -> KernelMatrix:
-        number = finite_number("factor", factor)
-        error = frobenius_error(abs(number) * float(self.error), self.error.kind, self.error.method)
-        return replace(
-            self._derived(number * self.symmetric, error, f"{number:g}*{self.law or self.method}"),
-            replicates=tuple(number * part for part in self.replicates),
-            reversible=self.reversible,
-            mirror_symmetric=self.mirror_symmetric,
-            norm_bound=abs(number) * self.norm_bound,
-        )
+        return scaled(self, finite_number("factor", factor))
 
     __rmul__ = __mul__
 
@@ -213,23 +190,13 @@ class KernelMatrix:
         return -1.0 * self
 
     def __add__(self, other: KernelMatrix) -> KernelMatrix:
-        return _added(self, other) if isinstance(other, KernelMatrix) else NotImplemented
+        return added(self, other) if isinstance(other, KernelMatrix) else NotImplemented
 
     def __sub__(self, other: KernelMatrix) -> KernelMatrix:
-        return _added(self, -1.0 * other) if isinstance(other, KernelMatrix) else NotImplemented
+        return added(self, -1.0 * other) if isinstance(other, KernelMatrix) else NotImplemented
 
     def __pow__(self, exponent: int) -> KernelMatrix:
-        n = whole_number("exponent", exponent, 0)
-        bound, error = self.norm_bound, float(self.error)
-        # telescoping S^n - S*^n with ||S*|| <= bound and ||S|| <= bound + error
-        whole = (bound + error) ** n - bound**n if bound != 1.0 else float(np.expm1(n * np.log1p(error)))
-        power = frobenius_error(whole, self.error.kind, f"power {n} of: {self.error.method}")
-        return replace(
-            self._derived(np.linalg.matrix_power(self.symmetric, n), power, f"({self.law or self.method})**{n}"),
-            reversible=True if n == 0 else self.reversible,
-            mirror_symmetric=True if n == 0 else self.mirror_symmetric,
-            norm_bound=bound**n,
-        )
+        return to_power(self, whole_number("exponent", exponent, 0))
 
     def adjoint(self) -> KernelMatrix:
         """The matrix of the adjoint kernel in L^2 of the invariant measure."""
@@ -237,27 +204,13 @@ class KernelMatrix:
             self,
             symmetric=self.symmetric.T,
             counts=None if self.counts is None else self.counts.T,
-            replicates=tuple(part.T for part in self.replicates),
+            replicates=tuple(cast(Any, part).T for part in self.replicates),
             law=self.law if self.reversible else f"adjoint of {self.law or self.method}",
         )
 
     def tensor(self, other: KernelMatrix) -> KernelMatrix:
         """The kernel that applies this one to the first angle and the other to the second, independently."""
-        _same_frame(self, other)
-        mine, yours = float(self.error), float(other.error)
-        size = float(np.linalg.norm(self.symmetric)) + mine
-        error = mine * float(np.linalg.norm(other.symmetric)) + size * yours
-        return KernelMatrix(
-            np.kron(self.symmetric, other.symmetric),
-            TensorBasis((self.basis, other.basis)),
-            frobenius_error(error, _joint_kind(self, other), "tensor product"),
-            method="tensor product",
-            law=f"({self.law or self.method}) x ({other.law or other.method})",
-            reversible=_both(self.reversible, other.reversible),
-            mirror_symmetric=_both(self.mirror_symmetric, other.mirror_symmetric),
-            frame=self.frame,
-            norm_bound=self.norm_bound * other.norm_bound,
-        )
+        return tensor_product(self, other)
 
     def in_specular_frame(self) -> KernelMatrix:
         """P J, J f(theta) = f(pi - theta): Feres' convention, where specular reflection is the identity.
@@ -266,23 +219,7 @@ class KernelMatrix:
         Raises an InputError where J does not keep the span of the basis; discretise the law's own
         ``in_specular_frame()`` then.
         """
-        if not is_mirror_symmetric(self.basis):
-            raise InputError(
-                f"{self.basis!r} is not kept by theta -> pi - theta; discretise law.in_specular_frame() instead"
-            )
-        flip = reflection_matrix(self.basis)
-        return replace(
-            self._derived(self.symmetric @ flip, self.error, self.law),
-            method=self.method,
-            replicates=tuple(part @ flip for part in self.replicates),
-            samples=self.samples,
-            unresolved=self.unresolved,
-            requested_tolerance=self.requested_tolerance,
-            frame="paper" if self.frame == "specular" else "specular",
-            reversible=bool(self.reversible) if self.mirror_symmetric else None,
-            mirror_symmetric=self.mirror_symmetric,
-            norm_bound=self.norm_bound,
-        )
+        return flipped_frame(self)
 
     def as_linear_operator(self) -> LinearOperator:
         """``array`` as a scipy LinearOperator, with its transpose."""
@@ -322,75 +259,3 @@ class KernelMatrix:
         if values.ndim == 0 or values.shape[axis] != self.size:
             raise InputError(f"{name}: expected {self.size} entries for {self.basis!r}, got shape {values.shape}")
         return values
-
-    def _derived(self, symmetric: Floats, error: Estimate, law: str) -> KernelMatrix:
-        """A matrix on the same basis that is no sample any more."""
-        return KernelMatrix(symmetric, self.basis, error, method="algebra", law=law, frame=self.frame)
-
-
-def _multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
-    _same_basis(first, second)
-    mine, yours = float(first.error), float(second.error)
-    # S_1 S_2 - S_1* S_2* = E_1 S_2* + S_1 E_2, and ||S_1|| <= norm_bound + error
-    error = mine * second.norm_bound + (first.norm_bound + mine) * yours
-    method = f"product of ({first.error.method}) and ({second.error.method})"
-    same = first is second
-    return replace(
-        first._derived(
-            first.symmetric @ second.symmetric,
-            frobenius_error(error, _joint_kind(first, second), method),
-            f"{first.law or first.method} @ {second.law or second.method}",
-        ),
-        reversible=first.reversible if same else None,
-        mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
-        norm_bound=first.norm_bound * second.norm_bound,
-    )
-
-
-def _added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
-    _same_basis(first, second)
-    replicates: tuple[Any, ...] = ()
-    # independent randomisations cannot be paired; those of one term are shifted by the other where it has none
-    if first.replicates and not second.replicates:
-        replicates = tuple(part + second.symmetric for part in first.replicates)
-    elif second.replicates and not first.replicates:
-        replicates = tuple(part + first.symmetric for part in second.replicates)
-    return replace(
-        first._derived(
-            first.symmetric + second.symmetric,
-            frobenius_error(
-                float(first.error) + float(second.error),
-                _joint_kind(first, second),
-                f"sum of ({first.error.method}) and ({second.error.method})",
-            ),
-            f"{first.law or first.method} + {second.law or second.method}",
-        ),
-        replicates=replicates,
-        reversible=_both(first.reversible, second.reversible),
-        mirror_symmetric=_both(first.mirror_symmetric, second.mirror_symmetric),
-        norm_bound=first.norm_bound + second.norm_bound,
-    )
-
-
-def _same_basis(first: KernelMatrix, second: KernelMatrix) -> None:
-    if first.basis != second.basis:
-        raise InputError(f"the matrices have different bases, {first.basis!r} and {second.basis!r}; discretise again")
-    _same_frame(first, second)
-
-
-def _same_frame(first: KernelMatrix, second: KernelMatrix) -> None:
-    if first.frame != second.frame:
-        raise InputError(
-            f"the matrices are in different conventions, {first.frame!r} and {second.frame!r}; "
-            "use in_specular_frame() on both or on neither"
-        )
-
-
-def _joint_kind(first: KernelMatrix, second: KernelMatrix) -> str:
-    return "bound" if first.error.kind == second.error.kind == "bound" else "estimate"
-
-
-def _both(first: bool | None, second: bool | None) -> bool | None:
-    return True if first and second else None
-
-

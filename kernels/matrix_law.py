@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, finite_array, frozen
 from ..errors import InputError
-from .density import GAUSS_NODES, SYMMETRY_TOLERANCE, DensityLaw
+from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw
 from .law import AngleFunction, Frame, set_facts
 from .measure import SINE
 from .stable_angles import kept_inside
@@ -72,11 +72,12 @@ class MatrixLaw(DensityLaw):
             raise InputError(f"matrix: expected a square array of probabilities, got shape {array.shape}")
         size = array.shape[0]
         edges = SINE.quantile(np.arange(size + 1) / size) if basis is None else _bin_edges(basis, size)
-        if array.min() < 0.0:
+        if array.min() < -NEGATIVE_TOLERANCE:
             row, column = np.unravel_index(int(np.argmin(array)), array.shape)
             raise InputError(
                 f"matrix: expected probabilities, got {array[row, column]:g} in row {row}, column {column}"
             )
+        array = np.maximum(array, 0.0)
         sums = array.sum(axis=1)
         worst = int(np.argmax(np.abs(sums - 1.0)))
         if abs(sums[worst] - 1.0) > ROW_SUM_TOLERANCE:

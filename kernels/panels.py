@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, frozen, number_between, whole_number
 from .basis import Basis
 from .bins import Bins
-from .measure import SINE, AngularMeasure, WeightName, gauss_rule, measure_by_name
+from .measure import SINE, AngularMeasure, WeightName, gauss_rule
 
 if TYPE_CHECKING:
     from ..geometry import Wall
@@ -125,10 +126,15 @@ class Panels(Basis):
     def key(self) -> tuple[object, ...]:
         return (self._cells.key(), self.degree)
 
-    def evaluate(self, angle: ArrayLike) -> Floats:
+    def local(self, angle: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
+        """The panel of each angle and the values of its own functions there, shape ``angle.shape + (degree + 1,)``."""
         angle = np.asarray(angle, dtype=np.float64)
         panel = self._cells.index(angle)
-        local = np.einsum("...k,...ki->...i", self._local_legendre(angle, panel), self._coefficients[panel])
+        return panel, np.einsum("...k,...ki->...i", self._local_legendre(angle, panel), self._coefficients[panel])
+
+    def evaluate(self, angle: ArrayLike) -> Floats:
+        angle = np.asarray(angle, dtype=np.float64)
+        panel, local = self.local(angle)
         values = np.zeros((*angle.shape, self._cells.size, self.degree + 1))
         np.put_along_axis(values, panel[..., None, None], local[..., None, :], axis=-2)
         return values.reshape((*angle.shape, self.size))
@@ -141,7 +147,7 @@ class Panels(Basis):
         merged = self._cells.coarsened()
         return None if merged is None else (Panels(merged[0].edges, 0, self.measure.name), merged[1])
 
-    def _local_legendre(self, angle: Floats, panel: np.ndarray[Any, np.dtype[np.int64]]) -> Floats:
+    def _local_legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
         low, high = self.edges[panel], self.edges[panel + 1]
         return np.asarray(np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), self.degree))
 
@@ -178,7 +184,7 @@ def _graded_edges(special: list[float], followed: list[float], smallest: float) 
     """
     marks = np.unique(special)
     edges = [marks, np.asarray(followed)]
-    for low, high in zip(marks[:-1], marks[1:], strict=True):
+    for low, high in pairwise(marks):
         half = 0.5 * (high - low)
         upward = half * _grading(smallest if low == 0.0 else smallest**0.5)
         downward = half * _grading(smallest if high == np.pi else smallest**0.5)

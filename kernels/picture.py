@@ -49,7 +49,7 @@ def draw_matrix(matrix: KernelMatrix, ax: Axes | None = None) -> Axes:
     ax.set_ylabel("outgoing angle θ' (rad)")
     figure = ax.get_figure()
     if figure is not None:
-        figure.colorbar(mesh, ax=ax, label="density with respect to (1/2) sin θ' dθ'")
+        figure.colorbar(mesh, ax=ax, label="density with respect to the invariant measure, sin θ' dθ'/2")
     return ax
 
 

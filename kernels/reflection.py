@@ -40,9 +40,9 @@ def reflection_matrix(basis: Basis) -> Floats:
     if isinstance(basis, Legendre):
         return np.diag((-1.0) ** np.arange(basis.size))
     if isinstance(basis, TensorBasis):
-        product = np.ones((1, 1))
+        product: Floats = np.ones((1, 1))
         for factor in basis.factors:
-            product = np.kron(product, reflection_matrix(factor))
+            product = np.asarray(np.kron(product, reflection_matrix(factor)), dtype=np.float64)
         return product
     if isinstance(basis, Bins) and is_mirror_symmetric(basis):
         return np.ascontiguousarray(np.eye(basis.size)[::-1])

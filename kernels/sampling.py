@@ -151,4 +151,7 @@ def _rays(
 def _progress(total: int) -> AbstractContextManager[Any]:
     from tqdm import tqdm
 
-    return tqdm(total=total, unit="ray", unit_scale=True, delay=SLOW_SECONDS, disable=None, leave=False)
+    bar: AbstractContextManager[Any] = tqdm(
+        total=total, unit="ray", unit_scale=True, delay=SLOW_SECONDS, disable=None, leave=False
+    )
+    return bar

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
 from typing import NoReturn
 
 import numpy as np
@@ -14,6 +13,13 @@ from ..checks import Floats
 from ..errors import InputError
 from .basis import Basis
 from .measure import AngularMeasure
+
+
+def _kron(parts: Sequence[Floats]) -> Floats:
+    product = parts[0]
+    for part in parts[1:]:
+        product = np.asarray(np.kron(product, part), dtype=np.float64)
+    return product
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -73,15 +79,15 @@ class TensorBasis(Basis):
 
     @property
     def constant(self) -> Floats:
-        return reduce(np.kron, [factor.constant for factor in self.factors])
+        return _kron([factor.constant for factor in self.factors])
 
     @property
     def weights(self) -> Floats:
-        return reduce(np.kron, [factor.weights for factor in self.factors])
+        return _kron([factor.weights for factor in self.factors])
 
     @property
     def heights(self) -> Floats:
-        return reduce(np.kron, [factor.heights for factor in self.factors])
+        return _kron([factor.heights for factor in self.factors])
 
     def key(self) -> tuple[object, ...]:
         return self.factors
@@ -112,7 +118,7 @@ class TensorBasis(Basis):
         if all(part is None for part in parts):
             return None
         kept = [part or (factor, np.eye(factor.size)) for part, factor in zip(parts, self.factors, strict=True)]
-        return TensorBasis(tuple(basis for basis, _ in kept)), reduce(np.kron, [table for _, table in kept])
+        return TensorBasis(tuple(basis for basis, _ in kept)), _kron([table for _, table in kept])
 
     def _refuse(self, what: str) -> NoReturn:
         raise InputError(f"{what}: a tensor basis has one for every angle; use basis.factors[k].{what}")

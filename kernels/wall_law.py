@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats, angles
 from ..errors import AccuracyError, InputError
 from .circular import CircularArcLaw
-from .weighted_sum import Combination
 from .ideal import specular
 from .law import AngleFunction, DrivenLaw, Law, entry_points
 from .rectangular import RectangularTeethLaw
 from .triangular import TriangularTeethLaw
+from .weighted_sum import Combination
 
 if TYPE_CHECKING:
     from ..geometry import Wall
@@ -128,13 +128,12 @@ class WallLaw(DrivenLaw):
         """Those of the closed form."""
         return super().kinks(limit) if self.closed_form is None else self.closed_form.kinks(limit)
 
-    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        return super()._sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
+    # `_apply` stays that of a traced law: its absence from this class tells `discretise` that it is a coarse rule.
+    def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
+        return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
 
-    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        if self.closed_form is None:
-            return super()._apply(function, theta)
-        return self.closed_form.apply(function, theta)
+    def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
+        return super().apply(function, theta) if self.closed_form is None else self.closed_form.apply(function, theta)
 
 
 def _closed_form(wall: Wall) -> Law | None:

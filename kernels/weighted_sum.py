@@ -170,4 +170,6 @@ def _sum_promise(promises: Sequence[bool | None]) -> bool | None:
 
 def as_factor(law: Law) -> str:
     """The name of a law as a factor."""
-    return f"({law!r})" if law.name_is_a_sum_or_product else repr(law)
+    from .composition import Composition
+
+    return f"({law!r})" if isinstance(law, (Combination, Composition)) else repr(law)

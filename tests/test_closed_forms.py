@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 
@@ -69,7 +70,7 @@ def triangle_walls(angle: float) -> list[Callable[[np.ndarray, np.ndarray], Hit]
 def rectangle_walls(ratio: float) -> list[Callable[[np.ndarray, np.ndarray], Hit]]:
     floor = -0.5 * ratio
     corners = [(0.0, 0.0), (0.5, 0.0), (0.5, floor), (1.0, floor), (1.0, 0.0)]
-    sides = [(a, b) for a, b in zip(corners[1:-1], corners[2:], strict=True)]
+    sides = list(itertools.pairwise(corners[1:]))
     return [lambda p, v, a=a, b=b: segment_hit(p, v, a, b) for a, b in sides]
 
 
@@ -163,8 +164,8 @@ def test_right_angled_teeth_are_corner_reflectors_or_mirrors() -> None:
     theta = np.linspace(0.1, 3.0, 50)
     probability, outgoing = law.branches(theta)
     retro = np.abs(outgoing - theta[:, None]) < 1e-14
-    single = np.minimum(np.abs(outgoing - (math.pi / 2 - theta)[:, None]), abs(outgoing - (1.5 * math.pi - theta)[:, None]))
-    assert np.all(retro | (single < 1e-14) | (probability == 0.0))
+    turned = [np.abs(outgoing - (quarters * math.pi / 2 - theta)[:, None]) < 1e-14 for quarters in (1, 3)]
+    assert np.all(retro | turned[0] | turned[1] | (probability == 0.0))
     # straight down, every ray hits both sides
     assert np.allclose(law.apply(lambda angle: np.abs(angle - math.pi / 2), math.pi / 2), 0.0, atol=1e-15)
 

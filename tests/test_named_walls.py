@@ -19,7 +19,7 @@ def test_named_walls_have_period_one_and_touch_the_opening_at_both_ends(name):
     assert wall.period == 1.0 and wall.closes
     assert wall.vertices[0].tolist() == [0.0, 0.0] and wall.vertices[-1].tolist() == [1.0, 0.0]
     assert geo.Wall(wall.pieces) == wall
-    assert wall.is_mirror_symmetric == (name != "rectangular-teeth")
+    assert wall.is_mirror_symmetric
     assert geo.WALLS[name].summary and geo.WALLS[name].name == name
 
 

@@ -165,7 +165,7 @@ def test_islands_run_clockwise():
 
 
 def test_mirror_symmetry():
-    symmetric = ["cavities that touch", "flasks", "flasks that touch", "inner plate", "cubic", "floor", "disk"]
+    symmetric = ["caves", "cavities that touch", "flasks", "flasks that touch", "inner plate", "cubic", "floor", "disk"]
     for name, wall in WALLS.items():
         assert wall.is_mirror_symmetric == (name in symmetric or name == "bumps"), name
     shifted = Wall(FLOOR, islands=[[Arc((0.5 + 1e-9, -0.5), 0.2, 0, 2 * pi)]])
@@ -173,6 +173,17 @@ def test_mirror_symmetry():
     pair = Wall(FLOOR, islands=[square(0.1, -0.5, 0.25), square(0.65, -0.5, 0.25)])
     assert pair.is_mirror_symmetric
     assert Wall.from_vertices([(0, 0), (0.5 + 1e-11, -1), (1, 0)]).is_mirror_symmetric is False
+
+
+def test_the_mirror_axis_may_lie_anywhere_in_the_cell():
+    height = np.random.default_rng(3).random(12)
+    assert Wall.from_profile(np.arange(12), height, seam="mirror").is_mirror_symmetric
+    assert not Wall.from_profile(np.arange(12), height, seam="step").is_mirror_symmetric
+    # a tooth, then a crevice: the axes are at 1/4 and 3/4
+    assert Wall.from_vertices([(0, 0), (0.5, 0), (0.5, -1), (1, -1), (1, 0)]).is_mirror_symmetric
+    # the same for curves: two arcs of different radius, the cell cut between them
+    arcs = [Arc((0.25, 0.0), 0.25, pi, 2 * pi), Arc((0.75, 0.0), (0.25, 0.1), pi, 2 * pi)]
+    assert Wall(arcs).is_mirror_symmetric
 
 
 def test_walls_are_values():

@@ -1,0 +1,57 @@
+"""Whether a periodic wall equals its mirror image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..checks import Floats
+from .curve import EPS, Curve
+from .segment import Segment
+
+if TYPE_CHECKING:
+    from .wall import Wall
+
+# Mirror images agree to rounding if their points differ by this much, relative to the wall's size: a mirrored point
+# rounds once, but the two halves of a wall may have been computed by formulas of some fifty operations.
+MIRROR_TOLERANCE = 256.0 * EPS
+INSIDE = np.array([0.25, 0.5, 0.75])
+
+
+def has_mirror_axis(wall: Wall) -> bool:
+    """Whether the periodic wall has a mirror axis x = const; with islands only x = period/2 is tried.
+
+    A wall without islands is compared with its mirror image as a cycle of pieces, from every place at which the first
+    piece of the one can be the first of the other; so the cell may start anywhere.
+    """
+    tolerance = MIRROR_TOLERANCE * max(wall.period, float(np.abs(wall.vertices).max()), wall.depth)
+    image = wall.mirrored()
+    if wall.islands:
+        return _agree(wall.pieces, image.pieces, tolerance) and all(
+            any(_agree(loop[k:] + loop[:k], other, tolerance) for other in image.islands for k in range(len(loop)))
+            for loop in wall.islands
+        )
+    own, other = _steps(wall.pieces), _steps(image.pieces)
+    starts = np.flatnonzero(np.abs(own - other[0]).max(axis=1) <= tolerance).tolist()
+    return any(np.abs(np.roll(own, -k, axis=0) - other).max() <= tolerance for k in starts)
+
+
+def _steps(path: Sequence[Curve]) -> Floats:
+    """For every piece its points at three parameters and at its end, seen from its start; shape (n, 8)."""
+    rows = np.empty((len(path), 8))
+    for i, piece in enumerate(path):
+        start, end = np.array(piece.start), np.array(piece.end)
+        # the points of a segment follow from its ends
+        points = start + INSIDE[:, None] * (end - start) if isinstance(piece, Segment) else piece.point(INSIDE)
+        rows[i] = np.vstack([points - start, end - start]).ravel()
+    return rows
+
+
+def _agree(path: Sequence[Curve], other: Sequence[Curve], tolerance: float) -> bool:
+    """Whether two paths are the same piece by piece within ``tolerance``."""
+    if len(path) != len(other) or [type(p) for p in path] != [type(p) for p in other]:
+        return False
+    starts = np.array([p.start for p in path]) - np.array([p.start for p in other])
+    return bool(np.abs(starts).max() <= tolerance and np.abs(_steps(path) - _steps(other)).max() <= tolerance)

@@ -1,0 +1,53 @@
+"""Sums of products e_i(theta) e_j(theta') over many pairs of angles, in the way that suits the basis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import Floats
+from .basis import Basis
+from .panels import Panels
+
+# Values of basis functions held at a time.
+CHUNK = 2**21
+
+
+def cell_index(basis: Basis, angle: Floats) -> NDArray[np.int64]:
+    """The cell of each angle in a partition of (0, pi)."""
+    index = getattr(basis, "index", None)
+    if index is not None:
+        return np.asarray(index(angle), dtype=np.int64)
+    found = np.searchsorted(basis.edges, angle, side="right") - 1
+    return np.asarray(np.clip(found, 0, basis.size - 1), dtype=np.int64)
+
+
+def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats) -> None:
+    """Add the sum of weight e_i(incoming) e_j(outgoing) over the pairs to ``total``, shape (n, n)."""
+    if basis.is_partition:
+        cell = cell_index(basis, incoming) * basis.size + cell_index(basis, outgoing)
+        flux = np.bincount(cell, weights=weight, minlength=total.size).reshape(total.shape)
+        total += basis.heights[:, None] * flux * basis.heights
+        return
+    if isinstance(basis, Panels):
+        (source, values), (target, images) = basis.local(incoming), basis.local(outgoing)
+        add_blocks(total, basis, source, target, values, weight[:, None] * images)
+        return
+    step = max(1, CHUNK // basis.size)
+    for start in range(0, incoming.size, step):
+        part = slice(start, start + step)
+        total += basis.evaluate(incoming[part]).T @ (weight[part, None] * basis.evaluate(outgoing[part]))
+
+
+def add_blocks(
+    total: Floats, basis: Panels, source: NDArray[np.int64], target: NDArray[np.int64], values: Floats, images: Floats
+) -> None:
+    """Add outer products of values on the panel ``source`` with images on the panel ``target``."""
+    width = basis.degree + 1
+    panels = basis.size // width
+    cell = source * panels + target
+    blocks = total.reshape(panels, width, panels, width)
+    for row in range(width):
+        for column in range(width):
+            sums = np.bincount(cell, weights=values[:, row] * images[:, column], minlength=panels * panels)
+            blocks[:, row, :, column] += sums.reshape(panels, panels)

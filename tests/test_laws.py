@@ -1,0 +1,403 @@
+"""Ideal laws, Henyey-Greenstein, laws with a density, involutions, laws of matrices and laws of walls."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial import legendre
+from scipy.special import ellipe
+
+from asperity import geometry as geo
+from asperity.errors import AccuracyError, InputError
+from asperity.kernels.bins import Bins
+from asperity.kernels.circular import CircularArcLaw
+from asperity.kernels.combination import Combination
+from asperity.kernels.density import DensityLaw
+from asperity.kernels.ideal import lambertian, maxwell, retroreflection, specular
+from asperity.kernels.involution import InvolutionLaw
+from asperity.kernels.law import Law
+from asperity.kernels.legendre import Legendre
+from asperity.kernels.matrix_law import MatrixLaw
+from asperity.kernels.measure import SINE
+from asperity.kernels.phase_function import HenyeyGreensteinLaw, henyey_greenstein
+from asperity.kernels.rectangular import RectangularTeethLaw
+from asperity.kernels.triangular import TriangularTeethLaw
+from asperity.kernels.wall_law import LOST_TOLERANCE, WallLaw
+
+THETA = np.array([1e-12, 1e-4, 0.2, 0.9, math.pi / 2, 2.2, 3.0, math.pi - 1e-4, math.pi - 1e-12])
+
+
+def polynomial(degree: int):
+    coefficients = np.zeros(degree + 1)
+    coefficients[degree] = 1.0
+    return lambda theta: legendre.legval(np.cos(theta), coefficients)
+
+
+def assert_z(value: np.ndarray, mean: float, largest: float = 4.5) -> None:
+    spread = value.std() / math.sqrt(value.size)
+    assert abs(value.mean() - mean) < largest * spread + 1e-12
+
+
+# ---- ideal laws -------------------------------------------------------------------------------------------------
+def test_ideal_laws_do_what_their_names_say() -> None:
+    rng = np.random.default_rng(1)
+    assert np.array_equal(retroreflection().sample(THETA, rng), THETA)
+    assert np.allclose(specular().sample(THETA, rng), math.pi - THETA, rtol=0.0, atol=1e-15)
+    assert np.allclose(lambertian().apply(np.cos, THETA), 0.0, atol=1e-14)
+    drawn = lambertian().sample(np.full(20_000, 0.3), rng)
+    assert_z(np.cos(drawn), 0.0)
+    assert_z(np.cos(drawn) ** 2, 1.0 / 3.0)
+
+
+@pytest.mark.parametrize("fraction", [0.0, 0.3, 1.0])
+def test_maxwell_has_its_three_eigenvalues(fraction: float) -> None:
+    law = maxwell(fraction)
+    assert np.allclose(law.apply(np.ones_like, THETA), 1.0, atol=1e-14)
+    for degree in (1, 2, 3, 4):
+        value = (-1) ** degree * (1.0 - fraction)
+        expected = value * polynomial(degree)(THETA)
+        assert np.allclose(law.apply(polynomial(degree), THETA), expected, atol=1e-13)
+        # in the specular frame odd and even functions have the same eigenvalue
+        in_frame = law.in_specular_frame().apply(polynomial(degree), THETA)
+        assert np.allclose(in_frame, (1.0 - fraction) * polynomial(degree)(THETA), atol=1e-13)
+    assert law.reversible and law.mirror_symmetric
+
+
+def test_maxwell_refuses_fractions_outside_the_unit_interval() -> None:
+    for value in (-0.1, 1.1, math.nan):
+        with pytest.raises(InputError, match="diffuse_fraction"):
+            maxwell(value)
+
+
+# ---- Henyey-Greenstein --------------------------------------------------------------------------------------------
+@settings(max_examples=40, deadline=None)
+@given(g=st.floats(-0.95, 0.95), degree=st.integers(0, 12))
+def test_henyey_greenstein_has_the_eigenvalues_of_its_definition(g: float, degree: int) -> None:
+    law = henyey_greenstein(g)
+    expected = g**degree * polynomial(degree)(THETA)
+    assert np.allclose(law.apply(polynomial(degree), THETA), expected, rtol=0.0, atol=2e-13)
+
+
+@settings(max_examples=15, deadline=None)
+@given(g=st.floats(-0.8, 0.8), h=st.floats(-0.8, 0.8))
+def test_henyey_greenstein_laws_form_a_semigroup(g: float, h: float) -> None:
+    theta = np.array([0.2, 1.3, 2.9])
+    both, one = henyey_greenstein(g) @ henyey_greenstein(h), henyey_greenstein(g * h)
+    for function in (polynomial(1), polynomial(3), lambda a: np.exp(np.cos(a))):
+        assert np.allclose(both.apply(function, theta), one.apply(function, theta), rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("g", [-0.7, -0.2, 0.0, 0.4, 0.8])
+def test_henyey_greenstein_density_is_its_legendre_series(g: float) -> None:
+    theta, out = np.array([0.05, 1.0, 2.5])[:, None], np.linspace(0.01, 3.1, 40)
+    series = sum(
+        0.5 * (2 * degree + 1) * g**degree * polynomial(degree)(theta) * polynomial(degree)(out)
+        for degree in range(250)
+    )
+    expected = series * np.sin(out)
+    assert np.allclose(henyey_greenstein(g).density(theta, out), expected, rtol=1e-11, atol=1e-12)
+
+
+def test_henyey_greenstein_density_is_the_elliptic_formula_away_from_the_peak() -> None:
+    g, theta, out = 0.6, 0.8, np.linspace(0.9, 3.0, 30)
+    a = 1.0 + g * g - 2.0 * g * np.cos(theta) * np.cos(out)
+    b = 2.0 * g * np.sin(theta) * np.sin(out)
+    kernel = (1.0 - g * g) * ellipe(2.0 * b / (a + b)) / (math.pi * (a - b) * np.sqrt(a + b))
+    assert np.allclose(henyey_greenstein(g).density(theta, out), kernel * np.sin(out), rtol=1e-13)
+
+
+@pytest.mark.parametrize("g", [1.0 - 1e-6, 1.0 - 1e-10, -(1.0 - 1e-8)])
+def test_narrow_henyey_greenstein_laws_stay_resolved(g: float) -> None:
+    law = henyey_greenstein(g)
+    # g close to 1 is close to retroreflection, to -1 to specular reflection: <P_1, P P_1> = g
+    assert np.allclose(law.apply(np.cos, THETA), g * np.cos(THETA), rtol=0.0, atol=1e-12)
+    near = law.sample(np.full(1000, 1.0), np.random.default_rng(3))
+    target = 1.0 if g > 0 else math.pi - 1.0
+    assert np.median(np.abs(near - target)) < 10.0 * (1.0 - abs(g))
+
+
+def test_henyey_greenstein_samples_have_the_moments_of_its_eigenvalues() -> None:
+    rng = np.random.default_rng(4)
+    for g in (-0.6, 0.0, 0.3, 0.9):
+        for theta in (0.1, 1.2, 2.8):
+            drawn = henyey_greenstein(g).sample(np.full(20_000, theta), rng)
+            for degree in (1, 2, 5):
+                assert_z(polynomial(degree)(drawn), g**degree * float(polynomial(degree)(theta)))
+
+
+def test_henyey_greenstein_keeps_grazing_angles_apart() -> None:
+    drawn = henyey_greenstein(1.0 - 1e-12).sample(np.full(1000, 1e-10), np.random.default_rng(5))
+    assert np.all(drawn > 0.0)
+    assert np.median(np.abs(drawn - 1e-10)) < 1e-11
+
+
+def test_henyey_greenstein_refuses_its_limits() -> None:
+    for g in (1.0, -1.0, 1.5, math.nan):
+        with pytest.raises(InputError, match="g: expected"):
+            henyey_greenstein(g)
+    assert henyey_greenstein(0.5) == HenyeyGreensteinLaw(0.5)
+    assert [henyey_greenstein(-0.5).eigenvalue(degree) for degree in range(3)] == [1.0, -0.5, 0.25]
+
+
+# ---- densities ----------------------------------------------------------------------------------------------------
+def tilted(theta: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """Preserves sin(theta) d theta, is not reversible: 1 + P_1(theta) P_2(theta') / 2."""
+    return (1.0 + 0.5 * polynomial(1)(theta) * polynomial(2)(out)) * SINE.density(out)
+
+
+def test_a_density_law_measures_its_symmetries() -> None:
+    even = DensityLaw(lambda a, b: (1.0 + 0.5 * np.cos(a) * np.cos(b)) * SINE.density(b))
+    assert (even.reversible, even.mirror_symmetric) == (True, True)
+    assert even.adjoint() is even
+    law = DensityLaw(tilted)
+    assert (law.reversible, law.mirror_symmetric) == (False, False)
+    assert law.sampling_error < 1e-5
+
+
+def test_the_adjoint_of_a_density_law_is_its_reversal() -> None:
+    law = DensityLaw(tilted)
+    # <P_1, P P_2> = 1/2 |P_1|^2 |P_2|^2 and <P_2, P P_1> = 0
+    theta = np.array([0.4, 1.7])
+    assert np.allclose(law.apply(polynomial(2), theta), 0.5 * polynomial(1)(theta) / 5.0, atol=1e-13)
+    assert np.allclose(law.adjoint().apply(polynomial(1), theta), 0.5 * polynomial(2)(theta) / 3.0, atol=1e-13)
+    assert np.allclose(law.adjoint().apply(polynomial(2), theta), 0.0, atol=1e-13)
+
+
+def test_a_law_that_does_not_preserve_the_measure_has_no_adjoint() -> None:
+    uniform = DensityLaw(lambda a, b: 1.0 / math.pi)
+    assert uniform.reversible is False
+    with pytest.raises(InputError, match="does not preserve sin"):
+        uniform.adjoint()
+
+
+def test_densities_that_are_no_laws_are_refused_with_the_defect() -> None:
+    with pytest.raises(InputError, match=r"rows that integrate to 1, got 2 at theta"):
+        DensityLaw(lambda a, b: np.sin(b))
+    with pytest.raises(InputError, match="values of at least 0"):
+        DensityLaw(lambda a, b: SINE.density(b) * (1.0 + 3.0 * np.cos(b) + 0.0 * a))
+    with pytest.raises(InputError, match="vectorised"):
+        DensityLaw(lambda a, b: np.ones(5))
+    with pytest.raises(InputError, match="finite"):
+        DensityLaw(lambda a, b: np.full(np.broadcast_shapes(a.shape, b.shape), math.nan))
+    with pytest.raises(InputError, match="function of"):
+        DensityLaw(3.0)  # type: ignore[arg-type]
+    with pytest.raises(AccuracyError, match="breakpoints") as info:
+        DensityLaw(lambda a, b: np.where(b < 1.0, 2.0, 1.0) * SINE.density(b) / (1.5 - 0.5 * math.cos(1.0)) + 0.0 * a)
+    assert 1e-7 < info.value.defect < 1e-2
+
+
+def test_breakpoints_let_densities_jump() -> None:
+    share = float(SINE.mass(0.0, 1.0))
+    law = DensityLaw(lambda a, b: np.where(b < 1.0, 2.0, 1.0) * SINE.density(b) / (1.0 + share), breakpoints=[1.0])
+    assert abs(float(law.apply(lambda a: a < 1.0, 0.5)) - 2.0 * share / (1.0 + share)) < 1e-14
+    drawn = law.sample(np.full(20_000, 0.5), np.random.default_rng(2))
+    assert_z((drawn < 1.0).astype(float), 2.0 * share / (1.0 + share))
+
+
+def test_laws_are_immutable() -> None:
+    for law, name in ((DensityLaw(tilted), "breakpoints"), (specular(), "retro"), (henyey_greenstein(0.1), "g")):
+        with pytest.raises(dataclasses.FrozenInstanceError):
+            setattr(law, name, 1.0)
+    with pytest.raises(ValueError, match="read-only"):
+        MatrixLaw([[1.0]]).array[0, 0] = 2.0
+
+
+# ---- involutions --------------------------------------------------------------------------------------------------
+def exchanged(theta: np.ndarray) -> np.ndarray:
+    """Swaps the two halves of (0, pi) in u = -cos(theta), keeping orientation: u -> u + 1 or u - 1."""
+    u = -np.cos(theta)
+    return np.arccos(-np.where(u < 0.0, u + 1.0, u - 1.0))
+
+
+def test_an_exchange_of_intervals_is_a_law() -> None:
+    law = InvolutionLaw(exchanged)
+    assert law.reversible is True
+    assert law.mirror_symmetric is True
+    assert law.adjoint() is law
+    theta = np.array([0.5, 1.2, 2.0])
+    assert np.allclose(law.sample(theta, np.random.default_rng(0)), exchanged(theta))
+    assert np.allclose((law @ law).apply(np.sin, theta), np.sin(theta), atol=1e-12)
+
+
+def test_maps_that_are_no_reversible_laws_are_refused() -> None:
+    with pytest.raises(InputError, match="expected an involution"):
+        InvolutionLaw(lambda theta: np.arccos(np.clip(np.cos(theta) / 2.0, -1.0, 1.0)))
+    # a rotation of u preserves the measure and is no involution (ledger S1.08)
+    with pytest.raises(InputError, match="expected an involution"):
+        InvolutionLaw(lambda theta: np.arccos(-(np.mod(0.6 - np.cos(theta), 2.0) - 1.0)))
+    # tan(T/2) tan(theta/2) = 1/2 is an involution and stretches the measure
+    with pytest.raises(InputError, match=r"sin\(theta\) d theta to be preserved"):
+        InvolutionLaw(lambda theta: 2.0 * np.arctan(0.5 / np.tan(0.5 * theta)))
+    with pytest.raises(InputError, match=r"angles in \(0, pi\)"):
+        InvolutionLaw(lambda theta: theta + math.pi)
+    with pytest.raises(InputError, match="vectorised"):
+        InvolutionLaw(lambda theta: np.ones(3))
+    with pytest.raises(InputError, match="finite"):
+        InvolutionLaw(lambda theta: np.full(theta.shape, math.nan))
+
+
+# ---- matrices -------------------------------------------------------------------------------------------------------
+@settings(max_examples=25, deadline=None)
+@given(size=st.integers(1, 12), seed=st.integers(0, 10**6))
+def test_a_matrix_law_moves_bins_as_its_matrix_says(size: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    matrix = rng.random((size, size))
+    matrix /= matrix.sum(axis=1, keepdims=True)
+    law = MatrixLaw(matrix)
+    centres = SINE.quantile((np.arange(size) + 0.5) / size)
+    for column in range(size):
+        low, high = law.edges[column], law.edges[column + 1]
+        inside = law.apply(lambda a, low=low, high=high: (a >= low) & (a < high), centres)
+        assert np.allclose(inside, matrix[:, column], rtol=0.0, atol=1e-14)
+    assert np.allclose(law.edges, np.arccos(1.0 - 2.0 * np.arange(size + 1) / size), atol=1e-12)
+
+
+def test_matrix_law_samples_follow_rows_and_are_uniform_in_the_cosine() -> None:
+    law = MatrixLaw([[0.2, 0.3, 0.5], [0.6, 0.0, 0.4], [1.0, 0.0, 0.0]])
+    drawn = law.sample(np.full(30_000, 1.5), np.random.default_rng(6))
+    u = -np.cos(drawn)
+    assert_z((u < -1.0 / 3.0).astype(float), 0.6)
+    assert not np.any((u > -1.0 / 3.0) & (u < 1.0 / 3.0))
+    assert_z(u[u > 0.0], 2.0 / 3.0)
+    assert_z((u[u > 0.0] - 2.0 / 3.0) ** 2, 1.0 / 27.0)
+    assert np.all((drawn > 0.0) & (drawn < math.pi))
+
+
+def test_a_matrix_law_measures_reversibility_with_the_masses_of_its_bins() -> None:
+    class OnBins:
+        def __init__(self, array: list[list[float]], edges: list[float]) -> None:
+            self.array, self.basis = np.array(array), Bins(np.array(edges))
+
+    # masses 1/4 and 3/4: detailed balance needs P[0, 1] = 3 P[1, 0]
+    edges = [0.0, math.pi / 3, math.pi]
+    assert MatrixLaw(OnBins([[0.4, 0.6], [0.2, 0.8]], edges)).reversible is True
+    assert MatrixLaw(OnBins([[0.4, 0.6], [0.6, 0.4]], edges)).reversible is False
+    assert MatrixLaw(OnBins([[0.4, 0.6], [0.2, 0.8]], edges)).mirror_symmetric is None
+    with pytest.raises(InputError, match="does not preserve"):
+        MatrixLaw(OnBins([[0.4, 0.6], [0.6, 0.4]], edges)).adjoint()
+
+
+def test_matrices_that_are_no_laws_are_refused_by_row() -> None:
+    with pytest.raises(InputError, match=r"rows that sum to 1, got 0\.9 in row 1"):
+        MatrixLaw([[1.0, 0.0], [0.5, 0.4]])
+    with pytest.raises(InputError, match=r"probabilities, got -0\.1 in row 0, column 1"):
+        MatrixLaw([[1.1, -0.1], [0.0, 1.0]])
+    with pytest.raises(InputError, match="square"):
+        MatrixLaw([[0.5, 0.5]])
+
+    class InLegendre:
+        array, basis = np.eye(3), Legendre(3)
+
+    with pytest.raises(InputError, match="on Bins in theta"):
+        MatrixLaw(InLegendre())
+
+    class InPsi:
+        array, basis = np.eye(2), Bins(2, weight="sin2")
+
+    with pytest.raises(InputError, match="on Bins in theta"):
+        MatrixLaw(InPsi())
+
+
+# ---- walls ----------------------------------------------------------------------------------------------------------
+def same(law: Law | None, expected: Law) -> bool:
+    theta = np.linspace(0.1, 3.0, 20)
+    return law is not None and bool(np.allclose(law.apply(np.cos, theta), expected.apply(np.cos, theta), atol=1e-12))
+
+
+def test_walls_with_a_closed_form_are_recognised_by_their_shape() -> None:
+    assert WallLaw(geo.flat()).closed_form == specular()
+    assert WallLaw(geo.rectangular_teeth(1.5)).closed_form == RectangularTeethLaw(1.5)
+    for wall, expected in (
+        (geo.triangular_teeth(0.7), TriangularTeethLaw(0.7)),
+        (geo.Wall.from_vertices([(0, 0), (3, -4), (6, 0)]), TriangularTeethLaw(2.0 * math.atan(0.75))),
+        (geo.focusing_arcs(1.2), CircularArcLaw(1.2)),
+        (geo.focusing_arcs(math.pi / 2).scaled(7.0), CircularArcLaw(math.pi / 2)),
+        (geo.focusing_arcs(1e-6), CircularArcLaw(1e-6)),
+        (geo.elliptical_arcs(0.9, geo.Disk()).foreshorten(geo.Disk()), CircularArcLaw(0.9)),
+        (geo.rectangular_teeth(0.8).mirrored(), RectangularTeethLaw(0.8)),
+    ):
+        assert same(WallLaw(wall).closed_form, expected), wall
+
+
+def test_foreshortened_teeth_have_the_corrected_parameters() -> None:
+    disk = geo.Disk(mass=1.3, inertia=0.5)
+    stretch = math.sqrt(1.0 + 1.3 / 0.5)
+    rectangles = WallLaw(geo.rectangular_teeth(0.8).foreshorten(disk)).closed_form
+    assert isinstance(rectangles, RectangularTeethLaw)
+    assert rectangles.height_to_width == pytest.approx(stretch * 0.8, rel=1e-14)
+    triangles = WallLaw(geo.triangular_teeth(0.8).foreshorten(disk)).closed_form
+    assert isinstance(triangles, TriangularTeethLaw)
+    assert triangles.angle == pytest.approx(2.0 * math.atan(math.tan(0.4) / stretch), rel=1e-14)
+
+
+def test_several_hollows_make_a_combination_by_their_widths() -> None:
+    wall = geo.Wall.from_vertices([(0, 0), (1, -1), (2, 0), (3, 0), (3, -2), (3.5, -2), (3.5, 0), (4, 0)])
+    law = WallLaw(wall).closed_form
+    assert isinstance(law, Combination)
+    expected = 0.5 * TriangularTeethLaw(math.pi / 2) + 0.25 * RectangularTeethLaw(4.0) + 0.25 * specular()
+    assert same(law, expected)
+    assert np.allclose(WallLaw(wall).branches(1.0)[0].sum(), 1.0)
+
+
+@pytest.mark.parametrize(
+    "wall",
+    [
+        geo.dispersing_arcs(1.0),
+        geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)]),
+        geo.Wall.from_vertices([(0, 0), (0.2, 0), (0.2, -0.5), (1, -0.5), (1, 0)]),
+        geo.Wall([geo.Arc((0.5, 0.0), (0.5, 0.3), -math.pi, 0.0)]),
+        geo.double_parabola(),
+    ],
+    ids=["bumps", "skew", "wide crevice", "ellipse", "parabolas"],
+)
+def test_other_walls_have_no_closed_form(wall: geo.Wall) -> None:
+    law = WallLaw(wall)
+    assert law.closed_form is None
+    assert law.is_polygonal is wall.is_polygonal
+    with pytest.raises(InputError, match="no branches"):
+        law.branches(1.0)
+
+
+@pytest.mark.parametrize(
+    "wall", [geo.triangular_teeth(0.7), geo.rectangular_teeth(1.1), geo.focusing_arcs(1.2)], ids=repr
+)
+def test_traced_rays_go_where_the_closed_form_says(wall: geo.Wall) -> None:
+    law = WallLaw(wall)
+    rng = np.random.default_rng(8)
+    x, theta = rng.uniform(0.001, 0.999, 20_000), SINE.sample(20_000, rng)
+    outgoing, escaped = law.outcomes(x, theta)
+    assert escaped.mean() > 1.0 - LOST_TOLERANCE
+    error = np.abs(outgoing - law.closed_form.respond(x, theta))
+    assert np.median(error) < 1e-15
+    # a ray within rounding of a corner or of a change of its hits may go the other way
+    assert np.mean(error[escaped] > 1e-9) < 1e-4
+
+
+def test_a_traced_law_applies_and_samples_alike() -> None:
+    law = WallLaw(geo.dispersing_arcs(1.0))
+    assert law.reversible and law.mirror_symmetric
+    drawn = law.sample(np.full(20_000, 1.1), np.random.default_rng(9))
+    assert_z(np.cos(drawn), float(law.apply(np.cos, 1.1)), largest=5.0)
+    skew = WallLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)]))
+    assert skew.mirror_symmetric is None
+
+
+def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
+    law = WallLaw(geo.triangular_teeth(math.pi / 2))
+    # straight into the bottom, and beside it
+    outgoing, escaped = law.outcomes([0.5, 0.6], math.pi / 2)
+    assert escaped.tolist() == [False, True]
+    assert np.allclose(outgoing, math.pi / 2)
+    with pytest.raises(AccuracyError, match=r"0\.5 of 2 rays did not escape") as info:
+        law.respond([0.5, 0.6], math.pi / 2)
+    assert info.value.defect == 0.5
+
+
+def test_a_wall_law_wants_a_wall() -> None:
+    with pytest.raises(InputError, match="expected a Wall"):
+        WallLaw("koch")  # type: ignore[arg-type]
