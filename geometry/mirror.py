@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..checks import Floats
+from .arc import Arc
 from .curve import EPS, Curve
 from .segment import Segment
 
@@ -29,13 +30,25 @@ def has_mirror_axis(wall: Wall) -> bool:
     tolerance = MIRROR_TOLERANCE * max(wall.period, float(np.abs(wall.vertices).max()), wall.depth)
     image = wall.mirrored()
     if wall.islands:
+        islands, images = map(_with_bottom_starts, (wall.islands, image.islands))
         return _agree(wall.pieces, image.pieces, tolerance) and all(
-            any(_agree(loop[k:] + loop[:k], other, tolerance) for other in image.islands for k in range(len(loop)))
-            for loop in wall.islands
+            any(_agree(loop[k:] + loop[:k], other, tolerance) for other in images for k in range(len(loop)))
+            for loop in islands
         )
     own, other = _steps(wall.pieces), _steps(image.pieces)
     starts = np.flatnonzero(np.abs(own - other[0]).max(axis=1) <= tolerance).tolist()
     return any(np.abs(np.roll(own, -k, axis=0) - other).max() <= tolerance for k in starts)
+
+
+def _with_bottom_starts(islands: Sequence[Sequence[Curve]]) -> list[tuple[Curve, ...]]:
+    """The same islands, with those of one whole ellipse starting at its bottom: they may start anywhere."""
+    bottom = -0.5 * np.pi
+    return [
+        (Arc(loop[0].center, loop[0].semi_axes, bottom, bottom + 2.0 * np.pi * loop[0].direction),)
+        if len(loop) == 1 and isinstance(loop[0], Arc)
+        else tuple(loop)
+        for loop in islands
+    ]
 
 
 def _steps(path: Sequence[Curve]) -> Floats:

@@ -21,7 +21,7 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # take more than about a second.
 FEWEST_KINKS, KINK_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
 # Kinks of a chain are found from all pairs of kinks of its parts.
-MOST_CHAINED_KINKS = 2**10
+MOST_CHAINED_KINKS = 2**11
 # Nodes times branches held at a time.
 CHUNK = 2**22
 
@@ -49,8 +49,8 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     most = MOST_CHAINED_KINKS if _has_chain(law) else KINK_WORK // law.fan_out**2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
-    while omitted * worst > tolerance and 4 * limit <= most:
-        limit *= 4
+    while omitted * worst > tolerance and 2 * limit <= most:
+        limit *= 2
         kinks, omitted = law.kinks(limit)
     edges = np.unique(np.concatenate((basis.edges, kinks)))
     edges = np.unique(np.concatenate((edges, _preimages(law, np.concatenate(([0.0], kinks, [np.pi])), basis.edges))))

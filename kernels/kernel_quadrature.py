@@ -100,7 +100,8 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
         else:
             angle, weight = gauss_rule(fine, basis.nodes_per_interval)
             total = np.zeros((basis.size, basis.size))
-            add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), weight * SINE.density(angle))
+            image = np.asarray(map_angle(angle), dtype=np.float64)
+            add_products(total, basis, angle, image, weight * SINE.density(angle))
             yield total
         pieces *= 2
 
