@@ -18,6 +18,7 @@ from .named import (
     rectangular_teeth,
     triangular_teeth,
 )
+from .plan import TracePlan
 from .profile import read_profile
 from .segment import Segment
 from .tracing import Status, Trace, trace, trajectory
@@ -35,6 +36,7 @@ __all__ = [
     "Segment",
     "Status",
     "Trace",
+    "TracePlan",
     "Wall",
     "dispersing_arcs",
     "double_parabola",

@@ -24,6 +24,7 @@ from .profile import Seam, vertices_of_profile
 from .segment import Segment
 
 if TYPE_CHECKING:
+    from .plan import TracePlan
     from .scene import Scene
 
 @dataclass(frozen=True, repr=False)
@@ -214,6 +215,18 @@ class Wall:
         from .scene import scene_of
 
         return scene_of(self)
+
+    def plan(self) -> TracePlan:
+        """What the tracer will do with this wall and what it leaves out.
+
+        Examples
+        --------
+        >>> Wall.from_vertices([(0, 0), (0.5, 0), (0.5, -1), (1, -1), (1, 0)]).plan()  # doctest: +ELLIPSIS
+        TracePlan(primitives=('lines',), hollows=1, pieces_traced=3, pieces_left_out=1, flat_share=0.5, ...)
+        """
+        from .plan import plan_of
+
+        return plan_of(self)
 
     @cached_property
     def hollows(self) -> tuple[Hollow, ...]:

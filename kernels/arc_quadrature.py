@@ -123,13 +123,12 @@ def _add_strips(
     total: Floats, basis: Basis, edges: Floats, strips: _Strips, half_angle: float, mirrored: bool
 ) -> float:
     """Add the integrals over all strips; returns their mass."""
-    finest = np.diff(edges).min()
-    # how far incoming and outgoing angles move along a strip: the latter by 1 - 2 N a times as much on a side
-    slopes = np.abs(1.0 - 2.0 * strips.hits * np.stack((strips.lower[0], strips.upper[0])))
-    width = strips.high - strips.low
-    reach = width if basis.is_partition else width * np.maximum(slopes.max(axis=0), 1.0)
-    long_nodes = NODES_CELL if basis.is_partition else basis.nodes_per_interval
-    short = reach < (SHORT if basis.is_partition else finest / basis.nodes_per_interval)
+    if basis.is_partition:
+        long_nodes = NODES_CELL
+        short = strips.high - strips.low < SHORT
+    else:
+        long_nodes = basis.nodes_per_interval
+        short = _reach(strips, edges) * long_nodes < 1.0
     mass = 0.0
     for chosen, order in ((short, NODES_SHORT), (~short, long_nodes)):
         selected = np.flatnonzero(chosen)
@@ -140,6 +139,20 @@ def _add_strips(
             row = part.part(np.repeat(np.arange(part.hits.size), order))
             mass += _add_rows(total, basis, edges, row, theta, weight / (4.0 * np.sin(half_angle)), mirrored)
     return mass
+
+
+def _reach(strips: _Strips, edges: Floats) -> Floats:
+    """How far incoming and outgoing angles move along a strip, as a share of the basis' intervals that they are in."""
+    length, middle, widths = strips.high - strips.low, 0.5 * (strips.low + strips.high), np.diff(edges)
+
+    def interval(angle: Floats) -> Floats:
+        return np.asarray(widths[np.clip(np.searchsorted(edges, angle) - 1, 0, widths.size - 1)])
+
+    reach = length / interval(middle)
+    for slope, offset in (strips.lower, strips.upper):
+        outgoing = np.pi + middle - 2.0 * strips.hits * (slope * middle + offset)
+        reach = np.maximum(reach, length * np.abs(1.0 - 2.0 * strips.hits * slope) / interval(outgoing))
+    return reach
 
 
 def _add_rows(
@@ -166,7 +179,8 @@ def _add_rows(
         flux = np.bincount(cell, weights=mass, minlength=total.size).reshape(total.shape)
         total += basis.heights[:, None] * flux * basis.heights
         return float(mass.sum())
-    short = 2.0 * strips.hits[row] * (high - low) * basis.nodes_per_interval < np.diff(edges).min()
+    width = np.diff(edges)[np.clip(above - 1, 0, edges.size - 2)]
+    short = 2.0 * strips.hits[row] * (high - low) * basis.nodes_per_interval < width
     for chosen, order in ((short, NODES_SHORT), (~short, basis.nodes_per_interval)):
         selected = np.flatnonzero(chosen)
         step = max(1, CHUNK // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 EXTRA_NODES = 11
 # Graded panels: each is RATIO of its neighbour, down to SMALLEST times the distance to the next special angle.
 # A function that behaves like theta^s at grazing is then missed by SMALLEST^(s + 1) in L^2(sin theta d theta).
-RATIO, SMALLEST = 0.35, 1e-6
-WIDEST = np.pi / 8
+RATIO, SMALLEST = 0.35, 1e-4
+WIDEST = np.pi / 24
 # Kinks xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this share of xi.
-KINK_SPACING = 0.02
+KINK_SPACING = 0.05
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)

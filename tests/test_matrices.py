@@ -1,0 +1,359 @@
+"""Kernel matrices: their algebra and its errors, defects, files, pictures."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from asperity import kernels as ker
+from asperity.errors import FileExistsRefusal, InputError
+from asperity.estimates import Estimate
+from asperity.kernels.matrix_algebra import frobenius_error
+from asperity.kernels.symmetry import invariance_z_score, replicate_z_score, reversibility_z_score
+
+NO_ERROR = Estimate(0.0, 0.0, "bound", "given")
+ROUNDING = 1e-13
+
+
+def random_reversible(basis: ker.Basis, rng: np.random.Generator, error: float = 0.0) -> ker.KernelMatrix:
+    """A symmetric array of norm 1 that keeps the constant."""
+    array = rng.normal(size=(basis.size, basis.size))
+    array = array + array.T
+    constant = basis.constant
+    project = np.eye(basis.size) - np.outer(constant, constant)
+    array = project @ array @ project
+    array = array / max(np.linalg.norm(array, 2), 1e-300) + np.outer(constant, constant)
+    return ker.KernelMatrix(
+        array, basis, frobenius_error(error, "bound", "given"), reversible=True, mirror_symmetric=True
+    )
+
+
+def stochastic(n: int, rng: np.random.Generator) -> ker.KernelMatrix:
+    basis = ker.Bins(n)
+    array = rng.random((n, n)) + 0.1
+    array /= array.sum(axis=1, keepdims=True)
+    return ker.KernelMatrix(array / basis.heights[:, None] * basis.heights, basis, NO_ERROR)
+
+
+seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds, st.integers(1, 8))
+def test_products_are_associative_and_adjoints_reverse_them(rng: np.random.Generator, n: int) -> None:
+    p, q, r = (stochastic(n, rng) for _ in range(3))
+    assert np.abs(((p @ q) @ r).array - (p @ (q @ r)).array).max() < ROUNDING
+    assert np.abs((p @ q).adjoint().array - (q.adjoint() @ p.adjoint()).array).max() < ROUNDING
+    assert np.abs((p**3).array - (p @ p @ p).array).max() < ROUNDING
+    assert np.abs((p**0).array - np.eye(n)).max() == 0.0
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds, st.integers(1, 8))
+def test_an_operator_and_its_adjoint_pass_the_dot_test(rng: np.random.Generator, n: int) -> None:
+    p = stochastic(n, rng)
+    f, g = rng.normal(size=n), rng.normal(size=n)
+    assert np.sum(p.weights * f * (p @ g)) == pytest.approx(np.sum(p.weights * (p.adjoint() @ f) * g), abs=ROUNDING)
+    mu = rng.random(n)
+    assert (mu @ p) @ f == pytest.approx(mu @ (p @ f), abs=1e-12)
+    operator = p.as_linear_operator()
+    assert np.allclose(operator @ f, p @ f) and np.allclose(operator.T @ f, f @ p)
+
+
+def test_first_p_then_q() -> None:
+    to_first = ker.KernelMatrix(
+        np.array([[1.0, 0.0], [1.0, 0.0]]), ker.Bins(2), NO_ERROR, law="to the first bin"
+    )
+    swap = ker.KernelMatrix(np.array([[0.0, 1.0], [1.0, 0.0]]), ker.Bins(2), NO_ERROR, law="swap")
+    assert (to_first @ swap).array.round(15).tolist() == [[0.0, 1.0], [0.0, 1.0]]
+    assert (swap @ to_first).array.round(15).tolist() == [[1.0, 0.0], [1.0, 0.0]]
+    assert (np.array([0.25, 0.75]) @ swap).round(15).tolist() == [0.75, 0.25]
+
+
+def test_functions_and_densities_are_projected() -> None:
+    flat = ker.discretise(ker.lambertian(), ker.Bins(16))
+    assert np.abs(flat @ (lambda theta: np.cos(theta) ** 2) - 1.0 / 3.0).max() < ROUNDING
+    assert np.abs((lambda theta: 1.0 + np.cos(theta)) @ flat - flat.weights).max() < ROUNDING
+    smooth = ker.discretise(ker.lambertian(), ker.Legendre(4))
+    assert np.abs(smooth @ np.cos).max() < ROUNDING
+
+
+def test_combinations_of_matrices_are_linear() -> None:
+    rng = np.random.default_rng(3)
+    p, q = stochastic(5, rng), stochastic(5, rng)
+    mixed = 0.25 * p + np.float64(0.75) * q
+    assert np.abs(mixed.array - (0.25 * p.array + 0.75 * q.array)).max() < ROUNDING
+    assert float(mixed.stochastic_defect()) < ROUNDING
+    assert np.abs((p - p).array).max() == 0.0
+    assert float((-p).stochastic_defect()) == pytest.approx(2.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seeds, st.integers(2, 6), st.floats(1e-6, 0.1), st.floats(1e-6, 0.1))
+def test_errors_of_the_algebra_bound_the_true_ones(
+    rng: np.random.Generator, n: int, first_error: float, second_error: float
+) -> None:
+    basis = ker.Legendre(n)
+    exact = [random_reversible(basis, rng) for _ in range(2)]
+    found = []
+    for matrix, size in zip(exact, (first_error, second_error), strict=True):
+        wrong = rng.normal(size=(n, n))
+        wrong *= size / np.linalg.norm(wrong)
+        error = frobenius_error(size * (1.0 + 1e-9), "bound", "given")
+        found.append(dataclasses.replace(matrix, symmetric=matrix.symmetric + wrong, error=error))
+    (a, b), (x, y) = exact, found
+    for true, computed in [
+        (a @ b, x @ y),
+        (0.3 * a - 2.0 * b, 0.3 * x - 2.0 * y),
+        (a**4, x**4),
+        ((a - b) @ a, (x - y) @ x),
+        ((a - b) ** 3, (x - y) ** 3),
+        (a.tensor(b), x.tensor(y)),
+        (a.in_specular_frame(), x.in_specular_frame()),
+    ]:
+        # the last term is rounding
+        distance = np.linalg.norm(true.symmetric - computed.symmetric)
+        assert distance <= float(computed.error) + 1e-12
+        assert computed.error.kind == "bound"
+
+
+def test_a_tensor_product_acts_on_both_angles() -> None:
+    rng = np.random.default_rng(5)
+    p, q = stochastic(3, rng), stochastic(4, rng)
+    both = p.tensor(q)
+    f, g = rng.normal(size=3), rng.normal(size=4)
+    assert np.abs(both @ np.kron(f, g) - np.kron(p @ f, q @ g)).max() < ROUNDING
+    assert both.basis == ker.TensorBasis((p.basis, q.basis))
+    assert np.abs(both.flux.sum() - 1.0) < ROUNDING
+
+
+def test_the_specular_frame_makes_specular_the_identity_and_is_undone_by_itself() -> None:
+    for basis in (ker.Bins(9), ker.Legendre(7), ker.Panels([0.0, 1.0, np.pi - 1.0, np.pi], 2)):
+        matrix = ker.discretise(ker.specular(), basis)
+        turned = matrix.in_specular_frame()
+        assert turned.frame == "specular"
+        assert np.abs(turned.array - np.eye(basis.size)).max() < 1e-12
+        assert np.abs(turned.in_specular_frame().array - matrix.array).max() < 1e-12
+        assert turned.in_specular_frame().frame == "paper"
+    with pytest.raises(InputError, match="discretise law"):
+        ker.discretise(ker.specular(), ker.Bins([0.0, 1.0, np.pi])).in_specular_frame()
+
+
+def test_matrices_of_different_bases_or_frames_do_not_mix() -> None:
+    p, q = (ker.discretise(ker.lambertian(), ker.Bins(n)) for n in (2, 3))
+    with pytest.raises(InputError, match="different bases"):
+        p @ q
+    with pytest.raises(InputError, match="conventions"):
+        p + p.in_specular_frame()
+
+
+def test_flux_and_weights_are_those_of_the_bins() -> None:
+    matrix = ker.discretise(ker.TriangularTeethLaw(1.0), ker.Bins([0.0, 0.5, 1.7, np.pi]))
+    assert np.abs(matrix.weights - 0.5 * (np.cos(matrix.basis.edges[:-1]) - np.cos(matrix.basis.edges[1:]))).max() < 1e-15
+    assert np.abs(matrix.flux - matrix.weights[:, None] * matrix.array).max() < 1e-15
+    with pytest.raises(InputError, match="flux"):
+        _ = ker.discretise(ker.lambertian(), ker.Legendre(3)).flux
+
+
+def test_arrays_are_read_only_and_fields_fixed() -> None:
+    matrix = stochastic(3, np.random.default_rng(0))
+    with pytest.raises(ValueError, match="read-only"):
+        matrix.symmetric[0, 0] = 2.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        matrix.law = "other"  # type: ignore[misc]
+
+
+def test_the_asymmetry_does_not_depend_on_the_size() -> None:
+    # half of the array antisymmetric in each block: the defect of one block is that of a hundred
+    block = np.array([[0.0, 1.0], [0.0, 0.0]])
+    small = ker.KernelMatrix(block, ker.Bins(2), NO_ERROR)
+    large = ker.KernelMatrix(np.kron(np.eye(100), block), ker.Bins(200), NO_ERROR)
+    assert float(small.symmetry_defect()) == pytest.approx(np.sqrt(0.5))
+    assert float(large.symmetry_defect()) == pytest.approx(np.sqrt(0.5))
+    assert small.symmetry_defect().z_score is None
+
+
+def test_defects_are_numbers_that_know_their_norm() -> None:
+    defect = stochastic(4, np.random.default_rng(2)).symmetry_defect()
+    assert defect > 0.01 and "||_F" in defect.norm and defect.value == float(defect)
+    with pytest.raises(AttributeError, match="immutable"):
+        defect.norm = "other"
+    copied = pickle.loads(pickle.dumps(ker.SymmetryDefect(0.5, z_score=2.0)))
+    assert (float(copied), copied.z_score) == (0.5, 2.0)
+
+
+def reversible_flux(n: int, rng: np.random.Generator) -> np.ndarray:
+    flux = rng.random((n, n)) ** 3
+    flux += flux.T
+    return flux / flux.sum()
+
+
+# Sums over 300 samples: the mean is off by 0.06 (one standard deviation), the spread by 0.04.
+@pytest.mark.parametrize(("n", "pairs"), [(3, 60), (8, 200), (8, 5000), (30, 2000), (30, 300)])
+def test_z_scores_of_reversible_counts_are_standard_normal(n: int, pairs: int) -> None:
+    rng = np.random.default_rng(n * pairs)
+    drawn, fixed_rows, totals = [], [], []
+    for _ in range(300):
+        flux = reversible_flux(n, rng)
+        weights = flux.sum(axis=1)
+        counts = rng.multinomial(pairs, flux.ravel()).reshape(n, n)
+        drawn.append(reversibility_z_score(counts, weights, True))
+        totals.append(invariance_z_score(counts, weights))
+        rows = rng.multinomial(pairs, rng.dirichlet(np.full(n, 5.0)))
+        counts = np.array([rng.multinomial(r, p) for r, p in zip(rows, flux / weights[:, None], strict=True)])
+        fixed_rows.append(reversibility_z_score(counts, weights, False))
+    for scores in (drawn, fixed_rows, totals):
+        assert abs(np.mean(scores)) < 0.35
+        assert 0.75 < np.std(scores) < 1.2
+
+
+def test_z_scores_find_a_drift_that_a_fixed_tolerance_misses() -> None:
+    rng = np.random.default_rng(11)
+    n = 20
+    flux = reversible_flux(n, rng)
+    cycle = np.roll(np.eye(n), 1, axis=1) - np.roll(np.eye(n), -1, axis=1)
+    drifting = flux + 0.5 * flux * cycle
+    drifting /= drifting.sum()
+    weights = drifting.sum(axis=1)
+    counts = rng.multinomial(100_000, drifting.ravel()).reshape(n, n)
+    assert reversibility_z_score(counts, weights, True) > 10.0
+    assert reversibility_z_score(counts, weights, False) > 10.0
+
+
+def test_unequal_rows_are_no_sign_of_irreversibility() -> None:
+    # C - C^T is far from zero here, because the incoming angles were not drawn from the invariant measure
+    rng = np.random.default_rng(12)
+    flux = reversible_flux(6, rng)
+    weights = flux.sum(axis=1)
+    rows = [100, 5000, 300, 20_000, 700, 50]
+    counts = np.array([rng.multinomial(r, p) for r, p in zip(rows, flux / weights[:, None], strict=True)])
+    assert reversibility_z_score(counts, weights, True) > 20.0
+    assert abs(reversibility_z_score(counts, weights, False)) < 4.0
+    assert invariance_z_score(counts, weights) > 20.0
+
+
+def test_z_scores_from_replicates_are_centred_and_find_a_mean() -> None:
+    rng = np.random.default_rng(4)
+    scores = []
+    for _ in range(200):
+        parts = [rng.normal(size=(12, 12)) for _ in range(8)]
+        scores.append(replicate_z_score([part - part.T for part in parts]))
+    assert abs(np.mean(scores)) < 0.3 and 0.75 < np.std(scores) < 1.3
+    drift = np.triu(np.ones((12, 12)), 1)
+    parts = [part + drift for part in (rng.normal(size=(12, 12)) for _ in range(8))]
+    assert replicate_z_score([part - part.T for part in parts]) > 8.0
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        ker.discretise(ker.TriangularTeethLaw(0.7), ker.Bins(33)),
+        ker.discretise(ker.CircularArcLaw(1.0), ker.Bins(8), method="qmc", samples=4096, symmetrise=True),
+        ker.discretise(ker.CircularArcLaw(0.1), ker.Bins(200), method="qmc", samples=8192),
+        ker.discretise(ker.lambertian().in_specular_frame(), ker.Panels([0.0, 1.0, np.pi], 2)),
+        ker.discretise(ker.lambertian(), ker.Legendre(3)).tensor(ker.discretise(ker.lambertian(), ker.Bins([0, 1, np.pi]))),
+        dataclasses.replace(stochastic(2, np.random.default_rng(0)), metadata={"wall": "mine", "rays": [1, 2]}),
+    ],
+    ids=repr,
+)
+def test_files_keep_every_field_to_the_last_bit(matrix: ker.KernelMatrix, tmp_path: Path) -> None:
+    path = matrix.save(tmp_path / "kernel.npz")
+    loaded = ker.load_matrix(path)
+    for field in dataclasses.fields(matrix):
+        before, after = getattr(matrix, field.name), getattr(loaded, field.name)
+        if field.name == "replicates":
+            assert len(before) == len(after)
+            for one, other in zip(before, after, strict=True):
+                assert type(one) is type(other)
+                assert abs(one - other).max() == 0.0
+        elif isinstance(before, np.ndarray):
+            assert before.dtype == after.dtype and np.array_equal(before, after)
+        elif field.name == "raw_defect" and before is not None:
+            assert (before, before.norm, before.z_score) == (after, after.norm, after.z_score)
+        else:
+            assert before == after
+    assert repr(loaded) == repr(matrix)
+
+
+def test_a_path_is_used_as_it_stands_and_never_overwritten_unasked(tmp_path: Path) -> None:
+    matrix = stochastic(2, np.random.default_rng(0))
+    path = tmp_path / "kernel.with.dots"
+    matrix.save(path)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["kernel.with.dots"]
+    with pytest.raises(FileExistsRefusal, match="overwrite=True"):
+        matrix.save(path)
+    matrix.save(path, overwrite=True)
+    assert np.array_equal(ker.load_matrix(path).symmetric, matrix.symmetric)
+
+
+def test_other_files_are_refused_by_name(tmp_path: Path) -> None:
+    text, archive, array = tmp_path / "a.txt", tmp_path / "b.npz", tmp_path / "c.npy"
+    text.write_text("no matrix")
+    np.savez(archive, x=np.ones(3))
+    np.save(array, np.ones(3))
+    for path in (text, archive, array):
+        with pytest.raises(InputError, match=f"{path.name} is not a kernel matrix"):
+            ker.load_matrix(path)
+    with pytest.raises(InputError, match="No such file"):
+        ker.load_matrix(tmp_path / "missing.npz")
+    whole = stochastic(2, np.random.default_rng(0)).save(tmp_path / "whole.npz").read_bytes()
+    (tmp_path / "half.npz").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="is not a kernel matrix"):
+        ker.load_matrix(tmp_path / "half.npz")
+    with pytest.raises(InputError, match="cannot write"):
+        stochastic(2, np.random.default_rng(0)).save(tmp_path / "no" / "folder" / "kernel.npz")
+
+
+def test_metadata_that_a_file_cannot_hold_are_refused(tmp_path: Path) -> None:
+    matrix = dataclasses.replace(stochastic(2, np.random.default_rng(0)), metadata={"function": np.sin})
+    with pytest.raises(InputError, match="metadata"):
+        matrix.save(tmp_path / "kernel.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(5)], ids=repr)
+def test_the_picture_labels_its_axes_with_units(basis: ker.Basis) -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    ax = ker.discretise(ker.TriangularTeethLaw(1.0), basis).plot()
+    assert "incoming angle" in ax.get_xlabel() and "(rad)" in ax.get_xlabel()
+    assert "outgoing angle" in ax.get_ylabel()
+    assert [label.get_text() for label in ax.get_xticklabels()] == ["0", "π/2", "π"]
+    labels = [axes.get_ylabel() for axes in ax.get_figure().axes if axes is not ax]
+    assert any("invariant measure" in label for label in labels)
+    pyplot.close(ax.get_figure())
+    with pytest.raises(InputError, match="one angle"):
+        lambert = ker.discretise(ker.lambertian(), basis)
+        lambert.tensor(lambert).plot()
+
+
+def test_the_repr_is_one_line_and_owns_up_to_a_missed_tolerance() -> None:
+    text = repr(ker.discretise(ker.CircularArcLaw(1.0), ker.Bins(8), method="qmc", samples=4096))
+    assert "\n" not in text
+    for part in ("Bins(8)", "CircularArcLaw", "qmc", "4096 samples", "tolerance 1e-08 not met"):
+        assert part in text
+    assert "not met" not in repr(ker.discretise(ker.TriangularTeethLaw(1.0), ker.Bins(8)))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: ker.KernelMatrix(np.eye(3), ker.Bins(2), NO_ERROR), "expected shape"),
+        (lambda: ker.KernelMatrix(np.full((2, 2), np.nan), ker.Bins(2), NO_ERROR), "finite"),
+        (lambda: ker.KernelMatrix(np.eye(2), "bins", NO_ERROR), "basis"),
+        (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), 0.1), "Estimate"),
+        (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), NO_ERROR) @ np.ones(3), "expected 2 entries"),
+        (lambda: ker.KernelMatrix(np.eye(2), ker.Bins(2), NO_ERROR) ** -1, "exponent"),
+    ],
+)
+def test_bad_matrices_are_refused_in_one_sentence(make: object, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()  # type: ignore[operator]
