@@ -51,7 +51,8 @@ def _throughput_table(rays: int) -> list[str]:
 
 
 def _start_table() -> list[str]:
-    return ["| start | seconds |", "|---|---|", *(f"| {what} | {least:.2f} |" for what, least in measure_start().items())]
+    rows = [f"| {what} | {least:.2f} |" for what, least in measure_start().items()]
+    return ["| start | seconds |", "|---|---|", *rows]
 
 
 if __name__ == "__main__":

@@ -87,7 +87,7 @@ class Disk:
         Returns
         -------
         theta, psi : ndarray, shape (...)
-            In (0, pi), with w = |w| (cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi).
+            In (0, pi), with w = speed (cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi).
 
         Raises
         ------

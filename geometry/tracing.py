@@ -60,7 +60,7 @@ class Trace:
     @property
     def escaped(self) -> NDArray[np.bool_]:
         """Mask of the rays that left through y = 0."""
-        return self.status == Status.ESCAPED
+        return np.asarray(self.status == Status.ESCAPED)
 
     def counts(self) -> dict[str, int]:
         """Number of rays by the name of their status; every name is there.
@@ -203,4 +203,4 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     )  # fmt: skip
     points = path[np.isfinite(path[:, 0])]
     points[:, 0] += base
-    return points
+    return np.asarray(points)

@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, frozen, positive_number
 from ..errors import WallError
-from .arc import Arc
 from .conditions import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
 from .curve import Curve
 from .disk import Disk
@@ -26,6 +25,7 @@ from .segment import Segment
 if TYPE_CHECKING:
     from .plan import TracePlan
     from .scene import Scene
+
 
 @dataclass(frozen=True, repr=False)
 class Wall:
@@ -199,7 +199,7 @@ class Wall:
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
-        """Whether the periodic wall has a mirror axis x = const, to rounding; with islands only x = period/2 is tried."""
+        """Whether the periodic wall has a mirror axis, to rounding; with islands only x = period/2 is tried."""
         from .mirror import has_mirror_axis
 
         return has_mirror_axis(self)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -100,9 +101,7 @@ class CollisionLaw:
             raise InputError(f"velocity: expected incoming velocities with v2 < 0, got v2 >= 0 at row {worst}")
         generator(rng)
         frame = np.asarray(self.disk.frame)
-        along, up, roll = (
-            self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame
-        )
+        along, up, roll = (self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame)
         # angle and size of minus the incoming velocity in the plane of chi_perp and e2^; the share along chi stays
         theta = np.arctan2(-up, -along)
         outgoing = self.law.sample(theta, rng)
@@ -126,7 +125,7 @@ class CollisionLaw:
         value = np.empty(theta_all.shape)
         for k, turned in enumerate(rolled):
             here = psi_index.reshape(psi_all.shape) == k
-            value[here] = self.law.apply(lambda outgoing, turned=turned: function(outgoing, turned), theta_all[here])
+            value[here] = self.law.apply(partial(_with_psi, function, turned), theta_all[here])
         return value
 
     def branches(self, theta: ArrayLike) -> list[tuple[Floats, Floats]]:
@@ -173,3 +172,7 @@ class CollisionLaw:
 
     def __repr__(self) -> str:
         return f"CollisionLaw(law={self.law!r}, disk={self.disk!r})"
+
+
+def _with_psi(function: VelocityFunction, psi: Floats, theta: Floats) -> Floats:
+    return function(theta, psi)

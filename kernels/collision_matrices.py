@@ -21,7 +21,7 @@ def smooth_matrix(disk: Disk) -> Floats:
     Examples
     --------
     >>> from asperity import geometry as geo
-    >>> smooth_matrix(geo.Disk()).round(12).tolist()
+    >>> (smooth_matrix(geo.Disk()).round(12) + 0.0).tolist()
     [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
     """
     return isometry_matrix(disk, -1.0, np.pi)

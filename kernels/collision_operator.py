@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .symmetry import SymmetryDefect
 
 
-class CollisionOperator(LinearOperator):  # type: ignore[misc]
+class CollisionOperator(LinearOperator):
     """K = P~ (x) J_psi, symmetric with respect to Lambda^2 where P~ is symmetric.
 
     A vector holds coefficients in the orthonormal product basis e_i(theta) f_j(psi), the index of psi running fastest.
@@ -39,7 +39,7 @@ class CollisionOperator(LinearOperator):  # type: ignore[misc]
         self.psi_basis = psi_basis
         self.flip = reflection_matrix(psi_basis)
         size = theta_matrix.basis.size * psi_basis.size
-        super().__init__(np.dtype(np.float64), (size, size))
+        super().__init__(np.dtype(np.float64), (size, size))  # type: ignore[call-arg]
 
     def _split(self, vector: Floats) -> Floats:
         return np.asarray(vector).reshape(self.theta_matrix.basis.size, self.psi_basis.size)
@@ -52,7 +52,7 @@ class CollisionOperator(LinearOperator):  # type: ignore[misc]
 
     def dense(self) -> Floats:
         """The full matrix, shape (n, n) with n the product of the two sizes."""
-        return np.kron(self.theta_matrix.symmetric, self.flip)
+        return np.asarray(np.kron(self.theta_matrix.symmetric, self.flip), dtype=np.float64)
 
     def symmetry_defect(self) -> SymmetryDefect:
         """How far K is from symmetric with respect to Lambda^2: that of P~, because J_psi is exactly symmetric."""

@@ -87,7 +87,8 @@ def load_matrix(path: str | Path) -> KernelMatrix:
     """
     source = Path(path)
     try:
-        with np.load(source, allow_pickle=False) as archive:
+        with source.open("rb") as stream:
+            archive = np.load(stream, allow_pickle=False)
             if not hasattr(archive, "files") or "record" not in archive.files:
                 raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
             arrays = {name: archive[name] for name in archive.files}

@@ -48,8 +48,8 @@ class Defect(float):
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a Defect is immutable; {name} cannot be set")
 
-    def __getnewargs__(self) -> tuple[float, str, float | None]:  # type: ignore[override]  # more than a float has
-        return float(self), self.norm, self.z_score
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (float(self), self.norm, self.z_score)
 
     @property
     def value(self) -> float:

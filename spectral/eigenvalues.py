@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,7 +33,7 @@ class SpectrumErrors:
     Attributes
     ----------
     algebraic : array
-        Bound: |S v - lambda v| plus the rounding of the eigensolver. Some eigenvalue of the matrix is this near.
+        Bound: the norm of S v - lambda v plus the eigensolver's rounding. Some eigenvalue of the matrix is this near.
     discretisation : array
         Estimate: change of the eigenvalue from the basis of half the size; ``inf`` where there is none.
     sampling : array
@@ -60,9 +60,7 @@ class Spectrum:
     vectors : array of shape (n, k)
         Coefficients of the orthonormal eigenfunctions in ``basis``, constants first.
     residuals : array of shape (k,)
-        |S v - lambda v|.
-    intervals : array of shape (k, 2)
-        value -+ ``errors.total()``.
+        Norm of S v - lambda v.
     gap, slem : float
         1 - the largest eigenvalue off the constants; the largest modulus there.
     gap_error : float
@@ -103,7 +101,8 @@ class Spectrum:
         return draw_spectrum(self, ax)
 
     def __repr__(self) -> str:
-        return f"Spectrum(k={len(self.values)}, gap={self.gap:.10g}, slem={self.slem:.10g}, convention={self.convention!r})"
+        numbers = f"k={len(self.values)}, gap={self.gap:.10g}, slem={self.slem:.10g}"
+        return f"Spectrum({numbers}, convention={self.convention!r})"
 
 
 def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretisation: Any) -> Spectrum:
@@ -158,14 +157,22 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     errors = _errors(matrix, values, vectors, residuals, np.concatenate([[0.0], changes[chosen]]))
     gap_error, slem = float("inf"), 0.0
     if len(rest):
-        top, residual = rest_vectors[:, -1:], np.linalg.norm(array @ rest_vectors[:, -1] - rest[-1] * rest_vectors[:, -1])
-        gap_error = float(_errors(matrix, rest[-1:], top, np.array([residual]), changes[-1:]).total()[0])
+        top = rest_vectors[:, -1:]
+        residual = np.linalg.norm(array @ top - rest[-1] * top, axis=0)
+        gap_error = float(_errors(matrix, rest[-1:], top, residual, changes[-1:]).total()[0])
         slem = float(max(abs(rest[-1]), abs(rest[0])))
     return Spectrum(
-        values=frozen(values), vectors=frozen(vectors), residuals=frozen(residuals), errors=errors,
-        gap=float(1.0 - rest[-1]) if len(rest) else 1.0, gap_error=gap_error, slem=slem, convention=matrix.frame,
-        basis=matrix.basis, method=matrix.method,
-    )  # fmt: skip
+        values=frozen(values),
+        vectors=frozen(vectors),
+        residuals=frozen(residuals),
+        errors=errors,
+        gap=float(1.0 - rest[-1]) if len(rest) else 1.0,
+        gap_error=gap_error,
+        slem=slem,
+        convention=matrix.frame,
+        basis=matrix.basis,
+        method=matrix.method,
+    )
 
 
 def _errors(
@@ -227,15 +234,16 @@ def _two_grids(matrix: KernelMatrix, rest: Floats) -> Floats:
 
 def _both_signs(half: Spectrum, k: int) -> Spectrum:
     """spectrum(K) = spectrum(P~) x {+1, -1}: the flip of psi has both eigenvalues. The gap stays that of P~."""
-    index = np.concatenate([np.arange(len(half.values)), np.arange(len(half.values))])
-    sign = np.repeat([1.0, -1.0], len(half.values))
-    order = np.argsort(-np.abs(half.values[index]), kind="stable")[:k]
-    order = order[np.argsort(-(sign * half.values[index])[order], kind="stable")]
+    index = np.tile(np.arange(len(half.values)), 2)
+    values = np.concatenate([half.values, -half.values])
+    order = np.argsort(-np.abs(values), kind="stable")[:k]
+    order = order[np.argsort(-values[order], kind="stable")]
     pick = index[order]
-    return Spectrum(
-        values=frozen(sign[order] * half.values[pick]), vectors=frozen(half.vectors[:, pick]),
+    parts = (half.errors.algebraic, half.errors.discretisation, half.errors.sampling)
+    return replace(
+        half,
+        values=frozen(values[order]),
+        vectors=frozen(half.vectors[:, pick]),
         residuals=frozen(half.residuals[pick]),
-        errors=SpectrumErrors(*(frozen(e[pick]) for e in
-                                (half.errors.algebraic, half.errors.discretisation, half.errors.sampling))),
-        gap=half.gap, gap_error=half.gap_error, slem=half.slem, convention=half.convention, basis=half.basis, method=half.method,
-    )  # fmt: skip
+        errors=SpectrumErrors(*(frozen(part[pick]) for part in parts)),
+    )

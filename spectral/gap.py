@@ -54,7 +54,9 @@ class SpectralGap(Estimate):
         return f"{super().__str__()}, {self.verdict}, {self.convention} convention"
 
 
-def spectral_gap(law: Law | KernelMatrix, tolerance: float = 1e-6, rng: np.random.Generator | None = None) -> SpectralGap:
+def spectral_gap(
+    law: Law | KernelMatrix, tolerance: float = 1e-6, rng: np.random.Generator | None = None
+) -> SpectralGap:
     """The gap 1 - sup(spectrum off the constants) of a reversible law.
 
     Parameters

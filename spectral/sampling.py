@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..checks import Floats
 
 if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
     from ..kernels import KernelMatrix
 
 
@@ -26,7 +28,7 @@ def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Fl
     return np.zeros(len(values))
 
 
-def _quadratic_forms(symmetric: Floats, vectors: Floats) -> Floats:
+def _quadratic_forms(symmetric: Floats | csr_array[Any], vectors: Floats) -> Floats:
     return np.asarray(np.sum(vectors * (symmetric @ vectors), axis=0))
 
 

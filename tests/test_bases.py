@@ -101,7 +101,8 @@ def test_edges_themselves_belong_to_the_bin_on_their_right(n: int) -> None:
     bins = Bins(n)
     assert bins.index(bins.edges[:-1]).tolist() == list(range(n))
     assert int(bins.index(np.pi)) == n - 1
-    assert np.array_equal(bins.edges, np.pi - bins.edges[::-1])
+    lower = bins.edges[: (n + 1) // 2]
+    assert np.array_equal(bins.edges[::-1][: (n + 1) // 2], np.pi - lower)
 
 
 def test_legendre_values_are_those_of_the_polynomials() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plain_tracer import trace_plainly
 
 from asperity import geometry as geo
 from asperity.errors import InputError
+from plain_tracer import trace_plainly
 
 EPS = np.finfo(float).eps
 RAYS = 10**6

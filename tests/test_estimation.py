@@ -1,0 +1,114 @@
+"""Kernels from a user's own pairs of angles."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity import kernels as ker
+from asperity.errors import AccuracyError, InputError
+
+LAW = ker.TriangularTeethLaw(1.1)
+
+
+def pairs(number: int, seed: int, invariant: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    theta = ker.SINE.sample(number, rng) if invariant else np.pi * rng.beta(1.2, 1.6, number)
+    return theta, LAW.sample(theta, rng)
+
+
+def test_rows_are_shares_of_the_counts() -> None:
+    theta, image = pairs(5000, 0)
+    found = ker.estimate(theta, image, ker.Bins(6))
+    expected = np.zeros((6, 6), dtype=int)
+    for one, other in zip(np.floor(3 - 3 * np.cos(theta)), np.floor(3 - 3 * np.cos(image)), strict=True):
+        expected[int(one), int(other)] += 1
+    assert np.array_equal(found.counts, expected)
+    assert np.abs(found.array - expected / expected.sum(axis=1, keepdims=True)).max() < 1e-15
+    assert found.stochastic_defect() < 1e-15 and found.samples == 5000
+
+
+@pytest.mark.parametrize("symmetrise", [False, True])
+@pytest.mark.parametrize("invariant", [False, True])
+@pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(6)], ids=repr)
+def test_errors_are_calibrated_wherever_the_rays_came_from(
+    basis: ker.Basis, invariant: bool, symmetrise: bool
+) -> None:
+    exact = ker.discretise(LAW, basis).symmetric
+    ratios = []
+    for seed in range(24):
+        found = ker.estimate(*pairs(4000, seed, invariant), basis, symmetrise)
+        assert found.metadata["incoming_angles_follow_measure"] is invariant
+        ratios.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
+    # weights by nearest angles carry a bias of second order besides the noise that the batches see
+    assert 0.7 < np.mean(ratios) < 1.4
+
+
+@pytest.mark.parametrize("invariant", [False, True])
+@pytest.mark.parametrize("symmetrise", [False, True])
+def test_the_z_score_is_that_of_the_raw_pairs_for_any_incoming_angles(invariant: bool, symmetrise: bool) -> None:
+    scores = [
+        ker.estimate(*pairs(3000, seed, invariant), ker.Bins(10), symmetrise).symmetry_defect().z_score
+        for seed in range(60)
+    ]
+    assert abs(np.mean(scores)) < 0.6 and 0.7 < np.std(scores) < 1.3
+
+
+def test_pairs_of_an_irreversible_law_give_a_large_z_score() -> None:
+    rng = np.random.default_rng(3)
+    theta = np.pi * rng.beta(1.2, 1.6, 20_000)
+    share = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * rng.random(theta.size), 1.0)
+    found = ker.estimate(theta, ker.SINE.quantile(np.clip(share, 1e-12, 1 - 1e-12)), ker.Bins(12), symmetrise=True)
+    assert found.symmetry_defect().z_score > 10.0
+    assert np.abs(found.flux - found.flux.T).max() < 1e-17
+
+
+def test_the_test_of_the_incoming_angles_can_be_overruled() -> None:
+    theta, image = pairs(3000, 1)
+    found = ker.estimate(theta, image, ker.Bins(8), symmetrise=True, invariant=False)
+    plain = ker.estimate(theta, image, ker.Bins(8), symmetrise=True)
+    assert found.metadata["incoming_angles_follow_measure"] is False
+    # fluxes from rows, w_i C_ij / N_i, against fluxes from all pairs, C_ij / N
+    assert 0.0 < np.abs(found.flux - plain.flux).max() < 0.01
+
+
+def test_a_grid_of_angles_with_repeats_is_weighted_by_the_measure_it_stands_for() -> None:
+    rng = np.random.default_rng(5)
+    theta = np.repeat((np.arange(400) + 0.5) * np.pi / 400, 16)
+    found = ker.estimate(theta, LAW.sample(theta, rng), ker.Legendre(5))
+    assert not found.metadata["incoming_angles_follow_measure"]
+    exact = ker.discretise(LAW, ker.Legendre(5))
+    assert np.linalg.norm(found.symmetric - exact.symmetric) < 2.0 * float(found.error)
+    assert found.stochastic_defect() < 1e-14
+
+
+def test_pairs_of_any_shape_are_taken() -> None:
+    theta, image = pairs(600, 2)
+    flat = ker.estimate(theta, image, ker.Bins(4))
+    assert np.array_equal(ker.estimate(theta.reshape(20, 30), image.reshape(20, 30), ker.Bins(4)).array, flat.array)
+
+
+def test_empty_bins_are_named() -> None:
+    with pytest.raises(AccuracyError, match=r"2 of 4 bins have no incoming pair \(bins 2, 3\)") as caught:
+        ker.estimate([0.5, 1.2], [0.5, 3.0], ker.Bins(4))
+    assert caught.value.defect == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(
+    ("theta_in", "theta_out", "basis", "message"),
+    [
+        ([0.5, 1.0], [0.5], ker.Bins(1), "shape"),
+        ([0.0, 1.0], [0.5, 1.0], ker.Bins(1), "theta_in: expected angles"),
+        ([0.5, 1.0], [0.5, np.nan], ker.Bins(1), "theta_out: expected finite"),
+        ([0.5, 1.0], [0.5, 4.0], ker.Bins(1), "theta_out: expected angles"),
+        ([0.5, 1.0], [0.5, 1.0], 3, "basis"),
+        ([0.5, 1.0], [0.5, 1.0], ker.Bins(2, weight="sin2"), "sin"),
+        ([], [], ker.Bins(1), "at least 1"),
+        ([0.5] * 10, [0.5] * 10, ker.Legendre(2), "at least 16"),
+    ],
+)
+def test_bad_pairs_are_refused_in_one_sentence(
+    theta_in: list[float], theta_out: list[float], basis: ker.Basis, message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        ker.estimate(theta_in, theta_out, basis)
