@@ -7,19 +7,31 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import angles, finite_array
-from .tracing import trajectory
+from ..checks import Floats, angles, finite_array
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
 
+    from .curve import Curve
     from .wall import Wall
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 RAY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-SOLID = "0.82"
-OUTLINE_TOLERANCE = 1e-3
-FREE_SHARE = 0.35
+SOLID, LEVEL = "0.82", "0.5"
+# Curves are drawn within this share of the picture's size, and corners nearer to each other than it are drawn as one:
+# a tenth of a pixel in a picture a thousand pixels wide.
+OUTLINE_TOLERANCE = 1e-4
+# How much of the two neighbouring cells is drawn beside the cell, and of free space above it, in periods.
+MARGIN, FREE = 0.12, 0.3
+# Both axes have one scale if the depth is within these shares of the period; a shallower or deeper wall would be a
+# line, and its vertical axis says how much it is stretched.
+SHALLOWEST, DEEPEST = 0.04, 3.0
+# Height over width of the picture of a wall that is stretched.
+STRETCHED_SHAPE = {"shallow": 0.55, "deep": 1.6}
+# A ray that wanders farther through the cells of an open wall is followed this many cells to either side.
+MOST_CELLS = 2
 
 
 def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | None = None) -> Axes:
@@ -36,50 +48,109 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     Returns
     -------
     matplotlib Axes
-        Lengths are in the units of the wall; both axes have the same scale unless the wall is very flat.
+        Lengths are in the units of the wall. A dot marks where a ray enters, a ring where it leaves; a ray that does
+        not escape ends in a cross. Both axes have the same scale unless the wall is very shallow or very deep; the
+        label of the vertical axis then says by what factor it is stretched.
     """
+    places, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     if ax is None:
         from matplotlib import pyplot
 
         ax = pyplot.figure(layout="constrained").subplots()
-    outline = wall.outline(OUTLINE_TOLERANCE * wall.period)
-    height = FREE_SHARE * max(wall.depth, 0.3 * wall.period)
-    floor = -wall.depth - 0.25 * height
-    solid = np.vstack([outline, [wall.period, floor], [0.0, floor]])
-    ax.fill(solid[:, 0], solid[:, 1], color=SOLID, linewidth=0)
-    ax.plot(outline[:, 0], outline[:, 1], color="black", linewidth=1.2)
-    for island in wall.islands:
-        points = np.vstack([piece.flattened(OUTLINE_TOLERANCE * wall.period) for piece in island])
-        ax.fill(points[:, 0], points[:, 1], facecolor=SOLID, edgecolor="black", linewidth=1.2)
-    ax.axhline(0.0, color="0.5", linewidth=0.8, linestyle=":")
-    places, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
-    for i, (place, angle) in enumerate(zip(np.ravel(places), np.ravel(incoming), strict=True)):
-        _draw_ray(ax, wall, float(place), float(angle), height, RAY_COLOURS[i % len(RAY_COLOURS)])
-    ax.set_xlim(-0.02 * wall.period, 1.02 * wall.period)
-    ax.set_ylim(floor, height)
-    if wall.depth > 0.02 * wall.period:
-        ax.set_aspect("equal")
+    shallow = 0.0 < wall.depth < SHALLOWEST * wall.period
+    free = wall.depth if shallow else FREE * max(wall.period, wall.depth)
+    floor = -wall.depth - 0.25 * free
+    rays = [
+        _Ray(wall, float(place), float(angle), free)
+        for place, angle in zip(np.ravel(places), np.ravel(incoming), strict=True)
+    ]
+    inside = np.concatenate([[0.0, 1.0], *(ray.points[:, 0] / wall.period for ray in rays)])
+    first = max(int(np.floor(inside.min())), -MOST_CELLS)
+    last = min(int(np.ceil(inside.max())), 1 + MOST_CELLS)
+    _draw_solid(ax, wall, range(first - 1, last + 1), floor)
+    ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":", zorder=1)
+    for i, ray in enumerate(rays):
+        _draw_ray(ax, ray, RAY_COLOURS[i % len(RAY_COLOURS)])
+    left, right = (first - MARGIN) * wall.period, (last + MARGIN) * wall.period
+    ax.set_xlim(left, right)
+    ax.set_ylim(floor, free)
     ax.set_xlabel("x (length units of the wall)")
-    ax.set_ylabel("y")
+    _set_scale(ax, wall, right - left, free - floor, shallow)
+    ax.locator_params(axis="both", nbins=6)
     return ax
 
 
-def _draw_ray(ax: Axes, wall: Wall, x: float, theta: float, height: float, colour: str) -> None:
-    """One trajectory with its arrows: from above, through the wall, and out again."""
-    points = trajectory(wall, x, theta)
-    arrival = points[0] + height * np.array([np.cos(theta), np.sin(theta)]) / max(np.sin(theta), 0.2)
-    parts = [arrival, *points]
-    from .tracing import trace
+class _Ray:
+    """The path of one ray: where it comes from, its points inside, where it goes."""
 
-    ray = trace(wall, x, theta)
-    if bool(ray.escaped):
-        outgoing = float(ray.theta)
-        direction = np.array([np.cos(outgoing), np.sin(outgoing)])
-        parts.append(points[-1] + height * direction / max(direction[1], 0.2))
-    path = np.array(parts)
-    ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.1)
-    for start, end in ((path[0], path[1]), (path[-2], path[-1])):
-        ax.annotate(
-            "", xy=0.45 * start + 0.55 * end, xytext=0.55 * start + 0.45 * end,
-            arrowprops={"arrowstyle": "-|>", "color": colour},
-        )  # fmt: skip
+    def __init__(self, wall: Wall, x: float, theta: float, free: float) -> None:
+        from .tracing import trace, trajectory
+
+        self.points = trajectory(wall, x, theta)
+        self.arrival = self.points[0] + _up_to(free, theta)
+        result = trace(wall, x, theta)
+        self.departure = self.points[-1] + _up_to(free, float(result.theta)) if bool(result.escaped) else None
+
+
+def _up_to(height: float, theta: float) -> Floats:
+    """The vector along theta that rises by ``height``, or is as long as that at a slope of one in five."""
+    direction = np.array([np.cos(theta), np.sin(theta)])
+    return np.asarray(height * direction / max(direction[1], 0.2))
+
+
+def _draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> None:
+    size = max(wall.period, wall.depth)
+    outline = _thinned(wall.outline(OUTLINE_TOLERANCE * size), OUTLINE_TOLERANCE * size)
+    # the last point of a cell is the first of the next
+    path = np.concatenate([*(outline[:-1] + [k * wall.period, 0.0] for k in cells), outline[-1:]])
+    path[-1, 0] = (cells[-1] + 1) * wall.period
+    below = np.array([[path[-1, 0], floor], [path[0, 0], floor]])
+    solid = np.vstack([path, below])
+    ax.fill(solid[:, 0], solid[:, 1], color=SOLID, linewidth=0, zorder=1)
+    ax.plot(path[:, 0], path[:, 1], color="black", linewidth=1.2, zorder=2, solid_joinstyle="round")
+    for island in wall.islands:
+        loop = _loop(island, OUTLINE_TOLERANCE * size)
+        for k in cells:
+            ax.fill(loop[:, 0] + k * wall.period, loop[:, 1], facecolor=SOLID, edgecolor="black", linewidth=1.2, zorder=2)
+
+
+def _loop(island: Sequence[Curve], tolerance: float) -> Floats:
+    return np.vstack([piece.flattened(tolerance) for piece in island])
+
+
+def _thinned(points: Floats, step: float) -> Floats:
+    """Leave out points in the same square of side ``step`` as the one before: a wall may have 10^5 pieces."""
+    squares = np.floor(points / step)
+    keep = np.any(squares[1:] != squares[:-1], axis=1)
+    keep[-1] = True
+    return np.asarray(points[np.concatenate([[True], keep])])
+
+
+def _draw_ray(ax: Axes, ray: _Ray, colour: str) -> None:
+    """One trajectory: an arrow in, the path, an arrow out; a dot where it enters, a ring where it leaves."""
+    ends = [ray.departure] if ray.departure is not None else []
+    path = np.vstack([ray.arrival, ray.points, *ends])
+    ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.1, zorder=3)
+    style = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 13.0}
+    arrows = [(ray.arrival, ray.points[0], 0.55)]
+    ax.plot(*ray.points[0], "o", color=colour, markersize=4.5, zorder=4)
+    if ray.departure is None:
+        ax.plot(*ray.points[-1], "x", color=colour, markersize=7, zorder=4)
+    else:
+        ax.plot(*ray.points[-1], "o", markersize=5.5, mfc="white", mec=colour, mew=1.3, zorder=4)
+        arrows.append((ray.points[-1], ray.departure, 0.8))
+    for start, end, share in arrows:
+        tail, tip = start + (share - 0.05) * (end - start), start + share * (end - start)
+        ax.annotate("", xy=tuple(tip), xytext=tuple(tail), arrowprops=style, zorder=4, annotation_clip=True)
+
+
+def _set_scale(ax: Axes, wall: Wall, width: float, height: float, shallow: bool) -> None:
+    deep = wall.depth > DEEPEST * wall.period
+    if not (shallow or deep):
+        ax.set_aspect("equal")
+        ax.set_ylabel("y")
+        return
+    factor = STRETCHED_SHAPE["shallow" if shallow else "deep"] * width / height
+    ax.set_aspect(factor)
+    words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
+    ax.set_ylabel(f"y ({words} against x)")

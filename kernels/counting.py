@@ -53,20 +53,18 @@ def sum_products(basis: Basis, incoming: Floats, outgoing: Floats, weight: Float
 
 
 def array_from_counts(
-    parts: Sequence[Counts], basis: Basis, *, symmetrise: bool, invariant: bool, independent: bool
+    parts: Sequence[Counts | Floats], basis: Basis, *, symmetrise: bool, independent: bool
 ) -> SampledArray:
-    r"""The estimate from counts, one array of them for each independent randomisation.
+    r"""The estimate from counts C of pairs whose incoming angles follow the invariant measure.
 
     Parameters
     ----------
-    parts : sequence of (n, n) int64 arrays
-        One for pairs that are independent, several for randomised quasi-Monte Carlo.
+    parts : sequence of (n, n) arrays
+        One array for pairs that are independent; several, of independent randomisations or batches of the same size,
+        for others. Weights may stand for counts in the latter case.
     symmetrise : bool
         False: P[i, j] = C_ij / N_i, so that rows sum to 1. True: every pair counts both ways, and the flux is
-        F_ij = (C_ij + C_ji) / (E_i + E_j) with E_i = N where the incoming angles follow the invariant measure and
-        E_i = N_i / w_i where they do not, which is the maximum likelihood estimate of a symmetric flux.
-    invariant : bool
-        Whether the incoming angles follow the invariant measure.
+        (C_ij + C_ji) / (2 N).
     independent : bool
         Whether the pairs are independent, so that counts are multinomial; else errors come from the parts.
 
@@ -75,34 +73,31 @@ def array_from_counts(
     AccuracyError
         If a bin has no pairs; ``defect`` is the measure of such bins.
     """
-    counts = _summed(parts)
-    weights, rows = basis.weights, counts.sum(axis=1)
-    exposure = _exposure(counts, weights, invariant)
+    counts = parts[0] if len(parts) == 1 else _summed(parts)
+    number, rows = float(counts.sum()), counts.sum(axis=1)
     _check_occupied(rows + counts.sum(axis=0) if symmetrise else rows, basis)
     scale = basis.heights[:, None] * basis.heights  # from fluxes to the orthonormal basis
-    if symmetrise:
-        whole = exposure[:, None] + exposure
-        flux = _ratio(counts + counts.T, whole)
-    else:
-        whole = np.broadcast_to((rows / weights)[:, None], counts.shape)
-        flux = counts / whole
+    flux = (counts + counts.T) / (2.0 * number) if symmetrise else counts * (basis.weights / rows)[:, None]
     symmetric = scale * flux
     replicates = _Replicates(symmetric, len(parts))
     if independent:
-        variance = _variances(counts, flux, whole, weights, symmetrise, invariant)
-        error = float(np.linalg.norm(scale * np.sqrt(variance)))
-        z_score = reversibility_z_score(counts, weights, invariant)
+        error = float(np.linalg.norm(scale * np.sqrt(_variances(counts, basis.weights, symmetrise))))
+        z_score = reversibility_z_score(np.asarray(counts, dtype=np.int64))
     else:
         for part in parts:
             # the part's influence on the estimate: its numerators minus its denominators times the whole estimate
-            excess = _numerator(part, symmetrise) - _denominator(part, weights, invariant, symmetrise) * flux
-            replicates.add(len(parts) * scale * _ratio(excess, whole))
+            if symmetrise:
+                excess = (part + part.T) / (2.0 * number) - float(part.sum()) / number * flux
+            else:
+                excess = (part - (part.sum(axis=1) / rows)[:, None] * counts) * (basis.weights / rows)[:, None]
+            replicates.add(len(parts) * scale * excess)
         error = replicates.standard_error()
         pairs = np.nonzero(np.triu(counts + counts.T, 1))
         root = np.sqrt((counts + counts.T)[pairs])
         z_score = replicate_z_score([(part[pairs] - part.T[pairs]) / root for part in parts])
-    raw = relative_asymmetry(scale * _ratio(counts, exposure[:, None]))
-    return SampledArray(symmetric, error, replicates.kept(), SymmetryDefect(raw, z_score=z_score), counts)
+    raw = relative_asymmetry(scale * counts / number)
+    whole = np.asarray(counts, dtype=np.int64) if np.issubdtype(counts.dtype, np.integer) else None
+    return SampledArray(symmetric, error, replicates.kept(), SymmetryDefect(raw, z_score=z_score), whole)
 
 
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
@@ -158,51 +153,29 @@ def _with_constant(array: Floats, constant: Floats, both: bool) -> Floats:
     return array - np.outer(constant, constant @ array - constant) if both else array
 
 
-def _summed(parts: Sequence[Counts]) -> Counts:
-    total = np.zeros(parts[0].shape, dtype=np.int64)
-    for part in parts:
+def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:
+    total = parts[0].copy()
+    for part in parts[1:]:
         total += part
     return total
 
 
-def _exposure(counts: Counts, weights: Floats, invariant: bool) -> Floats:
-    return np.full(weights.size, float(counts.sum())) if invariant else counts.sum(axis=1) / weights
-
-
-def _numerator(counts: Counts, symmetrise: bool) -> Counts:
-    return counts + counts.T if symmetrise else counts
-
-
-def _denominator(part: Counts, weights: Floats, invariant: bool, symmetrise: bool) -> Floats:
-    if not symmetrise:
-        return np.asarray((part.sum(axis=1) / weights)[:, None])
-    exposure = _exposure(part, weights, invariant)
-    return np.asarray(exposure[:, None] + exposure)
-
-
-def _variances(
-    counts: Counts, flux: Floats, whole: Floats, weights: Floats, symmetrise: bool, invariant: bool
-) -> Floats:
+def _variances(counts: Counts | Floats, weights: Floats, symmetrise: bool) -> Floats:
     """Variances of the estimated fluxes for multinomial counts."""
-    rows = counts.sum(axis=1)
+    rows = counts.sum(axis=1)[:, None]
     if not symmetrise:
-        share = counts / rows[:, None]
+        share = counts / rows
         # unbiased for two rays or more; a single ray says nothing about its spread, which is then taken as large
-        spread = np.where(rows[:, None] > 1, share * (1.0 - share) / np.maximum(rows[:, None] - 1, 1), share)
+        spread = np.where(rows > 1, share * (1.0 - share) / np.maximum(rows - 1, 1), share)
         return np.asarray(weights[:, None] ** 2 * spread)
-    trials = np.broadcast_to(counts.sum() if invariant else np.maximum(rows, 1)[:, None], counts.shape)
-    single = counts * (1.0 - counts / trials)
-    doubled = np.where(np.eye(weights.size, dtype=bool), 4.0 * single, single + single.T)
-    return _ratio(doubled, whole**2)
+    number = float(counts.sum())
+    both = np.where(np.eye(weights.size, dtype=bool), counts, counts + counts.T) / number
+    # a pair on the diagonal counts fully, one off it by half at each of its two places
+    return np.asarray(np.where(np.eye(weights.size, dtype=bool), 1.0, 0.25) * both * (1.0 - both) / number)
 
 
-def _ratio(numerator: NDArray[Any], denominator: Floats) -> Floats:
-    denominator = np.broadcast_to(denominator, numerator.shape)
-    return np.asarray(np.divide(numerator, denominator, out=np.zeros(numerator.shape), where=denominator > 0.0))
-
-
-def _check_occupied(rows: Counts, basis: Basis) -> None:
-    empty = np.flatnonzero(rows == 0)
+def _check_occupied(rows: Counts | Floats, basis: Basis) -> None:
+    empty = np.flatnonzero(rows <= 0)
     if empty.size:
         named = ", ".join(map(str, empty[:WORST_NAMED])) + (", ..." if empty.size > WORST_NAMED else "")
         raise AccuracyError(
@@ -210,4 +183,3 @@ def _check_occupied(rows: Counts, basis: Basis) -> None:
             "cover all angles, or fewer bins",
             float(basis.weights[empty].sum()),
         )
-

@@ -225,8 +225,10 @@ class _Maker:
     def _sampled(self, law: Law, method: Method) -> KernelMatrix:
         chosen: SamplingMethod = "qmc" if method == "qmc" else "monte-carlo"
         array, used, lost = sampled_array(law, self.basis, chosen, self.samples, self.rng, self.symmetrise)
-        how = "variance of multinomial counts" if not array.replicates and chosen == "monte-carlo" else (
-            f"spread of {RANDOMISATIONS} randomisations"
+        how = (
+            "variance of multinomial counts"
+            if not array.replicates and chosen == "monte-carlo"
+            else (f"spread of {RANDOMISATIONS} randomisations")
         )
         if lost:
             how += ", plus a bound for rays that did not escape"

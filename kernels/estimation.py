@@ -45,14 +45,16 @@ def estimate(
         Without it rows sum to 1.
     invariant : bool, optional
         Whether the incoming angles follow sin(theta) d theta. By default decided by a test of their totals in bins.
-        Where they do not, fluxes are estimated from the rows, w_i C_ij / N_i; in bases without cells every pair is
-        weighted by the measure of the angles that are nearer to its own incoming angle than to any other.
+        Where they do not, C - C^T says nothing about reversibility, and rows of counts are not even averages over
+        their bins; every pair is then weighted by the measure of the angles that are nearer to its own incoming
+        angle than to any other of its batch.
 
     Returns
     -------
     KernelMatrix
-        With ``counts`` for Bins and the sampling error in ``error``, from the variance of multinomial counts, or
-        from the spread of 8 batches in bases without cells. The truncation to the basis is not part of it.
+        With the raw ``counts`` for Bins and the sampling error in ``error``, from the variance of multinomial
+        counts, or from the spread of 8 batches for weighted pairs and for bases without cells. The truncation to the
+        basis is not part of it.
 
     Raises
     ------
@@ -81,20 +83,23 @@ def estimate(
     if incoming.size < least:
         raise InputError(f"theta_in: expected at least {least} pairs for {basis!r}, got {incoming.size}")
     follows = _follows_measure(incoming, basis) if invariant is None else bool(invariant)
-    if basis.is_partition:
-        counts = count_pairs(basis, incoming, outgoing)
-        array = array_from_counts([counts], basis, symmetrise=symmetrise, invariant=follows, independent=True)
+    counts = count_pairs(basis, incoming, outgoing) if basis.is_partition else None
+    if counts is not None and (follows or incoming.size < 2 * BATCHES):
+        array = array_from_counts([counts], basis, symmetrise=symmetrise, independent=True)
         method = "variance of multinomial counts"
     else:
-        array = array_from_sums(
-            _batch_means(basis, incoming, outgoing, follows), basis, symmetrise=symmetrise, keeps_measure=False
-        )
         method = f"spread of {BATCHES} batches"
+        means = _batch_means(basis, incoming, outgoing, follows)
+        if counts is not None:
+            fluxes = [mean / (basis.heights[:, None] * basis.heights) for mean in means]
+            array = array_from_counts(fluxes, basis, symmetrise=symmetrise, independent=False)
+        else:
+            array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=False)
     return KernelMatrix(
         array.symmetric,
         basis,
         frobenius_error(array.error, "estimate", method),
-        counts=array.counts,
+        counts=counts,
         replicates=array.replicates,
         symmetrised=symmetrise,
         samples=incoming.size,
@@ -108,7 +113,7 @@ def estimate(
 def _follows_measure(incoming: Floats, basis: Basis) -> bool:
     bins = basis if isinstance(basis, Bins) else Bins(TEST_BINS)
     totals = np.bincount(bins.index(incoming), minlength=bins.size)
-    return invariance_z_score(totals[:, None].astype(np.int64), bins.weights) < NOT_INVARIANT_Z
+    return invariance_z_score(totals, bins.weights) < NOT_INVARIANT_Z
 
 
 def _batch_means(basis: Basis, incoming: Floats, outgoing: Floats, follows: bool) -> list[Floats]:

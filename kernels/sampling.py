@@ -83,7 +83,7 @@ def sampled_array(
             share,
         )
     if basis.is_partition:
-        array = array_from_counts(parts, basis, symmetrise=symmetrise, invariant=True, independent=independent)
+        array = array_from_counts(parts, basis, symmetrise=symmetrise, independent=independent)
     else:
         means = [part / each for part in parts]
         array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=bool(law.reversible))

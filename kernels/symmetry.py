@@ -76,62 +76,27 @@ def relative_asymmetry(symmetric: Floats) -> float:
     return float(np.linalg.norm(symmetric - symmetric.T)) / (2.0 * whole) if whole > 0.0 else 0.0
 
 
-def reversibility_z_score(counts: NDArray[np.int64], weights: Floats, invariant: bool) -> float:
+def reversibility_z_score(counts: NDArray[np.int64]) -> float:
     r"""The z-score of the hypothesis that the law behind transition counts is reversible.
 
     Parameters
     ----------
     counts : ndarray of int64, shape (n, n)
-        Raw counts C of pairs (incoming bin, outgoing bin), from independent pairs.
-    weights : ndarray, shape (n,)
-        The invariant measure of the bins.
-    invariant : bool
-        Whether the incoming angles were drawn from the invariant measure. If so the test is that of C - C^T; if not
-        it compares the flux estimates w_i C_ij / N_i and w_j C_ji / N_j.
+        Raw counts C of independent pairs (incoming bin, outgoing bin), the incoming angles drawn from the invariant
+        measure. (Where they were not, C - C^T says nothing; `estimate` then compares fluxes by `replicate_z_score`.)
 
     Notes
     -----
-    With incoming angles from the invariant measure, given n = C_ij + C_ji, C_ij is binomial (n, 1/2) and independent
-    for different pairs i < j, so Z = (C_ij - C_ji)/sqrt(n) has E Z^2 = 1 and Var Z^2 = 2 - 2/n exactly, for small
-    counts too. The sum of Z^2 over pairs is matched to a scaled chi-square by its two moments, which is then made
-    normal by the cube root (Wilson-Hilferty). Otherwise every row is multinomial given its total N_i; the variance
-    of the difference of fluxes uses the pooled flux f = n / (N_i/w_i + N_j/w_j), and the correlation of pairs that
-    share a row enters the variance of the sum.
+    Given n = C_ij + C_ji, C_ij is binomial (n, 1/2) and independent for different pairs i < j, so that
+    Z = (C_ij - C_ji)/sqrt(n) has E Z^2 = 1 and Var Z^2 = 2 - 2/n exactly, for small counts too; n = 1 says nothing.
+    The sum of Z^2 over pairs is matched to a scaled chi-square by its two moments, which is then made normal by the
+    cube root (Wilson-Hilferty).
     """
     upper = np.triu_indices(counts.shape[0], 1)
     forth, back = counts[upper].astype(np.float64), counts.T[upper].astype(np.float64)
-    pair = forth + back
-    if invariant:
-        informative = pair >= 2.0
-        pair, difference = pair[informative], (forth - back)[informative]
-        return _cube_root_score(float(np.sum(difference**2 / pair)), pair.size, float(np.sum(2.0 - 2.0 / pair)))
-    totals = counts.sum(axis=1).astype(np.float64)
-    exposure = totals / weights
-    both = (pair > 0.0) & (totals[upper[0]] > 0.0) & (totals[upper[1]] > 0.0)
-    first, second = upper[0][both], upper[1][both]
-    flux = pair[both] / (exposure[first] + exposure[second])
-    # (n - 1) n has the expectation of n^2 without its noise, so the binomial factor 1 - p is unbiased for small n
-    rest = flux * (1.0 - 1.0 / pair[both])
-    shares = np.minimum(rest / weights[first], 1.0), np.minimum(rest / weights[second], 1.0)
-    parts = flux / exposure[first] * (1.0 - shares[0]), flux / exposure[second] * (1.0 - shares[1])
-    variance = parts[0] + parts[1]
-    spread = variance > 0.0
-    first, second, flux, variance = first[spread], second[spread], flux[spread], variance[spread]
-    difference = (forth / _positive(exposure[upper[0]]) - back / _positive(exposure[upper[1]]))[both][spread]
-    statistic = float(np.sum(difference**2 / variance))
-    # excess kurtosis of a binomial with share q = exposure_i / (exposure_i + exposure_j), given the pair's count
-    share = exposure[first] / (exposure[first] + exposure[second])
-    product = share * (1.0 - share)
-    kurtosis = np.sum((1.0 - 6.0 * product) / (pair[both][spread] * product))
-    # correlation of (i, j) and (i, k): - w_i^2 p_ij p_ik / N_i = - f_ij f_ik / N_i over the two standard deviations
-    squared = np.zeros_like(weights)
-    fourth = np.zeros_like(weights)
-    for row in (first, second):
-        entry = flux**2 / (variance * totals[row])
-        np.add.at(squared, row, entry)
-        np.add.at(fourth, row, entry**2)
-    correlation = 2.0 * np.sum(squared**2 - fourth)
-    return _cube_root_score(statistic, variance.size, float(2.0 * variance.size + kurtosis + correlation))
+    informative = forth + back >= 2.0
+    pair, difference = (forth + back)[informative], (forth - back)[informative]
+    return _cube_root_score(float(np.sum(difference**2 / pair)), pair.size, float(np.sum(2.0 - 2.0 / pair)))
 
 
 def replicate_z_score(antisymmetric: list[Floats]) -> float:
@@ -146,18 +111,13 @@ def replicate_z_score(antisymmetric: list[Floats]) -> float:
     return float(np.mean(products)) / error if error > 0.0 else 0.0
 
 
-def invariance_z_score(counts: NDArray[np.int64], weights: Floats) -> float:
-    """The z-score of the hypothesis that incoming angles were drawn from the invariant measure (row totals)."""
-    totals = counts.sum(axis=1).astype(np.float64)
-    expected = totals.sum() * weights
+def invariance_z_score(totals: NDArray[np.int64], weights: Floats) -> float:
+    """The z-score of the hypothesis that incoming angles, counted in bins, were drawn from the invariant measure."""
+    expected = float(totals.sum()) * weights
     # Pearson's statistic of a multinomial has mean n - 1 and variance 2 (n - 1) + (sum 1/w - n^2 - 2 n + 2)/N
     freedom = weights.size - 1
-    variance = 2.0 * freedom + (np.sum(1.0 / weights) - weights.size**2 - 2.0 * freedom) / max(totals.sum(), 1.0)
+    variance = 2.0 * freedom + (np.sum(1.0 / weights) - weights.size**2 - 2.0 * freedom) / max(float(totals.sum()), 1.0)
     return _cube_root_score(float(np.sum((totals - expected) ** 2 / expected)), freedom, float(variance))
-
-
-def _positive(values: Floats) -> Floats:
-    return np.where(values > 0.0, values, 1.0)
 
 
 def _cube_root_score(statistic: float, mean: float, variance: float) -> float:

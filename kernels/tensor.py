@@ -48,9 +48,7 @@ class TensorBasis(Basis):
 
     def __init__(self, factors: tuple[Basis, ...]) -> None:
         flat = tuple(
-            part
-            for factor in factors
-            for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))
+            part for factor in factors for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))
         )
         if len(flat) < 2 or not all(isinstance(factor, Basis) for factor in flat):
             raise InputError(f"factors: expected two bases or more, got {factors!r}")

