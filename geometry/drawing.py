@@ -28,8 +28,12 @@ MARGIN, FREE = 0.12, 0.3
 # Both axes have one scale if the depth is within these shares of the period; a shallower or deeper wall would be a
 # line, and its vertical axis says how much it is stretched.
 SHALLOWEST, DEEPEST = 0.04, 3.0
-# Height over width of the picture of a wall that is stretched.
-STRETCHED_SHAPE = {"shallow": 0.55, "deep": 1.6}
+# Height over width of the picture of one cell of a wall that is stretched.
+SHALLOW_SHAPE, DEEP_SHAPE = 0.55, 1.6
+# Outlines with more points than this are drawn with a thin pen, which does not blot their details.
+FINE_POINTS = 2000
+# Rays that rise less than this in the picture leave it sideways.
+FLATTEST = 0.2
 # A ray that wanders farther through the cells of an open wall is followed this many cells to either side.
 MOST_CELLS = 2
 
@@ -57,9 +61,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
         from matplotlib import pyplot
 
         ax = pyplot.figure(layout="constrained").subplots()
-    shallow = 0.0 < wall.depth < SHALLOWEST * wall.period
-    free = wall.depth if shallow else FREE * max(wall.period, wall.depth)
-    floor = -wall.depth - 0.25 * free
+    free, floor = _heights(wall)
     rays = [
         _Ray(wall, float(place), float(angle), free)
         for place, angle in zip(np.ravel(places), np.ravel(incoming), strict=True)
@@ -75,9 +77,35 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     ax.set_xlim(left, right)
     ax.set_ylim(floor, free)
     ax.set_xlabel("x (length units of the wall)")
-    _set_scale(ax, wall, right - left, free - floor, shallow)
+    factor = vertical_stretch(wall)
+    words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
+    ax.set_ylabel("y" if factor == 1.0 else f"y ({words} against x)")
+    ax.set_aspect(factor)
     ax.locator_params(axis="both", nbins=6)
     return ax
+
+
+def vertical_stretch(wall: Wall) -> float:
+    """How many times larger y is drawn than x: 1 unless the wall is very shallow or very deep.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> vertical_stretch(geo.flat()), vertical_stretch(geo.rectangular_teeth(1e4)) < 1
+    (1.0, True)
+    """
+    if wall.depth == 0.0 or SHALLOWEST * wall.period <= wall.depth <= DEEPEST * wall.period:
+        return 1.0
+    free, floor = _heights(wall)
+    shape = SHALLOW_SHAPE if wall.depth < wall.period else DEEP_SHAPE
+    return shape * (1.0 + 2.0 * MARGIN) * wall.period / (free - floor)
+
+
+def _heights(wall: Wall) -> tuple[float, float]:
+    """Top and bottom of the picture: where free space and the solid end."""
+    shallow = 0.0 < wall.depth < SHALLOWEST * wall.period
+    free = wall.depth if shallow else FREE * max(wall.period, wall.depth)
+    return free, -wall.depth - 0.25 * free
 
 
 class _Ray:
@@ -86,30 +114,33 @@ class _Ray:
     def __init__(self, wall: Wall, x: float, theta: float, free: float) -> None:
         from .tracing import trace, trajectory
 
+        stretch = vertical_stretch(wall)
         self.points = trajectory(wall, x, theta)
-        self.arrival = self.points[0] + _up_to(free, theta)
+        self.arrival = self.points[0] + _up_to(free, theta, stretch)
         result = trace(wall, x, theta)
-        self.departure = self.points[-1] + _up_to(free, float(result.theta)) if bool(result.escaped) else None
+        self.departure = self.points[-1] + _up_to(free, float(result.theta), stretch) if bool(result.escaped) else None
 
 
-def _up_to(height: float, theta: float) -> Floats:
-    """The vector along theta that rises by ``height``, or is as long as that at a slope of one in five."""
+def _up_to(height: float, theta: float, stretch: float) -> Floats:
+    """The vector along theta that rises by ``height``, or less where it is flat in the picture."""
     direction = np.array([np.cos(theta), np.sin(theta)])
-    return np.asarray(height * direction / max(direction[1], 0.2))
+    return np.asarray(height * direction / max(direction[1], FLATTEST * abs(direction[0]) / stretch))
 
 
 def _draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> None:
-    size = max(wall.period, wall.depth)
-    outline = _thinned(wall.outline(OUTLINE_TOLERANCE * size), OUTLINE_TOLERANCE * size)
+    # a tenth of a pixel in either direction
+    step = OUTLINE_TOLERANCE * np.array([wall.period, -floor])
+    outline = _thinned(wall.outline(float(step.min())), step)
+    pen = 1.2 if len(outline) <= FINE_POINTS else 0.6
     # the last point of a cell is the first of the next
     path = np.concatenate([*(outline[:-1] + [k * wall.period, 0.0] for k in cells), outline[-1:]])
     path[-1, 0] = (cells[-1] + 1) * wall.period
     below = np.array([[path[-1, 0], floor], [path[0, 0], floor]])
     solid = np.vstack([path, below])
     ax.fill(solid[:, 0], solid[:, 1], color=SOLID, linewidth=0, zorder=1)
-    ax.plot(path[:, 0], path[:, 1], color="black", linewidth=1.2, zorder=2, solid_joinstyle="round")
+    ax.plot(path[:, 0], path[:, 1], color="black", linewidth=pen, zorder=2, solid_joinstyle="round")
     for island in wall.islands:
-        loop = _loop(island, OUTLINE_TOLERANCE * size)
+        loop = _loop(island, float(step.min()))
         for k in cells:
             ax.fill(loop[:, 0] + k * wall.period, loop[:, 1], facecolor=SOLID, edgecolor="black", linewidth=1.2, zorder=2)
 
@@ -118,10 +149,10 @@ def _loop(island: Sequence[Curve], tolerance: float) -> Floats:
     return np.vstack([piece.flattened(tolerance) for piece in island])
 
 
-def _thinned(points: Floats, step: float) -> Floats:
-    """Leave out points in the same square of side ``step`` as the one before: a wall may have 10^5 pieces."""
-    squares = np.floor(points / step)
-    keep = np.any(squares[1:] != squares[:-1], axis=1)
+def _thinned(points: Floats, step: Floats) -> Floats:
+    """Leave out points in the same rectangle of sides ``step`` as the one before: a wall may have 10^5 pieces."""
+    cells_of = np.floor(points / step)
+    keep = np.any(cells_of[1:] != cells_of[:-1], axis=1)
     keep[-1] = True
     return np.asarray(points[np.concatenate([[True], keep])])
 
@@ -142,15 +173,3 @@ def _draw_ray(ax: Axes, ray: _Ray, colour: str) -> None:
     for start, end, share in arrows:
         tail, tip = start + (share - 0.05) * (end - start), start + share * (end - start)
         ax.annotate("", xy=tuple(tip), xytext=tuple(tail), arrowprops=style, zorder=4, annotation_clip=True)
-
-
-def _set_scale(ax: Axes, wall: Wall, width: float, height: float, shallow: bool) -> None:
-    deep = wall.depth > DEEPEST * wall.period
-    if not (shallow or deep):
-        ax.set_aspect("equal")
-        ax.set_ylabel("y")
-        return
-    factor = STRETCHED_SHAPE["shallow" if shallow else "deep"] * width / height
-    ax.set_aspect(factor)
-    words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
-    ax.set_ylabel(f"y ({words} against x)")

@@ -27,6 +27,8 @@ SIGNIFICANCE = 10.0
 # Two refinements in a row must each shrink the change of the eigenvalue by this factor before it is called isolated:
 # at an essential edge the change falls only like a power of 1/log(n), by less than 2 a doubling.
 ISOLATED_SHRINKAGE = 3.0
+# At an essential edge the change by a doubling stays above a hundredth of the gap for every basis in reach.
+NEGLIGIBLE_GAP = 1e-3
 # Changes below this many rounding errors say nothing about convergence.
 ROUNDING_FLOOR = 1e-12
 
@@ -123,9 +125,10 @@ def _refined(law: Law, tolerance: float, rng: np.random.Generator) -> SpectralGa
         found = spectrum(matrix, k=min(4, matrix.basis.size))
         levels.append(found)
         evidence.append(f"{matrix.basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
-        if found.gap_error <= tolerance and len(levels) >= FEWEST_LEVELS:
+        enough = found.gap_error <= tolerance and len(levels) >= FEWEST_LEVELS
+        if enough and _verdict(levels, tolerance) == "isolated":
             break
-    return _as_gap(levels[-1], _verdict(levels), tuple(evidence))
+    return _as_gap(levels[-1], _verdict(levels, tolerance), tuple(evidence))
 
 
 def _matrices(law: Law, tolerance: float, rng: np.random.Generator) -> Iterator[KernelMatrix]:
@@ -146,12 +149,18 @@ def _matrices(law: Law, tolerance: float, rng: np.random.Generator) -> Iterator[
             degree *= 2
 
 
-def _verdict(levels: list[Spectrum]) -> Verdict:
-    """Isolated if each of the last two refinements shrank the change, or left one that sampling explains."""
+def _verdict(levels: list[Spectrum], tolerance: float) -> Verdict:
+    """Isolated if each of the last two refinements shrank the change, or left one that is negligible.
+
+    Negligible is what sampling explains, or what is below the tolerance and a small share of the gap.
+    """
     gaps = np.array([level.gap for level in levels])
     noise = np.array([NORMAL_95 * level.gap_errors.sampling[0] + ROUNDING_FLOOR for level in levels])
     change = np.abs(np.diff(gaps))
-    settled = (change[1:] * ISOLATED_SHRINKAGE <= change[:-1]) | (change[1:] <= noise[1:-1] + noise[2:])
+    small = np.minimum(tolerance, NEGLIGIBLE_GAP * gaps[2:])
+    settled = (change[1:] * ISOLATED_SHRINKAGE <= change[:-1]) | (
+        change[1:] <= np.maximum(noise[1:-1] + noise[2:], small)
+    )
     known = levels[-1].gap > SIGNIFICANCE * levels[-1].gap_error
     return "isolated" if len(settled) and settled[-2:].all() and known else "undecided"
 

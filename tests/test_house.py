@@ -42,9 +42,9 @@ def test_an_import_loads_no_heavy_library(statements):
     assert modules_loaded_by(statements) & HEAVY == set()
 
 
-def test_a_plain_trace_loads_only_the_compiler():
+def test_a_plain_trace_loads_only_the_compiler_and_the_checker_of_crossings():
     trace = "from asperity import geometry as g; g.trace(g.triangular_teeth(1.0), [0.2], [1.0])"
-    assert modules_loaded_by(trace) & HEAVY <= {"numba"}
+    assert modules_loaded_by(trace) & HEAVY <= {"numba", "shapely"}
 
 
 def test_the_front_door_opens_within_three_tenths_of_a_second():

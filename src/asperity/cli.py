@@ -54,7 +54,7 @@ def main() -> None:
 @click.argument("wall")
 @with_disk
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
-@click.option("--tolerance", default=1e-4, show_default=True, help="Error asked of the spectral gaps.")
+@click.option("--tolerance", default=1e-3, show_default=True, help="Error asked of gaps and matrices.")
 @click.option("--bins", default=128, show_default=True, help="Number of equal-measure bins of the matrix.")
 @click.option("--seed", default=0, show_default=True, help="Seed of the random generator.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the summary.")
@@ -101,12 +101,12 @@ def gap(wall: str, specular: bool, tolerance: float, as_json: bool) -> None:
     from .geometry import wall_from_text
     from .kernels import WallLaw
     from .spectral import spectral_gap
-    from .study import gap_as_dict
+    from .study_text import gap_as_dict
 
     law = WallLaw(wall_from_text(wall))
     found = spectral_gap(law.in_specular_frame() if specular else law, tolerance)
     if as_json:
-        click.echo(json.dumps(gap_as_dict(found), indent=2))
+        click.echo(json.dumps(gap_as_dict(found), indent=2, allow_nan=False))
     else:
         click.echo("\n".join([str(found), *(f"  {line}" for line in found.evidence)]))
 
@@ -117,8 +117,10 @@ def gap(wall: str, specular: bool, tolerance: float, as_json: bool) -> None:
 def walls(out: Path | None, force: bool) -> None:
     """List the named walls with their parameters and defaults, and draw them."""
     from .geometry import WALLS
-    from .study_picture import draw_gallery
+    from .study_picture import check_picture_path, draw_gallery
 
+    if out is not None:
+        check_picture_path(out, overwrite=force)
     for entry in WALLS.values():
         parameters = ", ".join(f"{key}={value:g}" for key, value in entry.defaults.items())
         click.echo(f"{entry.name:20s} {entry.summary}" + (f" [{parameters}]" if parameters else ""))

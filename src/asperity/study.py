@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .errors import FileExistsRefusal, InputError
+from .checks import positive_number
+from .errors import AccuracyError, FileExistsRefusal, InputError
 from .estimates import Estimate
-from .geometry import Disk, Wall, draw_wall, trace
-from .kernels import Bins, CollisionLaw, KernelMatrix, WallLaw, discretise
+from .geometry import Disk, Wall, trace
+from .kernels import Bins, CollisionLaw, KernelMatrix, Law, Legendre, WallLaw, discretise
 from .kernels.measure import SINE
 from .spectral import SpectralGap, Spectrum, spectral_gap, spectrum
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 BINS = 128
+TOLERANCE = 1e-3
 CHECK_RAYS = 2**16
-PICTURE_RAYS = 6
-PICTURE_BOUNCES = 40
+# Enough polynomials for the ten largest eigenvalues; the gap refines its own basis.
+SPECTRUM_BASIS, EIGENVALUES = Legendre(48), 10
 PICTURES = ("wall.png", "kernel.png", "spectrum.png", "collision.png")
 DATA = ("kernel.npz", "study.json")
 
@@ -35,62 +41,71 @@ class TracerCheck:
     mean_collisions : Estimate
         Mean number of collisions of the rays that enter a hollow.
     expected_collisions : float
-        |boundary of the hollows| / |openings| (Kac's formula); they agree where no part is unreachable.
+        |boundary of the hollows| / |openings|: Kac's formula for hollows all of whose boundary can be reached from the
+        opening. Where a part cannot, as in the caps of mushrooms, the mean is smaller, by that part's share.
     """
 
-    counts: dict[str, int]
+    counts: Mapping[str, int]
     mean_collisions: Estimate
     expected_collisions: float
 
     @property
     def z_score(self) -> float:
-        """Deviation of the mean from Kac's formula in standard errors."""
-        return (self.mean_collisions.value - self.expected_collisions) / self.mean_collisions.error
+        """Deviation of the mean from Kac's formula in standard errors; 0 where every ray has the same number."""
+        deviation = self.mean_collisions.value - self.expected_collisions
+        return deviation / self.mean_collisions.error if self.mean_collisions.error > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
 class Study:
-    """Everything that `study_wall` found; ``summary()`` is text, ``to_json()`` a string, ``save`` writes files."""
+    """Everything that `study_wall` found; ``summary()`` is text, ``to_json()`` a string, ``save`` writes files.
+
+    Attributes
+    ----------
+    name : str
+    wall : Wall
+    disk : Disk
+    tolerance : float
+        What was asked of the matrices (Frobenius norm) and of the gaps.
+    tracer : TracerCheck or None
+        None for walls without hollows, and for open walls, whose rays pass from cell to cell.
+    matrix : KernelMatrix
+        P~ of the wall in bins.
+    gap, specular_gap : SpectralGap or None
+        Of P~ in the paper's and in Feres' convention; the second only for mirror-symmetric walls, whose law is then
+        self-adjoint. None also where ``refusals`` says why.
+    spectrum : Spectrum or None
+        Ten eigenvalues of P~; of the matrix in bins where the law has no gap.
+    collision : CollisionLaw
+    collision_matrix : KernelMatrix
+        P~ of the foreshortened wall, in bins.
+    collision_gap : SpectralGap or None
+    conservation : dict
+        Largest relative change of the kinetic energy and of the rolling momentum in sampled collisions.
+    refusals : dict
+        By the name of the attribute, why a spectral quantity is missing.
+    """
 
     name: str
     wall: Wall
     disk: Disk
+    tolerance: float
     tracer: TracerCheck | None
     matrix: KernelMatrix
-    gap: SpectralGap
+    gap: SpectralGap | None
     specular_gap: SpectralGap | None
-    spectrum: Spectrum
+    spectrum: Spectrum | None
     collision: CollisionLaw
     collision_matrix: KernelMatrix
-    collision_gap: SpectralGap
-    conservation: dict[str, float] = field(default_factory=dict)
+    collision_gap: SpectralGap | None
+    conservation: Mapping[str, float]
+    refusals: Mapping[str, str]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain numbers and strings, ready for JSON."""
-        wall = self.wall
-        return {
-            "wall": {
-                "name": self.name, "period": wall.period, "depth": wall.depth, "arc_length": wall.arc_length,
-                "pieces": len(wall.pieces), "hollows": len(wall.hollows), "closes": wall.closes,
-                "polygonal": wall.is_polygonal, "mirror_symmetric": wall.is_mirror_symmetric,
-            },
-            "tracer": None if self.tracer is None else {
-                "rays": self.tracer.counts, "mean_collisions": _estimate(self.tracer.mean_collisions),
-                "kac": self.tracer.expected_collisions, "z_score": self.tracer.z_score,
-            },
-            "law": _matrix(self.matrix),
-            "gap": {"paper": gap_as_dict(self.gap), "specular": None if self.specular_gap is None else gap_as_dict(self.specular_gap)},
-            "eigenvalues": {
-                "convention": self.spectrum.convention, "method": self.spectrum.method,
-                "values": self.spectrum.values.tolist(),
-                **{part: _finite(getattr(self.spectrum.errors, part)) for part in
-                   ("algebraic", "discretisation", "sampling")},
-            },
-            "collision": {
-                "mass": self.disk.mass, "inertia": self.disk.inertia, "foreshortening": self.disk.foreshortening,
-                "law": _matrix(self.collision_matrix), "gap": gap_as_dict(self.collision_gap), **self.conservation,
-            },
-        }  # fmt: skip
+        """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
+        from .study_text import study_as_dict
+
+        return study_as_dict(self)
 
     def to_json(self) -> str:
         """The study as JSON."""
@@ -98,37 +113,9 @@ class Study:
 
     def summary(self) -> str:
         """The study as text, one fact a line."""
-        wall, disk = self.wall, self.disk
-        lines = [
-            f"wall       {self.name}: period {wall.period:g}, depth {wall.depth:.6g}, length {wall.arc_length:.6g}, "
-            f"{len(wall.pieces)} pieces, {len(wall.hollows)} hollows"
-            + ("" if wall.closes else ", open (rays may pass from cell to cell)"),
-        ]
-        if self.tracer is not None:
-            flagged = {k: n for k, n in self.tracer.counts.items() if n and k != "escaped"}
-            lines.append(
-                f"rays       {sum(self.tracer.counts.values())} traced, not escaped: {flagged or 'none'}; mean collisions "
-                f"{self.tracer.mean_collisions.value:.5f} +- {self.tracer.mean_collisions.error:.1g} "
-                f"(Kac: {self.tracer.expected_collisions:.5f}, z = {self.tracer.z_score:+.2f})"
-            )
-        lines += [
-            f"law P~     {self.matrix!r}",
-            f"symmetry   {self.matrix.symmetry_defect()}",
-            f"rows       {self.matrix.stochastic_defect()}",
-            f"gap        {self.gap}",
-        ]
-        if self.specular_gap is not None:
-            lines.append(f"           {self.specular_gap}")
-        values = ", ".join(f"{v:.6g}" for v in self.spectrum.values[:6])
-        lines += [
-            f"spectrum   {values}, ... ({self.spectrum.convention} convention, {self.spectrum.method})",
-            f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}",
-            f"collision  K = delta x P~ x delta(pi - psi), P~ of the foreshortened wall: {self.collision_matrix!r}",
-            f"           gap of that P~: {self.collision_gap}",
-            f"           energy kept to {self.conservation['energy_defect']:.1e}, "
-            f"-m v1 + J omega to {self.conservation['rolling_momentum_defect']:.1e} (relative)",
-        ]
-        return "\n".join(lines)
+        from .study_text import summary_of
+
+        return summary_of(self)
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
         """Write the pictures, the matrix with its metadata, and the study as JSON; returns the paths.
@@ -140,39 +127,16 @@ class Study:
         InputError
             If the folder cannot be made or written.
         """
+        from .study_picture import save_pictures
+
         target = prepare_folder(folder, overwrite=overwrite)
-        paths = [target / name for name in (*PICTURES, *DATA)]
-        for path, draw in zip(paths, (self._draw_wall, self._draw_kernel, self._draw_spectrum, self._draw_collision),
-                              strict=False):  # fmt: skip
-            _save_picture(path, draw)
-        self.matrix.save(target / "kernel.npz", overwrite=True)
-        (target / "study.json").write_text(self.to_json() + "\n", encoding="utf-8")
-        return paths
-
-    def _draw_wall(self, ax: Any) -> None:
-        # spread the rays over the largest hollow, at angles that show single and multiple bounces
-        low, high = (0.0, self.wall.period)
-        if self.wall.hollows:
-            widest = max(self.wall.hollows, key=lambda hollow: hollow.right - hollow.left)
-            low, high = widest.left, widest.right
-        x = low + (high - low) * (np.arange(PICTURE_RAYS) + 0.5) / PICTURE_RAYS
-        theta = np.linspace(2.4, 0.8, PICTURE_RAYS)
-        ray = trace(self.wall, x, theta)
-        shown = ray.escaped & (ray.collisions <= PICTURE_BOUNCES)
-        draw_wall(self.wall, x[shown], theta[shown], ax=ax)
-        ax.set_title(f"{self.name} and {int(shown.sum())} rays")
-
-    def _draw_kernel(self, ax: Any) -> None:
-        self.matrix.plot(ax)
-        ax.set_title(f"Reflection law of {self.name}")
-
-    def _draw_spectrum(self, ax: Any) -> None:
-        self.spectrum.plot(ax)
-
-    def _draw_collision(self, ax: Any) -> None:
-        from .study_picture import draw_outgoing_velocities
-
-        draw_outgoing_velocities(self.collision, ax)
+        try:
+            save_pictures(self, [target / name for name in PICTURES])
+            self.matrix.save(target / DATA[0], overwrite=True)
+            (target / DATA[1]).write_text(self.to_json() + "\n", encoding="utf-8")
+        except OSError as reason:
+            raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
+        return [target / name for name in (*PICTURES, *DATA)]
 
 
 def study_wall(
@@ -180,7 +144,7 @@ def study_wall(
     name: str = "wall",
     disk: Disk | None = None,
     *,
-    tolerance: float = 1e-4,
+    tolerance: float = TOLERANCE,
     bins: int = BINS,
     rng: np.random.Generator | None = None,
 ) -> Study:
@@ -194,7 +158,7 @@ def study_wall(
     disk : Disk, optional
         By default the uniform disk, mass 1 and inertia 1/2.
     tolerance : float
-        Error asked of the gaps; what was reached is reported.
+        Error asked of the gaps and of the matrices; what was reached is reported.
     bins : int
         Size of the matrix.
     rng : numpy.random.Generator, optional
@@ -203,53 +167,98 @@ def study_wall(
     Returns
     -------
     Study
+        A quantity that a check forbids to quote (as a spectrum, where the sampled law looks irreversible) is None, and
+        ``refusals`` says why; the rest of the study stands.
+
+    Raises
+    ------
+    InputError
+        If the tolerance or the number of bins is unsuitable.
+    AccuracyError
+        If more than 1e-4 of the rays do not escape.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> report = study_wall(geo.rectangular_teeth(2.0), bins=16)
+    >>> report.gap.verdict, report.matrix.method
+    ('no gap', 'exact')
     """
     from tqdm import tqdm
 
+    positive_number("tolerance", tolerance)
+    basis = Bins(bins)
     rng = rng or np.random.default_rng(0)
     disk = disk or Disk()
+    refusals: dict[str, str] = {}
+
+    def gap_of(law: Law, which: str) -> SpectralGap | None:
+        try:
+            return spectral_gap(law, tolerance, rng)
+        except AccuracyError as reason:
+            refusals[which] = str(reason)
+            return None
+
     # silent where standard error is not a terminal, and in the first two seconds
-    with tqdm(total=6, desc=name, delay=2, disable=None, leave=False) as progress:
+    with tqdm(total=7, desc=name, delay=2, disable=None, leave=False) as progress:
         tracer = _check_tracer(wall, rng) if wall.hollows else None
         progress.update()
         law = WallLaw(wall)
-        matrix = discretise(law, Bins(bins), rng=rng)
+        matrix = discretise(law, basis, tolerance=tolerance, rng=rng)
         progress.update()
-        gap = spectral_gap(law, tolerance, rng)
+        gap = gap_of(law, "gap")
         progress.update()
-        specular_gap = spectral_gap(law.in_specular_frame(), tolerance, rng) if wall.is_mirror_symmetric else None
+        specular_gap = gap_of(law.in_specular_frame(), "specular_gap") if wall.is_mirror_symmetric else None
         progress.update()
-        found = gap.spectrum if gap.spectrum is not None else spectrum(matrix, k=10)
+        found = None
+        try:
+            found = _spectrum(law, matrix, gap, tolerance, rng)
+        except AccuracyError as reason:
+            refusals["spectrum"] = str(reason)
+        progress.update()
         collision = CollisionLaw.from_wall(wall, disk)
-        collision_matrix = discretise(collision.law, Bins(bins), rng=rng)
+        collision_matrix = discretise(collision.law, basis, tolerance=tolerance, rng=rng)
         progress.update()
-        collision_gap = spectral_gap(collision.law, tolerance, rng)
+        collision_gap = gap_of(collision.law, "collision_gap")
         progress.update()
     return Study(
-        name, wall, disk, tracer, matrix, gap, specular_gap, found, collision, collision_matrix, collision_gap,
-        _conservation(collision, rng),
+        name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, collision, collision_matrix,
+        collision_gap, MappingProxyType(_conservation(collision, rng)), MappingProxyType(refusals),
     )  # fmt: skip
 
 
 def prepare_folder(folder: str | Path, *, overwrite: bool) -> Path:
     """Make the output folder, and refuse it where a file of an earlier study would be lost."""
     target = Path(folder)
-    existing = [name for name in (*PICTURES, *DATA) if (target / name).exists()]
-    if existing and not overwrite:
-        raise FileExistsRefusal(f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them")
     try:
+        existing = [name for name in (*PICTURES, *DATA) if (target / name).exists()]
+        if existing and not overwrite:
+            raise FileExistsRefusal(
+                f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them"
+            )
         target.mkdir(parents=True, exist_ok=True)
         probe = target / ".asperity-probe"
         probe.touch()
         probe.unlink()
+    except FileExistsRefusal:
+        raise
     except OSError as reason:
         raise InputError(f"{target}: cannot write there ({reason.strerror}); choose another folder") from reason
     return target
 
 
+def _spectrum(
+    law: WallLaw, matrix: KernelMatrix, gap: SpectralGap | None, tolerance: float, rng: np.random.Generator
+) -> Spectrum:
+    if gap is not None and gap.verdict == "no gap":
+        # whatever the basis, these are numbers of the grid; those of the matrix that is shown and saved
+        return spectrum(matrix, k=min(EIGENVALUES, matrix.basis.size))
+    return spectrum(law, EIGENVALUES, basis=SPECTRUM_BASIS, tolerance=0.1 * tolerance, rng=rng)
+
+
 def _check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
     """Trace rays that enter the hollows with the invariant measure."""
-    widths = np.array([hollow.right - hollow.left for hollow in wall.hollows])
+    widths = np.array([hollow.width for hollow in wall.hollows])
     lefts = np.array([hollow.left for hollow in wall.hollows])
     which = rng.choice(len(widths), CHECK_RAYS, p=widths / widths.sum())
     ray = trace(wall, lefts[which] + widths[which] * rng.random(CHECK_RAYS), SINE.sample(CHECK_RAYS, rng))
@@ -258,7 +267,7 @@ def _check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
         float(np.mean(ray.collisions)), float(np.std(ray.collisions, ddof=1) / np.sqrt(CHECK_RAYS)), "estimate",
         f"one standard error of {CHECK_RAYS} rays",
     )  # fmt: skip
-    return TracerCheck(ray.counts(), mean, float(boundary / widths.sum()))
+    return TracerCheck(MappingProxyType(ray.counts()), mean, float(boundary / widths.sum()))
 
 
 def _conservation(collision: CollisionLaw, rng: np.random.Generator) -> dict[str, float]:
@@ -275,39 +284,3 @@ def _conservation(collision: CollisionLaw, rng: np.random.Generator) -> dict[str
             np.max(np.abs(disk.rolling_momentum(outgoing) - disk.rolling_momentum(velocity)) / scale)
         ),
     }
-
-
-def _save_picture(path: Path, draw: Any) -> None:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.0, 5.0), layout="constrained")
-    draw(figure.subplots())
-    figure.savefig(path, dpi=150)
-
-
-def _estimate(number: Estimate) -> dict[str, Any]:
-    return {"value": number.value, "error": _finite(number.error), "kind": number.kind, "method": number.method}
-
-
-def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
-    """A gap as plain numbers and strings, ready for JSON."""
-    return {**_estimate(gap), "verdict": gap.verdict, "convention": gap.convention, "evidence": list(gap.evidence)}
-
-
-def _matrix(matrix: KernelMatrix) -> dict[str, Any]:
-    symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
-    return {
-        "basis": repr(matrix.basis), "method": matrix.method, "samples": matrix.samples,
-        "frobenius_error": _estimate(matrix.error),
-        "symmetry_defect": {"value": float(symmetry), "norm": symmetry.norm, "z_score": _finite(symmetry.z_score)},
-        "stochastic_defect": {"value": float(rows), "norm": rows.norm},
-    }  # fmt: skip
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no infinity: an unknown error is null."""
-    if value is None:
-        return None
-    if np.ndim(value):
-        return [_finite(entry) for entry in value]
-    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,206 @@
+"""A study as text and as plain values for JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .estimates import Estimate
+    from .kernels import KernelMatrix
+    from .spectral import SpectralGap
+    from .study import Study, TracerCheck
+
+# Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
+KAC_Z = 4.5
+SHOWN_EIGENVALUES = 8
+# A number without error is printed to this many decimals.
+DECIMALS = 12
+
+
+def summary_of(study: Study) -> str:
+    """The study as text, one fact a line."""
+    wall, disk = study.wall, study.disk
+    symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
+    lines = [
+        f"wall       {study.name}: period {wall.period:g}, depth {wall.depth:.6g}, length {wall.arc_length:.6g}, "
+        f"{_counted(len(wall.pieces), 'piece')}, "
+        + (_counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell")
+        + (f", {_counted(len(wall.islands), 'island')}" if wall.islands else "")
+        + f", {symmetry}"
+    ]
+    if study.tracer is not None:
+        lines += _tracer_lines(study.tracer)
+    lines += ["law P~     " + line if i == 0 else "           " + line for i, line in enumerate(_matrix_lines(study.matrix))]
+    lines += [f"gap        {_gap_line(study, 'gap')}"]
+    if study.wall.is_mirror_symmetric:
+        lines += [f"           {_gap_line(study, 'specular_gap')}"]
+    else:
+        lines += ["           specular convention: not asked, the cell has no mirror axis and P_F need not be self-adjoint"]
+    lines += [
+        f"spectrum   {_spectrum_line(study)}",
+        f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, so it feels "
+        f"the wall {1.0 / disk.foreshortening:.6g} times as deep",
+    ]
+    first, *more = _matrix_lines(study.collision_matrix)
+    lines += [
+        f"collision  K = delta x P~ x delta(pi - psi) with P~ of that deeper wall, {first}",
+        *(f"           {line}" for line in more),
+        f"           gap of that P~: {_gap_line(study, 'collision_gap')}",
+        f"           energy kept to {study.conservation['energy_defect']:.1e}, rolling momentum -m v1 + J omega "
+        f"to {study.conservation['rolling_momentum_defect']:.1e} (relative)",
+    ]
+    return "\n".join(lines)
+
+
+def _tracer_lines(tracer: TracerCheck) -> list[str]:
+    total = sum(tracer.counts.values())
+    flagged = [f"{n} {status.replace('_', ' ')}" for status, n in tracer.counts.items() if n and status != "escaped"]
+    found, expected = tracer.mean_collisions, tracer.expected_collisions
+    lines = [
+        f"rays       {total} into the hollows; " + (f"not escaped: {', '.join(flagged)}" if flagged else "all escaped"),
+        f"           mean collisions {rounded(found)}, length of boundary over opening (Kac) {expected:.6g}, "
+        f"z = {tracer.z_score:+.2f}",
+    ]
+    if tracer.z_score < -KAC_Z:
+        share = 1.0 - found.value / expected
+        lines.append(
+            f"           Kac's formula presumes that every ray inside can come from the opening; {100.0 * share:.3g} % of the "
+            "boundary's rays cannot if the tracer is right, as those that stay in a mushroom's cap for ever"
+        )
+    elif tracer.z_score > KAC_Z:
+        lines.append("           more collisions than Kac's formula allows: do not trust this wall's numbers")
+    return lines
+
+
+def _matrix_lines(matrix: KernelMatrix) -> list[str]:
+    symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
+    rays = f" of {matrix.samples} rays" if matrix.samples else ""
+    noise = "" if symmetry.z_score is None else f" (sampling alone explains it to z = {symmetry.z_score:+.2f})"
+    return [
+        f"{matrix.basis!r} by {matrix.method}{rays}: Frobenius error {_small(float(matrix.error))} "
+        f"({matrix.error.kind}), {_met(matrix.tolerance_met, matrix.requested_tolerance)}",
+        f"asymmetry {_small(float(symmetry))}{noise}, rows sum to 1 within {_small(float(rows))}",
+    ]
+
+
+def _gap_line(study: Study, which: str) -> str:
+    gap: SpectralGap | None = getattr(study, which)
+    if gap is None:
+        return f"refused: {study.refusals.get(which, 'not asked for')}"
+    words = f"{gap.convention} convention: "
+    if gap.verdict == "no gap":
+        return words + "none (no gap): " + gap.evidence[0].split(":")[0]
+    words += f"{rounded(gap)}, {gap.verdict} ({gap.kind}: {gap.method}), {_met(gap.error <= study.tolerance, study.tolerance)}"
+    return words + ("; not told from 0" if abs(gap.value) <= gap.error else "")
+
+
+def _spectrum_line(study: Study) -> str:
+    found = study.spectrum
+    if found is None:
+        return f"refused: {study.refusals['spectrum']}"
+    values = ", ".join(f"{value:.6g}" for value in found.values[:SHOWN_EIGENVALUES])
+    caution = ""
+    if study.gap is not None and study.gap.verdict == "no gap":
+        caution = "; they belong to the grid, for the law has no gap"
+    return f"{values} ({found.convention} convention, {found.basis!r}, {found.method}{caution})"
+
+
+def rounded(number: Estimate) -> str:
+    """Value and error to the digits that the error leaves.
+
+    Examples
+    --------
+    >>> from asperity.estimates import Estimate
+    >>> rounded(Estimate(0.63297743, 0.00022, "estimate", "")), rounded(Estimate(0.25, 0.0, "bound", ""))
+    ('0.63298 +- 0.00022', '0.25 +- 0')
+    """
+    if number.error == 0.0 or not math.isfinite(number.error):
+        return f"{number.value:.{DECIMALS}g} +- {number.error:g}"
+    decimals = min(max(1 - math.floor(math.log10(number.error)), 0), DECIMALS)
+    if decimals >= DECIMALS:
+        return f"{number.value:.{DECIMALS}f} +- {number.error:.2g}"
+    return f"{number.value:.{decimals}f} +- {number.error:.{decimals}f}"
+
+
+def _small(value: float) -> str:
+    return f"{value:.2g}"
+
+
+def _met(met: bool | None, tolerance: float | None) -> str:
+    if met is None or tolerance is None:
+        return "no tolerance asked"
+    return f"tolerance {tolerance:g} {'met' if met else 'NOT met'}"
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def study_as_dict(study: Study) -> dict[str, Any]:
+    """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
+    from . import __version__
+
+    wall, disk, found = study.wall, study.disk, study.spectrum
+    return {
+        "asperity": __version__,
+        "tolerance": study.tolerance,
+        "wall": {
+            "name": study.name, "period": wall.period, "depth": wall.depth, "arc_length": wall.arc_length,
+            "pieces": len(wall.pieces), "hollows": len(wall.hollows), "islands": len(wall.islands),
+            "closes": wall.closes, "polygonal": wall.is_polygonal, "mirror_symmetric": wall.is_mirror_symmetric,
+        },
+        "tracer": None if study.tracer is None else {
+            "rays": dict(study.tracer.counts), "mean_collisions": estimate_as_dict(study.tracer.mean_collisions),
+            "kac": study.tracer.expected_collisions, "z_score": study.tracer.z_score,
+        },
+        "law": _matrix(study.matrix),
+        "gap": {"paper": _gap(study.gap), "specular": _gap(study.specular_gap)},
+        "eigenvalues": None if found is None else {
+            "convention": found.convention, "basis": repr(found.basis), "method": found.method,
+            "values": found.values.tolist(),
+            **{part: finite(getattr(found.errors, part)) for part in ("algebraic", "discretisation", "sampling")},
+        },
+        "collision": {
+            "mass": disk.mass, "inertia": disk.inertia, "foreshortening": disk.foreshortening,
+            "law": _matrix(study.collision_matrix), "gap": _gap(study.collision_gap), **study.conservation,
+        },
+        "refusals": dict(study.refusals),
+    }  # fmt: skip
+
+
+def estimate_as_dict(number: Estimate) -> dict[str, Any]:
+    """A number with its error as plain values; an unknown error is None."""
+    return {"value": number.value, "error": finite(number.error), "kind": number.kind, "method": number.method}
+
+
+def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
+    """A gap as plain values, ready for JSON."""
+    return {
+        **estimate_as_dict(gap), "verdict": gap.verdict, "convention": gap.convention, "evidence": list(gap.evidence),
+    }  # fmt: skip
+
+
+def _gap(gap: SpectralGap | None) -> dict[str, Any] | None:
+    return None if gap is None else gap_as_dict(gap)
+
+
+def _matrix(matrix: KernelMatrix) -> dict[str, Any]:
+    symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
+    return {
+        "basis": repr(matrix.basis), "method": matrix.method, "samples": matrix.samples,
+        "frobenius_error": estimate_as_dict(matrix.error), "tolerance_met": matrix.tolerance_met,
+        "symmetry_defect": {"value": float(symmetry), "norm": symmetry.norm, "z_score": finite(symmetry.z_score)},
+        "stochastic_defect": {"value": float(rows), "norm": rows.norm},
+    }  # fmt: skip
+
+
+def finite(value: Any) -> Any:
+    """JSON has no infinity: an unknown number is None."""
+    if value is None:
+        return None
+    if np.ndim(value):
+        return [finite(entry) for entry in value]
+    return float(value) if np.isfinite(value) else None
