@@ -115,10 +115,13 @@ class _Ray:
         from .tracing import trace, trajectory
 
         stretch = vertical_stretch(wall)
+        result = trace(wall, x, theta)
         self.points = trajectory(wall, x, theta)
         self.arrival = self.points[0] + _up_to(free, theta, stretch)
-        result = trace(wall, x, theta)
-        self.departure = self.points[-1] + _up_to(free, float(result.theta), stretch) if bool(result.escaped) else None
+        self.departure: Floats | None = None
+        if bool(result.escaped):
+            self.points[-1] = (float(result.x), 0.0)
+            self.departure = self.points[-1] + _up_to(free, float(result.theta), stretch)
 
 
 def _up_to(height: float, theta: float, stretch: float) -> Floats:
@@ -133,7 +136,7 @@ def _draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> Non
     outline = _thinned(wall.outline(float(step.min())), step)
     pen = 1.2 if len(outline) <= FINE_POINTS else 0.6
     # the last point of a cell is the first of the next
-    path = np.concatenate([*(outline[:-1] + [k * wall.period, 0.0] for k in cells), outline[-1:]])
+    path = np.concatenate([*(outline[:-1] + np.array([k * wall.period, 0.0]) for k in cells), outline[-1:]])
     path[-1, 0] = (cells[-1] + 1) * wall.period
     below = np.array([[path[-1, 0], floor], [path[0, 0], floor]])
     solid = np.vstack([path, below])
@@ -142,7 +145,9 @@ def _draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> Non
     for island in wall.islands:
         loop = _loop(island, float(step.min()))
         for k in cells:
-            ax.fill(loop[:, 0] + k * wall.period, loop[:, 1], facecolor=SOLID, edgecolor="black", linewidth=1.2, zorder=2)
+            ax.fill(
+                loop[:, 0] + k * wall.period, loop[:, 1], facecolor=SOLID, edgecolor="black", linewidth=1.2, zorder=2
+            )
 
 
 def _loop(island: Sequence[Curve], tolerance: float) -> Floats:

@@ -316,7 +316,7 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
             return shift + px, vx, vy, bounces, CORNER
         if kind == LID:
             if path is not None:
-                path[bounces + 1, 0], path[bounces + 1, 1] = px + time * vx, 0.0
+                path[bounces + 1, 0], path[bounces + 1, 1] = shift + px + time * vx, 0.0
             return shift + px + time * vx, vx, vy, bounces, ESCAPED
         if tangent != 0:
             return shift + px, vx, vy, bounces, GRAZING

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from functools import cache
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +15,18 @@ from .panels import Panels
 
 # Values of basis functions held at a time.
 CHUNK = 2**21
+
+
+def one_blas_thread() -> AbstractContextManager[Any]:
+    """BLAS on one thread: its threads spin, and a tall thin product gets slower by a hundred on a busy machine."""
+    return _blas().limit(limits=1, user_api="blas")  # type: ignore[no-any-return]
+
+
+@cache
+def _blas() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 def cell_index(basis: Basis, angle: Floats) -> NDArray[np.int64]:
@@ -36,7 +52,9 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
     step = max(1, CHUNK // basis.size)
     for start in range(0, incoming.size, step):
         part = slice(start, start + step)
-        total += basis.evaluate(incoming[part]).T @ (weight[part, None] * basis.evaluate(outgoing[part]))
+        values, images = basis.evaluate(incoming[part]), weight[part, None] * basis.evaluate(outgoing[part])
+        with one_blas_thread():
+            total += values.T @ images
 
 
 def add_blocks(

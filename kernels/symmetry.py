@@ -11,6 +11,9 @@ from ..checks import Floats
 
 # Statistics with fewer degrees of freedom than this carry no information.
 LEAST_FREEDOM = 1e-9
+# Far out the statistic of eight randomisations follows Student's t; its degrees of freedom were fitted to 40,000 trials
+# with normal parts of 1 to 1000 dimensions d as 3.4 d^0.27, which gives upper tails right to a quarter up to z = 3.
+FREEDOM_AT_ONE, FREEDOM_POWER = 3.4, 0.27
 SYMMETRY_NORM = "||(S - S^T)/2||_F / ||S||_F in an orthonormal basis"
 STOCHASTIC_NORM_CELLS = "largest |sum over j of P[i, j] - 1|"
 STOCHASTIC_NORM = "||P 1 - 1|| in L^2 of the invariant probability measure"
@@ -103,12 +106,24 @@ def replicate_z_score(antisymmetric: list[Floats]) -> float:
     """The z-score of mean antisymmetric parts from independent randomisations, where counts are not independent.
 
     With A_r independent and of mean 0 the inner products <A_r, A_s>, r < s, are uncorrelated and of mean 0; their
-    average is compared with its standard error.
+    average is compared with its standard error. The fewer dimensions the A_r vary in, the heavier the tails of this
+    ratio; so it is made normal through a Student distribution, whose degrees of freedom follow from that number of
+    dimensions, (trace C)^2 / trace C^2 with C the covariance, estimated from the A_r themselves.
     """
+    from scipy.stats import norm, t
+
     flat = np.array([part.ravel() for part in antisymmetric])
-    products = (flat @ flat.T)[np.triu_indices(len(antisymmetric), 1)]
+    pairs = np.triu_indices(len(flat), 1)
+    products = (flat @ flat.T)[pairs]
     error = float(np.std(products, ddof=1)) / np.sqrt(products.size)
-    return float(np.mean(products)) / error if error > 0.0 else 0.0
+    if error <= 0.0:
+        return 0.0
+    centred = flat - flat.mean(axis=0)
+    gram = centred @ centred.T
+    dimensions = np.mean(np.diag(gram)) ** 2 / max(float(np.var(gram[pairs], ddof=1)), np.finfo(np.float64).tiny)
+    freedom = FREEDOM_AT_ONE * max(float(dimensions), 1.0) ** FREEDOM_POWER
+    freedom = min(freedom, products.size - 1.0)
+    return float(norm.isf(t.sf(np.mean(products) / error, freedom)))
 
 
 def invariance_z_score(totals: NDArray[np.int64], weights: Floats) -> float:

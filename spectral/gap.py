@@ -25,8 +25,8 @@ FEWEST_LEVELS = 3
 # A gap of fewer errors than this is not told from zero.
 SIGNIFICANCE = 10.0
 # Two refinements in a row must each shrink the change of the eigenvalue by this factor before it is called isolated:
-# at an essential edge the change falls only like a power of 1/log(n), by less than 2 a doubling.
-ISOLATED_SHRINKAGE = 3.0
+# at an essential edge the change falls only like a power of 1/log(n), by less than this a doubling.
+ISOLATED_SHRINKAGE = 2.0
 # At an essential edge the change by a doubling stays above a hundredth of the gap for every basis in reach.
 NEGLIGIBLE_GAP = 1e-3
 # Changes below this many rounding errors say nothing about convergence.

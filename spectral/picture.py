@@ -55,8 +55,9 @@ def draw_spectrum(found: Spectrum, ax: Axes | None = None, gap: SpectralGap | No
     ax.set_xticks(rank)
     ax.set_xlabel(f"rank among the {len(rank)} largest moduli, sorted descending")
     ax.set_ylabel("eigenvalue")
-    lowest = float(found.values.min())
-    ax.set_ylim(-1.1 if lowest < -0.5 else min(-0.15, lowest - 0.15), 1.1)
+    # the error bars inside the picture, within [-1, 1] where the spectrum lies
+    lowest = max(float(np.min(found.values - np.where(known, width, 0.0))), -1.0)
+    ax.set_ylim(-1.1 if lowest < -0.5 else min(-0.15, lowest - 0.1), 1.1)
     ax.set_title(f"Spectrum, {found.convention} convention ({CONVENTIONS[found.convention]})", fontsize=11)
     # below the axes: a spectrum may fill any corner
     ax.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=1 if gapless else 2)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from asperity import geometry as geo
+from asperity.study import PICTURES, study_wall
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 
@@ -19,7 +23,7 @@ def load(name):
 
 
 def test_every_example_has_a_test():
-    tested = {"measured_profile", "published_gap", "no_slip_or_smooth"}
+    tested = {"gallery", "maxwell_or_rough", "measured_profile", "no_slip_or_smooth", "published_gap"}
     assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
 
 
@@ -49,3 +53,36 @@ def test_deep_teeth_toss_a_coin_between_smooth_and_no_slip():
         d = 2 * ratio * np.sqrt(3) / np.tan(1.0)
         specular = 1 - (d % 1) / 2 if int(d) % 2 == 0 else 0.5 + (d % 1) / 2
         assert share == pytest.approx(1 - specular, abs=1e-12)
+
+
+def test_a_rough_wall_mixes_with_maxwells_law_as_theory_says():
+    found = load("maxwell_or_rough").main(half_angle=0.3, share=0.25)
+    rough, maxwell = found["rough wall"], found["Maxwell's law"]
+    # the gap of a shallow wall is four times its mean squared slope, less a few per cent at this depth
+    xi = 0.3
+    flatness = (np.log(1 / np.cos(xi) + np.tan(xi)) - np.sin(xi)) / np.sin(xi)
+    assert 0.9 < rough / (4 * flatness) < 1.0
+    assert maxwell == pytest.approx(0.25, abs=1e-12)
+    # both laws have their gap at the even polynomials or above it; concavity, and squares of eigenvalues
+    assert found["half and half"] >= 0.5 * (rough + maxwell) - 1e-12
+    assert found["rough wall, twice"] == pytest.approx(1 - (1 - rough) ** 2, abs=1e-10)
+
+
+def test_the_gallery_draws_what_its_page_shows(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES)
+    gallery = load("gallery")
+    quick = study_wall(geo.flat(), "flat", bins=8)
+    # the studies are tested for themselves; here only what becomes of them
+    monkeypatch.setattr(gallery, "study_wall", lambda *_, **__: quick)
+    monkeypatch.setattr(gallery.measured_profile, "main", lambda **_: quick)
+    assert list(gallery.main(tmp_path / "gallery")) == ["focusing-arcs", "measured-profile"]
+    sys.modules.pop("measured_profile", None)
+    drawn = {path.name for path in (tmp_path / "gallery").iterdir()}
+    named = {f"{study}-{name}" for study in ("focusing-arcs", "measured-profile") for name in PICTURES}
+    assert drawn == {"walls.png", *named}
+    page = EXAMPLES.parent / "gallery.md"
+    committed = EXAMPLES.parent / "gallery"
+    assert {path.name for path in committed.iterdir()} == drawn
+    for name in drawn:
+        assert f"gallery/{name}" in page.read_text(encoding="utf-8")
+        assert (committed / name).stat().st_size < 150_000

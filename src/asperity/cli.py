@@ -12,8 +12,8 @@ import click
 from . import __version__
 from .errors import AsperityError
 
-WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file with
-the two columns x and height of a measured profile (which is mirrored to make it periodic)."""
+WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
+with the two columns x and height of a measured profile (mirrored to make it periodic, or profile.txt:seam=step)."""
 
 
 class OneLineErrors(click.Group):
@@ -56,7 +56,7 @@ def main() -> None:
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
 @click.option("--tolerance", default=1e-3, show_default=True, help="Error asked of gaps and matrices.")
 @click.option("--bins", default=128, show_default=True, help="Number of equal-measure bins of the matrix.")
-@click.option("--seed", default=0, show_default=True, help="Seed of the random generator.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random generator.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the summary.")
 @click.option("--force", is_flag=True, help="Replace the files of an earlier study in the folder.")
 def study(
@@ -117,13 +117,13 @@ def gap(wall: str, specular: bool, tolerance: float, as_json: bool) -> None:
 def walls(out: Path | None, force: bool) -> None:
     """List the named walls with their parameters and defaults, and draw them."""
     from .geometry import WALLS
-    from .study_picture import check_picture_path, draw_gallery
+    from .study_picture import draw_gallery
 
     if out is not None:
-        check_picture_path(out, overwrite=force)
+        # refused before anything is printed
+        draw_gallery(out, overwrite=force)
     for entry in WALLS.values():
         parameters = ", ".join(f"{key}={value:g}" for key, value in entry.defaults.items())
         click.echo(f"{entry.name:20s} {entry.summary}" + (f" [{parameters}]" if parameters else ""))
     if out is not None:
-        draw_gallery(out, overwrite=force)
         click.echo(f"wrote {out}")

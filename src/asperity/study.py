@@ -201,7 +201,7 @@ def study_wall(
 
     # silent where standard error is not a terminal, and in the first two seconds
     with tqdm(total=7, desc=name, delay=2, disable=None, leave=False) as progress:
-        tracer = _check_tracer(wall, rng) if wall.hollows else None
+        tracer = check_tracer(wall, rng) if wall.hollows else None
         progress.update()
         law = WallLaw(wall)
         matrix = discretise(law, basis, tolerance=tolerance, rng=rng)
@@ -256,7 +256,7 @@ def _spectrum(
     return spectrum(law, EIGENVALUES, basis=SPECTRUM_BASIS, tolerance=0.1 * tolerance, rng=rng)
 
 
-def _check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
+def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
     """Trace rays that enter the hollows with the invariant measure."""
     widths = np.array([hollow.width for hollow in wall.hollows])
     lefts = np.array([hollow.left for hollow in wall.hollows])

@@ -108,7 +108,7 @@ def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.0))
     above.plot(allowed[:, 0], allowed[:, 1], color="0.75", linewidth=5.0, solid_capstyle="butt",
                label="same energy and rolling momentum")  # fmt: skip
-    above.plot(outgoing[:, 0], outgoing[:, 1], ".", color="black", markersize=1.5, rasterized=True,
+    above.plot(outgoing[:, 0], outgoing[:, 1], ".", color="black", markersize=2.5, rasterized=True,
                label=f"{SAMPLES} samples")  # fmt: skip
     edges = np.linspace(allowed[:, 0].min(), allowed[:, 0].max(), VELOCITY_BINS + 1)
     share = np.histogram(outgoing[:, 0], edges)[0] / SAMPLES
@@ -124,7 +124,7 @@ def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:
     above.legend(frameon=False, fontsize=8, loc="lower center", ncols=2)
     above.set_title("Disk in with v1 = 1, v2 = -1 (radius / time) and no spin", fontsize=11)
     below.set_ylim(0.0, 1.08 * float(share.max()))
-    below.set_ylabel(f"probability per bin (1/{VELOCITY_BINS} of the range)")
+    below.set_ylabel("probability per bin")
     below.set_xlabel("outgoing v1 (radius / time)")
     spin = above.secondary_xaxis(
         "top", functions=(lambda v1: (rolling + disk.mass * v1) / disk.inertia,
@@ -140,9 +140,7 @@ def _allowed_velocities(collision: CollisionLaw, incoming: Floats) -> Floats:
     along, up, roll = (float(collision.disk.inner(incoming, direction)) for direction in frame)
     theta = np.linspace(0.0, np.pi, 181)
     size = np.hypot(along, up)
-    return np.asarray(
-        size * (np.cos(theta)[:, None] * frame[0] + np.sin(theta)[:, None] * frame[1]) + roll * frame[2]
-    )
+    return np.asarray(size * (np.cos(theta)[:, None] * frame[0] + np.sin(theta)[:, None] * frame[1]) + roll * frame[2])
 
 
 def draw_gallery(path: Path, *, overwrite: bool) -> None:
@@ -155,21 +153,14 @@ def draw_gallery(path: Path, *, overwrite: bool) -> None:
     InputError
         If it cannot be written.
     """
-    check_picture_path(path, overwrite=overwrite)
     try:
+        if path.exists() and not overwrite:
+            raise FileExistsRefusal(f"{path} exists; use another name or --force to replace it")
         gallery().savefig(path, dpi=RESOLUTION)
+    except FileExistsRefusal:
+        raise
     except (OSError, ValueError) as reason:
         raise InputError(f"{path}: cannot write the picture ({reason}); use a .png, .pdf or .svg name") from reason
-
-
-def check_picture_path(path: Path, *, overwrite: bool) -> None:
-    """Refuse to replace a picture."""
-    try:
-        exists = path.exists()
-    except OSError as reason:
-        raise InputError(f"{path}: cannot write there ({reason.strerror}); choose another name") from reason
-    if exists and not overwrite:
-        raise FileExistsRefusal(f"{path} exists; use another name or --force to replace it")
 
 
 def gallery() -> Figure:

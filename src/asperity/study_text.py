@@ -33,16 +33,20 @@ def summary_of(study: Study) -> str:
     ]
     if study.tracer is not None:
         lines += _tracer_lines(study.tracer)
-    lines += ["law P~     " + line if i == 0 else "           " + line for i, line in enumerate(_matrix_lines(study.matrix))]
+    lines += [
+        "law P~     " + line if i == 0 else "           " + line for i, line in enumerate(_matrix_lines(study.matrix))
+    ]
     lines += [f"gap        {_gap_line(study, 'gap')}"]
     if study.wall.is_mirror_symmetric:
         lines += [f"           {_gap_line(study, 'specular_gap')}"]
     else:
-        lines += ["           specular convention: not asked, the cell has no mirror axis and P_F need not be self-adjoint"]
+        lines += [
+            "           specular convention: not asked, the cell has no mirror axis and P_F need not be self-adjoint"
+        ]
     lines += [
         f"spectrum   {_spectrum_line(study)}",
-        f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, so it feels "
-        f"the wall {1.0 / disk.foreshortening:.6g} times as deep",
+        f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
+        f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep",
     ]
     first, *more = _matrix_lines(study.collision_matrix)
     lines += [
@@ -67,8 +71,8 @@ def _tracer_lines(tracer: TracerCheck) -> list[str]:
     if tracer.z_score < -KAC_Z:
         share = 1.0 - found.value / expected
         lines.append(
-            f"           Kac's formula presumes that every ray inside can come from the opening; {100.0 * share:.3g} % of the "
-            "boundary's rays cannot if the tracer is right, as those that stay in a mushroom's cap for ever"
+            f"           Kac's formula presumes that every ray inside can come from the opening; {100.0 * share:.3g} % "
+            "of the boundary's rays cannot if the tracer is right, as those that stay in a mushroom's cap for ever"
         )
     elif tracer.z_score > KAC_Z:
         lines.append("           more collisions than Kac's formula allows: do not trust this wall's numbers")
@@ -78,7 +82,7 @@ def _tracer_lines(tracer: TracerCheck) -> list[str]:
 def _matrix_lines(matrix: KernelMatrix) -> list[str]:
     symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
     rays = f" of {matrix.samples} rays" if matrix.samples else ""
-    noise = "" if symmetry.z_score is None else f" (sampling alone explains it to z = {symmetry.z_score:+.2f})"
+    noise = "" if symmetry.z_score is None else f" (z = {symmetry.z_score:+.2f} against the sampling noise)"
     return [
         f"{matrix.basis!r} by {matrix.method}{rays}: Frobenius error {_small(float(matrix.error))} "
         f"({matrix.error.kind}), {_met(matrix.tolerance_met, matrix.requested_tolerance)}",
@@ -93,8 +97,13 @@ def _gap_line(study: Study, which: str) -> str:
     words = f"{gap.convention} convention: "
     if gap.verdict == "no gap":
         return words + "none (no gap): " + gap.evidence[0].split(":")[0]
-    words += f"{rounded(gap)}, {gap.verdict} ({gap.kind}: {gap.method}), {_met(gap.error <= study.tolerance, study.tolerance)}"
-    return words + ("; not told from 0" if abs(gap.value) <= gap.error else "")
+    met = _met(gap.error <= study.tolerance, study.tolerance)
+    if gap.verdict == "undecided" and gap.error >= abs(gap.value):
+        # rounding to its error would leave nothing of the number
+        words += f"not decided; {gap.value:.4g} at the finest basis, error up to {gap.error:.2g}"
+    else:
+        words += f"{rounded(gap)}, {gap.verdict}"
+    return f"{words} ({gap.kind}: {gap.method}), {met}"
 
 
 def _spectrum_line(study: Study) -> str:

@@ -1,0 +1,37 @@
+"""Draw the pictures of docs/gallery.md: python docs/examples/gallery.py docs/gallery"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import measured_profile
+
+from asperity import geometry as geo
+from asperity.study import PICTURES, Study, study_wall
+from asperity.study_picture import draw_gallery
+
+
+def main(folder: Path, tolerance: float = 1e-3) -> dict[str, Study]:
+    """Write the named walls, the study of focusing arcs and that of the measured profile; returns the studies."""
+    folder.mkdir(parents=True, exist_ok=True)
+    draw_gallery(folder / "walls.png", overwrite=True)
+    studies = {
+        "focusing-arcs": study_wall(geo.focusing_arcs(1.2), "focusing-arcs", tolerance=tolerance),
+        "measured-profile": measured_profile.main(tolerance=tolerance),
+    }
+    for name, report in studies.items():
+        paths = report.save(folder / name, overwrite=True)
+        for path in paths:
+            # the page shows the pictures; matrices and numbers are made again by the command above each of them
+            if path.name in PICTURES:
+                path.rename(folder / f"{name}-{path.name}")
+            else:
+                path.unlink()
+        (folder / name).rmdir()
+    return studies
+
+
+if __name__ == "__main__":
+    for report in main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/gallery")).values():
+        print(report.summary(), end="\n\n")

@@ -1,0 +1,182 @@
+"""A study gives the numbers that the library gives, and says what it does not know."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AccuracyError, FileExistsRefusal, InputError
+from asperity.study import DATA, PICTURES, check_tracer, study_wall
+
+TOLERANCE = 1e-2
+
+
+@pytest.fixture(scope="module")
+def arcs():
+    return study_wall(geo.focusing_arcs(1.2), "arcs", geo.Disk(1.0, 0.5), tolerance=TOLERANCE, bins=32)
+
+
+@pytest.fixture(scope="module")
+def teeth():
+    return study_wall(geo.rectangular_teeth(2.0), "teeth", bins=16)
+
+
+def test_the_matrix_is_that_of_the_law(arcs):
+    expected = ker.discretise(ker.WallLaw(geo.focusing_arcs(1.2)), ker.Bins(32), tolerance=TOLERANCE)
+    assert np.array_equal(arcs.matrix.array, expected.array)
+    # entries against the closed form of the arc, sampled: 5 standard errors of a million rays
+    closed = ker.discretise(
+        ker.CircularArcLaw(1.2), ker.Bins(32), method="monte-carlo", samples=2**20, rng=np.random.default_rng(1)
+    )
+    assert np.abs(arcs.matrix.array - closed.array).max() < 5.0 * np.sqrt(0.25 / 2**15)
+
+
+def test_the_gaps_are_those_of_the_library_and_of_the_reference(arcs):
+    law = ker.WallLaw(geo.focusing_arcs(1.2))
+    # the second largest eigenvalue, known to 3e-10 from an independent computation
+    assert abs(float(arcs.gap) - (1.0 - 0.3670253152)) <= arcs.gap.error
+    assert float(arcs.gap) == pytest.approx(float(spec.spectral_gap(law, TOLERANCE)), abs=1e-12)
+    specular = spec.spectral_gap(law.in_specular_frame(), TOLERANCE)
+    assert float(arcs.specular_gap) == pytest.approx(float(specular), abs=1e-12)
+    assert (arcs.gap.convention, arcs.specular_gap.convention) == ("paper", "specular")
+    # the same wall's odd eigenvalues change sign: 1 - gap is the least one's modulus
+    assert abs(1.0 - float(arcs.specular_gap) - 0.311346443) <= max(arcs.specular_gap.error, 1e-4)
+
+
+def test_the_spectrum_has_ten_eigenvalues_of_which_the_references_are_two(arcs):
+    values = arcs.spectrum.values
+    assert len(values) == 10
+    assert abs(values[1] - 0.3670253152) <= arcs.spectrum.errors.total()[1]
+    assert abs(values[-1] + 0.311346443) <= arcs.spectrum.errors.total()[-1]
+
+
+def test_the_disk_feels_the_foreshortened_wall(arcs):
+    deeper = geo.focusing_arcs(1.2).foreshorten(geo.Disk(1.0, 0.5))
+    assert arcs.collision.law == ker.WallLaw(deeper)
+    assert "1.73205 times as deep" in arcs.summary()  # (1 + m/J)^(1/2)
+
+
+def test_collisions_keep_energy_and_rolling_momentum(arcs):
+    assert set(arcs.conservation) == {"energy_defect", "rolling_momentum_defect"}
+    assert max(arcs.conservation.values()) < 64 * np.finfo(float).eps
+
+
+def test_mean_collisions_agree_with_kac(arcs, teeth):
+    assert arcs.tracer.expected_collisions == pytest.approx(1.2 / math.sin(1.2), rel=1e-14)
+    assert teeth.tracer.expected_collisions == pytest.approx(5.0, rel=1e-14)  # two sides of height 1, a floor of 1/2
+    for report in (arcs, teeth):
+        assert abs(report.tracer.z_score) < 4.5
+        assert "out of reach" not in report.summary() and "Kac's formula presumes" not in report.summary()
+        assert sum(report.tracer.counts.values()) == report.tracer.counts["escaped"] == 2**16
+
+
+def test_unreachable_rays_of_a_cap_are_no_defect_of_the_tracer(teeth):
+    check = check_tracer(geo.mushrooms(0.2, 0.5), np.random.default_rng(0))
+    assert check.z_score < -100.0
+    text = replace(teeth, tracer=check).summary()
+    assert "Kac's formula presumes that every ray inside can come from the opening" in text
+
+
+def test_too_many_collisions_are_called_a_defect(teeth):
+    check = replace(teeth.tracer, expected_collisions=0.5 * teeth.tracer.expected_collisions)
+    assert "do not trust" in replace(teeth, tracer=check).summary()
+
+
+def test_a_polygon_has_no_gap_and_the_summary_says_so(teeth):
+    assert teeth.gap.verdict == teeth.specular_gap.verdict == teeth.collision_gap.verdict == "no gap"
+    text = teeth.summary()
+    assert text.count("none (no gap)") == 3 and "they belong to the grid" in text
+
+
+def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
+    text = arcs.summary()
+    assert "Bins(32) by quadrature: Frobenius error" in text and "tolerance 0.01 met" in text
+    # the foreshortened arc is elliptic and has no closed form
+    assert f"{arcs.collision_matrix.samples} rays" in text and "against the sampling noise" in text
+    assert "paper convention: 0.63" in text and "specular convention: 0.6" in text
+
+
+def test_a_tolerance_that_was_not_met_is_said_loudly(teeth):
+    missed = replace(teeth.matrix, error=replace(teeth.matrix.error, value=0.5, error=0.5))
+    assert "Frobenius error 0.5 (bound), tolerance 0.001 NOT met" in replace(teeth, matrix=missed).summary()
+
+
+def test_a_gap_that_was_not_decided_is_not_rounded_away(arcs):
+    open_question = replace(arcs.gap, value=0.71234, error=0.71234, verdict="undecided")
+    text = replace(arcs, gap=open_question).summary()
+    assert "paper convention: not decided; 0.7123 at the finest basis, error up to 0.71" in text
+
+
+def test_a_law_without_mirror_axis_has_no_specular_gap():
+    wall = geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.7, -0.1), (1, 0)])
+    report = study_wall(wall, bins=8, tolerance=0.1)
+    assert report.specular_gap is None and report.as_dict()["gap"]["specular"] is None
+    assert "specular convention: not asked" in report.summary()
+
+
+def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):
+    def refuse(*arguments, **keywords):
+        raise AccuracyError("the counts speak against symmetry", 0.5)
+
+    monkeypatch.setattr("asperity.study.spectral_gap", refuse)
+    monkeypatch.setattr("asperity.study.spectrum", refuse)
+    report = study_wall(geo.rectangular_teeth(1.0), bins=8)
+    assert set(report.refusals) == {"gap", "specular_gap", "collision_gap", "spectrum"}
+    assert report.summary().count("refused: the counts speak against symmetry") == 4
+    assert json.loads(report.to_json())["gap"] == {"paper": None, "specular": None}
+    assert len(report.save(tmp_path)) == len(PICTURES) + len(DATA)
+
+
+def no_constants(name):
+    raise AssertionError(f"{name} is not JSON")
+
+
+@pytest.mark.parametrize("which", ["arcs", "teeth"])
+def test_json_round_trips_and_every_gap_says_what_it_is(which, request):
+    report = request.getfixturevalue(which)
+    text = report.to_json()
+    read = json.loads(text, parse_constant=no_constants)
+    assert read == report.as_dict() and json.dumps(read, indent=2) == text
+    gaps = {
+        "gap": read["gap"]["paper"], "specular_gap": read["gap"]["specular"], "collision_gap": read["collision"]["gap"],
+    }  # fmt: skip
+    for name, gap in gaps.items():
+        if gap is None:
+            assert name in read["refusals"]
+            continue
+        found = getattr(report, name)
+        assert (gap["value"], gap["error"]) == (found.value, found.error)
+        assert gap["kind"] in ("bound", "estimate") and gap["method"] and gap["evidence"]
+        assert gap["convention"] == ("specular" if name == "specular_gap" else "paper")
+
+
+def test_a_saved_study_can_be_read_back_and_is_not_overwritten(teeth, tmp_path):
+    paths = teeth.save(tmp_path / "deep" / "folder")
+    assert [path.name for path in paths] == [*PICTURES, *DATA]
+    assert all(path.stat().st_size > 500 for path in paths)
+    matrix = ker.load_matrix(paths[-2])
+    assert np.array_equal(matrix.array, teeth.matrix.array) and matrix.method == "exact"
+    before = [path.read_bytes() for path in paths]
+    with pytest.raises(FileExistsRefusal, match="--force"):
+        teeth.save(tmp_path / "deep" / "folder")
+    assert [path.read_bytes() for path in paths] == before
+    teeth.save(tmp_path / "deep" / "folder", overwrite=True)
+
+
+def test_pictures_stay_small(arcs, tmp_path):
+    for path in arcs.save(tmp_path)[: len(PICTURES)]:
+        assert path.read_bytes().startswith(b"\x89PNG")
+        assert path.stat().st_size < 150_000
+
+
+def test_a_study_does_not_accept_nonsense():
+    for keywords in ({"tolerance": -1.0}, {"bins": 0}):
+        with pytest.raises(InputError):
+            study_wall(geo.flat(), **keywords)
