@@ -267,8 +267,14 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
                 if c_before >= 0.0 >= c_after and c_before > c_after and joints[j - 1, 3] > 0.0:
                     if own_kind != LINE or own_index != j - 1:
                         share = c_before / (c_before - c_after)
-                        hx = joints[j - 1, 0] + share * lines[j - 1, 0]
-                        hy = joints[j - 1, 1] + share * lines[j - 1, 1]
+                        if share <= 0.5:
+                            hx = joints[j - 1, 0] + share * lines[j - 1, 0]
+                            hy = joints[j - 1, 1] + share * lines[j - 1, 1]
+                        else:
+                            # from the nearer joint, and negative to say so, so that both ends keep their digits
+                            share = c_after / (c_before - c_after)
+                            hx = joints[j, 0] + share * lines[j - 1, 0]
+                            hy = joints[j, 1] + share * lines[j - 1, 1]
                         t = (hx - px) * vx + (hy - py) * vy
                         if -slack <= t < time:
                             time, kind, index, hit_s = max(t, 0.0), LINE, j - 1, share
@@ -331,11 +337,12 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
                 continue
 
         if lines is not None and kind == LINE:
-            edge_x, edge_y = lines[index, 0], lines[index, 1]
-            px, py = joints[index, 0] + hit_s * edge_x, joints[index, 1] + hit_s * edge_y
-            if (hit_s * lines[index, 4] <= slack and joints[index, 2] > 0.0) or (
-                (1.0 - hit_s) * lines[index, 4] <= slack and joints[index + 1, 2] > 0.0
-            ):
+            near = index if hit_s >= 0.0 else index + 1
+            px = joints[near, 0] + hit_s * lines[index, 0]
+            py = joints[near, 1] + hit_s * lines[index, 1]
+            # a first hit below an end of the opening is as exact as the ray, at the smallest distance from that corner
+            room = 0.0 if bounces == 0 and joints[near, 1] == 0.0 else slack
+            if abs(hit_s) * lines[index, 4] <= room and joints[near, 2] > 0.0:
                 return shift + px, vx, vy, bounces, CORNER
             w = 2.0 * (vx * lines[index, 2] + vy * lines[index, 3])
             vx -= w * lines[index, 2]

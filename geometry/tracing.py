@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, finite_array, finite_number, number_between, whole_number
+from ..errors import InputError
 
 if TYPE_CHECKING:
     from .wall import Wall
@@ -128,6 +129,7 @@ def trace(
     """
     from .engine import trace_rays
 
+    _check_wall(wall)
     x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
     workers = os.cpu_count() or 1 if threads is None else whole_number("threads", threads, 1)
@@ -186,6 +188,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     """
     from .engine import trace_ray
 
+    _check_wall(wall)
     place = finite_number("x", x)
     incoming = number_between("theta", theta, 0.0, np.pi)
     limit = whole_number("max_collisions", max_collisions, 1)
@@ -204,3 +207,8 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     points = path[np.isfinite(path[:, 0])]
     points[:, 0] += base
     return np.asarray(points)
+
+
+def _check_wall(wall: Wall) -> None:
+    if not hasattr(wall, "scene"):
+        raise InputError(f"wall: expected a Wall such as geo.triangular_teeth(0.7), got {wall!r}")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Floats, frozen, positive_number
-from ..errors import WallError
+from ..errors import InputError, WallError
 from .conditions import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
 from .curve import Curve
 from .disk import Disk
@@ -243,11 +243,11 @@ class Wall:
         >>> Wall.from_vertices([(0, 0), (0.5, -0.25), (1, 0)]).foreshorten(Disk(1.0, 1 / 3)).depth
         0.5
         """
-        return self._image(1.0, 1.0 / disk.foreshortening, self.period)
+        return self._image(1.0, 1.0 / _checked(disk).foreshortening, self.period)
 
     def unforeshorten(self, disk: Disk) -> Self:
         """Return the wall whose foreshortened wall this is: y multiplied by ``disk.foreshortening``."""
-        return self._image(1.0, disk.foreshortening, self.period)
+        return self._image(1.0, _checked(disk).foreshortening, self.period)
 
     def scaled(self, factor: float) -> Self:
         """Return the wall enlarged by ``factor`` > 0, its period included."""
@@ -298,3 +298,9 @@ class Wall:
 
 def _vertices(path: Sequence[Curve]) -> Floats:
     return frozen([*(p.start for p in path), path[-1].end])
+
+
+def _checked(disk: Disk) -> Disk:
+    if not isinstance(disk, Disk):
+        raise InputError(f"disk: expected a Disk such as geo.Disk(mass=1.0, inertia=0.5), got {disk!r}")
+    return disk

@@ -14,8 +14,10 @@ from ..checks import Floats, angles, finite_array, generator
 from ..errors import InputError
 from .basis import Basis
 from .collision_matrices import isometry_matrix
+from .combination import Combination
 from .isometry import isometries
 from .law import Law
+from .legendre import Legendre
 
 if TYPE_CHECKING:
     from ..geometry import Disk, Wall
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 # Pairs of angles count as a grid if the grid of their distinct values has at most this many times as many points.
 GRID_EXCESS = 4
+DEFECT_SIZES = (32, 8)
 
 VelocityFunction = Callable[[Floats, Floats], Floats]
 
@@ -61,6 +64,10 @@ class CollisionLaw:
     def __post_init__(self) -> None:
         if not isinstance(self.law, Law):
             raise InputError(f"law: expected a Law such as ker.WallLaw(wall.foreshorten(disk)), got {self.law!r}")
+        if isinstance(self.law, Combination):
+            self.law.terms_checked()
+        if not hasattr(self.disk, "rolling_momentum"):
+            raise InputError(f"disk: expected a Disk such as geo.Disk(mass=1.0, inertia=0.5), got {self.disk!r}")
         if self.law.frame != "paper":
             raise InputError("law: expected a law in the paper's convention, got one in the specular frame")
 
@@ -70,8 +77,11 @@ class CollisionLaw:
 
         Source: Rudzis 2022, section 1.3.7 and Theorem 5.1.
         """
+        from ..geometry import Wall
         from .wall_law import WallLaw
 
+        if not isinstance(wall, Wall):
+            raise InputError(f"wall: expected a Wall such as geo.triangular_teeth(0.7), got {wall!r}")
         return cls(WallLaw(wall.foreshorten(disk)), disk)
 
     def sample(self, velocity: ArrayLike, rng: np.random.Generator) -> Floats:
@@ -166,8 +176,15 @@ class CollisionLaw:
 
         return CollisionOperator(discretise(self.law, theta_basis, **discretisation), psi_basis)  # type: ignore[arg-type]
 
-    def symmetry_defect(self, theta_basis: Basis, psi_basis: Basis, **discretisation: object) -> SymmetryDefect:
-        """How far the operator on the two bases is from symmetric with respect to Lambda^2."""
+    def symmetry_defect(
+        self, theta_basis: Basis | None = None, psi_basis: Basis | None = None, **discretisation: object
+    ) -> SymmetryDefect:
+        """How far K is from symmetric with respect to Lambda^2, measured on two bases.
+
+        By default polynomials of degree below 32 in cos theta and below 8 in cos psi.
+        """
+        theta_basis = Legendre(DEFECT_SIZES[0]) if theta_basis is None else theta_basis
+        psi_basis = Legendre(DEFECT_SIZES[1], weight="sin2") if psi_basis is None else psi_basis
         return self.operator(theta_basis, psi_basis, **discretisation).symmetry_defect()
 
     def __repr__(self) -> str:

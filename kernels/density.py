@@ -117,6 +117,15 @@ class DensityLaw(Law):
         edges = self._grid(self._panel_count)
         return np.broadcast_to(edges, (*theta.shape, edges.size))
 
+    @property
+    def resolution(self) -> float:
+        """Width of the narrowest feature of p(theta, .), pi where the coarsest panels resolve it."""
+        return np.pi if self._panel_count == PANEL_COUNTS[0] else np.pi / self._panel_count
+
+    def incoming_edges(self, edges: Floats) -> Floats:
+        """Angles theta between which the integrals of p(theta, .) between the given edges vary smoothly."""
+        return self._grid(self._panel_count)
+
     # ---- what every law does ---------------------------------------------------------------------------------
     def adjoint(self) -> Law:
         """The law with density sin(theta') p(theta', theta) / sin(theta); itself if it is reversible.
@@ -137,8 +146,12 @@ class DensityLaw(Law):
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         flat = theta.reshape(-1)
+        if not flat.size:
+            # the shape of a value is known to the function alone
+            value = np.asarray(function(np.empty(theta.shape)), dtype=np.float64)
+            return np.empty(theta.shape + value.shape[theta.ndim :])
         step = max(1, CHUNK // self.fan_out)
-        starts = range(0, max(flat.size, 1), step)
+        starts = range(0, flat.size, step)
         parts = [self._apply_chunk(function, flat[start : start + step]) for start in starts]
         total = np.concatenate(parts)
         return total.reshape(theta.shape + total.shape[1:])

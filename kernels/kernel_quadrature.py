@@ -11,14 +11,26 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats
 from ..errors import InputError
 from .basis import Basis
-from .measure import SINE, gauss_rule
+from .measure import SINE, gauss_on_intervals, gauss_rule
 from .products import add_products, cell_index
 
 # Evaluations of a density, values of basis functions in `law.apply`, and points of a map that are affordable: each is
 # about a second or two.
 MOST_DENSITY_VALUES, MOST_APPLY_VALUES, MOST_MAP_POINTS = 2**25, 2**26, 2**20
+# Gauss nodes in theta' on an interval, by the largest share that it has of a panel on which the law's 16 nodes reach
+# rounding. The singularities are then 3/8 of the panel away from its ends, and q nodes on a share r miss rho^(-2 q)
+# with rho + 1/rho = 2 + 3/(2 r): 1e-12 or less in each case.
+SHARES, SHARE_NODES = np.array([1 / 32, 1 / 4]), (4, 8, 16)
+# Gauss nodes in theta on each interval of the coarsest level by rows: the most that are affordable. Rows that still
+# cost more than some seconds are left to product rules.
+ROW_NODES = (6, 4, 2)
+MOST_ROW_VALUES = 2**27
+# Edges are their own mirror images within this.
+MIRROR_TOLERANCE = 4.0 * np.finfo(np.float64).eps * np.pi
 # Numbers held at a time.
 CHUNK = 2**21
+# Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.
+ROW_CHUNK = 2**17
 # Rows are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 BISECTIONS = 60
@@ -31,6 +43,12 @@ class HasDensity(Protocol):
     """What is asked of a law with a density."""
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats: ...
+    def panels(self, theta: Floats) -> Floats: ...
+    def incoming_edges(self, edges: Floats) -> Floats: ...
+    @property
+    def resolution(self) -> float: ...
+    @property
+    def mirror_symmetric(self) -> bool | None: ...
 
 
 class HasAction(Protocol):
@@ -43,9 +61,83 @@ class HasAction(Protocol):
 
 
 def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, P e_j> by product Gauss rules whose order doubles; the difference of the last two as error estimate."""
+    """<e_i, P e_j> by Gauss rules whose order doubles; the difference of the last two as error estimate.
+
+    Product rules, which do not see a peak narrower than the cells of a partition: there each row is integrated over
+    theta' by itself, between the edges of cells and of the law's own panels for that row.
+    """
     edges = np.unique(np.concatenate((basis.edges, np.asarray(getattr(law, "breakpoints", ())))))
+    if basis.is_partition and law.resolution < np.diff(edges).max():
+        outer = np.unique(np.concatenate((edges, law.incoming_edges(edges))))
+        mirrored = law.mirror_symmetric is True and np.abs(edges + edges[::-1] - np.pi).max() <= MIRROR_TOLERANCE
+        if mirrored:
+            outer = np.append(outer[outer < 0.5 * np.pi - MIRROR_TOLERANCE], 0.5 * np.pi)
+        # two levels at least, or there is no estimate: the second has twice the nodes of the first
+        cost = [3 * _row_cost(law, edges, outer, order) for order in ROW_NODES]
+        affordable = [order for order, each in zip(ROW_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
+        order = affordable[0] if affordable else ROW_NODES[-1]
+        if min(cost) <= MOST_ROW_VALUES:
+            levels = _row_levels(law, basis, edges, outer, order)
+            return _until_settled((_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance)
     return _until_settled(_density_levels(law, basis, edges), tolerance)
+
+
+def _with_mirror_image(half: Floats) -> Floats:
+    return half + half[::-1, ::-1]
+
+
+def _row_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
+    """About how often the density is evaluated: most intervals between cell edges are small shares of a panel."""
+    panels = law.panels(outer[:1]).shape[-1]
+    return (outer.size - 1) * order * (SHARE_NODES[0] * edges.size + SHARE_NODES[-1] * panels)
+
+
+def _row_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:
+    level, spent = 0, 0
+    while level < 2 or spent + _row_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
+        spent += _row_cost(law, edges, outer, order)
+        yield _row_rule(law, basis, edges, outer, order)
+        order, level = 2 * order, level + 1
+
+
+def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
+    angle, weight = gauss_rule(outer, order)
+    mass = weight * SINE.density(angle)
+    source = cell_index(basis, angle)
+    flux = np.zeros(basis.size**2)
+    step = max(1, ROW_CHUNK // (SHARE_NODES[0] * edges.size))
+    for start in range(0, angle.size, step):
+        part = slice(start, start + step)
+        row, low, high, nodes = _row_intervals(law, edges, angle[part])
+        target = cell_index(basis, 0.5 * (low + high))
+        for count in SHARE_NODES:
+            chosen = nodes == count
+            outgoing, inner = gauss_on_intervals(low[chosen], high[chosen], count)
+            shape = (-1, count)
+            value = law.density(angle[part][row[chosen], None], outgoing.reshape(shape)) * inner.reshape(shape)
+            cell = source[part][row[chosen]] * basis.size + target[chosen]
+            flux += np.bincount(cell, weights=mass[part][row[chosen]] * value.sum(axis=1), minlength=flux.size)
+    return basis.heights[:, None] * flux.reshape(basis.size, basis.size) * basis.heights
+
+
+def _row_intervals(
+    law: HasDensity, edges: Floats, theta: Floats
+) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
+    """Row, ends and number of Gauss nodes of the intervals into which cells and panels together cut (0, pi)."""
+    panels = law.panels(theta)
+    fixed = np.broadcast_to(edges, (theta.size, edges.size))
+    merged = np.concatenate((panels, fixed), axis=1)
+    # The panel of an interval is the one whose left edge came last.
+    widths = np.concatenate((np.diff(panels, axis=1), np.zeros((theta.size, 1 + edges.size))), axis=1)
+    number = np.concatenate((np.arange(panels.shape[1]), np.zeros(edges.size, dtype=np.int64)))
+    place = np.argsort(merged, axis=1, kind="stable")
+    merged = np.take_along_axis(merged, place, axis=1)
+    panel = np.maximum.accumulate(number[place], axis=1)[:, :-1]
+    width = np.diff(merged, axis=1)
+    row, column = np.nonzero(width > 0.0)
+    share = width[row, column] / widths[row, panel[row, column]]
+    nodes = np.asarray(SHARE_NODES)[np.searchsorted(SHARES, share)]
+    return row, merged[row, column], merged[row, column + 1], nodes
 
 
 def _density_levels(law: HasDensity, basis: Basis, edges: Floats) -> Iterator[Floats]:

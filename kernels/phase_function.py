@@ -81,6 +81,24 @@ class HenyeyGreensteinLaw(DensityLaw):
         edges = [ends, peak - distance[::-1], peak, peak + distance, ends + np.pi]
         return np.asarray(np.clip(np.concatenate(edges, axis=-1), 0.0, np.pi))
 
+    @property
+    def resolution(self) -> float:
+        """Width of the peak, 1 - |g|."""
+        return 1.0 - abs(self.g)
+
+    def incoming_edges(self, edges: Floats) -> Floats:
+        """Integrals between edges change where the peak passes an edge: distances from there that double."""
+        centre = edges if self.g >= 0.0 else np.pi - edges[::-1]
+        distance = self.resolution * 2.0 ** np.arange(self._doublings())
+        # up to the middle between two edges, from where the next edge is nearer
+        half = 0.5 * np.diff(centre)[:, None]
+        right, left = centre[:-1, None] + distance, centre[1:, None] - distance
+        near = distance <= half
+        # no interval between two edges is wider than the peak where both are near
+        halved = (0.5 * self.resolution < half) & (half < self.resolution)
+        middle = 0.5 * (centre[1:] + centre[:-1])[halved[:, 0]]
+        return np.unique(np.concatenate((centre[1:-1], middle, right[near], left[near])))
+
     def _doublings(self) -> int:
         return 1 + int(np.ceil(np.log2(np.pi / (1.0 - abs(self.g)))))
 

@@ -102,12 +102,12 @@ class Combination(Law):
         return self if self.reversible else Combination(tuple((weight, law.adjoint()) for weight, law in terms))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        parts = [(weight, *law.branches(theta)) for weight, law in self.terms_checked()]
+        parts = [(weight, *law.branches(theta)) for weight, law in self.terms_checked() if weight > 0.0]
         probability = np.concatenate([weight * share for weight, share, _ in parts], axis=-1)
         return merged(probability, np.concatenate([angle for _, _, angle in parts], axis=-1))
 
     def kinks(self, limit: int) -> tuple[Floats, float]:
-        parts = [law.kinks(limit) for _, law in self.terms_checked()]
+        parts = [law.kinks(limit) for weight, law in self.terms_checked() if weight > 0.0]
         return np.unique(np.concatenate([kinks for kinks, _ in parts])), min(sum(left for _, left in parts), 1.0)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:

@@ -27,14 +27,18 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
     return np.asarray(values), _reflect(reflector, vectors)
 
 
-def second_grid(matrix: KernelMatrix) -> Floats | None:
-    """Eigenvalues off the constants (ascending) on the coarser basis, or None where the basis has none."""
-    coarser = matrix.basis.coarsened()
-    if coarser is None:
-        return None
-    basis, embedding = coarser
-    array = embedding @ (0.5 * (matrix.symmetric + matrix.symmetric.T)) @ embedding.T
-    return off_constants(np.asarray(array), np.asarray(basis.constant))[0]
+def coarser_grids(matrix: KernelMatrix, levels: int) -> list[Floats]:
+    """Eigenvalues off the constants (ascending) on successively coarser bases, as many as the basis has."""
+    found: list[Floats] = []
+    basis, array = matrix.basis, 0.5 * (matrix.symmetric + matrix.symmetric.T)
+    for _ in range(levels):
+        coarser = basis.coarsened()
+        if coarser is None:
+            break
+        basis, embedding = coarser
+        array = np.asarray(embedding @ array @ embedding.T)
+        found.append(off_constants(array, np.asarray(basis.constant))[0])
+    return found
 
 
 def _householder(unit: Floats) -> Floats:

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
-from .deflation import off_constants, second_grid
+from .deflation import coarser_grids, off_constants
 from .sampling import sampling_errors
 
 if TYPE_CHECKING:
@@ -23,6 +24,8 @@ REVERSIBLE_Z = 5.0
 # An unsampled matrix is called reversible below this relative antisymmetry, a thousand times the rounding errors of
 # its entries; otherwise its own reported error decides.
 REVERSIBLE_ROUNDING = 1e-12
+# With order 2, the lowest of the bases, the change by the last doubling is this share of the one before.
+EARLIER_SHARE = 0.25
 NORMAL_95 = 1.959963984540054
 
 
@@ -35,7 +38,8 @@ class SpectrumErrors:
     algebraic : array
         Bound: the norm of S v - lambda v plus the eigensolver's rounding. Some eigenvalue of the matrix is this near.
     discretisation : array
-        Estimate: change of the eigenvalue from the basis of half the size; ``inf`` where there is none.
+        Change of the eigenvalue from the basis of half the size, or a quarter of the change before that, whichever
+        is larger (``inf`` where there is no coarser basis), plus the Frobenius error of a matrix that was not sampled.
     sampling : array
         Estimate: one standard error from the rays' randomness; 0 for matrices that were not sampled.
     """
@@ -119,7 +123,7 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         A law is discretised first; ``basis=`` and further keywords go to `asperity.kernels.discretise` (default:
         Legendre polynomials of degree below 48). A collision law has the eigenvalues of its P~ with both signs.
     k : int
-        Number of eigenvalues, at most the size of the matrix.
+        Number of eigenvalues; a matrix of fewer rows has fewer.
 
     Returns
     -------
@@ -148,9 +152,6 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), **discretisation), k)
     matrix = matrix_of(kernel, **discretisation)
     check_reversible(matrix)
-    size = matrix.basis.size
-    if k > size:
-        raise InputError(f"k: expected at most the size of the matrix, {size}, got {k}")
     array = 0.5 * (matrix.symmetric + matrix.symmetric.T)
     constant = np.asarray(matrix.basis.constant)
     rest, rest_vectors = off_constants(array, constant)
@@ -187,7 +188,8 @@ def _errors(
     rounding = matrix.basis.size * np.finfo(np.float64).eps * max(1.0, float(np.max(np.abs(values))))
     return SpectrumErrors(
         algebraic=frozen(residuals + rounding),
-        discretisation=frozen(changes),
+        # an entry's error moves an eigenvalue by no more than the Frobenius norm; sampled ones have their own part
+        discretisation=frozen(changes + (0.0 if matrix.samples else float(matrix.error))),
         sampling=frozen(sampling_errors(matrix, vectors, values)),
     )
 
@@ -226,16 +228,34 @@ def check_reversible(matrix: KernelMatrix) -> None:
 
 
 def _two_grids(matrix: KernelMatrix, rest: Floats) -> Floats:
-    """Change of every eigenvalue from the coarser basis, counted from the nearer end of the spectrum."""
-    coarse = second_grid(matrix)
-    if coarse is None:
+    """Change of every eigenvalue from the coarser basis, counted from the nearer end of the spectrum.
+
+    A step of parity can leave an eigenvalue unchanged by accident; so a share of the change before counts too.
+    """
+    grids = coarser_grids(matrix, levels=2)
+    if not grids:
         return np.full(len(rest), np.inf)
-    from_bottom = np.arange(len(rest))
-    counterpart = np.where(rest >= 0.0, len(coarse) - len(rest) + from_bottom, from_bottom)
-    inside = (counterpart >= 0) & (counterpart < len(coarse))
+    change = _changes(rest, grids[0])
+    if len(grids) == 1:
+        return change
+    earlier = _changes(grids[0], grids[1])
+    place, inside = _counterparts(rest, grids[0])
+    before = np.where(inside, earlier[place], np.inf)
+    return np.where(np.isfinite(before), np.maximum(change, EARLIER_SHARE * before), change)
+
+
+def _changes(fine: Floats, coarse: Floats) -> Floats:
     if len(coarse) == 0:
-        return np.full(len(rest), np.inf)
-    return np.where(inside, np.abs(rest - coarse[np.clip(counterpart, 0, len(coarse) - 1)]), np.inf)
+        return np.full(len(fine), np.inf)
+    place, inside = _counterparts(fine, coarse)
+    return np.where(inside, np.abs(fine - coarse[place]), np.inf)
+
+
+def _counterparts(fine: Floats, coarse: Floats) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Places in the ascending ``coarse`` of the eigenvalues ``fine``: from the top if positive, else from below."""
+    from_bottom = np.arange(len(fine))
+    place = np.where(fine >= 0.0, len(coarse) - len(fine) + from_bottom, from_bottom)
+    return np.clip(place, 0, max(len(coarse) - 1, 0)), (place >= 0) & (place < len(coarse))
 
 
 def _both_signs(half: Spectrum, k: int) -> Spectrum:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..checks import positive_number
 from ..estimates import Estimate
-from ..kernels import BranchLaw, KernelMatrix, Law, Legendre, WallLaw, discretise
+from ..kernels import Bins, BranchLaw, KernelMatrix, Law, Legendre, MatrixLaw, WallLaw, discretise
 from ..kernels.combination import SpecularFrame
 from .eigenvalues import NORMAL_95, Spectrum, spectrum
 
@@ -106,7 +106,18 @@ def spectral_gap(
             "so no L^2 gap exists, and a gap on a grid is an artefact of the grid"
         )
         return SpectralGap(0.0, 0.0, "bound", "structure of the law", "no gap", (reason,), law.frame)
+    if isinstance(law, MatrixLaw):
+        return _of_finite_rank(law)
     return _refined(law, tolerance, rng or np.random.default_rng(0))
+
+
+def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
+    """A law that is constant on bins: its own bins hold every eigenvalue but 0, which has infinite multiplicity."""
+    found = spectrum(discretise(law, Bins(law.edges)), k=4)
+    error = float(found.gap_errors.algebraic[0])
+    reason = f"the law is constant on {law.edges.size - 1} bins: beyond these its spectrum is 0"
+    method = _method(found, "algebraic error; the basis is exact")
+    return SpectralGap(min(found.gap, 1.0), error, "bound", method, "isolated", (reason,), found.convention, found)
 
 
 def made_of_isometries(law: Law) -> bool:

@@ -138,6 +138,7 @@ def test_the_lazy_operator_is_the_kronecker_product_and_symmetric(psi_basis):
     assert np.max(np.abs(dense - dense.T)) < 1e-12
     assert float(operator.symmetry_defect()) < 1e-12
     assert float(K.symmetry_defect(ker.Legendre(7), psi_basis)) < 1e-12
+    assert float(K.symmetry_defect()) < 1e-12
 
 
 def test_spectrum_of_k_is_that_of_the_reflection_law_with_both_signs():
@@ -160,5 +161,11 @@ def test_velocities_that_point_away_are_refused():
         K.sample([0.0, -1.0], rng)
     with pytest.raises(InputError, match="Generator"):
         K.sample([0.0, -1.0, 0.0], 7)
+    with pytest.raises(InputError, match="disk"):
+        ker.CollisionLaw(ker.specular(), 3)
+    with pytest.raises(InputError, match="wall"):
+        ker.CollisionLaw.from_wall(ker.specular(), geo.Disk())
+    with pytest.raises(InputError, match="sum of 1"):
+        ker.CollisionLaw(0.5 * ker.lambertian(), geo.Disk())
     with pytest.raises(InputError, match="paper"):
         ker.CollisionLaw(ker.specular().in_specular_frame(), geo.Disk())

@@ -242,6 +242,16 @@ def test_grazing_rays_are_accounted_for(name, theta):
         assert counts["bounce_limit"] == 0 or name in ("rectangular-teeth", *MUSHROOMS)
 
 
+def test_the_first_hit_is_told_from_a_corner_however_near_it_is():
+    """At theta = 1e-12 a ray that enters 1e-6 from a vertical side hits it 1e-18 below the corner, and comes back."""
+    wall = geo.rectangular_teeth(1.0)
+    for x, theta in ((0.5 + 1e-6, 1e-12), (1.0 - 1e-6, np.pi - 1e-12)):
+        traced = geo.trace(wall, x, theta, max_collisions=50)
+        assert traced.counts()["corner"] == 0 and traced.collisions == 50
+    notch = geo.trace(geo.triangular_teeth(0.1), 1e-20, np.pi / 2)
+    assert notch.counts()["corner"] == 0
+
+
 def test_a_ray_aimed_at_a_corner_is_reported():
     notch = geo.triangular_teeth(np.pi / 2)
     # straight down into the bottom, straight down onto a tip, and aimed at the bottom at 45 degrees

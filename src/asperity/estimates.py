@@ -38,6 +38,10 @@ class Estimate:
     kind: ErrorKind
     method: str
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "value", float(self.value))
+        object.__setattr__(self, "error", float(self.error))
+
     def __float__(self) -> float:
         return float(self.value)
 
