@@ -88,8 +88,9 @@ def _with_mirror_image(half: Floats) -> Floats:
 
 def _row_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
     """About how often the density is evaluated: most intervals between cell edges are small shares of a panel."""
-    panels = law.panels(outer[:1]).shape[-1]
-    return (outer.size - 1) * order * (SHARE_NODES[0] * edges.size + SHARE_NODES[-1] * panels)
+    panels: int = law.panels(outer[:1]).shape[-1]
+    values: int = (outer.size - 1) * order * (SHARE_NODES[0] * edges.size + SHARE_NODES[-1] * panels)
+    return values
 
 
 def _row_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:

@@ -161,7 +161,7 @@ def test_peaked_densities_have_their_exact_masses_between_bins(g: float, basis: 
 def test_a_peak_much_narrower_than_the_bins_is_seen() -> None:
     matrix = ker.discretise(ker.henyey_greenstein(1.0 - 1e-5), ker.Bins(16))
     assert matrix.stochastic_defect() < 1e-10 and eigenvalues(matrix)[0] == pytest.approx(1.0, abs=1e-10)
-    # at least what a Galerkin eigenvalue may be: below g
+    # a Galerkin eigenvalue of a reversible law lies below its own, g
     assert 0.999 < eigenvalues(matrix)[1] < 1.0 - 1e-5
 
 
