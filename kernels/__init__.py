@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .circular import CircularArcLaw
     from .collision import CollisionLaw
     from .collision_matrices import no_slip_matrix, smooth_matrix
-    from .combination import Combination, Composition, Power, SpecularFrame, mixture
+    from .composition import Composition, Power
     from .density import DensityLaw
     from .discretisation import discretise
     from .estimation import estimate
@@ -29,10 +29,12 @@ if TYPE_CHECKING:
     from .panels import Panels
     from .phase_function import henyey_greenstein
     from .rectangular import RectangularTeethLaw
+    from .specular_frame import SpecularFrame
     from .symmetry import Defect, SymmetryDefect
     from .tensor import TensorBasis
     from .triangular import TriangularTeethLaw
     from .wall_law import WallLaw
+    from .weighted_sum import Combination, mixture
 
 _HOMES = {
     "AngularMeasure": "measure",
@@ -41,8 +43,8 @@ _HOMES = {
     "BranchLaw": "law",
     "CircularArcLaw": "circular",
     "CollisionLaw": "collision",
-    "Combination": "combination",
-    "Composition": "combination",
+    "Combination": "weighted_sum",
+    "Composition": "composition",
     "Defect": "symmetry",
     "DensityLaw": "density",
     "DrivenLaw": "law",
@@ -52,11 +54,11 @@ _HOMES = {
     "Legendre": "legendre",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
-    "Power": "combination",
+    "Power": "composition",
     "RectangularTeethLaw": "rectangular",
     "SINE": "measure",
     "SINE_SQUARED": "measure",
-    "SpecularFrame": "combination",
+    "SpecularFrame": "specular_frame",
     "SymmetryDefect": "symmetry",
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
@@ -67,7 +69,7 @@ _HOMES = {
     "lambertian": "ideal",
     "load_matrix": "matrixfile",
     "maxwell": "ideal",
-    "mixture": "combination",
+    "mixture": "weighted_sum",
     "no_slip_matrix": "collision_matrices",
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",

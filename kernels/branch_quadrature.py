@@ -9,9 +9,11 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats
 from .basis import Basis
-from .combination import Combination, Composition, Power, SpecularFrame
+from .composition import Composition, Power
 from .measure import gauss_on_intervals, gauss_rule
 from .products import add_products
+from .specular_frame import SpecularFrame
+from .weighted_sum import Combination
 
 # A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
 # misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the

@@ -14,10 +14,10 @@ from ..checks import Floats, angles, finite_array, generator
 from ..errors import InputError
 from .basis import Basis
 from .collision_matrices import isometry_matrix
-from .combination import Combination
 from .isometry import isometries
 from .law import Law
 from .legendre import Legendre
+from .weighted_sum import Combination
 
 if TYPE_CHECKING:
     from ..geometry import Disk, Wall

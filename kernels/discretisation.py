@@ -13,7 +13,7 @@ from .arc_quadrature import arc_matrix
 from .basis import Basis
 from .branch_quadrature import branch_matrix
 from .circular import CircularArcLaw
-from .combination import Combination, Composition, Power, SpecularFrame
+from .composition import Composition, Power
 from .density import DensityLaw
 from .entry_quadrature import entry_matrix
 from .involution import InvolutionLaw
@@ -26,7 +26,9 @@ from .measure import SINE
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
 from .sampling import DEFAULT_SAMPLES, RANDOMISATIONS, SamplingMethod, responder, sampled_array
+from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
+from .weighted_sum import Combination
 
 Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 

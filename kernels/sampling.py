@@ -13,11 +13,11 @@ from ..checks import Floats
 from ..errors import AccuracyError, InputError
 from .basis import Basis
 from .branch_quadrature import largest_square_sum
-from .combination import SpecularFrame
 from .counting import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
 from .involution import InvolutionLaw
 from .law import BranchLaw, DrivenLaw, Law
 from .measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
+from .specular_frame import SpecularFrame
 from .stable_angles import flipped
 
 SamplingMethod = Literal["qmc", "monte-carlo"]

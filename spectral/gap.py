@@ -10,8 +10,7 @@ import numpy as np
 
 from ..checks import positive_number
 from ..estimates import Estimate
-from ..kernels import Bins, BranchLaw, KernelMatrix, Law, Legendre, MatrixLaw, WallLaw, discretise
-from ..kernels.combination import SpecularFrame
+from ..kernels import Bins, BranchLaw, KernelMatrix, Law, Legendre, MatrixLaw, SpecularFrame, WallLaw, discretise
 from .eigenvalues import NORMAL_95, Spectrum, spectrum
 
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity.errors import InputError
+from asperity.kernels import Combination, Composition, mixture
 from asperity.kernels.circular import CircularArcLaw
-from asperity.kernels.combination import Combination, Composition, mixture
 from asperity.kernels.density import DensityLaw
 from asperity.kernels.ideal import lambertian, maxwell, retroreflection, specular
 from asperity.kernels.law import Law

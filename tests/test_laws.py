@@ -14,9 +14,9 @@ from scipy.special import ellipe
 
 from asperity import geometry as geo
 from asperity.errors import AccuracyError, InputError
+from asperity.kernels import Combination
 from asperity.kernels.bins import Bins
 from asperity.kernels.circular import CircularArcLaw
-from asperity.kernels.combination import Combination
 from asperity.kernels.density import DensityLaw
 from asperity.kernels.ideal import lambertian, maxwell, retroreflection, specular
 from asperity.kernels.involution import InvolutionLaw
