@@ -30,8 +30,6 @@ EPS = 2.0**-52
 JOINT_ULPS = 16.0
 # D = B^2 + 2 kappa |v|^2 F carries about eight rounding errors of B^2; below them hit and miss are not told apart.
 TANGENT_ULPS = 16.0
-# An arc run is worth its two arctangents and one sincos when it saves at least this many bounces.
-RUN_BOUNCES = 8.0
 ROOT_STEPS = 80
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")

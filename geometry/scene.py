@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 SMOOTH_JOINT = 1e-9
 # An arc of more than this span is cut in two, so that the side of its chord decides what belongs to it.
 LONGEST_ARC = 1.5 * pi
-# A run along an arc is skipped where it has at least this many hops (engine.RUN_BOUNCES is the same trade).
+# A run along an arc is worth its two arctangents and one sincos where it has at least this many hops.
 RUN_HOPS = 8.0
 # Below this half angle the chord and the radius give it more exactly than the difference of two parameters does.
 SHALLOW_ARC = 0.5
@@ -65,7 +65,7 @@ def scene_of(wall: Wall) -> Scene:
     """Build the tables of a wall."""
     tables = _Tables()
     places = [(float(x), float(y)) for x, y in wall.vertices]
-    corners = _corners(list(wall.pieces), is_cycle=True)
+    corners = _corners(list(wall.pieces))
     if wall.closes:
         for hollow in wall.hollows:
             chain = _Chain(
@@ -78,7 +78,7 @@ def scene_of(wall: Wall) -> Scene:
         chains = [_Chain(list(wall.pieces), places, corners)]
         for island, island_places in zip(wall.islands, wall.island_vertices, strict=True):
             loop = [(float(x), float(y)) for x, y in island_places]
-            chains.append(_Chain(list(island), loop, _corners(list(island), is_cycle=True)))
+            chains.append(_Chain(list(island), loop, _corners(list(island))))
         tables.add_hollow(0.0, wall.period, chains, edges=(0, 0))
     return tables.scene(wall.period, not wall.closes)
 
@@ -190,7 +190,7 @@ def _table(rows: list[list[float]]) -> Floats | None:
     return np.array(rows, dtype=np.float64) if rows else None
 
 
-def _corners(pieces: list[Curve], *, is_cycle: bool) -> list[bool]:
+def _corners(pieces: list[Curve]) -> list[bool]:
     """For every joint of the cycle of pieces (the first one again at the end): is it a corner?"""
     heads = np.array([piece.tangent(0.0) for piece in pieces])
     tails = np.roll(np.array([piece.tangent(1.0) for piece in pieces]), 1, axis=0)

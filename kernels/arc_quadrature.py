@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from ..checks import Floats
 from .basis import Basis
-from .measure import LARGEST_ANGLE, SMALLEST_ANGLE, gauss_on_intervals
+from .measure import gauss_on_intervals
 from .panels import Panels
 from .products import add_blocks, cell_index
 from .reflection import is_mirror_symmetric, reflection_matrix
+from .stable_angles import flipped, kept_inside
 
 # Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
 # pi - xi, both within 2 xi / MOST_HITS, and are counted there.
@@ -192,7 +193,7 @@ def _add_rows(
             owner = row[part]
             each = np.repeat(owner, order)
             outgoing = np.pi + theta[each] - 2.0 * strips.hits[each] * chord
-            outgoing = np.clip(np.pi - outgoing if mirrored else outgoing, SMALLEST_ANGLE, LARGEST_ANGLE)
+            outgoing = flipped(outgoing) if mirrored else kept_inside(outgoing)
             share = (share * np.sin(chord) * weight[each])[:, None]
             if isinstance(basis, Panels):
                 panel, values = basis.local(outgoing)

@@ -16,9 +16,10 @@ from .branch_quadrature import largest_square_sum
 from .counting import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
 from .involution import InvolutionLaw
 from .law import BranchLaw, DrivenLaw, Law
-from .measure import LARGEST_ANGLE, SINE, SMALLEST_ANGLE
+from .measure import SINE
 from .specular_frame import SpecularFrame
-from .stable_angles import flipped
+from .stable_angles import flipped, kept_inside
+from .wall_law import LOST_TOLERANCE
 
 SamplingMethod = Literal["qmc", "monte-carlo"]
 # Outgoing angles and, for traced rays, which of them escaped.
@@ -32,8 +33,6 @@ RANDOMISATIONS = 8
 # two, which keeps the balance of Sobol points.
 SMALLEST_CHUNK = 2**16
 SOBOL_BITS = 52
-# A larger share of rays that did not escape shows in the matrix: see WallLaw.
-LOST_TOLERANCE = 1e-4
 SLOW_SECONDS = 2.0
 
 
@@ -135,7 +134,7 @@ def _rays(
         engine = Sobol(2, scramble=True, bits=SOBOL_BITS, rng=np.random.default_rng(key))
         for start in range(0, number, chunk):
             points = engine.random(min(chunk, number - start))
-            theta = np.clip(SINE.quantile(points[:, 1]), SMALLEST_ANGLE, LARGEST_ANGLE)
+            theta = kept_inside(SINE.quantile(points[:, 1]))
             yield theta, *respond(np.clip(points[:, 0], smallest, largest), theta)
         return
     traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None

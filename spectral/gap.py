@@ -15,6 +15,8 @@ from .eigenvalues import NORMAL_95, Spectrum, spectrum
 
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 
+# Eigenvalues that a gap carries along in its spectrum.
+SHOWN_VALUES = 4
 FIRST_DEGREE = 12
 LARGEST_DEGREE = 96
 SAMPLED_DEGREE = 48
@@ -93,7 +95,7 @@ def spectral_gap(
     """
     positive_number("tolerance", tolerance)
     if isinstance(law, KernelMatrix):
-        found = spectrum(law, k=min(4, law.basis.size))
+        found = spectrum(law, k=SHOWN_VALUES)
         method = _method(found, "algebraic + two-grid + 1.96 x sampling error")
         evidence = ("one matrix: its basis was not refined",)
         return SpectralGap(
@@ -112,7 +114,7 @@ def spectral_gap(
 
 def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
     """A law that is constant on bins: its own bins hold every eigenvalue but 0, which has infinite multiplicity."""
-    found = spectrum(discretise(law, Bins(law.edges)), k=4)
+    found = spectrum(discretise(law, Bins(law.edges)), k=SHOWN_VALUES)
     error = float(found.gap_errors.algebraic[0])
     reason = f"the law is constant on {law.edges.size - 1} bins: beyond these its spectrum is 0"
     method = _method(found, "algebraic error; the basis is exact")
@@ -132,7 +134,7 @@ def _refined(law: Law, tolerance: float, rng: np.random.Generator) -> SpectralGa
     levels: list[Spectrum] = []
     evidence: list[str] = []
     for matrix in _matrices(law, tolerance, rng):
-        found = spectrum(matrix, k=min(4, matrix.basis.size))
+        found = spectrum(matrix, k=SHOWN_VALUES)
         levels.append(found)
         evidence.append(f"{matrix.basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
         enough = found.gap_error <= tolerance and len(levels) >= FEWEST_LEVELS

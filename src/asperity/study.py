@@ -252,7 +252,7 @@ def _spectrum(
 ) -> Spectrum:
     if gap is not None and gap.verdict == "no gap":
         # whatever the basis, these are numbers of the grid; those of the matrix that is shown and saved
-        return spectrum(matrix, k=min(EIGENVALUES, matrix.basis.size))
+        return spectrum(matrix, k=EIGENVALUES)
     return spectrum(law, EIGENVALUES, basis=SPECTRUM_BASIS, tolerance=0.1 * tolerance, rng=rng)
 
 
