@@ -31,6 +31,8 @@ JOINT_ULPS = 16.0
 # D = B^2 + 2 kappa |v|^2 F carries about eight rounding errors of B^2; below them hit and miss are not told apart.
 TANGENT_ULPS = 16.0
 ROOT_STEPS = 80
+# An odd number without pattern, so that itineraries of the same pieces in another order differ.
+HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -222,11 +224,12 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
 
 
 @_compile
-def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, path):
+def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, path, itinerary):
     """Follow one ray through one hollow; returns x, the outgoing velocity, bounces and status.
 
     ``period`` is None for a closed hollow; for an open wall its sides are passed and x is unfolded by it.
-    ``path`` is None, or an array (limit + 2, 2) that receives the points of the trajectory.
+    ``path`` is None, or an array (limit + 2, 2) that receives the points of the trajectory. ``itinerary`` is None, or
+    an array of one uint64 that receives a hash of the pieces hit, in their order, and of the sides passed.
     """
     left, right, size = hollow[0], hollow[1], hollow[2]
     joint_low, joint_high = int(hollow[3]), int(hollow[4])
@@ -240,6 +243,8 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
     own_kind, own_index, own_s = LID, -1, -1.0
     if path is not None:
         path[0, 0], path[0, 1] = px, py
+    if itinerary is not None:
+        itinerary[0] = np.uint64(0)
     while True:
         kind, index, hit_s, tangent = NO_PIECE, -1, 0.0, 0
         time = np.inf
@@ -326,6 +331,9 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
             return shift + px, vx, vy, bounces, GRAZING
         if bounces >= limit or steps >= 2 * limit + 2:
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT
+        if itinerary is not None:
+            side = 1 if kind == SIDE and vx > 0.0 else 0
+            itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(8 * (index + 1 + side) + kind)
         if period is not None:
             if kind == SIDE:
                 py += time * vy
@@ -353,6 +361,8 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
             if circles[index, 10] > 0.0 and path is None:
                 px, py, vx, vy, hops = skip_run(circles[index], px, py, vx, vy)
                 bounces += hops
+                if itinerary is not None:
+                    itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(hops)
         if ellipses is not None and kind == ELLIPSE:
             px, py, nvx, nvy = arc_reflect(ellipses[index], time, px, py, vx, vy, ellipses[index, 12])
             if near_end(ellipses[index], px, py, slack):
@@ -420,7 +430,7 @@ def trace_rays(
                 out_theta[i], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
         place, vx, vy, bounces[i], status[i] = trace_ray(
-            place, theta[i], hollows[h], joints, lines, circles, ellipses, beziers, period, limit, None
+            place, theta[i], hollows[h], joints, lines, circles, ellipses, beziers, period, limit, None, None
         )
         out_x[i] = base + place
         out_theta[i] = math.atan2(vy, vx)

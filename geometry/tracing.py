@@ -202,7 +202,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     path = np.full((limit + 2, 2), np.nan)
     trace_ray(
         place - base, incoming, scene.hollows[inside[0]], scene.joints, scene.lines, scene.circles,
-        scene.ellipses, scene.beziers, scene.cell if scene.is_open else None, limit, path,
+        scene.ellipses, scene.beziers, scene.cell if scene.is_open else None, limit, path, None,
     )  # fmt: skip
     points = path[np.isfinite(path[:, 0])]
     points[:, 0] += base
