@@ -1,9 +1,9 @@
 """The compiled loop that splits beams. Only `beams` and `marching` import this file, because it loads numba.
 
-A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0, and an unfolded
-vertex (X, Y) is the functional f = X s - Y c - p, positive where it lies right of the line. A beam is a convex polygon
-of such vectors. The generators have p, s and abs(c) of one sign, and cutting only mixes them with positive weights: every
-component keeps its relative accuracy down to grazing.
+A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0, and an
+unfolded vertex (X, Y) is the functional f = X s - Y c - p, positive where it lies right of the line. A beam is a convex
+polygon of such vectors. The generators have p, s and abs(c) of one sign, and cutting only mixes them with positive
+weights: every component keeps its relative accuracy down to grazing.
 
 A slot of the tables is one beam:
 
@@ -62,7 +62,10 @@ def reduced(high, low):
 
 @_compile
 def triangle_flux(a, b, c):
-    """The integral of dp dtheta over a triangle of lines, positive if counterclockwise: -det sqrt(2 / prod(1 + cos))."""
+    """The integral of dp dtheta over a triangle of lines, positive if counterclockwise.
+
+    It is -det(a, b, c) sqrt(2 / product of 1 + cos over the three differences of angle).
+    """
     bp, bs, bc = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     cp, cs, cc = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     det = a[0] * (bs * cc - bc * cs) - a[1] * (bp * cc - bc * cp) + a[2] * (bp * cs - bs * cp)

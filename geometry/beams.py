@@ -124,8 +124,8 @@ def beams_of(hollow_vertices: ArrayLike, *, tolerance: float = TOLERANCE, max_be
     whole_number("max_beams", max_beams, 2)
     triangulation = triangulated(hollow_vertices)
     width = triangulation.width
-    *tables, rounding, _, status = split_beams(*triangulation.tables, tolerance, max_beams)
-    rows, tags = pieces_of(*tables, width)
+    corners, real, whole, used, rounding, _, status = split_beams(*triangulation.tables, tolerance, max_beams)
+    rows, tags = pieces_of(corners, real, whole, used, width)
     out = tags[:, 3] == 1
     kept, rest = rows[out], rows[~out]
     unresolved = float(_flux(*rest[:, :4].T).sum())

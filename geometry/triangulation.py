@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from math import frexp, ldexp
 
 import numpy as np
@@ -20,6 +21,8 @@ FIRST_WALL = -2
 # Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ULPS = 3.0 + 16.0 * 2.0**-52
 EPS = 2.0**-53
+# Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 8 EPS.
+PARALLEL = 32.0 * EPS
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +101,10 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     [[3, 0, 1], [1, 2, 3]]
     """
     points = _checked(hollow_vertices)
-    corners, beyond = _clipped(points)
-    entrance = int(np.flatnonzero(beyond == OPENING)[0])
     relative = points - points[0]
     unit = ldexp(1.0, frexp(float(np.abs(relative).max()))[1])
+    corners, beyond = _clipped(points / unit)
+    entrance = int(np.flatnonzero(beyond == OPENING)[0])
     high, low = _directions(points)
     for array in (corners, beyond):
         array.setflags(write=False)
@@ -138,7 +141,7 @@ def _signs(a: Floats, b: Floats, points: Floats) -> NDArray[np.int8]:
     first = (b[0] - a[0]) * (points[:, 1] - a[1])
     second = (b[1] - a[1]) * (points[:, 0] - a[0])
     cross = first - second
-    signs = np.sign(cross).astype(np.int8)
+    signs: NDArray[np.int8] = np.sign(cross).astype(np.int8)
     doubtful = np.abs(cross) <= CROSS_ULPS * EPS * (np.abs(first) + np.abs(second))
     # products of exact zeros are zero, for all others the sign is not certain
     doubtful &= (first != 0.0) | (second != 0.0)
@@ -150,7 +153,6 @@ def _signs(a: Floats, b: Floats, points: Floats) -> NDArray[np.int8]:
 def _enters(corners: list[Floats], start: Floats, end: Floats) -> bool:
     """Whether a segment meets the open triangle, exactly."""
     low, high = Fraction(0), Fraction(1)
-    strict = True
     for k in range(3):
         a, b = corners[k], corners[(k + 1) % 3]
         ax, ay, bx, by = (Fraction(float(value)) for value in (*a, *b))
@@ -160,8 +162,7 @@ def _enters(corners: list[Floats], start: Floats, end: Floats) -> bool:
         if at[0] < 0 or at[1] < 0:
             root = at[0] / (at[0] - at[1])
             low, high = (max(low, root), high) if at[0] < 0 else (low, min(high, root))
-            strict = strict and low < high
-    return strict
+    return low < high
 
 
 def _clipped(points: Floats) -> tuple[Integers, Integers]:
@@ -240,9 +241,8 @@ def _directions(points: Floats) -> tuple[Floats, Floats]:
     wide[flip] *= -1
     direction = np.arctan2(wide[:, 1], wide[:, 0])
     order = np.argsort(direction, kind="stable")
-    for before, after in zip(order[:-1], order[1:], strict=True):
-        # 8 ulp of a double: nothing farther apart is parallel
-        if 0 <= direction[after] - direction[before] <= 16.0 * EPS * 4.0 and _parallel(points, before, after):
+    for before, after in pairwise(order):
+        if direction[after] - direction[before] <= PARALLEL and _parallel(points, before, after):
             direction[after] = direction[before]
     high = direction.astype(np.float64)
     return high, (direction - high).astype(np.float64)
