@@ -114,11 +114,11 @@ def exact_row(
 
     Examples
     --------
-    A right-angled notch at vertical incidence: every ray comes back after two reflections.
+    A square notch at half a right angle: the floor and both sides in one order or another, or a side twice.
 
-    >>> row = exact_row([(0, 0), (0.5, -0.5), (1, 0)], np.pi / 2)
-    >>> row.edges.tolist(), row.sign.tolist(), row.bounces.tolist()
-    ([0.0, 0.5, 1.0], [1, 1], [2, 2])
+    >>> row = exact_row([(0, 0), (0, -1.25), (1, -1.25), (1, 0)], np.pi / 4)
+    >>> row.edges.round(12).tolist(), row.sign.tolist(), row.bounces.tolist()
+    ([0.0, 0.25, 0.5, 1.0], [1, 1, -1], [4, 4, 3])
     """
     number_between("theta", theta, 0.0, np.pi)
     return exact_rows(hollow_vertices, [theta], max_intervals=max_intervals, max_bounces=max_bounces).row(0)
@@ -135,9 +135,9 @@ def exact_rows(
 
     Examples
     --------
-    >>> rows = exact_rows([(0, 0), (0, -1), (1, -1), (1, 0)], [np.pi / 2, np.pi / 4])
-    >>> [rows.row(k).sign.tolist() for k in range(2)]
-    [[-1], [-1]]
+    >>> rows = exact_rows([(0, 0), (0, -1.25), (1, -1.25), (1, 0)], [np.pi / 4, 3 * np.pi / 4])
+    >>> [rows.row(k).bounces.tolist() for k in range(2)]
+    [[4, 4, 3], [3, 4, 4]]
     """
     from .marching_engine import march
 

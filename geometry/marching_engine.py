@@ -2,7 +2,8 @@
 
 The line is folded, not the hollow unfolded: with m = (m_x, m_y) the line's normal, at first (sin theta, -cos theta),
 a vertex (X, Y) is passed on its left exactly by the lines p < X m_x + Y m_y + shift, with p = x sin theta. A wall with
-unit normal n at distance d from the origin changes m by -2 (m.n) n and the shift by 2 (m.n) d.
+unit normal n at distance d from the origin changes m by -2 (m.n) n and the shift by 2 (m.n) d. The changes of m are
+added up as angles.
 """
 
 from __future__ import annotations
@@ -43,13 +44,13 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
         while low < stop:
             high = stop
             edge, sign, bounces, steps = entrance, 1, 0, 0
-            m_x, m_y, shift = sine, -cosine, 0.0
+            m_x, m_y, shift, shift_low = sine, -cosine, 0.0, 0.0
             turn, rest = 0.0, 0.0
             out = count + 1 < max_intervals
             while out:
                 triangle, side = edge // 3, edge % 3
                 apex = triangles[triangle, (side + 2) % 3]
-                value = x[apex] * m_x + y[apex] * m_y + shift
+                value = x[apex] * m_x + y[apex] * m_y + shift_low + shift
                 if value > low:
                     high = min(high, value)
                     edge = 3 * triangle + ((side + 1) % 3 if sign > 0 else (side + 2) % 3)
@@ -64,17 +65,16 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
                 else:
                     wall = FIRST_WALL - code
                     across = 2.0 * (m_x * walls[wall, 0] + m_y * walls[wall, 1])
-                    m_x -= across * walls[wall, 0]
-                    m_y -= across * walls[wall, 1]
-                    shift += across * walls[wall, 2]
-                    # one Newton step on |m| = 1
-                    scale = 1.5 - 0.5 * (m_x * m_x + m_y * m_y)
-                    m_x *= scale
-                    m_y *= scale
+                    shift, shift_low = add_to(shift, shift_low, across * walls[wall, 2], 0.0)
                     turn, rest = add_to(turn, rest, 2.0 * sign * turn_high[wall], 2.0 * sign * turn_low[wall])
                     turn, rest = reduced(turn, rest)
                     sign = -sign
                     bounces += 1
+                    # m from the sum of all turns, so that its error does not grow
+                    turned, along = math.sin(turn), math.cos(turn)
+                    turned, along = turned + rest * along, along - rest * turned
+                    m_x = sine * along - cosine * turned
+                    m_y = -sign * (cosine * along + sine * turned)
                 if bounces > max_bounces or steps > STEPS_A_BOUNCE * max_bounces:
                     out = False
             if count + 1 >= max_intervals:

@@ -98,7 +98,7 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     --------
     >>> square = triangulated([(0, 0), (0, -1), (1, -1), (1, 0)])
     >>> square.corners.tolist()
-    [[3, 0, 1], [1, 2, 3]]
+    [[2, 3, 0], [0, 1, 2]]
     """
     points = _checked(hollow_vertices)
     relative = points - points[0]

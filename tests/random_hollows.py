@@ -33,3 +33,8 @@ def random_hollow(seed: int) -> Chain:
     rng = np.random.default_rng([seed, 2027])
     vertices = int(rng.integers(3, 17))
     return (star_hollow if seed % 2 else graph_hollow)(vertices, rng)
+
+
+def wall_with(hollow: Chain) -> Chain:
+    """Vertices of a wall of period 3 with the hollow between x = 1 and x = 2, below flat tops."""
+    return np.vstack([[0.0, 0.0], hollow + np.array([1.0, 0.0]), [3.0, 0.0]])

@@ -8,7 +8,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.beams import beams_of
 from asperity.geometry.marching import exact_row, exact_rows
-from random_hollows import random_hollow
+from random_hollows import random_hollow, wall_with
 
 # Shares of a row that two methods may see differently: rounding of a vertex's place over sin(theta), for a hundred
 # reflections each.
@@ -69,7 +69,7 @@ def test_the_middle_of_every_interval_is_traced_to_its_angle(seed):
     row = exact_row(hollow, 1.1, max_bounces=1000)
     wide = (np.diff(row.edges) > 1e-6) & (row.sign != 0)
     middle = (0.5 * (row.edges[1:] + row.edges[:-1]))[wide]
-    ray = geo.trace(geo.Wall.from_vertices(hollow), middle, 1.1)
+    ray = geo.trace(geo.Wall.from_vertices(wall_with(hollow)), 1.0 + middle, 1.1)
     assert ray.escaped.all()
     assert np.array_equal(ray.collisions, row.bounces[wide])
     assert np.abs(ray.theta - row.outgoing[wide]).max() < 1e-13 * row.bounces.max()
