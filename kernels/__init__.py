@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from .measure import SINE, SINE_SQUARED, AngularMeasure
     from .panels import Panels
     from .phase_function import henyey_greenstein
+    from .polygon_law import PolygonLaw
     from .rectangular import RectangularTeethLaw
     from .specular_frame import SpecularFrame
     from .symmetry import Defect, SymmetryDefect
@@ -54,6 +55,7 @@ _HOMES = {
     "Legendre": "legendre",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
+    "PolygonLaw": "polygon_law",
     "Power": "composition",
     "RectangularTeethLaw": "rectangular",
     "SINE": "measure",
@@ -96,6 +98,7 @@ __all__ = [
     "Legendre",
     "MatrixLaw",
     "Panels",
+    "PolygonLaw",
     "Power",
     "RectangularTeethLaw",
     "SpecularFrame",

@@ -17,6 +17,7 @@ from .composition import Composition, Power
 from .density import DensityLaw
 from .entry_quadrature import entry_matrix
 from .involution import InvolutionLaw
+from .isometry import table_of
 from .kernel_quadrature import action_is_affordable, action_matrix, density_matrix, map_matrix
 from .law import DrivenLaw, Law
 from .legendre import Legendre
@@ -28,6 +29,7 @@ from .reflection import mirror_refinement, reflection_matrix
 from .sampling import DEFAULT_SAMPLES, RANDOMISATIONS, SamplingMethod, responder, sampled_array
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
+from .table_quadrature import table_matrix
 from .weighted_sum import Combination
 
 Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
@@ -139,7 +141,7 @@ class _Maker:
 
     def make(self, law: Law, method: Method) -> KernelMatrix:
         """The matrix of a law; the facts of the whole law are put in by `discretise`."""
-        closed_form = getattr(law, "closed_form", None)
+        closed_form = _replacement(law)
         if closed_form is not None and (method == "auto" or method in self.methods(closed_form)[:-1]):
             return self.make(closed_form, method)
         if method != "auto":
@@ -157,7 +159,7 @@ class _Maker:
 
     def methods(self, law: Law, isometries: bool = True) -> tuple[Method, ...]:
         """The methods that a law has, the best first; ``"monte-carlo"``, which all have, last."""
-        closed_form = getattr(law, "closed_form", None)
+        closed_form = _replacement(law)
         driven: tuple[Method, ...] = ("qmc",) if responder(law) is not None else ()
         found: tuple[Method, ...]
         if closed_form is not None:
@@ -191,12 +193,17 @@ class _Maker:
         return self._sampled(law, method)
 
     def _exact(self, law: Law) -> KernelMatrix:
-        symmetric, omitted = branch_matrix(law, self.basis, self.tolerance)
+        table = table_of(law)
+        if table is not None:
+            symmetric, omitted = table_matrix(table, self.basis)
+            how, left = "masses and Gauss rules on every piece of the table of isometries, to rounding", "unresolved beams"
+        else:
+            symmetric, omitted = branch_matrix(law, self.basis, self.tolerance)
+            how, left = "Gauss rules between the kinks of isometries, to rounding", "omitted kinks"
         # two Markov kernels cannot be further apart than their norms together
         furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(self.basis.size))
         error = min(omitted + ROUNDING * self.basis.size, furthest)
-        how = "Gauss rules between the kinks of isometries, to rounding"
-        return self._result(symmetric, "exact", error, "bound", how + (", plus omitted kinks" if omitted else ""))
+        return self._result(symmetric, "exact", error, "bound", how + (f", plus {left}" if omitted else ""))
 
     def _quadrature(self, law: Law) -> KernelMatrix:
         if isinstance(law, Combination):
@@ -305,6 +312,12 @@ def made_of_isometries(law: Law) -> bool:
     except InputError:
         return False
     return True
+
+
+def _replacement(law: Law) -> Law | None:
+    """The exact law of a wall, in closed form or as a table of isometries; None for other laws."""
+    found = getattr(law, "closed_form", None)
+    return getattr(law, "exact_law", None) if found is None else found
 
 
 def _is_sum_of_others(law: Law) -> bool:

@@ -6,7 +6,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Floats, angles
+from .ideal import IsometryLaw
+from .isometry_table import IsometryTable
 from .law import Law
+from .specular_frame import SpecularFrame
+from .weighted_sum import Combination
 
 # Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.
 KINKS = 20_000
@@ -15,7 +19,8 @@ KINKS = 20_000
 def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Probability, sign and offset of every branch of a law at the angles ``theta``.
 
-    Between two kinks every branch is one isometry; so a second angle of the same interval gives the sign.
+    A law with a table says so itself. For others: between two kinks every branch is one isometry, so a second angle
+    of the same interval gives the sign.
 
     Parameters
     ----------
@@ -37,6 +42,9 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     ([1.0], [-1.0], [1.0])
     """
     incoming = angles("theta", theta)
+    table = table_of(law)
+    if table is not None:
+        return table.rows(incoming)
     edges = np.concatenate([[0.0], law.kinks(KINKS)[0], [np.pi]])
     right = np.clip(np.searchsorted(edges, incoming, side="right"), 1, len(edges) - 1)
     low, high = edges[right - 1], edges[right]
@@ -47,3 +55,18 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     rises = (outgoing[1] - outgoing[0]) * (second - incoming)[..., None] >= 0.0
     sign = np.where(rises, 1.0, -1.0)
     return probability[0], sign, outgoing[0] - sign * incoming[..., None]
+
+
+def table_of(law: Law) -> IsometryTable | None:
+    """The table of a law, or None for a law that has none: one that is not made of isometries, or is a composition."""
+    if isinstance(law, IsometryLaw):
+        return IsometryTable.sent_back(1.0) if law.retro else IsometryTable.flat(1.0)
+    if isinstance(law, SpecularFrame):
+        table = table_of(law.law)
+        return None if table is None else table.in_specular_frame()
+    if isinstance(law, Combination):
+        terms = [(weight, table_of(term)) for weight, term in law.terms_checked() if weight > 0.0]
+        tables = [table.scaled(weight) for weight, table in terms if table is not None]
+        return IsometryTable.joined(tables) if len(tables) == len(terms) else None
+    made = getattr(law, "table", None)
+    return None if made is None else made()

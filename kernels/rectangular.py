@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, positive_number
+from .isometry_table import Crevice, IsometryTable
 from .law import BranchLaw, entry_points
 from .measure import SINE
 from .stable_angles import flipped
@@ -64,18 +65,18 @@ class RectangularTeethLaw(BranchLaw):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and angles, shape ``theta.shape + (2,)``: specular first, then retroreflection."""
         theta = angles("theta", theta)
-        crossings = _resolvable(self.crossings(theta))
-        retro = 0.5 * np.abs(crossings - 2.0 * np.rint(0.5 * crossings))
+        retro = 0.5 * crevice_retro(self.height_to_width, theta)
         return np.stack([1.0 - retro, retro], axis=-1), np.stack([flipped(theta), theta], axis=-1)
 
     def kinks(self, limit: int) -> tuple[Floats, float]:
         """The angles where d is a whole number, cot theta = k / (2 r), and the probability beyond the last of them."""
-        last = max((limit - 1) // 2, 0)
-        if last == 0:
-            return np.empty(0), 1.0
-        steep = np.arctan(2.0 * self.height_to_width / np.arange(last, 0, -1))
-        kinks = np.concatenate([steep, [0.5 * np.pi], np.pi - steep[::-1]])
-        return kinks, float(2.0 * SINE.cdf(steep[0]))
+        return crevice_kinks(self.height_to_width, limit)
+
+    def table(self) -> IsometryTable:
+        """Half of it flat tops, half of it crevices."""
+        nothing = np.empty(0)
+        crevices = IsometryTable(*(nothing,) * 6, crevices=(Crevice(0.5, self.height_to_width),))
+        return IsometryTable.joined([IsometryTable.flat(0.5), crevices])
 
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left end of the flat top."""
@@ -97,3 +98,39 @@ class RectangularTeethLaw(BranchLaw):
 
 def _resolvable(crossings: Floats) -> Floats:
     return np.where(crossings <= RESOLVABLE_CROSSINGS, crossings, MEAN_CROSSINGS)
+
+
+def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
+    """The probability of retroreflection in a crevice: the distance from d to the nearest even number."""
+    crossings = _resolvable(np.asarray(2.0 * height_to_width / np.abs(np.tan(theta))))
+    return np.asarray(np.abs(crossings - 2.0 * np.rint(0.5 * crossings)))
+
+
+def crevice_kinks(height_to_width: float, limit: int) -> tuple[Floats, float]:
+    """The angles where d is a whole number, at most about ``limit``, and the measure of the angles beyond them."""
+    last = max((limit - 1) // 2, 0)
+    if last == 0:
+        return np.empty(0), 1.0
+    steep = np.arctan(2.0 * height_to_width / np.arange(last, 0, -1))
+    kinks = np.concatenate([steep, [0.5 * np.pi], np.pi - steep[::-1]])
+    return kinks, float(2.0 * SINE.cdf(steep[0]))
+
+
+def crevice_pieces(height_to_width: float, last: int) -> IsometryTable:
+    """The pieces of a crevice with d < ``last``; the opening counts as the whole period."""
+    number = np.arange(last)
+    high = np.arctan2(2.0 * height_to_width, number)
+    low = np.arctan2(2.0 * height_to_width, number + 1)
+    # at a whole number d = k one outcome is certain: retroreflection where k is odd
+    start, end = (np.where(at % 2 == 1, np.sin(angle), 0.0) for at, angle in ((number + 1, low), (number, high)))
+    one, zero = np.ones(last), np.zeros(last)
+    other = np.sin(low) - start, np.sin(high) - end
+    right = IsometryTable(
+        np.concatenate([one, -one]),
+        np.concatenate([zero, np.pi * one]),
+        np.concatenate([low, low]),
+        np.concatenate([high, high]),
+        np.concatenate([start, other[0]]),
+        np.concatenate([end, other[1]]),
+    )
+    return IsometryTable.joined([right, right.mirrored()])

@@ -9,12 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, number_between
 from .branching import merged
+from .isometry_table import IsometryTable
 from .law import BranchLaw, entry_points
 from .measure import SINE
 from .stable_angles import flipped, kept_inside, mixed_arccos
 
 # Kinks closer together than this are one kink computed in two ways.
 KINK_SPACING = 16.0 * np.finfo(np.float64).eps
+# A table has four pieces between two kinks; laws with more kinks than this have none.
+MOST_LISTED_KINKS = 2**17
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,31 @@ class TriangularTeethLaw(BranchLaw):
             return kinks, 1.0
         return kinks, float(SINE.cdf(kinks[0]) + SINE.mass(kinks[-1], np.pi))
 
+    def table(self) -> IsometryTable | None:
+        """The pieces between the kinks, or None where there are too many."""
+        if 4.0 * np.pi / self.angle > MOST_LISTED_KINKS:
+            return None
+        kinks, _ = self.kinks(2 * MOST_LISTED_KINKS)
+        edges = np.unique(np.concatenate([[0.0], kinks, [0.5 * np.pi, np.pi]]))
+        low, high = edges[:-1], edges[1:]
+        middle = 0.5 * (low + high)
+        most, most_mirror = self._most_hits(middle), self._most_hits(np.pi - middle)
+        # the four probabilities of `branches`, times sin(theta), which stays finite at the ends
+        ends = []
+        for theta in (low, high):
+            sine, mirror = np.sin(theta), np.pi - theta
+            left = np.sin(theta + 0.5 * (np.pi - self.angle)) / (2.0 * np.sin(0.5 * self.angle))
+            left = np.clip(left, 0.0, sine)
+            fewer = np.clip(self._density_of_fewer(theta, most), 0.0, left)
+            fewer_mirror = np.clip(self._density_of_fewer(mirror, most_mirror), 0.0, sine - left)
+            ends.append(np.concatenate([fewer, left - fewer, sine - left - fewer_mirror, fewer_mirror]))
+        count = np.concatenate([most - 1.0, most, most_mirror, most_mirror - 1.0])
+        left_side = np.repeat([True, True, False, False], low.size)
+        even, turn = np.mod(count, 2.0) == 0.0, count * self.angle
+        offset = np.where(even, np.pi - turn, turn)
+        offset = np.where(left_side, offset, np.where(even, -offset, 2.0 * np.pi - offset))
+        return IsometryTable(np.where(even, 1.0, -1.0), offset, np.tile(low, 4), np.tile(high, 4), *ends)
+
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
         right, base, count = self._unfolded(entry_points(x), angles("theta", theta))
@@ -135,8 +163,11 @@ class TriangularTeethLaw(BranchLaw):
 
     def _share_of_fewer(self, theta: Floats, most: Floats) -> Floats:
         """The X below which a ray left of the bottom is hit N - 1 times: a product, so that nothing cancels."""
+        return np.asarray(self._density_of_fewer(theta, most) / np.sin(theta))
+
+    def _density_of_fewer(self, theta: Floats, most: Floats) -> Floats:
         half = 0.5 * self.angle
-        return np.asarray(np.sin((most - 1.0) * half) * np.sin(most * half - theta) / (np.sin(theta) * np.sin(half)))
+        return np.asarray(np.sin((most - 1.0) * half) * np.sin(most * half - theta) / np.sin(half))
 
     def _turned(self, theta: Floats, count: Floats) -> Floats:
         turn = count * self.angle

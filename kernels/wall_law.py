@@ -14,7 +14,10 @@ from ..checks import Floats, angles
 from ..errors import AccuracyError, InputError
 from .circular import CircularArcLaw
 from .ideal import specular
+from .isometry import table_of
+from .isometry_table import IsometryTable
 from .law import AngleFunction, DrivenLaw, Law, entry_points
+from .polygon_law import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .triangular import TriangularTeethLaw
 from .weighted_sum import Combination
@@ -30,14 +33,17 @@ SHAPE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
 # Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
 # error in total variation; above this it would show in a kernel estimated from a million rays.
 LOST_TOLERANCE = 1e-4
+# Polygonal walls are resolved into beams where that takes about a second (a microsecond a beam, a few to make the
+# table) and leaves so little that a sampled kernel could not show it.
+MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 512, 100_000, 1e-7
 
 
 @dataclass(frozen=True)
 class WallLaw(DrivenLaw):
     """The law P~ of a wall: a ray enters at a uniform point of the period.
 
-    `respond` and `outcomes` trace rays. `sample`, `apply`, `branches` and `kinks` use the closed form if there is
-    one, else `sample` and `apply` trace.
+    `respond` and `outcomes` trace rays. `sample` and `apply` use the closed form if there is one, else they trace;
+    `branches`, `kinks` and `discretise` use the exact law if there is one.
 
     Parameters
     ----------
@@ -49,6 +55,9 @@ class WallLaw(DrivenLaw):
         The exact law if the wall consists of flat tops and hollows that are isosceles triangles, rectangles (not
         wider, all together, than the flat tops), or circular arcs up to a semicircle; a Combination if there are
         several different ones. Recognised by their shape, whatever constructor made the wall.
+    exact_law : Law or None
+        The closed form; or else, for a polygonal wall that closes and is resolved within about a second, its
+        `PolygonLaw`. Computed on first use.
     mirror_symmetric : bool or None
         True if the wall's cell is; otherwise not known.
 
@@ -97,6 +106,16 @@ class WallLaw(DrivenLaw):
     def closed_form(self) -> Law | None:
         return _closed_form(self.wall)
 
+    @cached_property
+    def exact_law(self) -> Law | None:
+        if self.closed_form is not None:
+            return self.closed_form
+        wall = self.wall
+        if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
+            return None
+        law = PolygonLaw(wall, max_beams=MOST_BEAMS)
+        return law if float(law.unresolved) <= EXACT_ENOUGH else None
+
     def outcomes(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing angles by tracing, and the mask of the rays that escaped; the others are sent back.
 
@@ -122,11 +141,15 @@ class WallLaw(DrivenLaw):
         return outgoing
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        return super().branches(theta) if self.closed_form is None else self.closed_form.branches(theta)
+        return super().branches(theta) if self.exact_law is None else self.exact_law.branches(theta)
 
     def kinks(self, limit: int) -> tuple[Floats, float]:
-        """Those of the closed form."""
-        return super().kinks(limit) if self.closed_form is None else self.closed_form.kinks(limit)
+        """Those of the exact law."""
+        return super().kinks(limit) if self.exact_law is None else self.exact_law.kinks(limit)
+
+    def table(self) -> IsometryTable | None:
+        """That of the exact law, or None."""
+        return None if self.exact_law is None else table_of(self.exact_law)
 
     # `_apply` stays that of a traced law: its absence from this class tells `discretise` that it is a coarse rule.
     def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
