@@ -22,10 +22,14 @@ ORDERS = (4, 7, 12, 20, 32)
 FIRST_SAMPLES = 24
 GOLDEN = 0.6180339887498949
 # Samples and nodes of one row at most; what is then still undecided counts as error.
-MOST_SAMPLES = 1 << 15
-MOST_NODES = 1 << 16
-MOST_ROUNDS = 60
+MOST_SAMPLES = 1 << 13
+MOST_NODES = 1 << 17
+MOST_ROUNDS = 200
 EPS = 2.0**-52
+# Gaps that matter less than this share of the worst one wait for a later round.
+WORST_SHARE = 0.1
+# Pieces are not halved below this share of the opening.
+NARROWEST = 1e-9
 # A Gauss rule's error is taken as the last difference times the last ratio of differences, at least this, twice.
 LEAST_RATIO = 1e-3
 # The share of the row's tolerance that any piece may spend, however short it is.
@@ -81,20 +85,24 @@ def undecided(width, first, second, degree, whole):
 
 @_compile
 def halve_gaps(
-    theta, hollow, tables, period, limit, edges, degree, code, xs, outs, labels, follow, count, gaps, gap_count, goal
+    theta, hollow, tables, period, limit, edges, degree, code, xs, outs, labels, follow, count, gaps, gap_count, goal,
+    most,
 ):
     """Halve gaps between different labels, all of them once a round, until together they matter less than ``goal``."""
     joints, lines, circles, ellipses, beziers = tables
     whole = hollow[1] - hollow[0]
     fresh = np.empty_like(gaps)
     for _ in range(MOST_ROUNDS):
-        total = 0.0
+        total, worst = 0.0, 0.0
         for g in range(gap_count):
             i, j = gaps[g], follow[gaps[g]]
-            total += undecided(xs[j] - xs[i], outs[i], outs[j], degree, whole)
+            matter = undecided(xs[j] - xs[i], outs[i], outs[j], degree, whole)
+            total += matter
+            worst = max(worst, matter)
         if total <= goal:
             break
-        fair = 0.25 * goal / gap_count
+        # the worst first, so that an accumulation of changes does not use up all samples before the others are found
+        fair = max(0.25 * goal / gap_count, WORST_SHARE * worst)
         fresh_count = 0
         moved = False
         for g in range(gap_count):
@@ -105,7 +113,7 @@ def halve_gaps(
                 fresh[fresh_count] = i
                 fresh_count += 1
                 continue
-            if width <= 2.0 * EPS * max(abs(xs[i]), abs(xs[j])) or count + 1 >= MOST_SAMPLES:
+            if width <= 2.0 * EPS * max(abs(xs[i]), abs(xs[j])) or count >= most:
                 continue
             middle = 0.5 * (xs[i] + xs[j])
             out, label = probe(
@@ -132,11 +140,13 @@ def halve_gaps(
 
 @_compile
 def integrate(
-    theta, hollow, tables, period, limit, edges, degree, code, rules, low, high, label, goal, least, node, mass, filled, room
+    theta, hollow, tables, period, limit, edges, degree, code, rules, low, high, label, goal, least, node, mass, filled, room,
+    strict,
 ):
     """Nodes on [low, high], where all rays should have the given label.
 
-    Returns their number, the error, and a place where a ray has another label (nan: none).
+    Returns their number, the error, and a place where a ray has another label (nan: none). Without ``strict`` labels
+    do not matter, and the difference of the rules has to show what the piece hides.
     """
     joints, lines, circles, ellipses, beziers = tables
     places, weights, starts = rules
@@ -153,7 +163,7 @@ def integrate(
         for n in range(first, last):
             x = low + width * places[n]
             out, here = probe(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, edges, code)
-            if here != label:
+            if strict and here != label:
                 return used, error, x
             weight = width * weights[n]
             node[filled + n - first], mass[filled + n - first] = out, weight
@@ -211,7 +221,7 @@ def march_row(
     rays = count
     count = halve_gaps(
         theta, hollow, tables, period, limit, edges, degree, code, xs, outs, labels, follow, count, gaps, gap_count,
-        GAP_SHARE * goal,
+        GAP_SHARE * goal, 3 * MOST_SAMPLES // 4,
     )
     rays += count - rays
     filled, pieces = 0, 0
@@ -236,21 +246,15 @@ def march_row(
                 depth -= 1
                 low, high = stack_low[depth], stack_high[depth]
                 allowed = 0.5 * goal * max((high - low) / whole, LEAST_SHARE)
-                room = min(MOST_NODES - filled - 2, ORDERS[-1] if count < MOST_SAMPLES - 4 else ORDERS[1])
+                room = MOST_NODES - filled - 2
                 used, miss, uncovered = integrate(
                     theta, hollow, tables, period, limit, edges, degree, code, rules, low, high, labels[i], allowed,
-                    least, node, mass, filled, room,
+                    least, node, mass, filled, room, count < MOST_SAMPLES - 4,
                 )
                 rays += 2 * used
                 if not math.isnan(uncovered):
-                    if count < MOST_SAMPLES - 4:
-                        break
-                    miss = high - low
-                    uncovered = np.nan
-                    if used == 0:
-                        node[filled], mass[filled] = outs[i], high - low
-                        used = 1
-                if miss > allowed and depth < 40 and high - low > 1e-9 * whole and room >= ORDERS[-1]:
+                    break
+                if miss > allowed and depth < 40 and high - low > NARROWEST * whole and room >= ORDERS[-1]:
                     middle = 0.5 * (low + high)
                     stack_low[depth], stack_high[depth] = middle, high
                     stack_low[depth + 1], stack_high[depth + 1] = low, middle
@@ -278,7 +282,7 @@ def march_row(
                 rays -= count
                 count = halve_gaps(
                     theta, hollow, tables, period, limit, edges, degree, code, xs, outs, labels, follow, count,
-                    gaps, 2, 0.05 * GAP_SHARE * goal,
+                    gaps, 2, 0.05 * GAP_SHARE * goal, MOST_SAMPLES,
                 )
                 rays += count
                 continue

@@ -135,11 +135,12 @@ class WallRows:
                 shapes.append((shape, k, share))
         return [(first, share) for _, first, share in shapes]
 
-    def __call__(self, theta: Floats, tolerance: float) -> AdaptiveRows:
+    def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveRows:
         """Rows at checked angles."""
         order = np.argsort(theta, kind="stable")
         rows = len(theta)
         incoming = np.ascontiguousarray(theta[order])
+        tolerances = np.ascontiguousarray(np.broadcast_to(tolerance, theta.shape)[order], dtype=np.float64)
         owner, nodes, weights = [], [], []
         error, lost, rays = np.zeros(rows), np.zeros(rows), 0
         level = 1.0 - sum(share for _, share in self._hollows)
@@ -148,7 +149,7 @@ class WallRows:
             nodes.append(np.pi - incoming)
             weights.append(np.full(rows, level))
         for hollow, share in self._hollows:
-            found = self._march(incoming, hollow, tolerance)
+            found = self._march(incoming, hollow, tolerances)
             owner.append(np.repeat(np.arange(rows), np.diff(found[2])))
             nodes.append(found[0])
             width = float(self.wall.scene.hollows[hollow, 1] - self.wall.scene.hollows[hollow, 0])
@@ -171,14 +172,14 @@ class WallRows:
             rays,
         )
 
-    def _march(self, theta: Floats, hollow: int, tolerance: float) -> tuple[Floats, ...]:
+    def _march(self, theta: Floats, hollow: int, tolerances: Floats) -> tuple[Floats, ...]:
         from ..geometry.itineraries import gauss_tables, march_rows
 
         scene = self.wall.scene
         tables = (scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers)
         found: tuple[Floats, ...] = march_rows(
             theta, scene.hollows[hollow], tables, scene.cell if scene.is_open else None, MOST_COLLISIONS, self.edges,
-            self.degree, self.least_level, np.full(len(theta), tolerance), gauss_tables(), MOST_SEEDS,
+            self.degree, self.least_level, tolerances, gauss_tables(), MOST_SEEDS,
         )  # fmt: skip
         return found
 

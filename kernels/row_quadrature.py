@@ -48,6 +48,9 @@ VALUES_AT_ONCE = 2_000_000
 # The rows together may spend this share of the tolerance.
 ROW_SHARE = 0.1
 SMALLEST_ROW_TOLERANCE = 1e-14
+# The rows of a narrow panel may be coarser: the panel may spend this share of what all rows together may.
+FAIR_SHARE = 0.02
+COARSEST_ROW = 1e-4
 # Where a half has this share of its panel's difference of the two rules, or more, the integrand is not smooth: a kink
 # leaves 1/8 or more of it, a smooth integrand 2^-14.
 SMOOTH_SHRINKING = 1e-3
@@ -189,7 +192,9 @@ class _Integrator:
         half = 0.5 * (high - low)
         angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
         flat = angle.ravel()
-        rows = self.rows(flat, self.row_tolerance)
+        share = FAIR_SHARE / np.maximum(SINE.mass(low, high), np.finfo(np.float64).tiny)
+        tolerance = np.minimum(self.row_tolerance * np.maximum(1.0, share), COARSEST_ROW)
+        rows = self.rows(flat, np.repeat(tolerance, len(NODES)))
         self.rays += rows.rays
         shape = (len(low), len(NODES), self.basis.size)
         image = self._images(rows.nodes, rows.weights, rows.starts).reshape(shape)
