@@ -1,0 +1,210 @@
+"""Rows of the law of a traced wall by adaptive quadrature in the entry point, with an error for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..checks import Floats, angles, finite_number
+from ..errors import InputError
+from .law import AngleFunction
+
+if TYPE_CHECKING:
+    from ..geometry import Wall
+
+# Collisions after which a ray counts as lost.
+MOST_COLLISIONS = 100_000
+# Pieces of a row that its neighbour starts from.
+MOST_SEEDS = 128
+# Hollows are translates of each other if their tables agree to this share of their size.
+SAME_SHAPE = 1e-13
+
+
+@dataclass(frozen=True)
+class AdaptiveRows:
+    """Rows P(theta, d theta') of a wall as weighted outgoing angles.
+
+    Attributes
+    ----------
+    theta : array, shape (rows,)
+    nodes, weights : arrays
+        Outgoing angles and their probabilities, row after row; the weights of a row sum to 1.
+    starts : array of int, shape (rows + 1,)
+        Row k owns ``nodes[starts[k]:starts[k + 1]]``.
+    error : array, shape (rows,)
+        Estimated error of the mean of a function of sup norm 1 and the degree asked for.
+    lost : array, shape (rows,)
+        Probability of rays that did not escape; they are sent back.
+    rays : int
+        Number of rays traced.
+    """
+
+    theta: Floats
+    nodes: Floats
+    weights: Floats
+    starts: NDArray[np.int64]
+    error: Floats
+    lost: Floats
+    rays: int
+
+    def mean(self, function: AngleFunction) -> Floats:
+        """E[f(Theta') | theta] for every row, shape ``(rows,) + extra`` for f with values ``theta.shape + extra``."""
+        values = np.asarray(function(self.nodes), dtype=np.float64)
+        weighted = self.weights.reshape((-1,) + (1,) * (values.ndim - 1)) * values
+        return np.add.reduceat(weighted, self.starts[:-1], axis=0)
+
+
+def adaptive_rows(
+    wall: Wall, theta: ArrayLike, tolerance: float = 1e-10, degree: int = 1, edges: ArrayLike = ()
+) -> AdaptiveRows:
+    r"""Rows of a wall's law to a tolerance.
+
+    Parameters
+    ----------
+    wall : Wall
+    theta : array_like
+        Incoming angles in (0, pi), radians; one row each, in this order.
+    tolerance : float
+        Wanted error of the mean of a function of sup norm 1.
+    degree : int
+        Highest degree, as a trigonometric polynomial, of the functions that the rows will be used for; 0 if they are
+        constant between the edges.
+    edges : array_like
+        Outgoing angles where the functions are not smooth.
+
+    Returns
+    -------
+    AdaptiveRows
+
+    Raises
+    ------
+    InputError
+        If an angle is not in (0, pi), or the tolerance is not positive.
+
+    Notes
+    -----
+    For fixed theta the map from the entry point to theta' is analytic between changes of the itinerary. The changes
+    are found by bisection; between them Gauss rules take over. Near cusps and grazing there are infinitely many: what
+    is left undecided is counted in the error. The error is an estimate: a piece narrower than the distance of the
+    samples can be overlooked.
+
+    Examples
+    --------
+    >>> from math import cos
+    >>> from asperity import geometry as geo
+    >>> rows = adaptive_rows(geo.flat(), [0.5])
+    >>> rows.weights.tolist(), bool(rows.mean(np.cos)[0] == cos(np.pi - 0.5))
+    ([1.0], True)
+    """
+    if not hasattr(wall, "scene"):
+        raise InputError(f"wall: expected a Wall such as geo.focusing_arcs(0.9), got {wall!r}")
+    if not finite_number("tolerance", tolerance) > 0.0:
+        raise InputError(f"tolerance: expected a number greater than 0, got {tolerance!r}")
+    incoming = np.atleast_1d(angles("theta", theta)).ravel()
+    return WallRows(wall, int(degree), np.asarray(edges, dtype=np.float64))(incoming, tolerance)
+
+
+class WallRows:
+    """Rows of one wall for one kind of functions; what is the same for all calls is made once."""
+
+    def __init__(self, wall: Wall, degree: int, edges: Floats, least_level: int = 0) -> None:
+        self.wall = wall
+        self.degree = degree
+        # the first of the Gauss rules on a piece that may be used
+        self.least_level = least_level
+        self.edges = np.ascontiguousarray(edges, dtype=np.float64)
+
+    @cached_property
+    def _hollows(self) -> list[tuple[int, float]]:
+        """One hollow of each shape, and the share of the period that all of this shape take."""
+        scene = self.wall.scene
+        tables = (scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers)
+        shapes: list[tuple[list[Floats], int, float]] = []
+        for k, hollow in enumerate(scene.hollows):
+            share = float(hollow[1] - hollow[0]) / self.wall.period
+            shape = _shape(hollow, tables)
+            for n, (other, first, total) in enumerate(shapes):
+                if _alike(shape, other, float(hollow[2])):
+                    shapes[n] = (other, first, total + share)
+                    break
+            else:
+                shapes.append((shape, k, share))
+        return [(first, share) for _, first, share in shapes]
+
+    def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveRows:
+        """Rows at checked angles."""
+        order = np.argsort(theta, kind="stable")
+        rows = len(theta)
+        incoming = np.ascontiguousarray(theta[order])
+        tolerances = np.ascontiguousarray(np.broadcast_to(tolerance, theta.shape)[order], dtype=np.float64)
+        owner, nodes, weights = [], [], []
+        error, lost, rays = np.zeros(rows), np.zeros(rows), 0
+        level = 1.0 - sum(share for _, share in self._hollows)
+        if level > 8.0 * np.finfo(np.float64).eps:
+            owner.append(np.arange(rows))
+            nodes.append(np.pi - incoming)
+            weights.append(np.full(rows, level))
+        for hollow, share in self._hollows:
+            found = self._march(incoming, hollow, tolerances)
+            owner.append(np.repeat(np.arange(rows), np.diff(found[2])))
+            nodes.append(found[0])
+            width = float(self.wall.scene.hollows[hollow, 1] - self.wall.scene.hollows[hollow, 0])
+            weights.append(share / width * found[1])
+            error += share / width * found[3]
+            lost += share / width * found[4]
+            rays += int(found[5].sum())
+        rank = order[np.concatenate(owner)]
+        sorting = np.argsort(rank, kind="stable")
+        starts = np.concatenate(([0], np.cumsum(np.bincount(rank, minlength=rows))))
+        back = np.empty(rows, dtype=np.int64)
+        back[order] = np.arange(rows)
+        return AdaptiveRows(
+            theta,
+            np.concatenate(nodes)[sorting],
+            np.concatenate(weights)[sorting],
+            starts,
+            error[back],
+            lost[back],
+            rays,
+        )
+
+    def _march(self, theta: Floats, hollow: int, tolerances: Floats) -> tuple[Floats, ...]:
+        from ..geometry.itineraries import gauss_tables, march_rows
+
+        scene = self.wall.scene
+        tables = (scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers)
+        found: tuple[Floats, ...] = march_rows(
+            theta, scene.hollows[hollow], tables, scene.cell if scene.is_open else None, MOST_COLLISIONS, self.edges,
+            self.degree, self.least_level, tolerances, gauss_tables(), MOST_SEEDS,
+        )  # fmt: skip
+        return found
+
+
+def _shape(hollow: Floats, tables: tuple[Floats | None, ...]) -> list[Floats]:
+    """The tables of one hollow, measured from its left end."""
+    joints, lines, circles, ellipses, beziers = tables
+    left = float(hollow[0])
+    parts = [hollow[[1, 2, 11, 12]] - [left, 0.0, 0.0, 0.0]]
+    low, high = int(hollow[3]), int(hollow[4])
+    assert joints is not None
+    parts.append(joints[low:high] - [left, 0.0, 0.0, 0.0])
+    if lines is not None:
+        parts.append(lines[low:high])
+    for column, table in ((5, circles), (7, ellipses), (9, beziers)):
+        if table is not None:
+            moved = table[int(hollow[column]) : int(hollow[column + 1])].copy()
+            moved[:, 0] -= left
+            moved[:, [-6, -4]] -= left
+            parts.append(moved)
+    return [np.asarray(part) for part in parts]
+
+
+def _alike(first: list[Floats], second: list[Floats], size: float) -> bool:
+    return all(
+        one.shape == other.shape and np.allclose(one, other, rtol=SAME_SHAPE, atol=SAME_SHAPE * size)
+        for one, other in zip(first, second, strict=True)
+    )
