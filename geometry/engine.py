@@ -21,6 +21,8 @@ import math
 import numpy as np
 from numba import njit
 
+from .skips import skip_crossings, skip_hops
+
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
 NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
@@ -95,35 +97,6 @@ def arc_reflect(arc, t, px, py, vx, vy, stretch):
     px, py = arc[0] + qx, arc[1] + qy / stretch
     w = 2.0 * (vx * nx + vy * ny)
     return px, py, vx - w * nx, vy - w * ny
-
-
-@_compile
-def skip_run(arc, px, py, vx, vy):
-    """Carry a ray along a circular arc by all whole hops of its run; returns the state and the number of hops."""
-    qx, qy = px - arc[0], py - arc[1]
-    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
-    sine = vx * nx + vy * ny
-    # the tangent in the direction of travel has the free side, and so the normal n, on its left
-    cosine = vx * ny - vy * nx
-    if sine <= 0.0 or sine > arc[10]:
-        return px, py, vx, vy, 0
-    hop = 2.0 * math.atan2(sine, abs(cosine))
-    # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
-    phi = 2.0 * math.atan2(qx * arc[2] + qy * arc[3], qx * arc[3] - qy * arc[2])
-    if phi < 0.0:
-        phi += 2.0 * math.pi
-    room = arc[11] - phi if cosine > 0.0 else phi
-    hops = math.floor(room / hop)
-    if hops < 1.0:
-        return px, py, vx, vy, 0
-    turn = hops * hop if cosine > 0.0 else -hops * hop
-    phi += turn
-    half = 0.5 * phi
-    chord = 2.0 * math.sin(half) / arc[4]
-    along, inward = chord * math.cos(half), chord * math.sin(half)
-    qx, qy = along * arc[3] + inward * arc[2], -along * arc[2] + inward * arc[3]
-    c, s = math.cos(turn), math.sin(turn)
-    return arc[0] + qx, arc[1] + qy, c * vx - s * vy, s * vx + c * vy, int(hops)
 
 
 @_compile
@@ -224,12 +197,13 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
 
 
 @_compile
-def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, path, itinerary):
+def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, path, itinerary, pairs=None):
     """Follow one ray through one hollow; returns x, the outgoing velocity, bounces and status.
 
     ``period`` is None for a closed hollow; for an open wall its sides are passed and x is unfolded by it.
     ``path`` is None, or an array (limit + 2, 2) that receives the points of the trajectory. ``itinerary`` is None, or
-    an array of one uint64 that receives a hash of the pieces hit, in their order, and of the sides passed.
+    an array of one uint64 that receives a hash of the pieces hit, in their order, of the lengths of runs, and of the
+    sides passed. ``pairs`` is None, or the table of the channels and wedges in which runs are skipped.
     """
     left, right, size = hollow[0], hollow[1], hollow[2]
     joint_low, joint_high = int(hollow[3]), int(hollow[4])
@@ -329,7 +303,7 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
             return shift + px + time * vx, vx, vy, bounces, ESCAPED
         if tangent != 0:
             return shift + px, vx, vy, bounces, GRAZING
-        if bounces >= limit or steps >= 2 * limit + 2:
+        if bounces >= limit or steps // 2 > limit:
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT
         if itinerary is not None:
             side = 1 if kind == SIDE and vx > 0.0 else 0
@@ -353,13 +327,23 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
             w = 2.0 * (vx * lines[index, 2] + vy * lines[index, 3])
             vx -= w * lines[index, 2]
             vy -= w * lines[index, 3]
+            if pairs is not None:
+                if own_kind == LINE and path is None:
+                    for row in range(int(lines[index, 5]), int(lines[index, 6])):
+                        if pairs[row, 0] == own_index:
+                            px, py, vx, vy, hits = skip_crossings(
+                                pairs[row], lines[index, 2], lines[index, 3], px, py, vx, vy, slack, limit - bounces - 1
+                            )
+                            bounces += hits
+                            if itinerary is not None:
+                                itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(hits)
         if circles is not None and kind == CIRCLE:
             px, py, nvx, nvy = arc_reflect(circles[index], time, px, py, vx, vy, 1.0)
             if near_end(circles[index], px, py, slack):
                 return shift + px, vx, vy, bounces, CORNER
             vx, vy = nvx, nvy
             if circles[index, 10] > 0.0 and path is None:
-                px, py, vx, vy, hops = skip_run(circles[index], px, py, vx, vy)
+                px, py, vx, vy, hops = skip_hops(circles[index], px, py, vx, vy, limit - bounces - 1)
                 bounces += hops
                 if itinerary is not None:
                     itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(hops)
@@ -404,8 +388,9 @@ def near_end(piece, px, py, slack):
 
 @_compile
 def trace_rays(
-    x, theta, hollows, joints, lines, circles, ellipses, beziers, period, cell, limit, out_x, out_theta, bounces, status
-):
+    x, theta, hollows, joints, lines, circles, ellipses, beziers, pairs, period, cell, limit,
+    out_x, out_theta, bounces, status,
+):  # fmt: skip
     """Trace a block of rays; fills the four output arrays."""
     for i in range(x.shape[0]):
         base = math.floor(x[i] / cell) * cell
@@ -430,7 +415,7 @@ def trace_rays(
                 out_theta[i], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
         place, vx, vy, bounces[i], status[i] = trace_ray(
-            place, theta[i], hollows[h], joints, lines, circles, ellipses, beziers, period, limit, None, None
+            place, theta[i], hollows[h], joints, lines, circles, ellipses, beziers, period, limit, None, None, pairs
         )
         out_x[i] = base + place
         out_theta[i] = math.atan2(vy, vx)

@@ -5,7 +5,9 @@ Flat tops have no place in the tables, and a table of a primitive that the wall 
 Columns. ``hollows``: left, right, size, first joint, joint after the last, then the ranges in ``circles``, ``ellipses``
 and ``beziers`` (two columns each), then the kind of edge at the left and at the right end (0 none, 1 smooth, 2 corner).
 ``joints``: x, y, 1 if a corner, 1 if a segment starts here. ``lines`` (a row a joint): edge vector, left unit normal,
-length. ``circles`` and ``ellipses``: first joint (2), unit normal there (2), curvature, chord direction (2), chord
+length, range of its rows in ``pairs``. ``pairs`` (a row for each line of a pair that faces another with nothing in
+between): the partner, the ends of the part that faces it, first the one towards the apex (4), unit vector towards the
+apex, gap at that end, sine of the angle between the lines, that angle. ``circles`` and ``ellipses``: first joint (2), unit normal there (2), curvature, chord direction (2), chord
 length (0 beyond a half angle of pi/4), two unused, sine below which a run of hops is skipped (0 never), span, stretch,
 both joints (4), corner flags (2); all in coordinates whose y is multiplied by the stretch, but for the joints.
 ``beziers``: coefficients of 1, s, s^2, s^3 (x and y each), both joints (4), corner flags (2).
@@ -22,6 +24,7 @@ import numpy as np
 from ..checks import Floats
 from .arc import Arc
 from .bezier import Bezier
+from .facing import facing_pairs
 from .segment import Segment
 
 if TYPE_CHECKING:
@@ -52,6 +55,7 @@ class Scene:
     circles: Floats | None
     ellipses: Floats | None
     beziers: Floats | None
+    pairs: Floats | None
     cell: float
     is_open: bool
 
@@ -119,6 +123,7 @@ class _Tables:
         self.circles: list[list[float]] = []
         self.ellipses: list[list[float]] = []
         self.beziers: list[list[float]] = []
+        self.pairs: list[list[float]] = []
 
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[int, int]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
@@ -133,6 +138,9 @@ class _Tables:
         ranges = [value for pair in zip(before, after, strict=True) for value in pair]
         self.hollows.append([left, right, size, *map(float, ranges), *map(float, edges)])
         self._mark_runs(before[1], after[1], chains)
+        inside = bool(np.all((left <= joints[:, 0]) & (joints[:, 0] <= right)))
+        if inside or edges != (0, 0):
+            self._mark_pairs(before[0], chains, size)
 
     def _sizes(self) -> tuple[int, int, int, int]:
         return len(self.joints), len(self.circles), len(self.ellipses), len(self.beziers)
@@ -145,13 +153,13 @@ class _Tables:
             self.joints.append([*start, flags[0], float(is_line)])
             edge = (end[0] - start[0], end[1] - start[1])
             length = hypot(*edge)
-            self.lines.append([*edge, -edge[1] / length, edge[0] / length, length] if is_line else [0.0] * 5)
+            self.lines.append([*edge, -edge[1] / length, edge[0] / length, length, 0.0, 0.0] if is_line else [0.0] * 7)
             if isinstance(piece, Arc):
                 (self.circles if piece.is_circular else self.ellipses).append(_arc_row(piece, start, end) + flags)
             elif isinstance(piece, Bezier):
                 self.beziers.append(_bezier_row(piece, start, end) + flags)
         self.joints.append([*chain.places[-1], float(chain.corners[-1]), 0.0])
-        self.lines.append([0.0] * 5)
+        self.lines.append([0.0] * 7)
 
     def _mark_runs(self, first: int, last: int, chains: list[_Chain]) -> None:
         """Allow runs on the focusing circles whose circular segment no other piece of the hollow enters."""
@@ -171,9 +179,35 @@ class _Tables:
             if row[4] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
                 row[10] = sin(half / RUN_HOPS)
 
+    def _mark_pairs(self, first: int, chains: list[_Chain], size: float) -> None:
+        """Find the channels and wedges of a hollow; its lines start at the joint ``first``."""
+        numbers, starts, ends, hulls = [], [], [], []
+        joint = first
+        for chain in chains:
+            for piece, start, end in zip(chain.pieces, chain.places, chain.places[1:], strict=False):
+                if isinstance(piece, Segment):
+                    numbers.append(joint)
+                    starts.append(start)
+                    ends.append(end)
+                hulls.append(_hull(piece, start, end))
+                joint += 1
+            joint += 1
+        rows = facing_pairs(
+            np.array(numbers, dtype=np.int64),
+            np.array(starts, dtype=np.float64).reshape(-1, 2),
+            np.array(ends, dtype=np.float64).reshape(-1, 2),
+            np.array(hulls, dtype=np.float64).reshape(-1, 4, 2),
+            size,
+        )
+        for line, row in sorted(rows):
+            if self.lines[line][6] == 0.0:
+                self.lines[line][5] = self.lines[line][6] = float(len(self.pairs))
+            self.pairs.append(row)
+            self.lines[line][6] += 1.0
+
     def scene(self, cell: float, is_open: bool) -> Scene:
         joints = np.array(self.joints, dtype=np.float64).reshape(-1, 4)
-        lines = np.array(self.lines, dtype=np.float64).reshape(-1, 5)
+        lines = np.array(self.lines, dtype=np.float64).reshape(-1, 7)
         return Scene(
             hollows=np.array(self.hollows, dtype=np.float64).reshape(-1, 13),
             joints=joints,
@@ -181,6 +215,7 @@ class _Tables:
             circles=_table(self.circles),
             ellipses=_table(self.ellipses),
             beziers=_table(self.beziers),
+            pairs=_table(self.pairs),
             cell=cell,
             is_open=is_open,
         )
@@ -188,6 +223,16 @@ class _Tables:
 
 def _table(rows: list[list[float]]) -> Floats | None:
     return np.array(rows, dtype=np.float64) if rows else None
+
+
+def _hull(piece: Curve, start: Point, end: Point) -> list[Point]:
+    """Four points whose convex hull contains the piece."""
+    if isinstance(piece, Segment):
+        return [start, end, start, end]
+    if isinstance(piece, Bezier):
+        return [start, *list(piece.control_points[1:-1])[:2], *[end] * (5 - len(piece.control_points))]
+    x0, y0, x1, y1 = piece.box
+    return [(x0, y0), (x0, y1), (x1, y0), (x1, y1)]
 
 
 def _corners(pieces: list[Curve]) -> list[bool]:

@@ -1,0 +1,109 @@
+"""Runs in closed form: the hits that a ray makes in a row on one circular arc, or between two facing lines.
+
+Imported by `engine` alone, because it loads numba. Both functions return the state after the run and its number of
+hits, 0 where the run is not worth it; they stop short of the last hits, which the ordinary loop then judges.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+# A run costs about as much as this many hits of the ordinary loop.
+SHORTEST_RUN = 4.0
+# The number of hits left carries some eight rounding errors of itself; the last two are left to the ordinary loop.
+COUNT_ROUNDING = 1.0 - 16.0 * 2.0**-52
+LAST_HITS = 2.0
+# Ends of the facing parts, and the pieces beyond them, are known to JOINT_ULPS of `engine`, once for each of the two.
+END_SLACKS = 2.0
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def skip_hops(arc, px, py, vx, vy, most):
+    """Carry a ray along a circular arc by all whole hops of its run, at most ``most``."""
+    qx, qy = px - arc[0], py - arc[1]
+    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
+    sine = vx * nx + vy * ny
+    # the tangent in the direction of travel has the free side, and so the normal n, on its left
+    cosine = vx * ny - vy * nx
+    if sine <= 0.0 or sine > arc[10]:
+        return px, py, vx, vy, 0
+    hop = 2.0 * math.atan2(sine, abs(cosine))
+    # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
+    phi = 2.0 * math.atan2(qx * arc[2] + qy * arc[3], qx * arc[3] - qy * arc[2])
+    if phi < 0.0:
+        phi += 2.0 * math.pi
+    room = arc[11] - phi if cosine > 0.0 else phi
+    count = room / hop
+    if count < 1.0 or most < 1:
+        return px, py, vx, vy, 0
+    hops = most if count >= most else np.int64(count)
+    turn = hops * hop if cosine > 0.0 else -hops * hop
+    phi += turn
+    half = 0.5 * phi
+    chord = 2.0 * math.sin(half) / arc[4]
+    along, inward = chord * math.cos(half), chord * math.sin(half)
+    qx, qy = along * arc[3] + inward * arc[2], -along * arc[2] + inward * arc[3]
+    c, s = math.cos(turn), math.sin(turn)
+    return arc[0] + qx, arc[1] + qy, c * vx - s * vy, s * vx + c * vy, hops
+
+
+@_compile
+def skip_crossings(pair, nx, ny, px, py, vx, vy, slack, most):
+    """Carry a ray that has just left a line for the line facing it by an even number of hits, at most ``most``.
+
+    ``pair`` is a row of the table of that name (see `scene`), (nx, ny) the unit normal of the line. With beta the angle
+    between the lines, g the gap at the ray and alpha the angle of its velocity with the direction u of the apex, the
+    unfolded lines are a fan: hit k lies
+
+        s_k = g (2 sin(k beta/2) / sin(beta)) cos(alpha + k beta/2) / sin(alpha + k beta)
+
+    further towards the apex and its angle is alpha + k beta; for beta = 0, s_k = g k cot(alpha). All terms keep
+    their digits down to beta = 0, because the distance g / sin(beta) of the apex enters by its inverse only.
+    """
+    ux, uy, sine, beta = pair[5], pair[6], pair[8], pair[9]
+    along, away = vx * ux + vy * uy, vx * nx + vy * ny
+    ahead = (pair[1] - px) * ux + (pair[2] - py) * uy
+    behind = (px - pair[3]) * ux + (py - pair[4]) * uy
+    gap = pair[7] + ahead * sine
+    ahead -= END_SLACKS * slack
+    behind -= END_SLACKS * slack
+    if not (ahead > 0.0 and behind > 0.0 and away > 0.0 and gap > 0.0):
+        return px, py, vx, vy, 0
+    if beta == 0.0:
+        room = ahead if along > 0.0 else behind
+        step = gap * abs(along)
+        if room * away < (SHORTEST_RUN + LAST_HITS) * step:
+            return px, py, vx, vy, 0
+        count = room * away / step
+    else:
+        # the part ends on circles about the apex, whose curvature is that of the circle through the ray's place
+        curvature = sine / gap
+        d = along * along - ahead * curvature * (2.0 - ahead * curvature)
+        if along > 0.0 and d >= 0.0:
+            t = ahead * (2.0 - ahead * curvature) / (along + math.sqrt(d))
+        else:
+            root = math.sqrt(along * along + behind * curvature * (2.0 + behind * curvature))
+            if along >= 0.0:
+                t = (along + root) / curvature
+            else:
+                t = behind * (2.0 + behind * curvature) / (root - along)
+        count = math.atan2(curvature * t * away, 1.0 - curvature * t * along) / beta
+    count = count * COUNT_ROUNDING - LAST_HITS
+    if not count >= SHORTEST_RUN or most < SHORTEST_RUN:
+        return px, py, vx, vy, 0
+    hits = most if count >= most else np.int64(count)
+    hits -= hits % 2
+    if beta == 0.0:
+        step = hits * (gap * along / away)
+        return px + step * ux, py + step * uy, vx, vy, hits
+    turn = hits * beta
+    angle = math.atan2(away, along)
+    last = angle + turn
+    c, s = math.cos(last), math.sin(last)
+    step = gap * (2.0 * math.sin(0.5 * turn) / sine) * math.cos(angle + 0.5 * turn) / s
+    return px + step * ux, py + step * uy, c * ux + s * nx, c * uy + s * ny, hits

@@ -1,0 +1,167 @@
+"""Runs of hits in channels, in wedges and along arcs: computed in one step, to be the same as hit by hit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+
+EPS = np.finfo(float).eps
+# Counts fit into int64 up to here.
+NO_LIMIT = 2**62
+
+
+def rays(seed, n):
+    rng = np.random.default_rng(seed)
+    return rng.random(n), np.arccos(1.0 - 2.0 * rng.random(n))
+
+
+def step_by_step(wall):
+    """The same wall, with the marks that allow runs taken off its tables."""
+    plain = geo.Wall(wall.pieces, wall.period, wall.islands)
+    circles = plain.scene.circles
+    if circles is not None:
+        circles = circles.copy()
+        circles[:, 10] = 0.0
+    plain.__dict__["scene"] = replace(plain.scene, pairs=None, circles=circles)
+    return plain
+
+
+def turned(points, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(points) @ np.array([[c, s], [-s, c]])
+
+
+def tilted_channel(width, length, angle):
+    """A channel with a flat end, tilted about its upper left joint, below an opening as wide as its mouth."""
+    inner = turned([(0, 0), (0, -length), (width, -length), (width, 0)], angle) + np.array([0.4, -0.1])
+    right = inner[3, 0]
+    return geo.Wall.from_vertices([(0, 0), (0.35, 0), *inner.tolist(), (max(right, 0.4) + 0.05, 0.0), (1, 0)])
+
+
+def funnel(top, bottom, depth):
+    """An isosceles trapezoid that narrows downwards, or upwards where bottom > top."""
+    m = 0.5
+    return geo.Wall.from_vertices(
+        [(0, 0), (m - top / 2, 0), (m - bottom / 2, -depth), (m + bottom / 2, -depth), (m + top / 2, 0), (1, 0)]
+    )
+
+
+def bent_channel():
+    """A mushroom's stem with a curved bottom that bulges into it, and a long tail beside it."""
+    return geo.Wall(
+        [
+            geo.Segment((0, 0), (0.45, 0)),
+            geo.Segment((0.45, 0), (0.45, -3)),
+            geo.Bezier([(0.45, -3), (0.5, -2.6), (0.55, -3)]),
+            geo.Segment((0.55, -3), (0.55, 0)),
+            geo.Segment((0.55, 0), (1, 0)),
+        ]
+    )
+
+
+WALLS = {
+    "tilted channel": tilted_channel(0.05, 2.0, 0.3),
+    "channel tilted the other way": tilted_channel(0.05, 2.0, -0.2),
+    "narrowing funnel": funnel(0.2, 0.05, 2.0),
+    "widening funnel": funnel(0.05, 0.2, 2.0),
+    "nearly a channel": funnel(0.1, 0.1 - 1e-9, 3.0),
+    "sharp tooth": geo.triangular_teeth(0.02),
+    "curved bottom": bent_channel(),
+    "stem of a mushroom": geo.mushrooms(0.1, 4.0),
+    "two generations": geo.mushrooms(0.3, 0.5, 2),
+    "semicircle": geo.focusing_arcs(np.pi / 2),
+}
+
+
+@pytest.mark.parametrize(
+    ("ratio", "theta"), [(1.0, 1e-12), (1e8, 1.0), (1e8, 1e-3), (7.3, 0.01), (1e6, 1e-6), (1e-6, 1e-12), (1e8, 2.9)]
+)
+def test_channels_of_rectangular_teeth_count_every_hit(ratio, theta):
+    x, _ = rays(1, 20_000)
+    law = ker.RectangularTeethLaw(ratio)
+    traced = geo.trace(geo.rectangular_teeth(ratio), x, theta, max_collisions=NO_LIMIT)
+    # A hit within 16 ulp of the depth of a joint is a corner, at the bottom after half of the d crossings or at the top
+    # after all; one crossing sinks by the depth over d/2.
+    d = law.crossings(theta)
+    ahead = 2 * x - 1 if theta < np.pi / 2 else 2 - 2 * x
+    slack = 64 * EPS * d * (1 + 1 / ratio)
+    miss = [np.abs(place - np.round(place)) for place in (d - ahead, d / 2 - ahead)]
+    clear = (x < 0.5) | (np.minimum(*miss) > slack)
+    assert clear.mean() > 0.85
+    assert traced.escaped[clear].all()
+    assert np.array_equal(traced.collisions[clear], law.hits(x, theta)[clear])
+    assert np.max(np.abs(traced.theta - law.respond(x, theta))[clear]) <= 8 * EPS
+
+
+@pytest.mark.parametrize("angle", [1e-8, 1e-6, 1e-4, 1e-2, 0.25])
+def test_wedges_of_triangular_teeth_count_every_hit(angle):
+    x, theta = rays(2, 100_000)
+    law = ker.TriangularTeethLaw(angle)
+    traced = geo.trace(geo.triangular_teeth(angle), x, theta, max_collisions=NO_LIMIT)
+    hits, outgoing = law.hits(x, theta), law.respond(x, theta)
+    # the number of hits changes where the angle at the last hit is 0, the outgoing angle is near 0 or pi there
+    clear = np.minimum(outgoing, np.pi - outgoing) > 1e-12
+    assert clear.mean() > 0.999
+    same = traced.collisions == hits
+    # rays within rounding of one hit more or less: the share of starts that lie within 64 ulp of such a place
+    assert np.mean(~same) <= 1e-4
+    assert traced.counts()["escaped"] >= len(x) - np.sum(~clear)
+    assert np.max(np.abs(traced.theta - outgoing)[same & traced.escaped]) <= 64 * EPS
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_runs_change_nothing_but_the_time(name):
+    wall = WALLS[name]
+    x, theta = rays(3, 20_000)
+    fast, slow = geo.trace(wall, x, theta), geo.trace(step_by_step(wall), x, theta)
+    # conditioning by a finite difference: rays that another start nearby sends elsewhere are left out
+    h = 1e-9
+    near = [geo.trace(wall, x + h, theta), geo.trace(wall, x, theta + h * np.sign(np.pi / 2 - theta))]
+    stable = np.all([n.collisions == fast.collisions for n in near], axis=0) & fast.escaped
+    assert stable.mean() > 0.95
+    stretch = sum(np.abs(n.theta - fast.theta) + np.abs(n.x - fast.x) for n in near) / h
+    # hit by hit each hit adds a rounding error; a channel multiplies it by the hits to come
+    allowed = 64 * EPS * (1 + slow.collisions) * (1 + stretch)
+    assert np.array_equal(fast.collisions[stable], slow.collisions[stable])
+    assert np.array_equal(fast.status[stable], slow.status[stable])
+    miss = np.abs(fast.theta - slow.theta) + np.abs(fast.x - slow.x)
+    assert np.all(miss[stable] <= allowed[stable])
+
+
+def test_only_lines_that_face_each_other_freely_make_runs():
+    assert geo.triangular_teeth(0.7).scene.pairs is None
+    assert len(geo.rectangular_teeth(1.0).scene.pairs) == 2
+    # a tooth stands between the outer sides of this hollow: only the channels on either side of it make runs
+    comb = [(0, 0), (0.1, 0), (0.1, -1), (0.2, -1), (0.2, -0.2), (0.25, -0.2), (0.25, -1), (0.4, -1), (0.4, 0), (1, 0)]
+    pairs = geo.Wall.from_vertices(comb).scene.pairs
+    assert sorted(pairs[:, 0].tolist()) == [0.0, 2.0, 4.0, 6.0]
+
+
+def test_a_run_stops_at_the_largest_number_of_collisions():
+    wall = geo.rectangular_teeth(1e8)
+    traced = geo.trace(wall, [0.7, 0.71], 0.3, max_collisions=100_001)
+    assert traced.collisions.tolist() == [100_001] * 2
+    assert traced.counts()["bounce_limit"] == 2
+    arc = geo.trace(geo.focusing_arcs(np.pi / 2), 1e-11, np.pi / 2 + 1e-5, max_collisions=5_000)
+    assert int(arc.collisions) == 5_000 and arc.counts()["bounce_limit"] == 1
+
+
+def test_a_thousand_million_hits_cost_no_more_than_a_few():
+    """The wedge turns a ray pi/psi times, the channel a ray 2 r cot(theta) times: all of it within the bounce loop."""
+    import time
+
+    x, _ = rays(4, 100_000)
+    deep, wall = geo.rectangular_teeth(1e9), geo.rectangular_teeth(4.0)
+    geo.trace(deep, x, 1.0, max_collisions=NO_LIMIT, threads=1)
+    times = []
+    for case in (deep, wall):
+        start = time.process_time()
+        traced = geo.trace(case, x, 1.0, max_collisions=NO_LIMIT, threads=1)
+        times.append(time.process_time() - start)
+        assert traced.escaped.mean() > 0.9999
+    assert times[0] < 20 * times[1] + 0.1
