@@ -154,6 +154,10 @@ def trace(
     else:
         with ThreadPoolExecutor(min(workers, len(blocks))) as pool:
             list(pool.map(run, blocks))
+    if np.any((status == Status.CORNER) | (status == Status.GRAZING)):
+        from .refinement import retrace
+
+        retrace(scene, starts, incoming, max_collisions, out_x, out_theta, collisions, status)
     shape = x_all.shape
     results = (out_x.reshape(shape), out_theta.reshape(shape), collisions.reshape(shape), status.reshape(shape))
     for array in results:

@@ -1,0 +1,138 @@
+"""A tracer in 50 digits, from the definitions: the judge of the double-double one, with other formulas throughout.
+
+The wall is the one that the scene's tables define: joints are doubles, a circular arc is the one through both of its
+joints that subtends the double in its table (ellipses are circles in stretched coordinates), a Bezier piece has the
+coefficients of its table but the highest, which takes it to its end joint. Arcs are found by the quadratic about their
+centre and the angle there, segments by a 2x2 system, Bezier pieces by the roots of a polynomial.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import mpmath as mp
+
+DIGITS = 50
+# Guard digits, and the distance below which a hit is the ray's own start: 50 digits lie between the two.
+GUARD, NEAR = 25, mp.mpf(10) ** -40
+
+
+class PreciseRay(NamedTuple):
+    """Place and angle at the way out, or None, and the number of bounces."""
+
+    x: mp.mpf | None
+    theta: mp.mpf | None
+    bounces: int
+
+
+def _line_hits(a, b, p, v):
+    e, r = (b[0] - a[0], b[1] - a[1]), (p[0] - a[0], p[1] - a[1])
+    det = e[0] * v[1] - e[1] * v[0]
+    # det < 0: from the free side, which is on the left of the edge
+    if det < 0 and 0 <= (r[0] * v[1] - r[1] * v[0]) / det <= 1:
+        yield (r[0] * e[1] - r[1] * e[0]) / det, (-e[1], e[0])
+
+
+def _arc(row):
+    """Centre and radius in stretched coordinates, whether it focuses, the angle of its middle and half its span."""
+    stretch = mp.mpf(row[12])
+    a, b = (mp.mpf(row[13]), stretch * mp.mpf(row[14])), (mp.mpf(row[15]), stretch * mp.mpf(row[16]))
+    half, focusing = mp.mpf(row[11]) / 2, row[4] > 0
+    chord = mp.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
+    radius = chord / 2 / mp.sin(half)
+    left = (-(b[1] - a[1]) / chord, (b[0] - a[0]) / chord)
+    height = radius * mp.cos(half) * (1 if focusing else -1)
+    center = ((a[0] + b[0]) / 2 + height * left[0], (a[1] + b[1]) / 2 + height * left[1])
+    side = -1 if focusing else 1
+    return center, radius, focusing, mp.atan2(side * left[1], side * left[0]), half, stretch
+
+
+def _arc_hits(arc, p, v):
+    center, radius, focusing, middle, half, stretch = arc
+    r, w = (p[0] - center[0], stretch * p[1] - center[1]), (v[0], stretch * v[1])
+    a, b = w[0] ** 2 + w[1] ** 2, r[0] * w[0] + r[1] * w[1]
+    disc = b * b - a * (r[0] ** 2 + r[1] ** 2 - radius**2)
+    if disc < 0:
+        return
+    # the front of a focusing arc is met on the way out of its circle, that of a dispersing one on the way in
+    t = (-b + (1 if focusing else -1) * mp.sqrt(disc)) / a
+    q = (r[0] + t * w[0], r[1] + t * w[1])
+    turn = mp.atan2(q[1], q[0]) - middle
+    turn -= 2 * mp.pi * mp.nint(turn / (2 * mp.pi))
+    if abs(turn) <= half:
+        sign = -1 if focusing else 1
+        yield t, (sign * q[0], sign * stretch * q[1])
+
+
+def _bezier(row):
+    """Coefficients of 1, s, s^2, s^3 as points."""
+    c = [(mp.mpf(row[2 * k]), mp.mpf(row[2 * k + 1])) for k in range(4)]
+    top = 2 if row[6] == 0 and row[7] == 0 else 3
+    end = (mp.mpf(row[-4]), mp.mpf(row[-3]))
+    c[top] = tuple(end[i] - mp.fsum(c[k][i] for k in range(top)) for i in (0, 1))
+    return c[: top + 1]
+
+
+def _bezier_hits(c, p, v):
+    poly = [a[0] * v[1] - a[1] * v[0] for a in c]
+    poly[0] -= p[0] * v[1] - p[1] * v[0]
+    while len(poly) > 1 and abs(poly[-1]) < mp.mpf(10) ** (-DIGITS):
+        poly.pop()
+    if len(poly) < 2:
+        return
+    for root in mp.polyroots(poly[::-1], maxsteps=500, extraprec=200):
+        s = mp.re(root)
+        if abs(mp.im(root)) < mp.mpf(10) ** (-DIGITS) and -NEAR <= s <= 1 + NEAR:
+            x, y = (mp.fsum(a[i] * s**k for k, a in enumerate(c)) for i in (0, 1))
+            tx, ty = (mp.fsum(k * a[i] * s ** (k - 1) for k, a in enumerate(c) if k) for i in (0, 1))
+            if -ty * v[0] + tx * v[1] < 0:
+                yield (x - p[0]) * v[0] + (y - p[1]) * v[1], (-ty, tx)
+
+
+def trace_precisely(scene, x, theta, limit=2000):
+    """Follow one ray whose place and angle are exact doubles through the wall that the tables define."""
+    with mp.workdps(DIGITS + GUARD):
+        base = mp.floor(mp.mpf(x) / mp.mpf(scene.cell)) * mp.mpf(scene.cell)
+        p = (mp.mpf(x) - base, mp.mpf(0))
+        v = (-mp.cos(mp.mpf(theta)), -mp.sin(mp.mpf(theta)))
+        inside = [h for h in scene.hollows if h[0] < p[0] < h[1]]
+        if not inside:
+            return PreciseRay(mp.mpf(x), mp.pi - mp.mpf(theta), 1)
+        hollow = inside[0]
+        left, right = mp.mpf(hollow[0]), mp.mpf(hollow[1])
+        joints = [(mp.mpf(a), mp.mpf(b)) for a, b in scene.joints[:, :2]]
+        rows = range(int(hollow[3]), int(hollow[4]) - 1)
+        lines = [(joints[j], joints[j + 1]) for j in rows if scene.joints[j, 3] > 0]
+        arcs = [
+            _arc(row)
+            for table, k in ((scene.circles, 5), (scene.ellipses, 7))
+            if table is not None
+            for row in table[int(hollow[k]) : int(hollow[k + 1])]
+        ]
+        curves = [] if scene.beziers is None else [_bezier(r) for r in scene.beziers[int(hollow[9]) : int(hollow[10])]]
+        for bounces in range(limit + 1):
+            while True:
+                hits = [h for a, b in lines for h in _line_hits(a, b, p, v)]
+                hits += [h for arc in arcs for h in _arc_hits(arc, p, v)]
+                hits += [h for curve in curves for h in _bezier_hits(curve, p, v)]
+                t, normal = min(
+                    (h for h in hits if h[0] > NEAR * scene.cell), default=(mp.inf, None), key=lambda h: h[0]
+                )
+                leave = -p[1] / v[1] if v[1] > 0 else mp.inf
+                side = ((right if v[0] > 0 else left) - p[0]) / v[0] if scene.is_open and v[0] != 0 else mp.inf
+                if min(leave, t) <= side:
+                    break
+                # into the next cell: the wall is periodic, and the base counts the periods
+                step = right - left if v[0] > 0 else left - right
+                base += step
+                p = (left if v[0] > 0 else right, p[1] + side * v[1])
+            if leave < mp.inf and leave <= t:
+                return PreciseRay(base + p[0] + leave * v[0], mp.atan2(v[1], v[0]), bounces)
+            if normal is None:
+                return PreciseRay(None, None, bounces)
+            p = (p[0] + t * v[0], p[1] + t * v[1])
+            size = mp.sqrt(normal[0] ** 2 + normal[1] ** 2)
+            n = (normal[0] / size, normal[1] / size)
+            w = 2 * (v[0] * n[0] + v[1] * n[1])
+            v = (v[0] - w * n[0], v[1] - w * n[1])
+        return PreciseRay(None, None, limit)
