@@ -196,7 +196,10 @@ class _Maker:
         table = table_of(law)
         if table is not None:
             symmetric, omitted = table_matrix(table, self.basis)
-            how, left = "masses and Gauss rules on every piece of the table of isometries, to rounding", "unresolved beams"
+            how, left = (
+                "masses and Gauss rules on every piece of the table of isometries, to rounding",
+                "unresolved beams",
+            )
         else:
             symmetric, omitted = branch_matrix(law, self.basis, self.tolerance)
             how, left = "Gauss rules between the kinks of isometries, to rounding", "omitted kinks"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,8 +16,10 @@ from .stable_angles import kept_inside
 
 Whole = NDArray[np.int64]
 
-# Offsets are sums of a few angles of the wall, found along different routes: a few dozen roundings of numbers below 2 pi.
+# Offsets are sums of a few angles of the wall, found along different routes: dozens of roundings of numbers below 2 pi.
 SAME_OFFSET = 64.0 * np.pi * np.finfo(np.float64).eps
+# Rows of a table that misses nothing sum to 1 within the rounding of their many terms; below this it is made good.
+ROUNDED_ROW = 1e-9
 # Candidates a query looks at are held at a time.
 CHUNK = 2**21
 # Buckets of the index hold about this many entries a piece in all.
@@ -78,6 +80,7 @@ class IsometryTable:
     high: Floats
     start: Floats
     end: Floats
+    _: KW_ONLY
     crevices: tuple[Crevice, ...] = ()
     unresolved: float = 0.0
 
@@ -205,9 +208,11 @@ class IsometryTable:
         sign, offset, _ = self.isometries
         query, number, probability = self._entries(flat)
         key, place = np.unique(query * sign.size + number, return_inverse=True)
-        total = np.bincount(place, weights=probability, minlength=key.size)
+        total: Floats = np.bincount(place, weights=probability, minlength=key.size)
         key, total = key[total > 0.0], total[total > 0.0]
         query, number = np.divmod(key, sign.size)
+        whole = np.bincount(query, weights=total, minlength=flat.size)
+        total = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
         count = np.bincount(query, minlength=flat.size)
         slot = np.arange(key.size) - np.repeat(np.cumsum(count) - count, count)
         slots = int(count.max(initial=1))
@@ -272,7 +277,7 @@ class IsometryTable:
         return self.sign, self.offset, self.low, self.high, self.start, self.end
 
     def kinks(self, limit: int) -> tuple[Floats, float]:
-        """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of what is left out."""
+        """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of those left out."""
         from .rectangular import crevice_kinks
 
         lists, left_out = [self.ends], 0.0

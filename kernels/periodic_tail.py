@@ -173,4 +173,4 @@ def _pieces(low: Floats, high: Floats, nodes: int) -> tuple[Floats, Floats, Floa
     # distances from the middle of the period are exact, also where d itself is only known to a few digits
     inside, weight = gauss_on_intervals(np.zeros(low.size), high - low, nodes)
     offset = np.repeat(low - centre, nodes) + inside
-    return np.repeat(centre, nodes) + offset, weight, 1.0 - np.abs(offset)
+    return np.repeat(centre, nodes) + offset, weight, np.clip(1.0 - np.abs(offset), 0.0, 1.0)
