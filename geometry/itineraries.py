@@ -38,7 +38,7 @@ LEAST_SHARE = 0.02
 GAP_SHARE = 0.25
 
 
-def gauss_tables():
+def gauss_tables() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions in (0, 1) and weights of all rules after the substitution, one after the other, and their starts."""
     places, weights, starts = [], [], [0]
     for order in ORDERS:
@@ -53,7 +53,7 @@ def gauss_tables():
 @_compile
 def probe(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, edges, code):
     """Outgoing angle of one ray and the label of its itinerary and of the cell between ``edges`` that it goes to."""
-    place, vx, vy, bounces, status = trace_ray(
+    _, vx, vy, _, status = trace_ray(
         x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, None, code
     )
     if status != ESCAPED:
@@ -85,7 +85,22 @@ def undecided(width, first, second, degree, whole):
 
 @_compile
 def halve_gaps(
-    theta, hollow, tables, period, limit, edges, degree, code, xs, outs, labels, follow, count, gaps, gap_count, goal,
+    theta,
+    hollow,
+    tables,
+    period,
+    limit,
+    edges,
+    degree,
+    code,
+    xs,
+    outs,
+    labels,
+    follow,
+    count,
+    gaps,
+    gap_count,
+    goal,
     most,
 ):
     """Halve gaps between different labels, all of them once a round, until together they matter less than ``goal``."""
@@ -140,7 +155,24 @@ def halve_gaps(
 
 @_compile
 def integrate(
-    theta, hollow, tables, period, limit, edges, degree, code, rules, low, high, label, goal, least, node, mass, filled, room,
+    theta,
+    hollow,
+    tables,
+    period,
+    limit,
+    edges,
+    degree,
+    code,
+    rules,
+    low,
+    high,
+    label,
+    goal,
+    least,
+    node,
+    mass,
+    filled,
+    room,
     strict,
 ):
     """Nodes on [low, high], where all rays should have the given label.
@@ -186,8 +218,26 @@ def integrate(
 
 @_compile
 def march_row(
-    theta, hollow, tables, period, limit, edges, degree, least, tolerance, seeds, rules, xs, outs, labels, follow, gaps, code,
-    node, mass, ends,
+    theta,
+    hollow,
+    tables,
+    period,
+    limit,
+    edges,
+    degree,
+    least,
+    tolerance,
+    seeds,
+    rules,
+    xs,
+    outs,
+    labels,
+    follow,
+    gaps,
+    code,
+    node,
+    mass,
+    ends,
 ):
     """Nodes and masses of one row; returns their number, the error, the lost width, pieces and rays.
 
@@ -220,8 +270,23 @@ def march_row(
     follow[last] = -1
     rays = count
     count = halve_gaps(
-        theta, hollow, tables, period, limit, edges, degree, code, xs, outs, labels, follow, count, gaps, gap_count,
-        GAP_SHARE * goal, 3 * MOST_SAMPLES // 4,
+        theta,
+        hollow,
+        tables,
+        period,
+        limit,
+        edges,
+        degree,
+        code,
+        xs,
+        outs,
+        labels,
+        follow,
+        count,
+        gaps,
+        gap_count,
+        GAP_SHARE * goal,
+        3 * MOST_SAMPLES // 4,
     )
     rays += count - rays
     filled, pieces = 0, 0
@@ -248,8 +313,25 @@ def march_row(
                 allowed = 0.5 * goal * max((high - low) / whole, LEAST_SHARE)
                 room = MOST_NODES - filled - 2
                 used, miss, uncovered = integrate(
-                    theta, hollow, tables, period, limit, edges, degree, code, rules, low, high, labels[i], allowed,
-                    least, node, mass, filled, room, count < MOST_SAMPLES - 4,
+                    theta,
+                    hollow,
+                    tables,
+                    period,
+                    limit,
+                    edges,
+                    degree,
+                    code,
+                    rules,
+                    low,
+                    high,
+                    labels[i],
+                    allowed,
+                    least,
+                    node,
+                    mass,
+                    filled,
+                    room,
+                    count < MOST_SAMPLES - 4,
                 )
                 rays += 2 * used
                 if not math.isnan(uncovered):
@@ -281,8 +363,23 @@ def march_row(
                 count += 1
                 rays -= count
                 count = halve_gaps(
-                    theta, hollow, tables, period, limit, edges, degree, code, xs, outs, labels, follow, count,
-                    gaps, 2, 0.05 * GAP_SHARE * goal, MOST_SAMPLES,
+                    theta,
+                    hollow,
+                    tables,
+                    period,
+                    limit,
+                    edges,
+                    degree,
+                    code,
+                    xs,
+                    outs,
+                    labels,
+                    follow,
+                    count,
+                    gaps,
+                    2,
+                    0.05 * GAP_SHARE * goal,
+                    MOST_SAMPLES,
                 )
                 rays += count
                 continue
@@ -327,8 +424,26 @@ def march_rows(thetas, hollow, tables, period, limit, edges, degree, least, tole
     all_node, all_mass = np.empty(1024), np.empty(1024)
     for k in range(n):
         filled, errors[k], lost[k], pieces, rays[k] = march_row(
-            thetas[k], hollow, tables, period, limit, edges, degree, least, tolerances[k], seeds, rules, xs, outs, labels,
-            follow, gaps, code, node, mass, ends,
+            thetas[k],
+            hollow,
+            tables,
+            period,
+            limit,
+            edges,
+            degree,
+            least,
+            tolerances[k],
+            seeds,
+            rules,
+            xs,
+            outs,
+            labels,
+            follow,
+            gaps,
+            code,
+            node,
+            mass,
+            ends,
         )
         seeds = ends[: min(pieces, most_seeds)].copy()
         begin = starts[k]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 MOST_COLLISIONS = 100_000
 # Pieces of a row that its neighbour starts from.
 MOST_SEEDS = 128
+# Pieces of a wall up to which a row takes no more than some milliseconds.
+MOST_PIECES = 64
 # Hollows are translates of each other if their tables agree to this share of their size.
 SAME_SHAPE = 1e-13
 
@@ -56,6 +58,11 @@ class AdaptiveRows:
         values = np.asarray(function(self.nodes), dtype=np.float64)
         weighted = self.weights.reshape((-1,) + (1,) * (values.ndim - 1)) * values
         return np.add.reduceat(weighted, self.starts[:-1], axis=0)
+
+
+def is_few(wall: Wall) -> bool:
+    """Whether the wall has so few pieces that its rows are cheap: a row costs about their number squared."""
+    return len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
 
 
 def adaptive_rows(
@@ -172,12 +179,20 @@ class WallRows:
             rays,
         )
 
-    def _march(self, theta: Floats, hollow: int, tolerances: Floats) -> tuple[Floats, ...]:
+    def _march(self, theta: Floats, hollow: int, tolerances: Floats) -> tuple[Any, ...]:
         from ..geometry.itineraries import gauss_tables, march_rows
 
         scene = self.wall.scene
-        tables = (scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers)
-        found: tuple[Floats, ...] = march_rows(
+        # empty tables instead of absent ones, so that one compiled version serves all walls: compiling takes 20 s
+        tables = (
+            scene.joints,
+            np.zeros((len(scene.joints), 5)) if scene.lines is None else scene.lines,
+            *(
+                np.zeros((0, columns)) if table is None else table
+                for columns, table in ((19, scene.circles), (19, scene.ellipses), (14, scene.beziers))
+            ),
+        )
+        found: tuple[Any, ...] = march_rows(
             theta, scene.hollows[hollow], tables, scene.cell if scene.is_open else None, MOST_COLLISIONS, self.edges,
             self.degree, self.least_level, tolerances, gauss_tables(), MOST_SEEDS,
         )  # fmt: skip

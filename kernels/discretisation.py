@@ -26,10 +26,15 @@ from .matrix_algebra import frobenius_error
 from .measure import SINE
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
+from .row_quadrature import is_affordable, row_matrix
 from .sampling import DEFAULT_SAMPLES, RANDOMISATIONS, SamplingMethod, responder, sampled_array
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
+<<<<<<< HEAD
 from .table_quadrature import table_matrix
+=======
+from .wall_law import WallLaw
+>>>>>>> f4ee9002bbde3cc54fe404d5ce7b13c40aebdee6
 from .weighted_sum import Combination
 
 Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
@@ -66,13 +71,14 @@ def discretise(
         Gauss rules, refined until two levels differ by the tolerance or the work exceeds about a second; the error
         is that difference. ``"qmc"``: rays from 8 independently scrambled Sobol sequences; the error is from their
         spread. ``"monte-carlo"``: independent rays; the error is from the variance of the counts. ``"auto"`` takes
-        the first of these that the law has, except that quadrature in the entry point, which converges slowly where
-        rays jump, comes after ``"qmc"``. ``KernelMatrix.method`` says what was used.
+        the first of these that the law has, except that quadrature in the entry point comes after ``"qmc"`` where it
+        is slow: for traced walls of many pieces, by a prediction of its cost, and for driven laws without a wall.
+        ``KernelMatrix.method`` says what was used.
     tolerance : float
         Wanted Frobenius error of ``symmetric``. If it is not met the matrix says so: in its ``error`` and its repr.
     samples : int, optional
         Number of rays where rays are sampled, 2**20 by default; ``"qmc"`` rounds up to 8 times a power of two, for
-        the quadrature of traced rays it is the number of nodes.
+        the quadrature of other driven laws it is the number of nodes.
     rng : numpy.random.Generator, optional
         Source of randomness; by default a fixed one, so that results are reproducible.
     symmetrise : bool
@@ -172,7 +178,8 @@ class _Maker:
         elif isinstance(law, SpecularFrame):
             found = tuple(name for name in self.methods(law.law, isometries)[:-1] if name != "exact")
         elif isinstance(law, DrivenLaw):
-            accurate = isinstance(law, CircularArcLaw) or self._acts_accurately(law)
+            rows = isinstance(law, WallLaw) and is_affordable(law.wall, self.basis)
+            accurate = isinstance(law, CircularArcLaw) or rows or self._acts_accurately(law)
             found = ("quadrature", "qmc") if accurate else ("qmc", "quadrature")
         elif isinstance(law, (Composition, Power)):
             found = ("quadrature",) if all(map(self._acts_accurately, _factors(law))) else ()
@@ -221,6 +228,12 @@ class _Maker:
         elif isinstance(law, CircularArcLaw):
             symmetric, error = arc_matrix(law.half_angle, self.basis)
             how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
+        elif isinstance(law, WallLaw):
+            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance)
+            how = (
+                f"adaptive rows and panels, {rays} rays, as predicted to be cheaper than sampling: Gauss against Kronrod, "
+                "plus undecided entry points; or the asymmetry if that is more"
+            )
         elif isinstance(law, DrivenLaw) and not self._acts_accurately(law):
             symmetric, error = entry_matrix(law, self.basis, self.samples)
         elif isinstance(law, (Composition, Power)) and (

@@ -42,6 +42,8 @@ GAUSS = np.array(list(_GAUSS[:-1]) + list(_GAUSS[::-1]))
 
 # Rays after which the matrix is handed over as it is, with the error that it has: some seconds.
 MOST_RAYS = 10_000_000
+# For the prediction of the cost; measured on random walls of two to five pieces.
+ROWS_A_PIECE, RAYS_A_CHANGE = 100, 100
 # Rows at a time, so that their nodes fit into memory, and outgoing angles times functions at a time.
 ROWS_AT_ONCE = 1500
 VALUES_AT_ONCE = 2_000_000
@@ -61,6 +63,19 @@ RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
 # Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error.
 FEWEST_FUNCTIONS = 3
+
+
+def is_affordable(wall: Wall, basis: Basis) -> bool:
+    """Whether adaptive rows are likely to beat the sampling of rays: few pieces, and few functions with edges.
+
+    A row has several changes of itinerary a piece, each found by about 30 rays, and a matrix needs about a thousand
+    rows for an error of 1e-6 and as many kinks in theta as pieces: the cost grows like the square of the pieces. A
+    change of cell costs as much as one of itinerary, in each row, and the rows of each cell are integrated anew.
+    """
+    pieces = len(wall.pieces) + sum(map(len, wall.islands))
+    cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
+    predicted = ROWS_A_PIECE * RAYS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
+    return bool(wall.closes) and predicted <= MOST_RAYS
 
 
 @dataclass
@@ -100,12 +115,12 @@ def row_matrix(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
     of that difference scaled by what halving the panel showed where they are smooth; plus the errors of the rows. It
-    is at least half the asymmetry of the result, which another error than these would show.
+    is at least the asymmetry of the result, which another error than these would show.
     """
     small = isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS
     inner = Legendre(FEWEST_FUNCTIONS) if small else basis
     matrix, error, rays = _Integrator(wall, inner, tolerance, most_rays).run()
-    error = max(error, 0.5 * float(np.linalg.norm(matrix - matrix.T)))
+    error = max(error, float(np.linalg.norm(matrix - matrix.T)))
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), error, rays
 
 
@@ -203,9 +218,7 @@ class _Integrator:
         weight = density * KRONROD
         value = np.einsum("pk,pki,pkj->pij", weight, here, image, optimize=True)
         gauss = density * (KRONROD - GAUSS)
-        difference = np.linalg.norm(
-            np.einsum("pk,pki,pkj->pij", gauss, here, image, optimize=True), axis=(1, 2)
-        )
+        difference = np.linalg.norm(np.einsum("pk,pki,pkj->pij", gauss, here, image, optimize=True), axis=(1, 2))
         size = np.linalg.norm(here, axis=2)
         row_error = self.scale * np.sum(weight * size * (rows.error + 2.0 * rows.lost).reshape(angle.shape), axis=1)
         return _Panels(low, high, list(value), difference, difference.copy(), row_error)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles
 from ..errors import AccuracyError, InputError
+from .adaptive_rows import adaptive_rows, is_few
 from .circular import CircularArcLaw
 from .ideal import specular
 from .isometry import table_of
@@ -33,9 +34,14 @@ SHAPE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
 # Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
 # error in total variation; above this it would show in a kernel estimated from a million rays.
 LOST_TOLERANCE = 1e-4
+<<<<<<< HEAD
 # Polygonal walls are resolved into beams where that takes about a second (a microsecond a beam, a few to make the
 # table) and leaves so little that a sampled kernel could not show it.
 MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 512, 100_000, 1e-7
+=======
+# `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
+APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
+>>>>>>> f4ee9002bbde3cc54fe404d5ce7b13c40aebdee6
 
 
 @dataclass(frozen=True)
@@ -156,7 +162,17 @@ class WallLaw(DrivenLaw):
         return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
 
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
-        return super().apply(function, theta) if self.closed_form is None else self.closed_form.apply(function, theta)
+        if self.closed_form is not None:
+            return self.closed_form.apply(function, theta)
+        incoming = angles("theta", theta)
+        if incoming.size == 0 or not is_few(self.wall):
+            return super().apply(function, incoming)
+        rows = adaptive_rows(self.wall, incoming.ravel(), APPLY_TOLERANCE, APPLY_DEGREE)
+        lost = float(np.mean(rows.lost))
+        if lost > LOST_TOLERANCE:
+            raise AccuracyError(f"{self!r}: {lost:.2g} of the rays did not escape, more than {LOST_TOLERANCE:g}", lost)
+        mean = rows.mean(function)
+        return mean.reshape(incoming.shape + mean.shape[1:])
 
 
 def _closed_form(wall: Wall) -> Law | None:
