@@ -197,13 +197,89 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
 
 
 @_compile
-def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, path, itinerary, pairs=None):
+def corner_ahead(dx, dy, c, vx, vy, slack, bounces):
+    """Time to a joint within rounding of the ray's line, or inf where it is behind."""
+    ahead = dx * vx + dy * vy
+    # a ray that has not been reflected yet is exact, and so is its distance from the joint
+    exact = bounces > 0 or abs(c) <= 4.0 * EPS * (abs(dx * vy) + abs(dy * vx))
+    return ahead if exact and ahead > slack else np.inf
+
+
+@_compile
+def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
+    """Flight time to the line that starts at joint j, and the share of it at the hit, negative from its end."""
+    share = c_before / (c_before - c_after)
+    near = j
+    if share > 0.5:
+        # from the nearer joint, and negative to say so, so that both ends keep their digits
+        share = c_after / (c_before - c_after)
+        near = j + 1
+    hx = joints[near, 0] + share * lines[j, 0]
+    hy = joints[near, 1] + share * lines[j, 1]
+    return (hx - px) * vx + (hy - py) * vy, share
+
+
+@_compile
+def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time):
+    """Follow a ray through the cells of the grid to its first line before ``time``.
+
+    Returns the flight time (inf if none), the line, the share of it, and the time to the first corner on the way that
+    is met within rounding. Lines are listed in every cell that they nearly touch, so the walk's own rounding leaves
+    out no line that the ray can meet; the signs at the joints are the same numbers in every cell.
+    """
+    columns, rows, base = int(hollow[17]), int(hollow[18]), int(hollow[19])
+    x, y = (px - hollow[13]) / hollow[15], (py - hollow[14]) / hollow[16]
+    column, row = min(max(int(x), 0), columns - 1), min(max(int(y), 0), rows - 1)
+    right, up = 1 if vx > 0.0 else -1, 1 if vy > 0.0 else -1
+    step_x = hollow[15] / abs(vx) if vx != 0.0 else np.inf
+    step_y = hollow[16] / abs(vy) if vy != 0.0 else np.inf
+    leave_x = ((column + 1 if vx > 0.0 else column) - x) * (hollow[15] / vx) if vx != 0.0 else np.inf
+    leave_y = ((row + 1 if vy > 0.0 else row) - y) * (hollow[16] / vy) if vy != 0.0 else np.inf
+    best, found, best_share = np.inf, -1, 0.0
+    corner_time = np.inf
+    while True:
+        cell = base + row * columns + column
+        for entry in range(grid[cell], grid[cell + 1]):
+            j = grid[entry]
+            dx, dy = joints[j, 0] - px, joints[j, 1] - py
+            c_before = dx * vy - dy * vx
+            if abs(c_before) <= slack and joints[j, 2] > 0.0:
+                corner_time = min(corner_time, corner_ahead(dx, dy, c_before, vx, vy, slack, bounces))
+            dx, dy = joints[j + 1, 0] - px, joints[j + 1, 1] - py
+            c_after = dx * vy - dy * vx
+            if abs(c_after) <= slack and joints[j + 1, 2] > 0.0:
+                corner_time = min(corner_time, corner_ahead(dx, dy, c_after, vx, vy, slack, bounces))
+            if c_before >= 0.0 >= c_after and c_before > c_after and j != own:
+                t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
+                # of two lines at one distance the first in the order of the wall is hit, as without a grid
+                if -slack <= t and (max(t, 0.0) < best or (max(t, 0.0) == best and j < found)):
+                    best, found, best_share = max(t, 0.0), j, share
+        if min(leave_x, leave_y) > min(best, time) + 2.0 * slack:
+            break
+        if leave_x < leave_y:
+            column += right
+            leave_x += step_x
+            if column < 0 or column >= columns:
+                break
+        else:
+            row += up
+            leave_y += step_y
+            if row < 0 or row >= rows:
+                break
+    return best, found, best_share, corner_time
+
+
+@_compile
+def trace_ray(
+    x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, path, itinerary, pairs=None, grid=None
+):
     """Follow one ray through one hollow; returns x, the outgoing velocity, bounces and status.
 
     ``period`` is None for a closed hollow; for an open wall its sides are passed and x is unfolded by it.
     ``path`` is None, or an array (limit + 2, 2) that receives the points of the trajectory. ``itinerary`` is None, or
     an array of one uint64 that receives a hash of the pieces hit, in their order, of the lengths of runs, and of the
-    sides passed. ``pairs`` is None, or the table of the channels and wedges in which runs are skipped.
+    sides passed. ``pairs`` is None, or the table of the channels and wedges in which runs are skipped. ``grid``
+    is None, or the table of cells of the hollows that have many lines.
     """
     left, right, size = hollow[0], hollow[1], hollow[2]
     joint_low, joint_high = int(hollow[3]), int(hollow[4])
@@ -223,39 +299,6 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
         kind, index, hit_s, tangent = NO_PIECE, -1, 0.0, 0
         time = np.inf
         corner_time = np.inf
-
-        # segments, by the signs of the joints
-        dx, dy = joints[joint_low, 0] - px, joints[joint_low, 1] - py
-        c_before = dx * vy - dy * vx
-        if abs(c_before) <= slack and joints[joint_low, 2] > 0.0:
-            ahead = dx * vx + dy * vy
-            exact = bounces > 0 or abs(c_before) <= 4.0 * EPS * (abs(dx * vy) + abs(dy * vx))
-            if exact and ahead > slack:
-                corner_time = ahead
-        for j in range(joint_low + 1, joint_high):
-            dx, dy = joints[j, 0] - px, joints[j, 1] - py
-            c_after = dx * vy - dy * vx
-            if abs(c_after) <= slack and joints[j, 2] > 0.0:
-                ahead = dx * vx + dy * vy
-                exact = bounces > 0 or abs(c_after) <= 4.0 * EPS * (abs(dx * vy) + abs(dy * vx))
-                if exact and slack < ahead < corner_time:
-                    corner_time = ahead
-            if lines is not None:
-                if c_before >= 0.0 >= c_after and c_before > c_after and joints[j - 1, 3] > 0.0:
-                    if own_kind != LINE or own_index != j - 1:
-                        share = c_before / (c_before - c_after)
-                        if share <= 0.5:
-                            hx = joints[j - 1, 0] + share * lines[j - 1, 0]
-                            hy = joints[j - 1, 1] + share * lines[j - 1, 1]
-                        else:
-                            # from the nearer joint, and negative to say so, so that both ends keep their digits
-                            share = c_after / (c_before - c_after)
-                            hx = joints[j, 0] + share * lines[j - 1, 0]
-                            hy = joints[j, 1] + share * lines[j - 1, 1]
-                        t = (hx - px) * vx + (hy - py) * vy
-                        if -slack <= t < time:
-                            time, kind, index, hit_s = max(t, 0.0), LINE, j - 1, share
-            c_before = c_after
 
         if circles is not None:
             for k in range(circle_low, circle_high):
@@ -281,6 +324,34 @@ def trace_ray(x, theta, hollow, joints, lines, circles, ellipses, beziers, perio
                 t, s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
                 if t < time:
                     time, kind, index, hit_s, tangent = t, BEZIER, k, s, 0
+
+        # segments, by the signs of the joints: of all of them, or of those in the cells that the ray passes
+        walking = False
+        if grid is not None:
+            walking = hollow[17] > 0.0
+        if not walking:
+            dx, dy = joints[joint_low, 0] - px, joints[joint_low, 1] - py
+            c_before = dx * vy - dy * vx
+            if abs(c_before) <= slack and joints[joint_low, 2] > 0.0:
+                corner_time = min(corner_time, corner_ahead(dx, dy, c_before, vx, vy, slack, bounces))
+            for j in range(joint_low + 1, joint_high):
+                dx, dy = joints[j, 0] - px, joints[j, 1] - py
+                c_after = dx * vy - dy * vx
+                if abs(c_after) <= slack and joints[j, 2] > 0.0:
+                    corner_time = min(corner_time, corner_ahead(dx, dy, c_after, vx, vy, slack, bounces))
+                if lines is not None:
+                    if c_before >= 0.0 >= c_after and c_before > c_after and joints[j - 1, 3] > 0.0:
+                        if own_kind != LINE or own_index != j - 1:
+                            t, share = line_time(joints, lines, j - 1, c_before, c_after, px, py, vx, vy)
+                            if -slack <= t < time:
+                                time, kind, index, hit_s, tangent = max(t, 0.0), LINE, j - 1, share, 0
+                c_before = c_after
+        if grid is not None and walking:
+            own = own_index if own_kind == LINE else -1
+            t, index_there, share, ahead = walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
+            corner_time = min(corner_time, ahead)
+            if t < time:
+                time, kind, index, hit_s, tangent = t, LINE, index_there, share, 0
 
         # the opening, an edge from right to left, and the sides of an open wall
         if vy > 0.0:
@@ -388,7 +459,7 @@ def near_end(piece, px, py, slack):
 
 @_compile
 def trace_rays(
-    x, theta, hollows, joints, lines, circles, ellipses, beziers, pairs, period, cell, limit,
+    x, theta, hollows, joints, lines, circles, ellipses, beziers, pairs, grid, period, cell, limit,
     out_x, out_theta, bounces, status,
 ):  # fmt: skip
     """Trace a block of rays; fills the four output arrays."""
@@ -415,7 +486,20 @@ def trace_rays(
                 out_theta[i], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
         place, vx, vy, bounces[i], status[i] = trace_ray(
-            place, theta[i], hollows[h], joints, lines, circles, ellipses, beziers, period, limit, None, None, pairs
+            place,
+            theta[i],
+            hollows[h],
+            joints,
+            lines,
+            circles,
+            ellipses,
+            beziers,
+            period,
+            limit,
+            None,
+            None,
+            pairs,
+            grid,
         )
         out_x[i] = base + place
         out_theta[i] = math.atan2(vy, vx)

@@ -3,13 +3,16 @@
 Flat tops have no place in the tables, and a table of a primitive that the wall does not have is None.
 
 Columns. ``hollows``: left, right, size, first joint, joint after the last, then the ranges in ``circles``, ``ellipses``
-and ``beziers`` (two columns each), then the kind of edge at the left and at the right end (0 none, 1 smooth, 2 corner).
+and ``beziers`` (two columns each), then the kind of edge at the left and at the right end (0 none, 1 smooth, 2 corner),
+then the frame of the grid over the lines of a hollow that has many: lower left corner (2), size of a cell (2), columns
+(0: no grid), rows, place in ``grid``. ``grid`` (integers): see `grid.grid_of`.
 ``joints``: x, y, 1 if a corner, 1 if a segment starts here. ``lines`` (a row a joint): edge vector, left unit normal,
 length, range of its rows in ``pairs``. ``pairs`` (a row for each line of a pair that faces another with nothing in
 between): the partner, the ends of the part that faces it, first the one towards the apex (4), unit vector towards the
-apex, gap at that end, sine of the angle between the lines, that angle. ``circles`` and ``ellipses``: first joint (2), unit normal there (2), curvature, chord direction (2), chord
-length (0 beyond a half angle of pi/4), two unused, sine below which a run of hops is skipped (0 never), span, stretch,
-both joints (4), corner flags (2); all in coordinates whose y is multiplied by the stretch, but for the joints.
+apex, gap at that end, sine of the angle between the lines, that angle. ``circles`` and ``ellipses``: first joint (2),
+unit normal there (2), curvature, chord direction (2), chord length (0 beyond a half angle of pi/4), two unused, sine
+below which a run of hops is skipped (0 never), span, stretch, both joints (4), corner flags (2); all in coordinates
+whose y is multiplied by the stretch, but for the joints.
 ``beziers``: coefficients of 1, s, s^2, s^3 (x and y each), both joints (4), corner flags (2).
 """
 
@@ -20,6 +23,7 @@ from math import asin, cos, hypot, pi, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import Floats
 from .arc import Arc
@@ -41,6 +45,8 @@ RUN_HOPS = 8.0
 # Below this half angle the chord and the radius give it more exactly than the difference of two parameters does.
 SHALLOW_ARC = 0.5
 OUTLINE_POINTS = 64
+# Below this number of lines testing every joint is faster than walking through cells.
+GRID_LINES = 96
 
 Point = tuple[float, float]
 
@@ -56,6 +62,7 @@ class Scene:
     ellipses: Floats | None
     beziers: Floats | None
     pairs: Floats | None
+    grid: NDArray[np.int64] | None
     cell: float
     is_open: bool
 
@@ -124,6 +131,7 @@ class _Tables:
         self.ellipses: list[list[float]] = []
         self.beziers: list[list[float]] = []
         self.pairs: list[list[float]] = []
+        self.grids: list[NDArray[np.int64]] = []
 
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[int, int]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
@@ -136,11 +144,12 @@ class _Tables:
         size = float(np.max(np.ptp(joints, axis=0))) if len(joints) else right - left
         size = max(size, right - left)
         ranges = [value for pair in zip(before, after, strict=True) for value in pair]
-        self.hollows.append([left, right, size, *map(float, ranges), *map(float, edges)])
+        self.hollows.append([left, right, size, *map(float, ranges), *map(float, edges), *[0.0] * 7])
         self._mark_runs(before[1], after[1], chains)
         inside = bool(np.all((left <= joints[:, 0]) & (joints[:, 0] <= right)))
         if inside or edges != (0, 0):
             self._mark_pairs(before[0], chains, size)
+        self._add_grid(before[0])
 
     def _sizes(self) -> tuple[int, int, int, int]:
         return len(self.joints), len(self.circles), len(self.ellipses), len(self.beziers)
@@ -179,6 +188,20 @@ class _Tables:
             if row[4] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
                 row[10] = sin(half / RUN_HOPS)
 
+    def _add_grid(self, first: int) -> None:
+        """Lay a grid over the lines of the last hollow, which start at the joint ``first``, if they are many."""
+        joints = np.array(self.joints[first:], dtype=np.float64)
+        is_line = joints[:, 3] > 0.0
+        if is_line.sum() < GRID_LINES:
+            return
+        from .grid import grid_of
+
+        ends = np.roll(joints[:, :2], -1, axis=0)
+        ends[~is_line] = joints[~is_line, :2]
+        frame, table = grid_of(np.ascontiguousarray(joints[:, :2]), ends, first, sum(map(len, self.grids)))
+        self.hollows[-1][-7:] = frame
+        self.grids.append(table)
+
     def _mark_pairs(self, first: int, chains: list[_Chain], size: float) -> None:
         """Find the channels and wedges of a hollow; its lines start at the joint ``first``."""
         numbers, starts, ends, hulls = [], [], [], []
@@ -209,13 +232,14 @@ class _Tables:
         joints = np.array(self.joints, dtype=np.float64).reshape(-1, 4)
         lines = np.array(self.lines, dtype=np.float64).reshape(-1, 7)
         return Scene(
-            hollows=np.array(self.hollows, dtype=np.float64).reshape(-1, 13),
+            hollows=np.array(self.hollows, dtype=np.float64).reshape(-1, 20),
             joints=joints,
             lines=lines if joints[:, 3].any() else None,
             circles=_table(self.circles),
             ellipses=_table(self.ellipses),
             beziers=_table(self.beziers),
             pairs=_table(self.pairs),
+            grid=np.concatenate(self.grids) if self.grids else None,
             cell=cell,
             is_open=is_open,
         )
@@ -237,11 +261,20 @@ def _hull(piece: Curve, start: Point, end: Point) -> list[Point]:
 
 def _corners(pieces: list[Curve]) -> list[bool]:
     """For every joint of the cycle of pieces (the first one again at the end): is it a corner?"""
-    heads = np.array([piece.tangent(0.0) for piece in pieces])
-    tails = np.roll(np.array([piece.tangent(1.0) for piece in pieces]), 1, axis=0)
+    heads = np.array([_tangent(piece, 0.0) for piece in pieces])
+    tails = np.roll(np.array([_tangent(piece, 1.0) for piece in pieces]), 1, axis=0)
     turn = np.abs(tails[:, 0] * heads[:, 1] - tails[:, 1] * heads[:, 0])
     corner = (turn > SMOOTH_JOINT) | (np.sum(tails * heads, axis=1) < 0.0)
     return [*map(bool, corner), bool(corner[0])]
+
+
+def _tangent(piece: Curve, s: float) -> Point:
+    if isinstance(piece, Segment):
+        dx, dy = piece.end[0] - piece.start[0], piece.end[1] - piece.start[1]
+        length = hypot(dx, dy)
+        return dx / length, dy / length
+    x, y = piece.tangent(s)
+    return float(x), float(y)
 
 
 def _arc_row(arc: Arc, start: Point, end: Point) -> list[float]:

@@ -88,10 +88,8 @@ def skip_crossings(pair, nx, ny, px, py, vx, vy, slack, most):
             t = ahead * (2.0 - ahead * curvature) / (along + math.sqrt(d))
         else:
             root = math.sqrt(along * along + behind * curvature * (2.0 + behind * curvature))
-            if along >= 0.0:
-                t = (along + root) / curvature
-            else:
-                t = behind * (2.0 + behind * curvature) / (root - along)
+            reach = behind * (2.0 + behind * curvature)
+            t = (along + root) / curvature if along >= 0.0 else reach / (root - along)
         count = math.atan2(curvature * t * away, 1.0 - curvature * t * along) / beta
     count = count * COUNT_ROUNDING - LAST_HITS
     if not count >= SHORTEST_RUN or most < SHORTEST_RUN:

@@ -137,7 +137,9 @@ def trace(
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
     scene = wall.scene
-    tables = (scene.hollows, scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers, scene.pairs)
+    tables = (
+        scene.hollows, scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers, scene.pairs, scene.grid,
+    )  # fmt: skip
     period = scene.cell if scene.is_open else None
 
     def run(first: int) -> None:
