@@ -30,11 +30,8 @@ from .row_quadrature import is_affordable, row_matrix
 from .sampling import DEFAULT_SAMPLES, RANDOMISATIONS, SamplingMethod, responder, sampled_array
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
-<<<<<<< HEAD
 from .table_quadrature import table_matrix
-=======
 from .wall_law import WallLaw
->>>>>>> f4ee9002bbde3cc54fe404d5ce7b13c40aebdee6
 from .weighted_sum import Combination
 
 Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
