@@ -7,6 +7,8 @@ import os
 import platform
 from pathlib import Path
 
+from .laws import measure_laws
+from .runs import measure_runs
 from .start import measure_start
 from .throughput import RAYS, measure_throughput
 
@@ -20,7 +22,8 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=RAYS, help="rays on every wall")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/benchmarks.md")
     arguments = parser.parse_args()
-    text = "\n".join([_machine(), "", *_throughput_table(arguments.rays), "", *_start_table()])
+    tables = [_throughput_table(arguments.rays), _laws_table(), _runs_table(), _start_table()]
+    text = "\n".join([_machine(), *(line for table in tables for line in ("", *table))])
     print(text)
     if arguments.write:
         page = PAGE.read_text(encoding="utf-8")
@@ -47,6 +50,24 @@ def _throughput_table(rays: int) -> list[str]:
         f"| {row.two_threads / row.one_thread:.2f} | {row.one_thread / row.flop_limit:.3f} |"
         for row in measure_throughput(rays)
     ]
+    return rows
+
+
+def _laws_table() -> list[str]:
+    rows = ["| law | true error | reported error | seconds | Monte Carlo's error in that time |", "|---|---|---|---|---|"]
+    for row in measure_laws():
+        cells = (_figure(value) for value in (row.error, row.reported, row.seconds, row.monte_carlo))
+        rows.append(f"| {row.what} | {' | '.join(cells)} |")
+    return rows
+
+
+def _figure(value: float) -> str:
+    return "-" if value != value else f"{value:.1e}"
+
+
+def _runs_table() -> list[str]:
+    rows = ["| run of hits in one step | hits a ray | microseconds a ray | share that escaped |", "|---|---|---|---|"]
+    rows += [f"| {r.what} | {r.hits:.1e} | {1e6 * r.seconds:.2f} | {r.escaped:.3f} |" for r in measure_runs()]
     return rows
 
 

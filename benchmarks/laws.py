@@ -1,0 +1,109 @@
+"""Error against time of the laws that need no sampling, and what Monte Carlo does in the same time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.geometry.beams import beams_of
+from asperity.kernels.polygon_law import table_of_beams
+from asperity.kernels.row_quadrature import row_matrix
+from asperity.kernels.table_quadrature import table_matrix
+
+REPEATS = 3
+# <u, P u> / <u, u>, u = cos(theta): closed forms and independent quadrature, see docs/theory/closed-forms.md
+TRIANGULAR_MOMENT = 0.134541971359171
+ARC_MOMENT = 0.327558333378
+RAYS = 2**18
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class LawTime:
+    """One computation: its true and reported errors, its time, and the error of Monte Carlo after the same time."""
+
+    what: str
+    error: float
+    reported: float
+    seconds: float
+    monte_carlo: float
+
+
+def measure_laws(repeats: int = REPEATS) -> list[LawTime]:
+    """All rows; the least time of the repeats counts."""
+    teeth, arc = geo.triangular_teeth(0.7), geo.focusing_arcs(1.2)
+    rows = [
+        _moment("triangular teeth, first moment", teeth, TRIANGULAR_MOMENT, repeats),
+        _against("triangular teeth, Bins(512)", ker.TriangularTeethLaw(0.7), ker.Bins(512), teeth, repeats),
+        _against("triangular teeth, Legendre(64)", ker.TriangularTeethLaw(0.7), ker.Legendre(64), teeth, repeats),
+        _polygon(repeats),
+    ]
+    rows.append(_moment("focusing arc, first moment", arc, ARC_MOMENT, repeats))
+    rows += [_rows(arc, tolerance, repeats) for tolerance in (1e-6, 1e-8, 1e-10)]
+    return rows
+
+
+def _moment(what: str, wall: geo.Wall, exact: float, repeats: int) -> LawTime:
+    """By the method that the library chooses."""
+    matrix, seconds = _timed(lambda: ker.discretise(ker.WallLaw(wall), ker.Legendre(2)), repeats)
+    error = abs(float(matrix.symmetric[1, 1]) - exact)
+    return LawTime(what, error, matrix.error.value, seconds, _monte_carlo(wall) / seconds**0.5)
+
+
+def _rows(wall: geo.Wall, tolerance: float, repeats: int) -> LawTime:
+    """By adaptive rows, as if the arc had no quadrature of its own."""
+    (matrix, reported, _), seconds = _timed(lambda: row_matrix(wall, ker.Legendre(2), tolerance), repeats)
+    error = abs(float(matrix[1, 1]) - ARC_MOMENT)
+    what = f"focusing arc by adaptive rows, first moment to {tolerance:g}"
+    return LawTime(what, error, reported, seconds, _monte_carlo(wall) / seconds**0.5)
+
+
+def _against(what: str, law: ker.Law, basis: ker.Basis, wall: geo.Wall, repeats: int) -> LawTime:
+    """The closed form's matrix against the one from the beams of the same hollow."""
+    matrix, seconds = _timed(lambda: ker.discretise(law, basis), repeats)
+    beams, _ = table_matrix(table_of_beams(beams_of(wall.vertices)), basis)
+    error = float(np.linalg.norm(matrix.symmetric - beams))
+    return LawTime(what, error, matrix.error.value, seconds, float("nan"))
+
+
+def _polygon(repeats: int) -> LawTime:
+    """A random polygon of 16 vertices over the opening: all its beams, and the bound that they carry."""
+    rng = np.random.default_rng(16)
+    x = np.concatenate([[0.0], np.sort(rng.random(14)), [1.0]])
+    y = np.concatenate([[0.0], -0.1 - 0.8 * rng.random(14), [0.0]])
+    wall = geo.Wall.from_vertices(np.column_stack([x, y]))
+
+    def whole() -> ker.PolygonLaw:
+        law = ker.PolygonLaw(wall)
+        law.branches(1.0)
+        return law
+
+    law, seconds = _timed(whole, repeats)
+    return LawTime("polygon of 16 vertices, whole law", float("nan"), float(law.unresolved), seconds, float("nan"))
+
+
+def _monte_carlo(wall: geo.Wall) -> float:
+    """Error of the first moment by Monte Carlo times the root of the seconds it took."""
+    rng = np.random.default_rng(0)
+    start = time.perf_counter()
+    u = 1.0 - 2.0 * rng.random(RAYS)
+    traced = geo.trace(wall, rng.random(RAYS), np.arccos(-u), threads=1)
+    values = 3.0 * -u * np.cos(traced.theta)
+    seconds = time.perf_counter() - start
+    return float(values.std() * (seconds / RAYS) ** 0.5)
+
+
+def _timed(job: Callable[[], Result], repeats: int) -> tuple[Result, float]:
+    result, best = job(), np.inf
+    for _ in range(repeats):
+        start = time.perf_counter()
+        result = job()
+        best = min(best, time.perf_counter() - start)
+    return result, best
