@@ -302,8 +302,8 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
                 low_i = i
             if c * polygon[high_i, 1] < s * polygon[high_i, 2]:
                 high_i = i
-        if doubtful or (positive and negative):
-            # the line that divides is misplaced by at most `doubt` in p over at most the beam's range of angles
+        if doubtful and not (positive and negative):
+            # what lies beyond the line, by at most `doubt` in p, over at most the beam's range of angles
             spread = polygon[high_i, 1] * polygon[low_i, 2] - polygon[high_i, 2] * polygon[low_i, 1]
             rounding += 0.5 * math.pi * doubt * abs(spread)
         # the side of the triangle between its apex and the vertex of the edge that lies left of the beam, or right
@@ -336,6 +336,13 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
             first, second = np.empty((wide, 5)), np.empty((wide, 5))
         count_first = clip(polygon, count, values, 1.0, vx, vy, first)
         count_second = clip(polygon, count, values, -1.0, vx, vy, second)
+        for i in range(count_first):
+            if first[i, 3] == vx and first[i, 4] == vy:
+                # the line that divides is misplaced by at most `doubt` in p over the cut's range of angles
+                j = i + 1 if i + 1 < count_first else 0
+                s, c = max(first[i, 1], first[j, 1]), max(abs(first[i, 2]), abs(first[j, 2]))
+                doubt = size_x * s + size_y * c + FUNCTIONAL_ULPS * EPS * max(first[i, 0], first[j, 0])
+                rounding += 0.5 * math.pi * doubt * abs(first[i, 1] * first[j, 2] - first[i, 2] * first[j, 1])
         new = used
         used += 1
         copied(slot, real, whole, new)
@@ -380,6 +387,9 @@ def pieces_of(corners, real, whole, used, width):
         middle = 0.5 * (cuts[0] + cuts[count - 1])
         turns = np.rint((sign * middle + high - 0.5 * PI_HIGH) / (2.0 * PI_HIGH))
         high, low = add_to(high, low, -2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW)
+        if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + high <= PI_HIGH:
+            # no ray can leave downwards: a sliver within rounding of a corner
+            whole[slot, LEAF] = 0
         for k in range(count - 1):
             if cuts[k + 1] <= cuts[k]:
                 continue
