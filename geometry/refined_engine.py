@@ -468,7 +468,7 @@ def refined_rays(
             else:
                 high = middle
         h = low - 1
-        amplification[i], rounding[i] = 1.0, 0.0
+        amplification[i], rounding[i] = 1.0, LOCAL_ERROR
         at_left = h >= 0 and subtract(place, wide(hollows[h, 0]))[0] == 0.0 and hollows[h, 11] > 0.0
         to_right = subtract(place, wide(hollows[h, 1]))[0] if h >= 0 else 1.0
         if h < 0 or to_right >= 0.0 or at_left:
