@@ -18,6 +18,8 @@ from asperity.geometry.refinement import RefinedTrace, refined_trace
 
 Floats = NDArray[np.float64]
 EPS = 2.0**-52
+# The twin's status of a ray that met nothing.
+LOST = 4
 RAYS = 1_000_000
 # Rays still inside after so many collisions are not compared: on both sides they end with the bounce limit.
 COLLISIONS = 200
@@ -62,9 +64,10 @@ def aimed_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Fl
 
     Such an edge is a later corner or a tangency. ``rng`` also spreads the rays over a few ulps about their target.
     """
-    straight = count // 2
     joints = wall.scene.joints[wall.scene.joints[:, 1] < 0.0]
-    target = joints[rng.integers(len(joints), size=straight)]
+    # a wall of single arcs has no joint below its openings
+    straight = count // 2 if len(joints) else 0
+    target = joints[rng.integers(max(1, len(joints)), size=straight)]
     x = wall.period * rng.random(straight)
     theta = np.arctan2(-target[:, 1], x - target[:, 0])
     edges_x, edges_theta = _edges(wall, (count - straight + AIM_ULPS) // (AIM_ULPS + 1), rng)
@@ -88,7 +91,7 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats) -> Verdict:
     same, distance = _agree(traced, twin)
     other = np.flatnonzero(~same)
     # lost: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
-    lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status > geo.Status.BOUNCE_LIMIT)
+    lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == LOST)
     explained = _explained(wall, x[other], theta[other])
     worst = float(distance[same].max(initial=0.0))
     return Verdict(

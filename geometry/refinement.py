@@ -29,7 +29,7 @@ class RefinedTrace:
         Place and angle of rays that escaped, as double-doubles.
     collisions : array of int, shape (n,)
     status : array of int, shape (n,)
-        Values of `Status`, or 4 where no piece was met, which no ray should show.
+        Values of `Status`; 4 where no piece was met, which no ray should show, and 5 where rounding decides.
     amplification : array of float, shape (n,)
         Norm of the derivative of (x'/scale, theta') by (x/scale, theta), the scale being the cell plus the hollow's
         size: an error e of the incoming ray is about this times e in the outgoing one.
