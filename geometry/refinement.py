@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Double-double steps cost about twenty times a double one, and runs are not skipped: a flagged ray that needs more
 # collisions than these keeps its flag.
 REFINED_COLLISIONS = 20_000
-_CORNER, _GRAZING, _SETTLED = 1, 2, 0
+_SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -94,6 +94,9 @@ def retrace(
     if len(flagged) == 0:
         return
     refined = refined_trace(scene, x[flagged], theta[flagged], min(max_collisions, REFINED_COLLISIONS))
+    # a ray that is still inside after as many collisions as were asked for is settled, too
+    limited = (refined.status == _BOUNCE_LIMIT) & (max_collisions <= REFINED_COLLISIONS)
+    collisions[flagged[limited]], status[flagged[limited]] = refined.collisions[limited], _BOUNCE_LIMIT
     settled = refined.status == _SETTLED
     rays = flagged[settled]
     out_x[rays], out_theta[rays] = refined.x[settled, 0], refined.theta[settled, 0]

@@ -13,7 +13,7 @@ from asperity.geometry.refinement import refined_trace
 from precise_tracer import trace_precisely
 
 EPS = 2.0**-52
-RAYS = 2_000
+RAYS = 1_000
 PRECISE_RAYS = 3
 # The double tracer's error in units of EPS times the norm of the derivative, a bounce; below 5 wherever measured.
 ERROR_UNITS = 32.0
@@ -112,3 +112,22 @@ def test_scaling_by_a_power_of_two_changes_no_angle(factor):
         gone = one.escaped
         assert np.array_equal(one.status, two.status)
         assert np.max(np.abs(one.theta - two.theta)[gone]) <= 1e-9
+
+
+# Set to True once runs between parallel walls are followed in one step: a deep channel takes 1e20 of them otherwise.
+CHANNEL_RUNS = False
+
+
+@pytest.mark.skipif(not CHANNEL_RUNS, reason="channels are followed bounce by bounce")
+@pytest.mark.parametrize(("theta", "height_to_width"), [(1e-12, 2.0), (1.0, 1e8), (1e-3, 1e4)])
+def test_deep_channels_follow_the_law_of_rectangular_teeth(theta, height_to_width):
+    from asperity import kernels as ker
+
+    x = (np.arange(RAYS) + 0.5) / RAYS
+    traced = geo.trace(geo.rectangular_teeth(height_to_width), x, np.full(RAYS, theta))
+    weights, angles = ker.RectangularTeethLaw(height_to_width).branches(theta)
+    assert traced.escaped.all()
+    for weight, angle in zip(np.ravel(weights), np.ravel(angles), strict=True):
+        share = np.mean(np.abs(traced.theta - angle) <= 1e-15 * height_to_width)
+        # equidistant rays resolve the two intervals of each branch to one ray an end
+        assert share == pytest.approx(weight, abs=4.0 / RAYS)

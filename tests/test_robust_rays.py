@@ -13,7 +13,7 @@ from asperity import geometry as geo
 from asperity.geometry.refinement import refined_trace
 from precise_tracer import trace_precisely
 
-RAYS = 5_000
+RAYS = 3_000
 PRECISE_RAYS = 4
 
 
