@@ -245,6 +245,9 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
             c_before = dx * vy - dy * vx
             if abs(c_before) <= slack and joints[j, 2] > 0.0:
                 corner_time = min(corner_time, corner_ahead(dx, dy, c_before, vx, vy, slack, bounces))
+            if joints[j, 3] <= 0.0:
+                # a joint between curves, listed for its corner
+                continue
             dx, dy = joints[j + 1, 0] - px, joints[j + 1, 1] - py
             c_after = dx * vy - dy * vx
             if abs(c_after) <= slack and joints[j + 1, 2] > 0.0:
