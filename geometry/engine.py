@@ -245,6 +245,9 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
             c_before = dx * vy - dy * vx
             if abs(c_before) <= slack and joints[j, 2] > 0.0:
                 corner_time = min(corner_time, corner_ahead(dx, dy, c_before, vx, vy, slack, bounces))
+            if joints[j, 3] <= 0.0:
+                # a joint between curves, listed for its corner
+                continue
             dx, dy = joints[j + 1, 0] - px, joints[j + 1, 1] - py
             c_after = dx * vy - dy * vx
             if abs(c_after) <= slack and joints[j + 1, 2] > 0.0:
@@ -291,6 +294,7 @@ def trace_ray(
     shift = 0.0
     bounces, steps = 0, 0
     own_kind, own_index, own_s = LID, -1, -1.0
+    third = -1
     if path is not None:
         path[0, 0], path[0, 1] = px, py
     if itinerary is not None:
@@ -385,6 +389,7 @@ def trace_ray(
                 px = left if vx > 0.0 else right
                 shift += (right - left) if vx > 0.0 else (left - right)
                 own_kind, own_index, own_s = SIDE, -1, -1.0
+                third = -1
                 continue
 
         if lines is not None and kind == LINE:
@@ -399,7 +404,8 @@ def trace_ray(
             vx -= w * lines[index, 2]
             vy -= w * lines[index, 3]
             if pairs is not None:
-                if own_kind == LINE and path is None:
+                # the ray came from this line, to that one, and back
+                if third == index and own_kind == LINE and path is None and lines[index, 6] > 0.0:
                     for row in range(int(lines[index, 5]), int(lines[index, 6])):
                         if pairs[row, 0] == own_index:
                             px, py, vx, vy, hits = skip_crossings(
@@ -436,6 +442,7 @@ def trace_ray(
             vx += w * ty
             vy -= w * tx
             own_s = hit_s
+        third = own_index if own_kind == LINE else -1
         own_kind, own_index = kind, index
         if kind != BEZIER:
             own_s = -1.0

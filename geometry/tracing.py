@@ -63,6 +63,18 @@ class Trace:
         """Mask of the rays that left through y = 0."""
         return np.asarray(self.status == Status.ESCAPED)
 
+    @property
+    def flagged(self) -> NDArray[np.bool_]:
+        """Mask of the rays that double precision does not settle: those that met a corner or grazed a piece.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.trace(geo.triangular_teeth(1.5), [0.25, 0.5], np.pi / 2).flagged.tolist()
+        [False, True]
+        """
+        return np.asarray((self.status == Status.CORNER) | (self.status == Status.GRAZING))
+
     def counts(self) -> dict[str, int]:
         """Number of rays by the name of their status; every name is there.
 
@@ -98,7 +110,8 @@ def trace(
         Incoming angles in (0, pi), radians.
     max_collisions : int
         Rays still inside after so many collisions end with ``Status.BOUNCE_LIMIT``. A run of hits on one circular
-        arc is computed in one step, whatever its length, and counts in full.
+        arc, in a channel or in a wedge is computed in one step, whatever its length, and counts in full: where runs
+        are the only reason for many collisions, 2**62 costs nothing.
     threads : int, optional
         Number of threads; by default one a processor. The result does not depend on it.
 
@@ -113,8 +126,9 @@ def trace(
 
     Notes
     -----
-    Cost: about 20 ns a bounce on a wall of few pieces. The first call of a process loads the compiled loop (about a
-    second); the first on a machine compiles it for the primitives that the wall has (some seconds, then cached).
+    Cost: about 20 ns a bounce on a wall of few pieces, below 1 us on one of 10^5 lines (a grid). The first call of a
+    process loads the compiled loop (about a second); the first on a machine compiles it for the primitives that the
+    wall has (some seconds, then cached).
 
     Examples
     --------
