@@ -228,7 +228,7 @@ class _Maker:
         elif isinstance(law, WallLaw):
             symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance)
             how = (
-                f"adaptive rows and panels, {rays} rays, as predicted to be cheaper than sampling: Gauss against Kronrod, "
+                f"adaptive rows and panels, {rays} rays, predicted cheaper than sampling: Gauss against Kronrod, "
                 "plus undecided entry points; or the asymmetry if that is more"
             )
         elif isinstance(law, DrivenLaw) and not self._acts_accurately(law):
