@@ -1,0 +1,136 @@
+"""Exact beams of polygonal hollows: mass, closed forms, detailed balance, and rays traced one by one."""
+
+import numpy as np
+import pytest
+
+from asperity import InputError, WallError
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.geometry.beams import beams_of
+from random_hollows import random_hollow, wall_with
+
+RANDOM = 50
+
+
+def row(beams, theta):
+    """Probabilities by isometry at one angle, straight from the pieces."""
+    inside = (beams.low <= theta) & (theta < beams.high)
+    probability = beams.sine[inside] + beams.cosine[inside] / np.tan(theta)
+    return probability, beams.sign[inside], beams.offset[inside]
+
+
+def mean_cosine(beams, theta):
+    probability, sign, offset = row(beams, theta)
+    return probability @ np.cos(sign * theta + offset), probability.sum()
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.7, np.pi / 2, 2.0, 3.0])
+def test_triangular_teeth_have_their_closed_law(angle):
+    wall = geo.triangular_teeth(angle)
+    beams = beams_of(wall.vertices)
+    law = ker.TriangularTeethLaw(angle)
+    assert beams.unresolved == 0.0
+    for theta in np.linspace(0.01, np.pi - 0.01, 23):
+        probability, outgoing = law.branches(theta)
+        mean, total = mean_cosine(beams, theta)
+        assert abs(total - 1.0) < 1e-13 / np.sin(theta)
+        assert abs(mean - probability @ np.cos(outgoing)) < 1e-13 / np.sin(theta)
+
+
+@pytest.mark.parametrize("ratio", [0.2, 1.0, 2.5])
+def test_a_rectangular_crevice_reflects_by_the_fractional_part_of_its_depth(ratio):
+    beams = beams_of([(0, 0), (0, -ratio), (1, -ratio), (1, 0)], max_beams=20_000)
+    for theta in np.linspace(0.3, np.pi - 0.3, 17):
+        probability, sign, offset = row(beams, theta)
+        strip = 2.0 * ratio * abs(np.cos(theta) / np.sin(theta))
+        back = probability[sign > 0].sum()
+        expected = strip % 1.0 if np.floor(strip) % 2 == 0 else 1.0 - strip % 1.0
+        assert abs(back - expected) < 1e-12
+        assert abs(probability.sum() - 1.0) < 1e-12
+        assert np.abs(offset[sign > 0]).max(initial=0.0) < 1e-18
+        assert np.abs(offset[sign < 0] - np.pi).max(initial=0.0) == 0.0
+
+
+@pytest.mark.parametrize("seed", range(RANDOM))
+def test_the_pieces_of_a_random_hollow_have_mass_one(seed):
+    beams = beams_of(random_hollow(seed), max_beams=20_000)
+    assert beams.defect < 1e-13
+    assert abs(beams.resolved() + beams.unresolved - 1.0) < 1e-13
+    assert beams.rounding < 1e-10
+    if seed % 2 == 0:
+        assert beams.unresolved <= 1e-12
+
+
+def test_bad_chains_are_refused_with_a_reason():
+    with pytest.raises(InputError, match="left < right"):
+        beams_of([(1, 0), (0.5, -1), (0, 0)])
+    with pytest.raises(InputError, match="y <= 0"):
+        beams_of([(0, 0), (0.5, 1), (1, 0)])
+    with pytest.raises(WallError, match="cross itself"):
+        beams_of([(0, 0), (1, -1), (0, -1), (1, 0)])
+
+
+@pytest.mark.parametrize("seed", range(RANDOM))
+def test_every_isometry_is_as_likely_as_its_inverse(seed):
+    beams = beams_of(random_hollow(seed), max_beams=20_000)
+    theta = np.random.default_rng(seed).uniform(0.1, np.pi - 0.1, 4)
+    for angle in theta:
+        probability, sign, offset = row(beams, angle)
+        for s, a in {(int(s), round(a, 9)) for s, a in zip(sign, offset, strict=True)}:
+            same = (sign == s) & (np.abs(offset - a) < 1e-8)
+            image = s * angle + offset[same][0]
+            if not 0.01 < image < np.pi - 0.01:
+                continue
+            back, back_sign, back_offset = row(beams, image)
+            # theta' = -theta + a is its own inverse; theta' = theta + a has the inverse theta' - a
+            inverse = (back_sign == s) & (np.abs(back_offset - (-a if s > 0 else a)) < 1e-8)
+            defect = probability[same].sum() * np.sin(angle) - back[inverse].sum() * np.sin(image)
+            missing = unresolved_at(beams, angle) + unresolved_at(beams, image)
+            assert abs(defect) < 1e-12 + missing
+
+
+def unresolved_at(beams, theta):
+    inside = (beams.unresolved_low <= theta) & (theta < beams.unresolved_high)
+    return (beams.unresolved_sine + beams.unresolved_cosine / np.tan(theta))[inside].sum()
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6, 3.0])
+@pytest.mark.parametrize("seed", [2, 3, 4, 7, 13])
+def test_the_law_does_not_depend_on_the_size_of_the_hollow(seed, scale):
+    hollow = random_hollow(seed)
+    plain, scaled = beams_of(hollow), beams_of(scale * hollow + [scale, 0.0])
+    for theta in (0.3, 1.0, 2.2):
+        ours, theirs = mean_cosine(plain, theta), mean_cosine(scaled, theta)
+        assert np.abs(np.subtract(ours, theirs)).max() < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(0, RANDOM, 3))
+def test_a_ray_in_the_middle_of_a_piece_is_traced_to_its_isometry(seed):
+    hollow = random_hollow(seed)
+    beams = beams_of(hollow, max_beams=20_000)
+    wall = geo.Wall.from_vertices(wall_with(hollow))
+    large = np.argsort(-beams.flux())[:40]
+    for k in large:
+        theta = 0.5 * (beams.low[k] + beams.high[k])
+        x = (np.arange(4001) + 0.5) / 4001
+        ray = geo.trace(wall, 1.0 + x, theta)
+        same = ray.collisions == beams.bounces[k]
+        image = beams.sign[k] * theta + beams.offset[k]
+        share = np.mean(same & (np.abs(ray.theta - image) < 1e-11))
+        # a grid of n points finds an interval's length within 1/n
+        assert share >= beams.sine[k] + beams.cosine[k] / np.tan(theta) - 1.0 / 4001
+
+
+def test_a_plate_of_no_thickness_shields_what_is_behind_it():
+    # a plate from the left corner to the middle of the opening, 0.2 below it
+    chain = [(0, 0), (0, -0.2), (0.5, -0.2), (0, -0.2), (0, -1), (1, -1), (1, 0)]
+    beams = beams_of(chain, max_beams=50_000)
+    theta = np.pi / 2
+    probability, sign, offset = row(beams, theta)
+    # at vertical incidence half of the rays meet the plate, the others the floor, and all come straight back
+    assert abs(probability.sum() - 1.0) < 1e-12
+    assert np.allclose(np.abs(sign * theta + offset - theta), 0.0, atol=1e-12)
+    first = beams.bounces == 1
+    assert beams.defect < 1e-13
+    here = first & (beams.low <= theta) & (theta < beams.high)
+    assert abs((beams.sine[here]).sum() - 1.0) < 1e-12
