@@ -114,11 +114,6 @@ def test_scaling_by_a_power_of_two_changes_no_angle(factor):
         assert np.max(np.abs(one.theta - two.theta)[gone]) <= 1e-9
 
 
-# Set to True once runs between parallel walls are followed in one step: a deep channel takes 1e20 of them otherwise.
-CHANNEL_RUNS = False
-
-
-@pytest.mark.skipif(not CHANNEL_RUNS, reason="channels are followed bounce by bounce")
 @pytest.mark.parametrize(("theta", "height_to_width"), [(1e-12, 2.0), (1.0, 1e8), (1e-3, 1e4)])
 def test_deep_channels_follow_the_law_of_rectangular_teeth(theta, height_to_width):
     from asperity import kernels as ker
@@ -126,8 +121,14 @@ def test_deep_channels_follow_the_law_of_rectangular_teeth(theta, height_to_widt
     x = (np.arange(RAYS) + 0.5) / RAYS
     traced = geo.trace(geo.rectangular_teeth(height_to_width), x, np.full(RAYS, theta))
     weights, angles = ker.RectangularTeethLaw(height_to_width).branches(theta)
-    assert traced.escaped.all()
+    # near grazing the last hit can lie within rounding of the bottom corners' depth: such rays are reported
+    flagged = np.mean(traced.status == geo.Status.CORNER)
+    assert traced.escaped.mean() + flagged == 1.0
+    assert flagged <= 0.02
+    # the number of crossings is known to a relative eps, and so is the share of each outcome
+    crossings = 2.0 * height_to_width / np.tan(theta)
+    unsure = 4.0 / RAYS + flagged + 4.0 * np.finfo(float).eps * crossings
     for weight, angle in zip(np.ravel(weights), np.ravel(angles), strict=True):
-        share = np.mean(np.abs(traced.theta - angle) <= 1e-15 * height_to_width)
+        share = np.mean(np.abs(traced.theta - angle) <= 64 * np.finfo(float).eps)
         # equidistant rays resolve the two intervals of each branch to one ray an end
-        assert share == pytest.approx(weight, abs=4.0 / RAYS)
+        assert share == pytest.approx(weight, abs=unsure)
