@@ -61,24 +61,21 @@ def reduced(high, low):
 
 
 @_compile
-def triangle_flux(a, b, c):
-    """The integral of dp dtheta over a triangle of lines, positive if counterclockwise.
-
-    It is -det(a, b, c) sqrt(2 / product of 1 + cos over the three differences of angle).
-    """
-    bp, bs, bc = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    cp, cs, cc = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-    det = a[0] * (bs * cc - bc * cs) - a[1] * (bp * cc - bc * cp) + a[2] * (bp * cs - bs * cp)
-    product = (1.0 + a[1] * b[1] + a[2] * b[2]) * (1.0 + b[1] * c[1] + b[2] * c[2])
-    product *= 1.0 + a[1] * c[1] + a[2] * c[2]
-    return -det * math.sqrt(2.0 / product)
-
-
-@_compile
 def polygon_flux(polygon, count):
+    """The integral of dp dtheta over a polygon of lines, positive if counterclockwise, as a fan of triangles.
+
+    That of a triangle is -det(a, b, c) sqrt(2 / product of 1 + cos over the three differences of angle).
+    """
     total = 0.0
+    p, s, c = polygon[0, 0], polygon[0, 1], polygon[0, 2]
     for i in range(1, count - 1):
-        total += triangle_flux(polygon[0], polygon[i], polygon[i + 1])
+        here_s, here_c = polygon[i, 1], polygon[i, 2]
+        next_s, next_c = polygon[i + 1, 1], polygon[i + 1, 2]
+        bp, bs, bc = polygon[i, 0] - p, here_s - s, here_c - c
+        cp, cs, cc = polygon[i + 1, 0] - p, next_s - s, next_c - c
+        det = p * (bs * cc - bc * cs) - s * (bp * cc - bc * cp) + c * (bp * cs - bs * cp)
+        product = (1.0 + s * here_s + c * here_c) * (1.0 + here_s * next_s + here_c * next_c)
+        total -= det * math.sqrt(2.0 / (product * (1.0 + s * next_s + c * next_c)))
     return total
 
 
@@ -181,6 +178,41 @@ def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
 
 
 @_compile
+def longer(array):
+    """Twice as many slots; plain loops, because numba takes seconds to compile a concatenation."""
+    new = np.empty(2 * array.shape[0], array.dtype)
+    for i in range(array.shape[0]):
+        new[i] = array[i]
+    return new
+
+
+@_compile
+def taller(array):
+    new = np.zeros((2 * array.shape[0], array.shape[1]), array.dtype)
+    for i in range(array.shape[0]):
+        for j in range(array.shape[1]):
+            new[i, j] = array[i, j]
+    return new
+
+
+@_compile
+def larger(corners, room, wide):
+    new = np.empty((room, wide, 5))
+    for i in range(corners.shape[0]):
+        for j in range(corners.shape[1]):
+            for k in range(5):
+                new[i, j, k] = corners[i, j, k]
+    return new
+
+
+@_compile
+def put(polygon, count, corners, slot):
+    for j in range(count):
+        for k in range(5):
+            corners[slot, j, k] = polygon[j, k]
+
+
+@_compile
 def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, tolerance, max_beams):
     """Carry the beams of all rays through the hollow, the largest first.
 
@@ -200,9 +232,9 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
     used, queue = 0, 0
     for half in range(2):
         polygon = corners[half]
-        polygon[0] = 0.0
-        polygon[1] = 0.0
-        polygon[2] = 0.0
+        for i in range(3):
+            for k in range(5):
+                polygon[i, k] = 0.0
         if half == 0:
             polygon[0, 2], polygon[1, 1], polygon[2, 1] = 1.0, 1.0, 1.0
             polygon[2, 0], polygon[2, 3] = width, width
@@ -270,10 +302,10 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
                 low_i = i
             if c * polygon[high_i, 1] < s * polygon[high_i, 2]:
                 high_i = i
-        if doubtful or (positive and negative):
-            # the line that divides is misplaced by at most `doubt` in p over at most the beam's range of angles
-            low_c, high_c = polygon[low_i], polygon[high_i]
-            rounding += 0.5 * math.pi * doubt * abs(high_c[1] * low_c[2] - high_c[2] * low_c[1])
+        if doubtful and not (positive and negative):
+            # what lies beyond the line, by at most `doubt` in p, over at most the beam's range of angles
+            spread = polygon[high_i, 1] * polygon[low_i, 2] - polygon[high_i, 2] * polygon[low_i, 1]
+            rounding += 0.5 * math.pi * doubt * abs(spread)
         # the side of the triangle between its apex and the vertex of the edge that lies left of the beam, or right
         left_side, right_side = (side + 1) % 3, (side + 2) % 3
         if sign < 0.0:
@@ -292,29 +324,30 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
             break
         splits += 1
         if used == room:
-            corners = np.concatenate((corners, np.empty_like(corners)))
-            real = np.concatenate((real, np.zeros_like(real)))
-            whole = np.concatenate((whole, np.zeros_like(whole)))
-            heap = np.concatenate((heap, np.empty_like(heap)))
             room *= 2
+            corners = larger(corners, room, wide)
+            real, whole, heap = taller(real), taller(whole), longer(heap)
             polygon = corners[slot]
         if count + 1 >= wide:
-            wider = np.empty((room, 2 * wide, 5))
-            wider[:, :wide] = corners
-            corners = wider
-            polygon = corners[slot]
             wide *= 2
-            longer = np.empty(wide)
-            longer[: values.shape[0]] = values
-            values = longer
+            corners = larger(corners, room, wide)
+            polygon = corners[slot]
+            values = longer(values)
             first, second = np.empty((wide, 5)), np.empty((wide, 5))
         count_first = clip(polygon, count, values, 1.0, vx, vy, first)
         count_second = clip(polygon, count, values, -1.0, vx, vy, second)
+        for i in range(count_first):
+            if first[i, 3] == vx and first[i, 4] == vy:
+                # the line that divides is misplaced by at most `doubt` in p over the cut's range of angles
+                j = i + 1 if i + 1 < count_first else 0
+                s, c = max(first[i, 1], first[j, 1]), max(abs(first[i, 2]), abs(first[j, 2]))
+                doubt = size_x * s + size_y * c + FUNCTIONAL_ULPS * EPS * max(first[i, 0], first[j, 0])
+                rounding += 0.5 * math.pi * doubt * abs(first[i, 1] * first[j, 2] - first[i, 2] * first[j, 1])
         new = used
         used += 1
         copied(slot, real, whole, new)
-        corners[slot, :count_first] = first[:count_first]
-        corners[new, :count_second] = second[:count_second]
+        put(first, count_first, corners, slot)
+        put(second, count_second, corners, new)
         whole[slot, COUNT], whole[new, COUNT] = count_first, count_second
         open_flux -= real[slot, FLUX]
         real[slot, FLUX] = polygon_flux(corners[slot], count_first)
@@ -354,6 +387,9 @@ def pieces_of(corners, real, whole, used, width):
         middle = 0.5 * (cuts[0] + cuts[count - 1])
         turns = np.rint((sign * middle + high - 0.5 * PI_HIGH) / (2.0 * PI_HIGH))
         high, low = add_to(high, low, -2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW)
+        if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + high <= PI_HIGH:
+            # no ray can leave downwards: a sliver within rounding of a corner
+            whole[slot, LEAF] = 0
         for k in range(count - 1):
             if cuts[k + 1] <= cuts[k]:
                 continue

@@ -33,6 +33,8 @@ JOINT_ULPS = 16.0
 # D = B^2 + 2 kappa |v|^2 F carries about eight rounding errors of B^2; below them hit and miss are not told apart.
 TANGENT_ULPS = 16.0
 ROOT_STEPS = 80
+# Flights followed one by one before a ray is given up: 20 to 100 ms. Hits in a run cost one flight together.
+MOST_STEPS = 1_000_000
 # An odd number without pattern, so that itineraries of the same pieces in another order differ.
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 
@@ -97,6 +99,14 @@ def arc_reflect(arc, t, px, py, vx, vy, stretch):
     px, py = arc[0] + qx, arc[1] + qy / stretch
     w = 2.0 * (vx * nx + vy * ny)
     return px, py, vx - w * nx, vy - w * ny
+
+
+@_compile
+def arc_incidence(arc, t, px, py, vx, vy, stretch):
+    """Sine of the angle between the velocity and the arc that it meets after the time t."""
+    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
+    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
+    return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)
 
 
 @_compile
@@ -245,6 +255,9 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
             c_before = dx * vy - dy * vx
             if abs(c_before) <= slack and joints[j, 2] > 0.0:
                 corner_time = min(corner_time, corner_ahead(dx, dy, c_before, vx, vy, slack, bounces))
+            if joints[j, 3] <= 0.0:
+                # a joint between curves, listed for its corner
+                continue
             dx, dy = joints[j + 1, 0] - px, joints[j + 1, 1] - py
             c_after = dx * vy - dy * vx
             if abs(c_after) <= slack and joints[j + 1, 2] > 0.0:
@@ -291,6 +304,7 @@ def trace_ray(
     shift = 0.0
     bounces, steps = 0, 0
     own_kind, own_index, own_s = LID, -1, -1.0
+    third = -1
     if path is not None:
         path[0, 0], path[0, 1] = px, py
     if itinerary is not None:
@@ -368,13 +382,24 @@ def trace_ray(
         steps += 1
         if kind == NO_PIECE or corner_time <= time + slack:
             return shift + px, vx, vy, bounces, CORNER
+        if corner_time < np.inf:
+            # at a shallow incidence a corner that the ray meets within the slack lies far beyond the hit
+            sine = abs(vy)
+            if lines is not None and kind == LINE:
+                sine = abs(vx * lines[index, 2] + vy * lines[index, 3])
+            if circles is not None and kind == CIRCLE:
+                sine = arc_incidence(circles[index], time, px, py, vx, vy, 1.0)
+            if ellipses is not None and kind == ELLIPSE:
+                sine = arc_incidence(ellipses[index], time, px, py, vx, vy, ellipses[index, 12])
+            if kind != BEZIER and kind != SIDE and (corner_time - time) * sine <= 2.0 * slack:
+                return shift + px, vx, vy, bounces, CORNER
         if kind == LID:
             if path is not None:
                 path[bounces + 1, 0], path[bounces + 1, 1] = shift + px + time * vx, 0.0
             return shift + px + time * vx, vx, vy, bounces, ESCAPED
         if tangent != 0:
             return shift + px, vx, vy, bounces, GRAZING
-        if bounces >= limit or steps // 2 > limit:
+        if bounces >= limit or steps // 2 > min(limit, MOST_STEPS):
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT
         if itinerary is not None:
             side = 1 if kind == SIDE and vx > 0.0 else 0
@@ -385,6 +410,7 @@ def trace_ray(
                 px = left if vx > 0.0 else right
                 shift += (right - left) if vx > 0.0 else (left - right)
                 own_kind, own_index, own_s = SIDE, -1, -1.0
+                third = -1
                 continue
 
         if lines is not None and kind == LINE:
@@ -399,7 +425,8 @@ def trace_ray(
             vx -= w * lines[index, 2]
             vy -= w * lines[index, 3]
             if pairs is not None:
-                if own_kind == LINE and path is None:
+                # the ray came from this line, to that one, and back
+                if third == index and own_kind == LINE and path is None and lines[index, 6] > 0.0:
                     for row in range(int(lines[index, 5]), int(lines[index, 6])):
                         if pairs[row, 0] == own_index:
                             px, py, vx, vy, hits = skip_crossings(
@@ -436,6 +463,7 @@ def trace_ray(
             vx += w * ty
             vy -= w * tx
             own_s = hit_s
+        third = own_index if own_kind == LINE else -1
         own_kind, own_index = kind, index
         if kind != BEZIER:
             own_s = -1.0

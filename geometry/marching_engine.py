@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .beam_engine import FIRST_WALL, OPENING, PI_HIGH, PI_LOW, add_to, reduced
+from .beam_engine import FIRST_WALL, OPENING, PI_HIGH, PI_LOW, add_to, longer, reduced, taller
 
 # Triangles that a ray may pass for every bounce that it is allowed.
 STEPS_A_BOUNCE = 64
@@ -80,9 +80,7 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
             if count + 1 >= max_intervals:
                 high = stop
             if used == room:
-                ends = np.concatenate((ends, np.empty_like(ends)))
-                offsets = np.concatenate((offsets, np.empty_like(offsets)))
-                tags = np.concatenate((tags, np.empty_like(tags)))
+                ends, offsets, tags = longer(ends), longer(offsets), taller(tags)
                 room *= 2
             offset = 0.0
             if out:

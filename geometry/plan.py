@@ -5,13 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..checks import Floats
+
 if TYPE_CHECKING:
     from .wall import Wall
+
+# Hollows are equal but for their place if their points agree to this share of the period: places are rounded once
+# each, and named walls compute them by some ten operations.
+PLACE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
+# Ends and three inner points tell pieces of one kind apart: circles need three points, ellipses and cubics five.
+SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 @dataclass(frozen=True)
 class TracePlan:
-    """How `trace` treats a wall.
+    """How `trace` treats a wall; made by ``wall.plan()``.
 
     Attributes
     ----------
@@ -25,8 +35,28 @@ class TracePlan:
         Share of the period that is flat top.
     arcs_with_runs : int
         Circular arcs on which a run of hits is computed in one step.
+    channels, wedges : int
+        Pairs of lines, parallel or not, that face each other with nothing in between: there, too, a run of hits is
+        computed in one step. Wedges of more than 0.3 radians have no long runs and are not among them.
+    hollows_with_grid : int
+        Hollows of so many lines that rays walk through the cells of a grid; in the others every piece is tested.
+    distinct_hollows : int
+        Hollows that remain when those equal to another but for their place, to 64 rounding errors of the period, are
+        left out. The law of the wall is a mixture of theirs.
+    mirror_symmetric : bool
+        Whether the wall has a mirror axis: half of the angles then give the other half.
     wraps : bool
         Whether rays pass from cell to cell, because the wall does not close its hollows.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> plan = geo.rectangular_teeth(3.0).plan()
+    >>> plan.pieces_left_out, plan.flat_share, plan.channels, plan.mirror_symmetric
+    (1, 0.5, 1, True)
+    >>> plan = geo.mushrooms(0.3, 0.5, 2).plan()
+    >>> plan.hollows, plan.distinct_hollows, plan.arcs_with_runs
+    (5, 2, 5)
     """
 
     primitives: tuple[str, ...]
@@ -36,6 +66,11 @@ class TracePlan:
     flat_share: float
     arcs_with_runs: int
     wraps: bool
+    channels: int
+    wedges: int
+    hollows_with_grid: int
+    distinct_hollows: int
+    mirror_symmetric: bool
 
 
 def plan_of(wall: Wall) -> TracePlan:
@@ -44,6 +79,8 @@ def plan_of(wall: Wall) -> TracePlan:
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     traced = sum(h.last - h.first for h in wall.hollows) if wall.closes else pieces
     runs = 0 if scene.circles is None else int((scene.circles[:, 10] > 0.0).sum())
+    # every pair has a row for each of its two lines
+    parallel = 0 if scene.pairs is None else int((scene.pairs[:, 9] == 0.0).sum()) // 2
     return TracePlan(
         primitives=scene.primitives,
         hollows=len(scene.hollows),
@@ -52,4 +89,21 @@ def plan_of(wall: Wall) -> TracePlan:
         flat_share=wall.flat_top / wall.period if wall.closes else 0.0,
         arcs_with_runs=runs,
         wraps=scene.is_open,
+        channels=parallel,
+        wedges=0 if scene.pairs is None else len(scene.pairs) // 2 - parallel,
+        hollows_with_grid=int((scene.hollows[:, 17] > 0.0).sum()),
+        distinct_hollows=_distinct(wall) if wall.closes else 1,
+        mirror_symmetric=wall.is_mirror_symmetric,
     )
+
+
+def _distinct(wall: Wall) -> int:
+    """Count the hollows that differ in more than their place."""
+    kinds: dict[tuple[str, ...], list[Floats]] = {}
+    for hollow in wall.hollows:
+        pieces = wall.pieces[hollow.first : hollow.last]
+        points = np.concatenate([piece.point(SAMPLES) for piece in pieces]) - np.array([hollow.left, 0.0])
+        shapes = kinds.setdefault(tuple(type(piece).__name__ for piece in pieces), [])
+        if not any(np.abs(points - shape).max() <= PLACE_TOLERANCE * wall.period for shape in shapes):
+            shapes.append(points)
+    return sum(map(len, kinds.values()))

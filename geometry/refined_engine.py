@@ -9,7 +9,8 @@ Three sizes accompany a ray.
 
 * Its Jacobi fields: displacement and turn of the ray for a unit displacement, and a unit turn, of the incoming one.
 * The bound on its rounding error: to first order the error after n bounces is the sum of M(n <- i) e_i over the local
-  errors e_i, and |M(n <- i)| <= |M_n| |M_i| because an area-preserving map has |M^-1| = |M| in two dimensions.
+  errors e_i, and |M(n <- i)| <= |M_n| |M_i| because an area-preserving map has |M^-1| = |M| in two dimensions. The
+  sum of absolute values from bounce to bounce is a second bound: better after a near tangency, worse along an arc.
 * Its width: half an ulp of the incoming angle. An angle stands for the angles that round to it; a ray meets a corner
   exactly if one of them does. (No ray of rational data but a vertical one meets a corner in the strict sense, since
   the tangent of an algebraic angle is transcendental.)
@@ -39,14 +40,14 @@ from .double_double import (
     wide,
 )
 
-ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, LOST = 0, 1, 2, 3, 4
+ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, LOST, UNSETTLED = 0, 1, 2, 3, 4, 5
 NO_PIECE, LID, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 # A bounce is fewer than 64 operations in a row on each coordinate, each within EPS_DOUBLE_DOUBLE of the cell's size.
 LOCAL_ERROR = 64.0 * EPS_DOUBLE_DOUBLE
 # The first-order estimate of the width is trusted to this share.
 WIDTH_MARGIN = 1.0 + 2.0**-20
 # Where the accumulated rounding exceeds this share of the cell, nothing is settled.
-LARGEST_ERROR = 2.0**-60
+LARGEST_ERROR = 2.0**-50
 ROOT_STEPS = 200
 ARC_COLUMNS = 22
 
@@ -325,13 +326,14 @@ def refined_ray(place, theta, hollow, joints, lines, arcs, first_ellipse, bezier
     j1, a1, j2, a2 = 1.0, 0.0, 0.0, 1.0
     half_ulp = math.ldexp(1.0, math.frexp(theta)[1] - 54)
     spread, norm = 1.0, 1.0
+    step_j, step_a = 1.0, 1.0
     wraps, bounces, steps = 0, 0, 0
     own_kind, own_index, own_s = LID, -1, (-1.0, 0.0)
     while True:
         # bound on the transversal error of the ray: on the segment, at a distance of up to one scale
-        local = LOCAL_ERROR * norm * spread
+        local = LOCAL_ERROR * min(norm * spread, step_j + step_a)
         if not local <= LARGEST_ERROR:
-            return px, (0.0, 0.0), bounces, CORNER, norm, local
+            return px, (0.0, 0.0), bounces, UNSETTLED, norm, local
         error = 2.0 * scale * local
         kind, index, hit_s, edge_share = NO_PIECE, -1, (0.0, 0.0), (0.0, 0.0)
         time = (np.inf, 0.0)
@@ -418,6 +420,7 @@ def refined_ray(place, theta, hollow, joints, lines, arcs, first_ellipse, bezier
         flight = time[0] / scale
         j1 += flight * a1
         j2 += flight * a2
+        step_j += flight * step_a + 1.0
         if kind == LID:
             x = add(qx, two_product(float(wraps), right - left))
             norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
@@ -438,6 +441,7 @@ def refined_ray(place, theta, hollow, joints, lines, arcs, first_ellipse, bezier
             if incidence == 0.0:
                 return px, (0.0, 0.0), bounces, GRAZING, norm, local
             power = 2.0 * bent * scale / incidence
+            step_a += abs(power) * step_j + 1.0
             a1 -= power * j1
             a2 -= power * j2
             bounces += 1
@@ -468,7 +472,7 @@ def refined_rays(
             else:
                 high = middle
         h = low - 1
-        amplification[i], rounding[i] = 1.0, 0.0
+        amplification[i], rounding[i] = 1.0, LOCAL_ERROR
         at_left = h >= 0 and subtract(place, wide(hollows[h, 0]))[0] == 0.0 and hollows[h, 11] > 0.0
         to_right = subtract(place, wide(hollows[h, 1]))[0] if h >= 0 else 1.0
         if h < 0 or to_right >= 0.0 or at_left:

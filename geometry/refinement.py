@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Double-double steps cost about twenty times a double one, and runs are not skipped: a flagged ray that needs more
 # collisions than these keeps its flag.
 REFINED_COLLISIONS = 20_000
-_CORNER, _GRAZING, _SETTLED = 1, 2, 0
+_SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class RefinedTrace:
         Place and angle of rays that escaped, as double-doubles.
     collisions : array of int, shape (n,)
     status : array of int, shape (n,)
-        Values of `Status`, or 4 where no piece was met, which no ray should show.
+        Values of `Status`; 4 where no piece was met, which no ray should show, and 5 where rounding decides.
     amplification : array of float, shape (n,)
         Norm of the derivative of (x'/scale, theta') by (x/scale, theta), the scale being the cell plus the hollow's
         size: an error e of the incoming ray is about this times e in the outgoing one.
@@ -94,6 +94,9 @@ def retrace(
     if len(flagged) == 0:
         return
     refined = refined_trace(scene, x[flagged], theta[flagged], min(max_collisions, REFINED_COLLISIONS))
+    # a ray that is still inside after as many collisions as were asked for is settled, too
+    limited = (refined.status == _BOUNCE_LIMIT) & (max_collisions <= REFINED_COLLISIONS)
+    collisions[flagged[limited]], status[flagged[limited]] = refined.collisions[limited], _BOUNCE_LIMIT
     settled = refined.status == _SETTLED
     rays = flagged[settled]
     out_x[rays], out_theta[rays] = refined.x[settled, 0], refined.theta[settled, 0]

@@ -45,7 +45,7 @@ RUN_HOPS = 8.0
 # Below this half angle the chord and the radius give it more exactly than the difference of two parameters does.
 SHALLOW_ARC = 0.5
 OUTLINE_POINTS = 64
-# Below this number of lines testing every joint is faster than walking through cells.
+# A grid pays from about so many lines a hollow: at 256 it was a third faster on a Koch curve; the place was not tuned.
 GRID_LINES = 96
 
 Point = tuple[float, float]

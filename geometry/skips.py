@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-# A run costs about as much as this many hits of the ordinary loop.
+# A run costs an arctangent and three sines or so; the number of hits from which it pays is a guess, not tuned.
 SHORTEST_RUN = 4.0
 # The number of hits left carries some eight rounding errors of itself; the last two are left to the ordinary loop.
 COUNT_ROUNDING = 1.0 - 16.0 * 2.0**-52

@@ -165,8 +165,11 @@ def _enters(corners: list[Floats], start: Floats, end: Floats) -> bool:
     return low < high
 
 
-def _clipped(points: Floats) -> tuple[Integers, Integers]:
-    """Clip ears until nothing is left; the edges remember what lies beyond them."""
+def _clipped(points: Floats, slits_first: bool = False) -> tuple[Integers, Integers]:
+    """Clip ears until nothing is left; the edges remember what lies beyond them.
+
+    Parts of the hollow that hang together by a point or by a slit of no width need ``slits_first``, which is slower.
+    """
     count = len(points)
     ring = list(range(count))
     link = [FIRST_WALL - e for e in range(count - 1)] + [OPENING]
@@ -174,7 +177,14 @@ def _clipped(points: Floats) -> tuple[Integers, Integers]:
     beyond = np.full(3 * (count - 2), OPENING, np.int64)
     place = count - 1
     for triangle in range(count - 2):
-        k = _next_ear(points, ring, place)
+        k = _next_ear(points, ring, place, slits_first)
+        if k < 0 and not slits_first:
+            return _clipped(points, slits_first=True)
+        if k < 0:
+            raise WallError(
+                f"hollow_vertices: no triangulation beyond vertex {ring[place % len(ring)]}; expected a chain that "
+                "does not cross itself, with the hollow on its left"
+            )
         a, b, c = ring[k - 1], ring[k], ring[(k + 1) % len(ring)]
         corners[triangle] = a, b, c
         for side, owner in ((0, a), (1, b)):
@@ -192,30 +202,43 @@ def _clipped(points: Floats) -> tuple[Integers, Integers]:
     return corners, beyond
 
 
-def _next_ear(points: Floats, ring: list[int], place: int) -> int:
-    """Position in the ring of a vertex that can be cut off: a true ear, or else one in line with its neighbours."""
+def _next_ear(points: Floats, ring: list[int], place: int, slits_first: bool) -> int:
+    """Position in the ring of a vertex that can be cut off, or -1.
+
+    A true ear, or else a vertex in line with its neighbours, or else the end of a slit of no width; or that first.
+    """
     size = len(ring)
     loop = points[ring]
-    straight, spike = -1, -1
+    straight, slit = -1, -1
     for step in range(size):
         k = (place + step) % size
         a, b, c = loop[k - 1], loop[k], loop[(k + 1) % size]
         turn = int(_signs(a, b, c[None])[0])
-        if turn > 0 and (size == 3 or _is_ear(loop, k)):
+        if turn > 0 and not slits_first and (size == 3 or _is_ear(loop, k)):
             return k
         if turn == 0:
-            between = (Fraction(float(a[0])) - Fraction(float(b[0]))) * (Fraction(float(c[0])) - Fraction(float(b[0])))
-            between += (Fraction(float(a[1])) - Fraction(float(b[1]))) * (Fraction(float(c[1])) - Fraction(float(b[1])))
-            if between < 0:
+            from_a = [Fraction(float(a[i])) - Fraction(float(b[i])) for i in (0, 1)]
+            from_c = [Fraction(float(c[i])) - Fraction(float(b[i])) for i in (0, 1)]
+            if from_a[0] * from_c[0] + from_a[1] * from_c[1] < 0:
                 straight = k if straight < 0 else straight
-            else:
-                spike = k if spike < 0 else spike
-    if straight >= 0 or spike >= 0:
-        return straight if straight >= 0 else spike
-    raise WallError(
-        f"hollow: no triangulation from vertex {points[ring[place % size]].tolist()} on; expected a chain that does "
-        "not cross itself, with the hollow on its left"
-    )
+            elif slit < 0 and not _surrounds(np.delete(loop, k, axis=0), b):
+                slit = k
+                if slits_first:
+                    return k
+    if slits_first:
+        return _next_ear(points, ring, place, False)
+    return straight if straight >= 0 else slit
+
+
+def _surrounds(loop: Floats, point: Floats) -> bool:
+    """Whether a loop winds around a point: then a fold that ends there is a plate in the hollow, not a slit of it."""
+    winding = 0
+    for start, end in zip(loop, np.roll(loop, -1, axis=0), strict=True):
+        if start[1] <= point[1] < end[1]:
+            winding += int(_signs(start, end, point[None])[0]) > 0
+        elif end[1] <= point[1] < start[1]:
+            winding -= int(_signs(start, end, point[None])[0]) < 0
+    return winding != 0
 
 
 def _is_ear(loop: Floats, k: int) -> bool:

@@ -206,19 +206,19 @@ class IsometryTable:
         incoming = angles("theta", theta)
         flat = incoming.ravel()
         sign, offset, _ = self.isometries
-        query, number, probability = self._entries(flat)
-        key, place = np.unique(query * sign.size + number, return_inverse=True)
-        total: Floats = np.bincount(place, weights=probability, minlength=key.size)
+        owner, isometry, probability = self._entries(flat)
+        key, place = np.unique(owner * sign.size + isometry, return_inverse=True)
+        total = np.bincount(place, weights=probability, minlength=key.size)
         key, total = key[total > 0.0], total[total > 0.0]
         query, number = np.divmod(key, sign.size)
         whole = np.bincount(query, weights=total, minlength=flat.size)
-        total = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
+        share = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
         count = np.bincount(query, minlength=flat.size)
         slot = np.arange(key.size) - np.repeat(np.cumsum(count) - count, count)
         slots = int(count.max(initial=1))
         filled = np.zeros((flat.size, slots))
         which = np.zeros((flat.size, slots), dtype=np.int64)
-        filled[query, slot] = total
+        filled[query, slot] = share
         which[query, slot] = number
         which = np.where(filled > 0.0, which, which[:, :1])
         shape = (*incoming.shape, slots)

@@ -18,10 +18,12 @@ from .rectangular import crevice_pieces
 from .stable_angles import kept_inside
 
 # Products of two functions of a basis times a sinusoid, on a piece of width w, vary like exp(n w) with n the
-# stiffness below. Gauss with m nodes misses (n w / 2)^(2m) / (2m)! of them: 3e-20, 7e-19 and 3e-17 for these three
-# pairs of (n w, m); beyond, m = n w / 2 + MORE_NODES follows the oscillation.
-SHORT = ((0.2, 5), (1.0, 8), (4.0, 14))
+# stiffness below. Gauss with m nodes misses (n w / 2)^(2m) / (2m)! of them: 3e-15 and less for these pairs of (n w, m),
+# relative to the measure of the piece; beyond, m = n w / 2 + MORE_NODES follows the oscillation.
+SHORT = ((1e-3, 2), (0.02, 3), (0.2, 5), (1.0, 8), (4.0, 14))
 MORE_NODES = 18
+# A width whose number of nodes does for the sinusoid on any shorter piece.
+FEW = 0.1
 # Pieces, or nodes, held at a time.
 CHUNK = 2**20
 
@@ -119,14 +121,19 @@ def _add_nodes(
 def _nodes(basis: Basis, width: Floats) -> NDArray[np.int64]:
     """Gauss nodes for every piece of the given width."""
     if isinstance(basis, Legendre):
-        reach, extra = (basis.size + 1) * width, 0
-    elif isinstance(basis, Panels):
-        # of degree 2 p whatever the width of the panel, times a sinusoid
-        reach, extra = width, basis.degree
-    else:
-        return np.full(width.shape, basis.nodes_per_interval)
+        return _nodes_for((basis.size + 1) * width)
+    if isinstance(basis, Panels):
+        # a polynomial of degree d on a panel of width W grows by a factor exp(2 d^2 w / W) at most (Markov); on longer
+        # pieces the polynomial, of degree 2 p, adds p nodes to those of the sinusoid
+        stiffness = 2.0 * (2.0 * basis.degree) ** 2 / float(np.diff(basis.edges).min()) + 1.0
+        short = stiffness * width <= SHORT[-1][0]
+        return np.where(short, _nodes_for(stiffness * width), _nodes_for(np.maximum(width, FEW)) + basis.degree)
+    return np.full(width.shape, basis.nodes_per_interval)
+
+
+def _nodes_for(reach: Floats) -> NDArray[np.int64]:
     # a few lengths only: every different one is a call
     number = 8 * np.ceil((0.5 * reach + MORE_NODES) / 8.0).astype(np.int64)
     for limit, nodes in reversed(SHORT):
         number = np.where(reach <= limit, nodes, number)
-    return np.asarray(number + extra, dtype=np.int64)
+    return np.asarray(number, dtype=np.int64)

@@ -34,9 +34,9 @@ SHAPE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
 # Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
 # error in total variation; above this it would show in a kernel estimated from a million rays.
 LOST_TOLERANCE = 1e-4
-# Polygonal walls are resolved into beams where that takes about a second (a microsecond a beam, a few to make the
-# table) and leaves so little that a sampled kernel could not show it.
-MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 512, 100_000, 1e-7
+# Polygonal walls are resolved into beams where that takes about a second (a few microseconds a beam, the table
+# included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
+MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 512, 100_000, 1e-6
 # `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 

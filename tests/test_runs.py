@@ -1,8 +1,9 @@
-"""Runs of hits in channels, in wedges and along arcs: computed in one step, to be the same as hit by hit."""
+"""Runs of hits computed in one step, and lines found through a grid: to be the same as hit by hit, line by line."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -165,3 +166,92 @@ def test_a_thousand_million_hits_cost_no_more_than_a_few():
         times.append(time.process_time() - start)
         assert traced.escaped.mean() > 0.9999
     assert times[0] < 20 * times[1] + 0.1
+
+
+def random_teeth(count, seed):
+    """One hollow with a ragged floor of many long and short lines, overhanging in places."""
+    rng = np.random.default_rng(seed)
+    x = np.linspace(0.0, 1.0, count + 1)[1:-1] + 0.3 / count * (rng.random(count - 1) - 0.5)
+    y = -0.2 - 0.6 * rng.random(count - 1) ** 3
+    return geo.Wall.from_vertices([(0, 0), *zip(x, y, strict=True), (1, 0)])
+
+
+def comb(count):
+    """Parallel slots below a common opening: every line is long and runs through many cells."""
+    points = [(0.0, 0.0), (0.0, -1.0)]
+    for k in range(count):
+        left, right = (k + 0.4) / count, (k + 0.6) / count
+        points += [(left, -1.0), (left, -0.1), (right, -0.1), (right, -1.0)]
+    return geo.Wall.from_vertices([*points, (1.0, -1.0), (1.0, 0.0)])
+
+
+def curved_floor(count):
+    """Many lines and a few Bezier pieces and arcs in one hollow."""
+    flanks = [(0.3 * k / count, -0.5 * k / count - 0.01 * (k % 2)) for k in range(count)]
+    left = [geo.Segment(p, q) for p, q in pairwise(flanks)]
+    x, y = flanks[-1]
+    middle = [
+        geo.Bezier([(x, y), (0.4, -0.9), (0.5, -0.4)]),
+        geo.Bezier([(0.5, -0.4), (0.6, -0.9), (1 - x, y)]),
+    ]
+    mirrored = [(1 - px, py) for px, py in reversed(flanks)]
+    right = [geo.Segment(p, q) for p, q in pairwise(mirrored)]
+    return geo.Wall([*left, *middle, *right])
+
+
+MANY = {
+    "koch 4": geo.koch(4),
+    "koch 6": geo.koch(6),
+    "random teeth": random_teeth(400, 5),
+    "comb": comb(60),
+    "lines and curves": curved_floor(80),
+}
+
+
+def without_grid(wall):
+    plain = geo.Wall(wall.pieces, wall.period, wall.islands)
+    hollows = plain.scene.hollows.copy()
+    hollows[:, 17] = 0.0
+    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, grid=None)
+    return plain
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_a_grid_changes_no_bit(name):
+    wall = MANY[name]
+    assert wall.plan().hollows_with_grid >= 1
+    x, theta = rays(6, 3_000)
+    # and rays along the axes, and aimed at joints: their walks pass along edges and through corners of cells
+    below = wall.vertices[wall.vertices[:, 1] < -1e-3]
+    targets = below[np.random.default_rng(7).integers(0, len(below), 3_000)]
+    aimed = np.mod(np.arctan2(targets[:, 1], targets[:, 0] - x), np.pi)
+    x = np.concatenate([x, x, targets[:, 0] % 1.0, wall.vertices[::7, 0] % 1.0])
+    theta = np.concatenate([theta, aimed, np.full(3_000, np.pi / 2), np.full(len(wall.vertices[::7]), np.pi / 4)])
+    found, plain = geo.trace(wall, x, theta), geo.trace(without_grid(wall), x, theta)
+    for field in ("x", "theta", "collisions", "status"):
+        assert np.array_equal(getattr(found, field), getattr(plain, field))
+
+
+def test_a_wall_of_sixty_thousand_lines_is_traced_in_microseconds_a_bounce():
+    import time
+
+    wall = geo.koch(8)
+    x, theta = rays(8, 2_000)
+    geo.trace(wall, x[:1], theta[:1])
+    start = time.process_time()
+    traced = geo.trace(wall, x, theta, threads=1)
+    spent = time.process_time() - start
+    assert sum(traced.counts().values()) == len(x)
+    # brute force takes 50 us a bounce
+    assert spent / traced.collisions.sum() < 10e-6
+
+
+def test_the_plan_tells_channels_wedges_and_grids():
+    assert geo.rectangular_teeth(2.0).plan().channels == 1
+    assert geo.triangular_teeth(0.1).plan().wedges == 1
+    assert geo.triangular_teeth(0.7).plan().wedges == 0
+    assert geo.koch(3).plan().hollows_with_grid == 0 and geo.koch(4).plan().hollows_with_grid == 1
+    tilted = tilted_channel(0.05, 2.0, 0.3).plan()
+    assert tilted.channels + tilted.wedges == 1 and not tilted.mirror_symmetric
+    two = geo.Wall.from_vertices([(0, 0), (0.25, -0.5), (0.5, 0), (0.75, -0.5), (1, 0)]).plan()
+    assert two.hollows == 2 and two.distinct_hollows == 1

@@ -1,0 +1,161 @@
+"""Rays aimed at corners and tangencies, and rays at grazing angles, against the double-double twin: every one of them.
+
+``python -m benchmarks.robustness`` traces a million of each on ten walls and prints what became of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity import geometry as geo
+from asperity.geometry.refinement import RefinedTrace, refined_trace
+
+Floats = NDArray[np.float64]
+EPS = 2.0**-52
+# The twin's status of a ray that met nothing.
+LOST = 4
+RAYS = 1_000_000
+# Rays still inside after so many collisions are not compared: on both sides they end with the bounce limit.
+COLLISIONS = 200
+# An aimed ray is off its target by up to so many ulps of its angle.
+AIM_ULPS = 4
+# Bisections from an interval of angles to two neighbouring doubles.
+BISECTIONS = 64
+# The double tracer's error, in units of EPS times the norm of the derivative, a bounce; measured below 5 in all.
+ERROR_UNITS = 32.0
+# A disagreement is one of conditioning where the twin, its ray moved by at most so many ulps, does what the tracer did.
+CONDITION_ULPS = 64
+
+WALLS: dict[str, geo.Wall] = {
+    "triangular teeth": geo.triangular_teeth(0.7),
+    "rectangular teeth": geo.rectangular_teeth(2.0),
+    "focusing arcs": geo.focusing_arcs(1.2),
+    "semicircles": geo.focusing_arcs(0.5 * math.pi),
+    "dispersing arcs": geo.dispersing_arcs(1.5),
+    "cusps": geo.dispersing_arcs(2.0),
+    "elliptical arcs": geo.elliptical_arcs(0.9, geo.Disk(1.0, 0.5)),
+    "parabolas": geo.double_parabola(),
+    "mushrooms": geo.mushrooms(0.3, 0.5),
+    "Koch curve": geo.koch(3),
+}
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of rays on one wall: all, lost, left flagged, wrong but for conditioning, and wrong."""
+
+    rays: int
+    lost: int
+    flagged: int
+    conditioned: int
+    wrong: int
+    worst: float
+    disagreements: tuple[tuple[float, float], ...]
+
+
+def aimed_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Half of the rays at joints straight away; half at the edges between itineraries, found by bisection.
+
+    Such an edge is a later corner or a tangency. ``rng`` also spreads the rays over a few ulps about their target.
+    """
+    joints = wall.scene.joints[wall.scene.joints[:, 1] < 0.0]
+    # a wall of single arcs has no joint below its openings
+    straight = count // 2 if len(joints) else 0
+    target = joints[rng.integers(max(1, len(joints)), size=straight)]
+    x = wall.period * rng.random(straight)
+    theta = np.arctan2(-target[:, 1], x - target[:, 0])
+    edges_x, edges_theta = _edges(wall, (count - straight + AIM_ULPS) // (AIM_ULPS + 1), rng)
+    copies = -(-(count - straight) // max(1, len(edges_x)))
+    x = np.concatenate([x, np.repeat(edges_x, copies)[: count - straight]])
+    theta = np.concatenate([theta, np.repeat(edges_theta, copies)[: count - straight]])
+    return x, theta + rng.integers(-AIM_ULPS, AIM_ULPS + 1, size=count) * np.spacing(theta)
+
+
+def grazing_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Angles 1e-12 to 1e-3, uniform in the logarithm, from either side."""
+    theta = 10.0 ** rng.uniform(-12.0, -3.0, count)
+    return wall.period * rng.random(count), np.where(rng.random(count) < 0.5, theta, math.pi - theta)
+
+
+def judge(wall: geo.Wall, x: Floats, theta: Floats) -> Verdict:
+    """Compare the tracer with the twin on every ray."""
+    traced = geo.trace(wall, x, theta, max_collisions=COLLISIONS)
+    twin = refined_trace(wall.scene, x, theta, COLLISIONS)
+    flagged = (traced.status == geo.Status.CORNER) | (traced.status == geo.Status.GRAZING)
+    same, distance = _agree(traced, twin)
+    other = np.flatnonzero(~same)
+    # lost: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
+    lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == LOST)
+    explained = _explained(wall, x[other], theta[other])
+    worst = float(distance[same].max(initial=0.0))
+    return Verdict(
+        len(x), int(lost.sum()), int(flagged.sum()), int(explained.sum()), int((~explained).sum()), worst,
+        tuple(zip(x[other].tolist(), theta[other].tolist(), strict=True)),
+    )  # fmt: skip
+
+
+def _agree(traced: geo.Trace, twin: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:
+    """Which rays end alike within conditioning, and their angles' distance in units of EPS times the derivative."""
+    gone = (traced.status == geo.Status.ESCAPED) & (twin.status == geo.Status.ESCAPED)
+    difference = np.abs((traced.theta - twin.theta[:, 0]) - twin.theta[:, 1])
+    distance = np.where(gone, difference / (EPS * twin.amplification * (1.0 + twin.collisions)), 0.0)
+    # a run on an arc is counted in full by the tracer, however long, but followed step by step by the twin
+    limited = (twin.status == geo.Status.BOUNCE_LIMIT) & (traced.collisions >= COLLISIONS)
+    near = gone & (distance <= ERROR_UNITS) & (traced.collisions == twin.collisions)
+    return near | limited | ((traced.status == twin.status) & ~gone), distance
+
+
+def _explained(wall: geo.Wall, x: Floats, theta: Floats) -> NDArray[np.bool_]:
+    """Which rays the twin takes where the tracer took them, once moved by a few ulps of the cell or of the angle."""
+    result = np.zeros(len(x), np.bool_)
+    if len(x) == 0:
+        return result
+    traced = geo.trace(wall, x, theta, max_collisions=COLLISIONS)
+    move: Callable[[float, float], tuple[Floats, Floats]] = lambda dx, dt: (  # noqa: E731
+        x + dx * EPS * wall.period, np.clip(theta + dt * EPS, 0.5 * theta, 0.5 * (theta + math.pi)),
+    )  # fmt: skip
+    ulps = [sign * 2.0**k for k in range(-2, int(math.log2(CONDITION_ULPS)) + 1) for sign in (-1.0, 1.0)]
+    for step in ulps:
+        for moved in (move(step, 0.0), move(0.0, step), move(step, step), move(step, -step)):
+            result |= _agree(traced, refined_trace(wall.scene, *moved, COLLISIONS))[0]
+    return result
+
+
+def _edges(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Rays at the edge between two numbers of collisions: a few more than ``count`` are tried, some pairs agree."""
+    x = wall.period * rng.random(4 * count)
+    low, high = np.sort(np.arccos(1.0 - 2.0 * rng.random((2, 4 * count))), axis=0)
+    hits = [geo.trace(wall, x, angle, max_collisions=COLLISIONS).collisions for angle in (low, high)]
+    chosen = np.flatnonzero(hits[0] != hits[1])[:count]
+    x, low, high, first = x[chosen], low[chosen], high[chosen], hits[0][chosen]
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        before = geo.trace(wall, x, middle, max_collisions=COLLISIONS).collisions == first
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    return x, low
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.robustness", description=__doc__)
+    parser.add_argument("--rays", type=int, default=RAYS, help="rays of each kind on all walls together")
+    rays = parser.parse_args().rays // len(WALLS)
+    print("| wall | rays | aimed | lost | flagged | conditioning | wrong | worst error/(eps derivative bounces) |")
+    print("|---|---|---|---|---|---|---|---|")
+    rng = np.random.default_rng(0)
+    for name, wall in WALLS.items():
+        for kind, make in (("corners", aimed_rays), ("grazing", grazing_rays)):
+            v = judge(wall, *make(wall, rays, rng))
+            print(
+                f"| {name} | {v.rays} | {kind} | {v.lost} | {v.flagged} | {v.conditioned} | {v.wrong} | {v.worst:.2g} |"
+            )
+
+
+if __name__ == "__main__":
+    main()

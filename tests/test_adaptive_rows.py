@@ -1,0 +1,78 @@
+"""Adaptive rows and matrices of curved walls: against closed forms, a plain tracer, and their own symmetry."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.kernels.adaptive_rows import adaptive_rows
+from asperity.kernels.row_quadrature import row_matrix
+from plain_tracer import trace_plainly
+from random_curved_walls import random_curved_wall
+
+ARCS = geo.focusing_arcs(1.2)
+# <u, P u>/<u, u> of ARCS, from an independent tracer and high-precision quadrature; its last digit rounds.
+FIRST_MOMENT, LAST_DIGIT = 0.327558333378, 1e-12
+ANGLES = np.array([0.003, 0.4, 1.0, 1.7, 2.9])
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_rows_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(tolerance: float) -> None:
+    rows = adaptive_rows(ARCS, ANGLES, tolerance)
+    exact = ker.CircularArcLaw(1.2).apply(np.cos, ANGLES)
+    assert np.all(rows.error <= 2.0 * tolerance)
+    assert np.all(np.abs(rows.mean(np.cos) - exact) <= rows.error + 1e-13)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_the_first_moment_of_a_focusing_arc_lies_within_its_error(tolerance: float) -> None:
+    matrix, error, _ = row_matrix(ARCS, ker.Legendre(2), tolerance)
+    assert error <= tolerance
+    assert abs(matrix[1, 1] - FIRST_MOMENT) <= error + LAST_DIGIT
+
+
+@pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(6), ker.Panels(np.linspace(0.0, np.pi, 4), 2)], ids=repr)
+def test_matrices_of_a_focusing_arc_lie_within_their_errors_in_every_basis(basis: ker.Basis) -> None:
+    exact = ker.discretise(ker.CircularArcLaw(1.2), basis)
+    matrix, error, _ = row_matrix(ARCS, basis, 1e-3)
+    assert error <= 1e-3
+    assert np.linalg.norm(matrix - exact.symmetric) <= error + float(exact.error)
+
+
+@pytest.mark.parametrize("kind", [0, 2, 5])
+def test_rows_of_random_walls_agree_with_a_plain_tracer(kind: int) -> None:
+    wall, entries = random_curved_wall(kind), 400
+    x = (np.arange(entries) + 0.5) / entries * wall.period
+    rows = adaptive_rows(wall, [1.1], 1e-7)
+    plain = np.mean([math.cos(trace_plainly(wall, place, 1.1)[1]) for place in x.tolist()])
+    # a midpoint sum over some twenty changes of itinerary, each of which shifts at most one point by a value of 2
+    assert abs(rows.mean(np.cos)[0] - plain) < 20 * 2.0 / entries
+
+
+def test_a_matrix_that_runs_out_of_rays_says_by_how_much_it_fell_short() -> None:
+    matrix, error, _ = row_matrix(ARCS, ker.Legendre(2), 1e-12, most_rays=50_000)
+    assert error > 1e-12
+    assert abs(matrix[1, 1] - FIRST_MOMENT) <= error
+
+
+def test_rows_of_equal_hollows_and_flat_tops_are_those_of_one_hollow() -> None:
+    arc = geo.focusing_arcs(0.8).pieces[0]
+    width = arc.end[0] - arc.start[0]
+    top = geo.Segment((2.0 * width, 0.0), (2.5 * width, 0.0))
+    twice = geo.Wall([arc, arc.moved(width, 0.0), top], period=2.5 * width)
+    one = adaptive_rows(geo.focusing_arcs(0.8), [1.0], 1e-9)
+    both = adaptive_rows(twice, [1.0], 1e-9)
+    assert both.rays == one.rays
+    mixed = 0.8 * one.mean(np.cos)[0] + 0.2 * math.cos(np.pi - 1.0)
+    assert both.mean(np.cos)[0] == pytest.approx(mixed, abs=1e-12)
+
+
+def test_discretise_takes_adaptive_rows_for_a_curved_wall_of_few_pieces() -> None:
+    found = ker.discretise(ker.WallLaw(geo.dispersing_arcs(0.5)), ker.Legendre(2), tolerance=1e-5)
+    assert found.method == "quadrature" and found.tolerance_met
+    assert "adaptive rows" in found.error.method
+    assert float(np.linalg.norm(found.symmetric - found.symmetric.T)) <= float(found.error)

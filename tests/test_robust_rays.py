@@ -1,0 +1,48 @@
+"""Rays aimed at corners and tangencies: none lost, none wrong but for conditioning."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from benchmarks.robustness import WALLS, aimed_rays, grazing_rays, judge
+
+from asperity import geometry as geo
+from asperity.geometry.refinement import refined_trace
+from precise_tracer import trace_precisely
+
+RAYS = 3_000
+PRECISE_RAYS = 4
+
+
+@pytest.mark.parametrize("make", [aimed_rays, grazing_rays])
+@pytest.mark.parametrize("name", WALLS)
+def test_no_ray_is_lost_and_none_is_wrong_but_for_conditioning(name, make):
+    verdict = judge(WALLS[name], *make(WALLS[name], RAYS, np.random.default_rng(5)))
+    assert verdict.rays == RAYS and verdict.lost == 0 and verdict.wrong == 0
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_the_double_double_twin_agrees_with_fifty_digits(name):
+    scene = WALLS[name].scene
+    rng = np.random.default_rng(6)
+    x, theta = rng.random(PRECISE_RAYS), np.arccos(1.0 - 2.0 * rng.random(PRECISE_RAYS))
+    twin = refined_trace(scene, x, theta)
+    for i in range(PRECISE_RAYS):
+        ray = trace_precisely(scene, x[i], theta[i])
+        assert twin.status[i] == geo.Status.ESCAPED and ray.bounces == twin.collisions[i]
+        assert abs(ray.theta - mp.mpf(twin.theta[i, 0]) - mp.mpf(twin.theta[i, 1])) <= twin.rounding[i]
+
+
+@pytest.mark.parametrize(
+    ("x", "theta"), [(0.5, 0.5 * math.pi), (0.0, 0.5 * math.pi), (0.25, 0.75 * math.pi), (0.75, 0.25 * math.pi)]
+)
+def test_a_corner_hit_exactly_is_reported_and_one_two_ulps_away_is_not(x, theta):
+    # aimed straight down, and at 45 degrees, at the corner (1/2, -1/4) of a notch
+    notch = geo.Wall.from_vertices([(0.0, 0.0), (0.5, -0.25), (1.0, 0.0)])
+    assert geo.trace(notch, x, theta).status == geo.Status.CORNER
+    if x > 0.0:
+        beside = geo.trace(notch, x, theta + np.spacing(theta) * np.array([-2.0, 2.0]))
+        assert beside.escaped.all()
