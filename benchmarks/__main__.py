@@ -54,7 +54,10 @@ def _throughput_table(rays: int) -> list[str]:
 
 
 def _laws_table() -> list[str]:
-    rows = ["| law | true error | reported error | seconds | Monte Carlo's error in that time |", "|---|---|---|---|---|"]
+    rows = [
+        "| law | true error | reported error | seconds | Monte Carlo's error in that time |",
+        "|---|---|---|---|---|",
+    ]
     for row in measure_laws():
         cells = (_figure(value) for value in (row.error, row.reported, row.seconds, row.monte_carlo))
         rows.append(f"| {row.what} | {' | '.join(cells)} |")
