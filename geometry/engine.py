@@ -37,6 +37,8 @@ ROOT_STEPS = 80
 MOST_STEPS = 1_000_000
 # An odd number without pattern, so that itineraries of the same pieces in another order differ.
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
+# Far beyond the numbers of the pieces.
+BEND_SHIFT = 40
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -204,6 +206,29 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
                 best_t, best_s = max(t, 0.0), s
         low, value_low = high, value_high
     return best_t, best_s
+
+
+@_compile
+def bend_number(curve, s):
+    """Which part between its inflections the point s of a Bezier piece belongs to: 0, 1 or 2.
+
+    A ray that just misses a bump may hit the same piece behind it, and leaves elsewhere; only a part that bends to one
+    side has one front hit that moves continuously with the ray.
+    """
+    # the curvature has the sign of b' x b'', which is a quadratic in s for a cubic b
+    c0 = 2.0 * (curve[2] * curve[5] - curve[3] * curve[4])
+    c1 = 6.0 * (curve[2] * curve[7] - curve[3] * curve[6])
+    c2 = 6.0 * (curve[4] * curve[7] - curve[5] * curve[6])
+    disc = c1 * c1 - 4.0 * c2 * c0
+    if disc <= 0.0:
+        return 0
+    q = -0.5 * (c1 + math.copysign(math.sqrt(disc), c1))
+    number = 0
+    if q != 0.0 and 0.0 < c0 / q < s:
+        number += 1
+    if c2 != 0.0 and 0.0 < q / c2 < s:
+        number += 1
+    return number
 
 
 @_compile
@@ -403,7 +428,10 @@ def trace_ray(
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT
         if itinerary is not None:
             side = 1 if kind == SIDE and vx > 0.0 else 0
-            itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(8 * (index + 1 + side) + kind)
+            number = 8 * (index + 1 + side) + kind
+            if beziers is not None and kind == BEZIER:
+                number += bend_number(beziers[index], hit_s) << BEND_SHIFT
+            itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(number)
         if period is not None:
             if kind == SIDE:
                 py += time * vy

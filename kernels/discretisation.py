@@ -235,7 +235,7 @@ class _Maker:
             symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance)
             how = (
                 f"adaptive rows and panels, {rays} rays, predicted cheaper than sampling: Gauss against Kronrod, "
-                "plus undecided entry points; or the asymmetry if that is more"
+                "plus undecided entry points and twice the asymmetry"
             )
         elif isinstance(law, DrivenLaw) and not self._acts_accurately(law):
             symmetric, error = entry_matrix(law, self.basis, self.samples)

@@ -42,8 +42,11 @@ GAUSS = np.array(list(_GAUSS[:-1]) + list(_GAUSS[::-1]))
 
 # Rays after which the matrix is handed over as it is, with the error that it has: some seconds.
 MOST_RAYS = 10_000_000
-# For the prediction of the cost; measured on random walls of two to five pieces.
+# For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, RAYS_A_CHANGE = 100, 100
+# The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
+# part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
+ASYMMETRY_FACTOR = 2.0
 # Rows at a time, so that their nodes fit into memory, and outgoing angles times functions at a time.
 ROWS_AT_ONCE = 1500
 VALUES_AT_ONCE = 2_000_000
@@ -114,13 +117,13 @@ def row_matrix(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
-    of that difference scaled by what halving the panel showed where they are smooth; plus the errors of the rows. It
-    is at least the asymmetry of the result, which another error than these would show.
+    of that difference scaled by what halving the panel showed where they are smooth; plus the errors of the rows;
+    plus ASYMMETRY_FACTOR times the asymmetry of the result, which other errors than these would show.
     """
     small = isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS
     inner = Legendre(FEWEST_FUNCTIONS) if small else basis
     matrix, error, rays = _Integrator(wall, inner, tolerance, most_rays).run()
-    error = max(error, float(np.linalg.norm(matrix - matrix.T)))
+    error += ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), error, rays
 
 
@@ -131,7 +134,7 @@ class _Integrator:
         self.basis = basis
         self.tolerance = max(tolerance, 8.0 * np.finfo(np.float64).eps * basis.size)
         self.most_rays = most_rays
-        self.rays = 0
+        self.rays, self.row_count = 0, 0
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
         if isinstance(basis, Legendre):
@@ -176,8 +179,11 @@ class _Integrator:
         chosen[order[cumulative > 0.25 * goal]] = True
         # a panel far below the worst waits for a later round
         chosen &= able & (panels.error > 0.02 * np.max(panels.error, where=able, initial=0.0))
-        # what is left of the budget, at the cost of a row so far
-        return np.asarray(chosen)
+        # no more than what is left of the budget buys, at the cost of a row so far
+        most = int((self.most_rays - self.rays) * self.row_count / max(1, self.rays)) // (2 * len(NODES))
+        worst = np.zeros(len(order), dtype=np.bool_)
+        worst[order[max(0, len(order) - most) :]] = True
+        return np.asarray(chosen & worst)
 
     def _halves(self, parents: _Panels) -> _Panels:
         middle = 0.5 * (parents.low + parents.high)
@@ -211,6 +217,7 @@ class _Integrator:
         tolerance = np.minimum(self.row_tolerance * np.maximum(1.0, share), COARSEST_ROW)
         rows = self.rows(flat, np.repeat(tolerance, len(NODES)))
         self.rays += rows.rays
+        self.row_count += len(flat)
         shape = (len(low), len(NODES), self.basis.size)
         image = self._images(rows.nodes, rows.weights, rows.starts).reshape(shape)
         here = self.basis.evaluate(flat).reshape(shape)
