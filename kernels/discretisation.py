@@ -26,7 +26,7 @@ from .matrix_algebra import frobenius_error
 from .measure import SINE
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
-from .row_quadrature import is_affordable, row_matrix
+from .row_quadrature import MOST_RAYS, is_affordable, row_matrix
 from .sampling import DEFAULT_SAMPLES, RANDOMISATIONS, SamplingMethod, responder, sampled_array
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
@@ -43,6 +43,8 @@ ROUNDING = 8.0 * np.finfo(np.float64).eps
 # cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
 DISPLACED = np.finfo(np.float64).eps
 SEED_WITHOUT_RNG = 0
+# Rays of adaptive rows that nobody asked for by name: a second or a few; beyond them the shortfall is reported.
+QUICK_RAYS = 2_000_000
 # Methods that a sum has if all its terms have them; asked of a law to see whether it lists isometries.
 SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
 FEW_KINKS, PROBE = 8, 1.0
@@ -124,7 +126,8 @@ def discretise(
     source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
-    maker = _Maker(basis, tolerance, number, source, symmetrise)
+    most_rays = MOST_RAYS if method == "quadrature" else QUICK_RAYS
+    maker = _Maker(basis, tolerance, number, source, symmetrise, most_rays)
     return replace(
         maker.make(law, method),
         law=repr(law),
@@ -145,6 +148,7 @@ class _Maker:
     samples: int
     rng: np.random.Generator
     symmetrise: bool
+    most_rays: int
 
     def make(self, law: Law, method: Method) -> KernelMatrix:
         """The matrix of a law; the facts of the whole law are put in by `discretise`."""
@@ -232,7 +236,7 @@ class _Maker:
             symmetric, error = arc_matrix(law.half_angle, self.basis)
             how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
         elif isinstance(law, WallLaw):
-            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance)
+            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, self.most_rays)
             how = (
                 f"adaptive rows and panels, {rays} rays, predicted cheaper than sampling: Gauss against Kronrod, "
                 "plus undecided entry points and twice the asymmetry"
