@@ -22,8 +22,6 @@ MOST_COLLISIONS = 100_000
 MOST_SEEDS = 128
 # Pieces of a wall up to which a row takes no more than some milliseconds.
 MOST_PIECES = 64
-# Hollows are translates of each other if their tables agree to this share of their size.
-SAME_SHAPE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -127,20 +125,17 @@ class WallRows:
 
     @cached_property
     def _hollows(self) -> list[tuple[int, float]]:
-        """One hollow of each shape, and the share of the period that all of this shape take."""
-        scene = self.wall.scene
-        tables = (scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers)
-        shapes: list[tuple[list[Floats], int, float]] = []
-        for k, hollow in enumerate(scene.hollows):
-            share = float(hollow[1] - hollow[0]) / self.wall.period
-            shape = _shape(hollow, tables)
-            for n, (other, first, total) in enumerate(shapes):
-                if _alike(shape, other, float(hollow[2])):
-                    shapes[n] = (other, first, total + share)
-                    break
-            else:
-                shapes.append((shape, k, share))
-        return [(first, share) for _, first, share in shapes]
+        """The number of one hollow of each shape, and the share of the period that all of this shape take."""
+        from ..geometry.hollow_shape import distinct_hollows
+
+        wall = self.wall
+        if not wall.closes:
+            return [(0, 1.0)]
+        shapes = [hollows for _, hollows in distinct_hollows(wall)]
+        return [
+            (wall.hollows.index(hollows[0]), sum(hollow.width for hollow in hollows) / wall.period)
+            for hollows in shapes
+        ]
 
     def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveRows:
         """Rows at checked angles."""
@@ -197,29 +192,3 @@ class WallRows:
             self.degree, self.least_level, tolerances, gauss_tables(), MOST_SEEDS,
         )  # fmt: skip
         return found
-
-
-def _shape(hollow: Floats, tables: tuple[Floats | None, ...]) -> list[Floats]:
-    """The tables of one hollow, measured from its left end."""
-    joints, lines, circles, ellipses, beziers = tables
-    left = float(hollow[0])
-    parts = [hollow[[1, 2, 11, 12]] - [left, 0.0, 0.0, 0.0]]
-    low, high = int(hollow[3]), int(hollow[4])
-    assert joints is not None
-    parts.append(joints[low:high] - [left, 0.0, 0.0, 0.0])
-    if lines is not None:
-        parts.append(lines[low:high])
-    for column, table in ((5, circles), (7, ellipses), (9, beziers)):
-        if table is not None:
-            moved = table[int(hollow[column]) : int(hollow[column + 1])].copy()
-            moved[:, 0] -= left
-            moved[:, [-6, -4]] -= left
-            parts.append(moved)
-    return [np.asarray(part) for part in parts]
-
-
-def _alike(first: list[Floats], second: list[Floats], size: float) -> bool:
-    return all(
-        one.shape == other.shape and np.allclose(one, other, rtol=SAME_SHAPE, atol=SAME_SHAPE * size)
-        for one, other in zip(first, second, strict=True)
-    )
