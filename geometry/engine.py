@@ -40,7 +40,9 @@ HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 # Far beyond the numbers of the pieces.
 BEND_SHIFT = 40
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+# The loop over rays takes in the loop over flights: passing some ten tables from one to the other would cost as much as
+# a bounce or two. Other callers go through a function of their own that calls `trace_ray` at one place.
+_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 @_compile
@@ -508,9 +510,11 @@ def trace_ray(
 def near_end(piece, px, py, slack):
     """Whether a hit is within rounding of a joint that is a corner; both tables keep the ends in their last columns."""
     n = piece.shape[0]
-    if piece[n - 2] > 0.0 and math.hypot(px - piece[n - 6], py - piece[n - 5]) <= slack:
+    x, y = px - piece[n - 6], py - piece[n - 5]
+    if piece[n - 2] > 0.0 and x * x + y * y <= slack * slack:
         return True
-    return piece[n - 1] > 0.0 and math.hypot(px - piece[n - 4], py - piece[n - 3]) <= slack
+    x, y = px - piece[n - 4], py - piece[n - 3]
+    return piece[n - 1] > 0.0 and x * x + y * y <= slack * slack
 
 
 @_compile
