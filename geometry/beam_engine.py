@@ -225,8 +225,8 @@ def put(polygon, count, corners, slot):
 
 
 @_compile
-def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, tolerance, max_beams):
-    """Carry the beams of all rays through the hollow, the largest first.
+def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, tolerance, max_beams, halves):
+    """Carry the beams of all rays through the hollow, the largest first; of the rays with theta < pi/2 if halves is 1.
 
     Returns the tables, the number of slots, the rounding bound (flux) and the number of splits.
     """
@@ -238,7 +238,7 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
     whole = np.zeros((room, 5), np.int64)
     heap = np.empty(room, np.int64)
     used, queue = 0, 0
-    for half in range(2):
+    for half in range(halves):
         polygon = corners[half]
         for i in range(3):
             for k in range(5):
@@ -253,7 +253,7 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
         real[half, FLUX] = polygon_flux(polygon, 3)
         queue = push(heap, queue, real, half)
         used += 1
-    total = real[0, FLUX] + real[1, FLUX]
+    total = real[:halves, FLUX].sum()
     open_flux = total
     rounding = 0.0
     values = np.empty(wide)

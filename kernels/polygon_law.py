@@ -61,7 +61,8 @@ class PolygonLaw(BranchLaw):
     Notes
     -----
     The beams are computed on first use. Hollows of the same shape, also in another size or mirrored, are computed
-    once; rectangles and isosceles triangles have closed forms, so that a rectangle of any depth costs nothing.
+    once, and of those that are their own mirror images half; rectangles and isosceles triangles have closed forms, so
+    that a rectangle of any depth costs nothing.
 
     Examples
     --------
@@ -104,15 +105,15 @@ class PolygonLaw(BranchLaw):
         parts = [IsometryTable.flat(level)] if level > LEVEL_TOLERANCE else []
         known: list[tuple[HollowShape, IsometryTable]] = []
         for shape, hollows in distinct_hollows(wall):
-            reflected = shape.mirrored()
-            table = next((found.mirrored() for other, found in known if reflected.same_as(other)), None)
+            image = shape.mirrored()
+            table = next((found.mirrored() for other, found in known if image.same_as(other)), None)
             if table is None:
-                table = self._of_shape(shape)
+                table = self._of_shape(shape, image.same_as(shape))
                 known.append((shape, table))
             parts.append(table.scaled(math.fsum(hollow.width for hollow in hollows) / wall.period))
         return IsometryTable.joined(parts)
 
-    def _of_shape(self, shape: HollowShape) -> IsometryTable:
+    def _of_shape(self, shape: HollowShape, symmetric: bool) -> IsometryTable:
         """The table of a hollow whose opening is the whole period."""
         if shape.height_to_width is not None:
             return IsometryTable.of_crevice(1.0, shape.height_to_width)
@@ -122,7 +123,8 @@ class PolygonLaw(BranchLaw):
                 return table
         from ..geometry.beams import beams_of
 
-        return table_of_beams(beams_of(shape.vertices, tolerance=self.tolerance, max_beams=self.max_beams))
+        beams = beams_of(shape.vertices, tolerance=self.tolerance, max_beams=self.max_beams, mirror_symmetric=symmetric)
+        return table_of_beams(beams)
 
     def table(self) -> IsometryTable:
         """All isometries with their probabilities."""
