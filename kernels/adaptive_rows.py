@@ -175,7 +175,8 @@ class WallRows:
         )
 
     def _march(self, theta: Floats, hollow: int, tolerances: Floats) -> tuple[Any, ...]:
-        from ..geometry.itineraries import gauss_tables, march_rows
+        from ..geometry.piece_rules import gauss_tables
+        from ..geometry.row_marching import march_rows
 
         scene = self.wall.scene
         # empty tables instead of absent ones, so that one compiled version serves all walls: compiling takes 20 s
@@ -187,8 +188,8 @@ class WallRows:
                 for columns, table in ((19, scene.circles), (19, scene.ellipses), (14, scene.beziers))
             ),
         )
+        bounds = (scene.hollows[hollow], tables, scene.cell if scene.is_open else None, MOST_COLLISIONS, self.edges)
         found: tuple[Any, ...] = march_rows(
-            theta, scene.hollows[hollow], tables, scene.cell if scene.is_open else None, MOST_COLLISIONS, self.edges,
-            self.degree, self.least_level, tolerances, gauss_tables(), MOST_SEEDS,
-        )  # fmt: skip
+            theta, tolerances, bounds, self.degree, gauss_tables(), self.least_level, MOST_SEEDS
+        )
         return found
