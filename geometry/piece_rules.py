@@ -1,7 +1,7 @@
 """Compiled Gauss rules on a piece of a row on which the itinerary does not change. Imported inside functions only.
 
 The rules are those in s with x = a + (b - a) s^2 (3 - 2 s): the square roots at tangencies are then analytic at both
-ends. ``rules`` are what `gauss_tables` gives. ``nodes`` are the outgoing angles and masses of a row, with room to spare.
+ends. ``rules`` are what `gauss_tables` gives. ``nodes`` are the outgoing angles and masses of a row, with spare room.
 """
 
 from __future__ import annotations
