@@ -25,8 +25,14 @@ from .piece_rules import MOST_NODES, SPARE, integrate_piece
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 # Samples that a row starts from, at irregular places so that no symmetry of the wall hides a piece from all of them.
-FIRST_SAMPLES = 24
+FIRST_SAMPLES = 32
 GOLDEN = 0.6180339887498949
+# Neighbouring rows have other places: any large number without pattern does.
+ROW_SHIFT = 12345.6789
+# More of them at either end, each nearer to it by this ratio.
+END_SAMPLES, END_RATIO = 10, 0.3
+# Pieces of a row that its neighbours start from.
+MOST_SEEDS = 128
 # The first and the last sample are this share of the row's tolerance, or of the opening, away from the ends.
 MARGIN = 1e-3
 # The share of the tolerance that the Gauss rules may spend, and that all undecided gaps may take.
@@ -38,37 +44,48 @@ LATE_SHARE = 0.05
 
 
 @_compile
-def first_places(hollow, goal, seeds):
-    """Places of the samples that a row starts from, in increasing order."""
+def first_places(theta, hollow, goal, seeds):
+    """Places of the samples that a row starts from, in increasing order.
+
+    They lie elsewhere in every row, so that the rows together leave no large part of all rays unseen, and crowd at the
+    ends of the opening, where the pieces of a smooth hollow become ever narrower.
+    """
     left, right = hollow[0], hollow[1]
     whole = right - left
     margin = MARGIN * min(goal, MARGIN * whole)
-    first = np.empty(FIRST_SAMPLES + 2 + seeds.shape[0])
-    first[0], first[1] = left + margin, right - margin
+    first = np.empty(FIRST_SAMPLES + 2 * (END_SAMPLES + 1) + seeds.shape[0])
+    shift = (theta * ROW_SHIFT) % 1.0
     for n in range(FIRST_SAMPLES):
-        first[2 + n] = left + whole * (n + 0.25 + 0.5 * ((n * GOLDEN) % 1.0)) / FIRST_SAMPLES
-    first[FIRST_SAMPLES + 2 :] = seeds
+        first[n] = left + whole * (n + 0.25 + 0.5 * ((n * GOLDEN + shift) % 1.0)) / FIRST_SAMPLES
+    share = 1.0 / FIRST_SAMPLES
+    count = FIRST_SAMPLES
+    for _ in range(END_SAMPLES):
+        share *= END_RATIO
+        first[count], first[count + 1] = left + share * whole, right - share * whole
+        count += 2
+    first[count], first[count + 1] = left + margin, right - margin
+    first[count + 2 :] = seeds
     first.sort()
     return first
 
 
 @_compile
-def march_row(task, goal, rules, least, seeds, chain, nodes, ends):
-    """Nodes and masses of one row; returns their number, the error, the lost width, pieces and rays.
+def march_row(task, goal, rules, least, seeds, chain, nodes, pieces):
+    """Nodes and masses of one row; returns their number, the error, the lost width, the number of pieces and of rays.
 
-    ``ends`` receives the middles of the pieces, seeds for the next row.
+    ``pieces`` receives first and last place and label of every piece.
     """
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
     hollow, degree = task[1], task[6]
     left, right = hollow[0], hollow[1]
     whole = right - left
-    count, last = sample_row(first_places(hollow, goal, seeds), task, chain, GAP_SHARE * goal)
+    count, last = sample_row(first_places(task[0], hollow, goal, seeds), task, chain, GAP_SHARE * goal)
     rays = 0
     # the margins count with the first and the last sample
     node[0], mass[0] = outs[0], xs[0] - left
     node[1], mass[1] = outs[last], right - xs[last]
-    filled, pieces, lost = 2, 0, 0.0
+    filled, number, lost = 2, 0, 0.0
     error = 2.0 * EPS * whole
     error += mass[0] * spread(outs[0], outs[1], degree) + mass[1] * spread(outs[last], outs[last - 1], degree)
     i = 0
@@ -90,9 +107,8 @@ def march_row(task, goal, rules, least, seeds, chain, nodes, ends):
             if labels[i] < FIRST_LABEL:
                 lost += xs[j] - xs[i]
                 error += 2.0 * (xs[j] - xs[i])
-        if pieces < ends.shape[0]:
-            ends[pieces] = 0.5 * (xs[i] + xs[j])
-        pieces += 1
+        pieces[0][number], pieces[1][number], pieces[2][number] = xs[i], xs[j], labels[i]
+        number += 1
         following = follow[j]
         if following >= 0:
             width = xs[following] - xs[j]
@@ -105,41 +121,67 @@ def march_row(task, goal, rules, least, seeds, chain, nodes, ends):
                 error += width
             error += undecided(j, task, chain)
         i = following
-    return filled, error, lost, pieces, rays + count
+    return filled, error, lost, number, rays + count
 
 
 @_compile
-def longer(array, used, least):
-    """The array with room for ``least`` entries, of which the first ``used`` are kept."""
-    if least <= array.shape[0]:
-        return array
-    bigger = np.empty(2 * least)
-    bigger[:used] = array[:used]
+def room_for_pieces(count):
+    """First places, last places and labels."""
+    return np.empty(count), np.empty(count), np.empty(count, np.uint64)
+
+
+@_compile
+def longer(array, size):
+    """The array with room for so many entries."""
+    bigger = np.empty(size, array.dtype)
+    bigger[: array.shape[0]] = array
     return bigger
 
 
 @_compile
-def march_rows(thetas, tolerances, scene, degree, rules, least, most_seeds):
-    """Rows at increasing angles: nodes and masses one after the other, where each row starts, errors, lost, rays.
+def wide_middles(lows, highs, least):
+    """The middles of the pieces wider than that: of the widest ones, if they are many."""
+    wide = highs - lows > least
+    if wide.sum() > MOST_SEEDS:
+        wide = highs - lows >= np.sort(highs - lows)[-MOST_SEEDS]
+    return 0.5 * (lows[wide] + highs[wide])
 
-    ``scene``: hollow, tables, period, limit of collisions, edges of cells. Each row starts also from the middles of its
-    neighbour's pieces, so that a narrow piece is followed until it vanishes.
+
+@_compile
+def march_rows(thetas, tolerances, scene, degree, rules, least, seeds, seed_starts):
+    """Rows at increasing angles.
+
+    ``scene``: hollow, tables, period, limit of collisions, edges of cells. A row starts also from its seeds, and from
+    the middles of the pieces of the row before, so that a narrow piece is followed until it vanishes. Returns outgoing
+    angles and masses, one row after the other, and where each row starts; the same of first places, last places and
+    labels of the pieces; and the error, the width lost and the number of rays of each row.
     """
     hollow, tables, period, limit, edges = scene
+    whole = hollow[1] - hollow[0]
     chain, code = empty_chain(), np.zeros(1, np.uint64)
     nodes = np.empty(MOST_NODES + SPARE), np.empty(MOST_NODES + SPARE)
-    ends, seeds = np.empty(most_seeds), np.empty(0)
+    pieces = room_for_pieces(MOST_SAMPLES)
     n = thetas.shape[0]
-    starts = np.zeros(n + 1, np.int64)
+    node_starts, piece_starts = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
     errors, lost, rays = np.empty(n), np.empty(n), np.empty(n, np.int64)
-    all_node, all_mass = np.empty(1024), np.empty(1024)
+    all_nodes = np.empty(1024), np.empty(1024)
+    all_pieces = room_for_pieces(1024)
+    previous = np.empty(0)
     for k in range(n):
         task = (thetas[k], hollow, tables, period, limit, edges, degree, code)
-        goal = tolerances[k] * (hollow[1] - hollow[0])
-        filled, errors[k], lost[k], pieces, rays[k] = march_row(task, goal, rules, least, seeds, chain, nodes, ends)
-        seeds = ends[: min(pieces, most_seeds)].copy()
-        begin, end = starts[k], starts[k] + filled
-        all_node, all_mass = longer(all_node, begin, end), longer(all_mass, begin, end)
-        all_node[begin:end], all_mass[begin:end] = nodes[0][:filled], nodes[1][:filled]
-        starts[k + 1] = end
-    return all_node[: starts[n]], all_mass[: starts[n]], starts, errors, lost, rays
+        goal = tolerances[k] * whole
+        places = np.concatenate((previous, seeds[seed_starts[k] : seed_starts[k + 1]]))
+        filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, least, places, chain, nodes, pieces)
+        previous = wide_middles(pieces[0][:number], pieces[1][:number], goal)
+        begin, end = node_starts[k], node_starts[k] + filled
+        if end > all_nodes[0].shape[0]:
+            all_nodes = longer(all_nodes[0], 2 * end), longer(all_nodes[1], 2 * end)
+        all_nodes[0][begin:end], all_nodes[1][begin:end] = nodes[0][:filled], nodes[1][:filled]
+        node_starts[k + 1] = end
+        begin, end = piece_starts[k], piece_starts[k] + number
+        if end > all_pieces[0].shape[0]:
+            all_pieces = longer(all_pieces[0], 2 * end), longer(all_pieces[1], 2 * end), longer(all_pieces[2], 2 * end)
+        all_pieces[0][begin:end], all_pieces[1][begin:end] = pieces[0][:number], pieces[1][:number]
+        all_pieces[2][begin:end] = pieces[2][:number]
+        piece_starts[k + 1] = end
+    return all_nodes, node_starts, all_pieces, piece_starts, errors, lost, rays
