@@ -178,3 +178,8 @@ class WallRows:
             lost[place],
             sum(rows.rays for rows in self._hollows) - before,
         )
+
+    def critical_angles(self, low: float, high: float) -> Floats:
+        """Angles in (low, high), increasing, where pieces of rows are born or vanish: the most important ones known."""
+        found = [cut for rows in self._hollows for cut in rows.critical_angles(low, high)]
+        return np.unique([angle for angle, _ in found])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 MOST_COLLISIONS = 100_000
 # Rounds in which rows are done again because a neighbour has a piece that they have overlooked.
 MOST_ROUNDS = 8
+# Critical angles looked for at a time, and the least width of their pieces as a share of the widest of them.
+MOST_CUTS, CUT_SHARE = 6, 0.1
 
 
 class Row(NamedTuple):
@@ -55,6 +58,7 @@ class HollowRows:
         self._theta = np.empty(0)
         self._pieces: dict[float, _Pieces] = {}
         self._overlooked: dict[float, list[float]] = {}
+        self._critical: dict[tuple[int, float, float], float] = {}
 
     @property
     def width(self) -> float:
@@ -141,3 +145,51 @@ class HollowRows:
         for angle, x in zip(angles[owner].tolist(), places.tolist(), strict=True):
             self._overlooked.setdefault(angle, []).append(x)
         return set(angles[owner].tolist())
+
+    def critical_angles(self, low: float, high: float) -> list[tuple[float, float]]:
+        """Angles in (low, high) where a piece is born or vanishes, with the width of that piece in the nearest row.
+
+        Only those that the rows known so far on either side of them show.
+        """
+        first = max(0, int(np.searchsorted(self._theta, low)) - 1)
+        last = int(np.searchsorted(self._theta, high, side="right")) + 1
+        angles = self._theta[first:last].tolist()
+        found = []
+        for before, after in pairwise(angles):
+            for present, absent in ((before, after), (after, before)):
+                there = set(self._pieces[absent].label.tolist())
+                row = self._pieces[present]
+                for k, label in enumerate(row.label.tolist()):
+                    if label not in there and row.high[k] - row.low[k] > row.width_that_matters:
+                        found.append((float(row.high[k] - row.low[k]), label, present, absent, k))
+        found.sort(reverse=True)
+        cuts = []
+        for width, label, present, absent, k in found[:MOST_CUTS]:
+            if width < CUT_SHARE * found[0][0]:
+                break
+            angle = self._located(label, present, absent, k)
+            if low < angle < high:
+                cuts.append((angle, width))
+        return cuts
+
+    def _located(self, label: int, present: float, absent: float, k: int) -> float:
+        from ..geometry.critical_angles import find_critical
+
+        key = (label, min(present, absent), max(present, absent))
+        for (name, low, high), angle in self._critical.items():
+            if name == label and low <= angle <= high and key[1] <= angle <= key[2]:
+                return angle
+        row = self._pieces[present]
+        low, high = float(row.low[k]), float(row.high[k])
+        place = int(np.searchsorted(self._theta, present)) + (1 if absent < present else -1)
+        drift = 0.0
+        if 0 <= place < len(self._theta):
+            beyond = float(self._theta[place])
+            other = np.flatnonzero(self._pieces[beyond].label == np.uint64(label))
+            if len(other) == 1:
+                there = self._pieces[beyond]
+                middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
+                drift = (0.5 * (low + high) - middle) / (present - beyond)
+        angle = float(find_critical(np.uint64(label), present, absent, low, high, drift, self._bounds, self.degree))
+        self._critical[key] = angle
+        return angle
