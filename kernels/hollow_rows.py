@@ -124,8 +124,11 @@ class HollowRows:
 
         k = int(np.searchsorted(self._theta, angle))
         known = [self._pieces[near] for near in self._theta[max(0, k - 1) : k + 2].tolist()]
-        middles = [wide_middles(row.low, row.high, least) for row in known]
-        return np.concatenate([*middles, np.array(self._overlooked.get(angle, []), dtype=np.float64)])
+        places = [wide_middles(row.low, row.high, least) for row in known]
+        if angle in self._pieces:
+            # its own changes are known already, up to the gaps that were left
+            places += [self._pieces[angle].low, self._pieces[angle].high]
+        return np.concatenate([*places, np.array(self._overlooked.get(angle, []), dtype=np.float64)])
 
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among these and their neighbours whose rows have overlooked pieces."""

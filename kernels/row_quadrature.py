@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +32,9 @@ VALUES_AT_ONCE = 2_000_000
 # The rows together may spend this share of the tolerance.
 ROW_SHARE = 0.1
 SMALLEST_ROW_TOLERANCE = 1e-14
+# Tolerances are approached in stages by this ratio, from one that is no coarser than this: where no more than a coarse
+# result can be had, its rows are coarse as well.
+STAGE_RATIO, COARSEST_STAGE = 1e-2, 0.1
 # The rows of a narrow panel may be coarser: the panel may spend this share of what all rows together may.
 FAIR_SHARE = 0.02
 COARSEST_ROW = 1e-4
@@ -99,26 +103,46 @@ class _Integrator:
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
         self.rows = WallRows(wall, degree, inside, least)
-        self.row_tolerance = max(ROW_SHARE * self.tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
-        self.panels = self._new_panels(edges[:-1], edges[1:])
+        self.stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
+        self.row_tolerance = ROW_SHARE * self.tolerance / STAGE_RATIO**self.stages / self.scale
+        self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
+        self._add_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
-        """Divide panels until the error is small enough, or no rays are left."""
-        goal = self.tolerance
-        while True:
-            matrix, known, hidden = self._state()
-            if known + hidden <= self.tolerance or self.rays >= self.most_rays:
+        """Divide panels until the error is small enough, or no rays are left: first for coarser tolerances."""
+        for stage in range(self.stages, -1, -1):
+            error = self._meet(self._begin(stage))
+            if self.rays >= self.most_rays:
                 break
+        return self._state()[0], error, self.rays
+
+    def _begin(self, stage: int) -> float:
+        """The tolerance of a stage; rows whose error is too large for it are done again."""
+        tolerance = self.tolerance / STAGE_RATIO**stage
+        self.row_tolerance = max(ROW_SHARE * tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
+        coarse = self.panels.row_errors(self.basis) > 2.0 * ROW_SHARE * tolerance * np.maximum(
+            self.panels.mass, FAIR_SHARE
+        )
+        self._fill(self.panels, np.broadcast_to(coarse[:, None], self.panels.angle.shape))
+        self._mend()
+        return tolerance
+
+    def _meet(self, tolerance: float) -> float:
+        """Divide panels until the error is below the tolerance, or no rays are left; returns the error."""
+        goal = tolerance
+        while True:
+            _, known, hidden = self._state()
+            if known + hidden <= tolerance or self.rays >= self.most_rays:
+                return known + hidden
             # errors that only the asymmetry shows lie in panels whose rules agree by chance
-            goal = min(goal, max(self.tolerance - hidden, 0.25 * known))
+            goal = min(goal, max(tolerance - hidden, 0.25 * known))
             chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
             if not chosen.any():
-                break
+                return known + hidden
             self._divide(chosen)
-        return matrix, known + hidden, self.rays
 
     def _state(self) -> tuple[Floats, float, float]:
         """The matrix, the error that its panels and rows are known to have, and what its asymmetry adds."""
@@ -159,15 +183,15 @@ class _Integrator:
         ]
         owner = np.repeat(np.arange(len(parts)), [len(part) - 1 for part in parts])
         self.panels = self.panels.kept(~chosen)
-        children = self._new_panels(np.concatenate([p[:-1] for p in parts]), np.concatenate([p[1:] for p in parts]))
+        self._add_panels(np.concatenate([p[:-1] for p in parts]), np.concatenate([p[1:] for p in parts]))
+        children = self.panels.kept(np.arange(-len(owner), 0))
         after, value = children.differences(self.basis), children.values(self.basis)
         total = np.zeros_like(whole)
         np.add.at(total, owner, value)
         actual = np.linalg.norm(total - whole, axis=(1, 2))
         ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
         smooth = after < SMOOTH_SHRINKING * before[owner]
-        children.error = np.where(smooth, ratio * after, after)
-        self.panels = self.panels.joined(children)
+        self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, after)
 
     def _cuts(self, low: float, high: float) -> Floats:
         """Where a panel is divided: at critical angles, in its middle if none is known inside it."""
@@ -176,19 +200,21 @@ class _Integrator:
         cuts = cuts[np.concatenate(([True], np.diff(cuts) > margin))[: len(cuts)]]
         return cuts if len(cuts) else np.array([0.5 * (low + high)])
 
-    def _new_panels(self, low: Floats, high: Floats) -> AnglePanels:
-        """Panels with their rows; earlier panels are mended where a row turns out to have overlooked a piece."""
-        panels = AnglePanels.between(low, high, self.basis.size)
-        self._fill(panels, np.ones(panels.angle.shape, dtype=np.bool_))
+    def _add_panels(self, low: Floats, high: Floats) -> None:
+        """Append panels, with their rows."""
+        fresh = AnglePanels.between(low, high, self.basis.size)
+        self._fill(fresh, np.ones(fresh.angle.shape, dtype=np.bool_))
+        self.panels = self.panels.joined(fresh)
+        self._mend()
+
+    def _mend(self) -> None:
+        """Do rows again that turned out to have overlooked a piece."""
         for _ in range(MOST_MENDINGS):
-            stale = sorted(self.rows.stale)
+            stale = np.isin(self.panels.angle, list(self.rows.stale))
             self.rows.stale.clear()
-            if not stale:
+            if not stale.any():
                 break
-            for known in (panels, getattr(self, "panels", None)):
-                if known is not None:
-                    self._fill(known, np.isin(known.angle, stale))
-        return panels
+            self._fill(self.panels, stale)
 
     def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
         """Compute the rows at these nodes, and the panels' differences of the rules as their errors."""
