@@ -26,10 +26,14 @@ ATTEMPTS = 4000
 
 @dataclass(frozen=True)
 class Domain:
-    """Open intervals, exact, one a symbol; ``conditions`` are the relations that are not of that kind."""
+    """Intervals, exact, one a symbol, taken without their ends; ``closed`` says that some end belongs to the domain.
+
+    ``conditions`` are the relations that are not the bound of one symbol.
+    """
 
     intervals: dict[Any, tuple[Any, Any]]
     conditions: tuple[Any, ...] = ()
+    closed: bool = False
 
     @classmethod
     def of(cls, symbols: Iterable[Any], assumptions: Iterable[Any]) -> Domain:
@@ -44,18 +48,22 @@ class Domain:
         every = set(symbols).union(*(relation.free_symbols for relation in relations))
         intervals = {symbol: _own_interval(symbol) for symbol in sorted(every, key=str)}
         conditions = []
+        closed = any(
+            (s.is_nonnegative and not s.is_positive) or (s.is_nonpositive and not s.is_negative) for s in every
+        )
         for relation in relations:
             bound = _bound(relation)
             if bound is None:
                 conditions.append(relation)
                 continue
             symbol, low, high = bound
+            closed = closed or isinstance(relation, sp.Le | sp.Ge)
             old_low, old_high = intervals[symbol]
             intervals[symbol] = sp.Max(old_low, low), sp.Min(old_high, high)
         for symbol, (low, high) in intervals.items():
             if not bool(low < high):
                 raise InputError(f"assumptions: no value of {symbol} lies between {low} and {high}")
-        return cls(intervals, tuple(conditions))
+        return cls(intervals, tuple(conditions), closed)
 
     def points(self, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
         """Rational points inside, simple ones first; conditions are met exactly."""

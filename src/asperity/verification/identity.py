@@ -42,7 +42,7 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] = ()) -> Verdict:
     >>> verify(sympy.sqrt(m**2 * sympy.sin(theta) ** 2), m * sympy.sin(theta), [0 < theta, theta < sympy.pi]).answer
     'proved'
     >>> print(verify(sympy.sqrt(sympy.sin(theta) ** 2), sympy.sin(theta), [theta < 0]).counterexample)
-    {'theta': '-1'}
+    {'theta': '-1/3'}
     """
     import sympy as sp
 
@@ -56,7 +56,7 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] = ()) -> Verdict:
 def _entries(sp: Any, side: Any) -> list[Any]:
     if isinstance(side, sp.MatrixBase | list | tuple):
         return [entry for part in side for entry in _entries(sp, part)]
-    return [sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(float(e)))]
+    return [sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(e))]
 
 
 def _decided(left: Any, right: Any, assumptions: list[Any]) -> Verdict:
