@@ -1,5 +1,11 @@
 """Walls, disks and tracing: curves, walls by name, profile or file, and where rays go in them."""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from ..verification.identity import verify
 from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
@@ -26,6 +32,9 @@ from .segment import Segment
 from .tracing import Status, Trace, trace, trajectory
 from .wall import Wall
 from .wallfile import load_wall
+
+if TYPE_CHECKING:
+    from . import symbolic
 
 __all__ = [
     "WALLS",
@@ -56,8 +65,17 @@ __all__ = [
     "plane_crossing_differential",
     "read_profile",
     "rectangular_teeth",
+    "symbolic",
     "trace",
     "trajectory",
     "triangular_teeth",
+    "verify",
     "wall_from_text",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # sympy is loaded when it is first asked for
+    if name == "symbolic":
+        return import_module(".symbolic", __name__)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
