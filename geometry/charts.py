@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats, finite_array, positive_number
 from ..errors import InputError
 from . import rolling
-from .rolling import NUMERIC, Matrix, Vector
+from .rolling import Matrix, Vector
 
 # How far 2 pi/spacing may be from a whole number because the spacing was computed or written with 12 digits.
 WHOLE_NUMBER = 1e-9
@@ -103,17 +103,17 @@ class RollingCharts:
         """
         x1, x2, alpha = _split("configuration", configuration, 3)
         bar = alpha + np.asarray(number) * (self.spacing / self.scale)
-        return _join(rolling.satellite(x1, x2, bar, self.scale, NUMERIC))
+        return _join(rolling.satellite(x1, x2, bar, self.scale))
 
     def contact(self, configuration: ArrayLike) -> Floats:
         """Return the place (..., 2) of the lowest satellite: G_eps (eq. 3.60', as the map of M* to the plane)."""
         x1, x2, alpha = _split("configuration", configuration, 3)
-        return _join(rolling.satellite(x1, x2, self.residual(alpha), self.scale, NUMERIC))
+        return _join(rolling.satellite(x1, x2, self.residual(alpha), self.scale))
 
     def contact_differential(self, configuration: ArrayLike) -> Floats:
         """Return the differential (..., 2, 3) of `contact`: dG_eps (eq. 3.66)."""
         _, _, alpha = _split("configuration", configuration, 3)
-        return _matrix(rolling.satellite_differential(self.residual(alpha), self.scale, NUMERIC), alpha.shape)
+        return _matrix(rolling.satellite_differential(self.residual(alpha), self.scale), alpha.shape)
 
     def roll(self, point: ArrayLike, alpha: ArrayLike) -> Floats:
         """Return the configurations (..., 3) with lowest satellite at ``point`` (..., 2), turned by ``alpha``.
@@ -128,7 +128,7 @@ class RollingCharts:
         """
         s1, s2 = _split("point", point, 2)
         turned = finite_array("alpha", alpha)
-        return _join((*rolling.roll(s1, s2, self.residual(turned), self.scale, NUMERIC), turned))
+        return _join((*rolling.roll(s1, s2, self.residual(turned), self.scale), turned))
 
     def roll_linear(self, point: ArrayLike, alpha: ArrayLike) -> Floats:
         """Return (s1 - alpha, s2, alpha): f_lin, the linear part of `roll` at alpha = 0 and the chart of M_cyl."""
@@ -143,17 +143,17 @@ class RollingCharts:
         rho is a whole multiple of the wall's period (eq. 5.71, corrected). There `bend` o `roll_linear` = `roll`.
         """
         y1, y2, alpha = _split("configuration", configuration, 3)
-        return _join((*rolling.bend(y1, y2, self.residual(alpha), self.scale, NUMERIC), alpha))
+        return _join((*rolling.bend(y1, y2, self.residual(alpha), self.scale), alpha))
 
     def straighten(self, configuration: ArrayLike) -> Floats:
         """Return the inverse of `bend` at configurations (..., 3)."""
         x1, x2, alpha = _split("configuration", configuration, 3)
-        return _join((*rolling.straighten(x1, x2, self.residual(alpha), self.scale, NUMERIC), alpha))
+        return _join((*rolling.straighten(x1, x2, self.residual(alpha), self.scale), alpha))
 
     def bend_differential(self, configuration: ArrayLike) -> Floats:
         """Return the differential (..., 3, 3) of `bend`; its determinant is 1."""
         _, _, alpha = _split("configuration", configuration, 3)
-        return _matrix(rolling.bend_differential(self.residual(alpha), self.scale, NUMERIC), alpha.shape)
+        return _matrix(rolling.bend_differential(self.residual(alpha), self.scale), alpha.shape)
 
     def transfer(self, position: ArrayLike, velocity: ArrayLike) -> Floats:
         """Return phi_w, the position of eta(y, w): `bend`, then along the velocity back to height 0.
@@ -178,7 +178,7 @@ class RollingCharts:
         """
         x1, alpha = _split("position", position, 2)
         w = _velocity(velocity)
-        return _join(rolling.transfer(x1, alpha, self.residual(alpha), w, self.scale, NUMERIC))
+        return _join(rolling.transfer(x1, alpha, self.residual(alpha), w, self.scale))
 
     def transfer_differential(self, position: ArrayLike, velocity: ArrayLike) -> Floats:
         """Return the differential (..., 2, 5) of `transfer` in (x1, alpha, v1, v2, omega).
@@ -187,7 +187,7 @@ class RollingCharts:
         """
         x1, alpha = _split("position", position, 2)
         w = _velocity(velocity)
-        entries = rolling.transfer_differential(self.residual(alpha), w, self.scale, NUMERIC)
+        entries = rolling.transfer_differential(self.residual(alpha), w, self.scale)
         return _matrix(entries, np.broadcast_shapes(x1.shape, w[0].shape))
 
 

@@ -13,7 +13,7 @@ from ..errors import InputError
 from . import rolling
 from .charts import RollingCharts
 from .disk import Disk
-from .rolling import NUMERIC
+from .kinetics import contact_normal
 from .solid import in_solid
 from .wall import Wall
 
@@ -109,10 +109,10 @@ class ConfigurationSpace:
         rho = default_spacing(eps, wall.depth) if spacing is None else RollingCharts(spacing).spacing
         for name, value in (("wall", wall), ("disk", disk), ("scale", eps), ("spacing", rho)):
             object.__setattr__(self, name, value)
-        if not self.depth < float(NUMERIC.rise(self.spacing)):
+        if not self.depth < float(rolling.rise(self.spacing)):
             raise InputError(
                 f"spacing: expected scale * depth = {self.depth:.3g} below 1 - cos(spacing) = "
-                f"{float(NUMERIC.rise(self.spacing)):.3g}, so that at most two satellites reach the wall; take a "
+                f"{float(rolling.rise(self.spacing)):.3g}, so that at most two satellites reach the wall; take a "
                 "smaller scale or a larger spacing"
             )
 
@@ -137,7 +137,7 @@ class ConfigurationSpace:
 
         arcsin(depth/(2 sin(rho/2))), which is sharp for a wall that reaches its depth close to every point.
         """
-        return float(rolling.gap_radius(self.depth, self.spacing, NUMERIC))
+        return float(rolling.gap_radius(self.depth, self.spacing))
 
     def is_single(self, alpha: ArrayLike) -> NDArray[np.bool_]:
         """Return whether alpha is in Z, where only one satellite can touch; the rest has share 2 delta_0/rho."""
@@ -196,5 +196,5 @@ class ConfigurationSpace:
         if k.ndim == 0 or k.shape[-1] != 2:
             raise InputError(f"wall_normal: expected an array of shape (..., 2), got shape {k.shape}")
         angle = finite_array("alpha", alpha) + np.asarray(number) * self.spacing
-        n = rolling.contact_normal(k[..., 0], k[..., 1], angle, self.disk.mass, self.disk.inertia, NUMERIC)
+        n = contact_normal(self.disk.mass, self.disk.inertia, (k[..., 0], k[..., 1]), angle)
         return np.stack(np.broadcast_arrays(*n), axis=-1)

@@ -4,14 +4,13 @@ A configuration is (x1, x2, alpha): the centre, its height over the level where 
 angle. Lengths are in units of ``scale``, and so is ``alpha``, the length that the rim turns by: with ``scale`` 1 these
 are the coordinates of Rudzis 2022, sections 1.3 and 4, with ``scale`` eps the zoomed ones of section 5.3. Heights of
 satellites are measured from the tops too: the paper's are smaller by 1/scale (its ``W^c + e_2`` is our wall). ``bar``
-is the part of alpha beyond the nearest multiple of the spacing (alpha-bar, alpha-bar*). ``fn`` supplies the functions:
-`NUMERIC` for arrays, real or complex, `symbolic()` for sympy.
+is the part of alpha beyond the nearest multiple of the spacing (alpha-bar, alpha-bar*). ``xp`` is the arithmetic:
+``numpy`` for arrays, real or complex, ``sympy`` for expressions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -24,75 +23,54 @@ Vector = tuple[Any, ...]
 Matrix = tuple[Vector, ...]
 
 
-class Functions(NamedTuple):
-    """The functions of an angle x that the formulas need."""
+def rise(angle: Any, xp: Any = np) -> Any:
+    """1 - cos: how much higher than its lowest point the rim is at an angle from it."""
+    return 2 * xp.sin(angle / 2) ** 2
 
-    sin: Callable[[Any], Any]
-    cos: Callable[[Any], Any]
-    rise: Callable[[Any], Any]
-    """1 - cos x: how much higher than the lowest point of the rim the rim is at the angle x."""
-    slip: Callable[[Any], Any]
+
+def slip(angle: Any, xp: Any = np) -> Any:
     """x - sin x: how far rolling about a satellite is from rolling along the line."""
-    sqrt: Callable[[Any], Any]
-    asin: Callable[[Any], Any]
-
-
-def _rise(x: Any) -> Any:
-    return 2.0 * np.sin(0.5 * x) ** 2
-
-
-def _slip(x: Any) -> Any:
-    square = x * x
+    if xp is not np:
+        return angle - xp.sin(angle)
+    square = angle * angle
     series = np.ones_like(square)
     for denominator in reversed(SLIP_DENOMINATORS):
         series = 1.0 - square / denominator * series
-    return np.where(np.abs(x) < SERIES_ANGLE, x * square / 6.0 * series, x - np.sin(x))
+    return np.where(np.abs(angle) < SERIES_ANGLE, angle * square / 6.0 * series, angle - np.sin(angle))
 
 
-NUMERIC = Functions(np.sin, np.cos, _rise, _slip, np.sqrt, np.arcsin)
-
-
-def symbolic() -> Functions:
-    """Return the functions for sympy expressions."""
-    import sympy
-
-    return Functions(
-        sympy.sin, sympy.cos, lambda x: 1 - sympy.cos(x), lambda x: x - sympy.sin(x), sympy.sqrt, sympy.asin
-    )
-
-
-def satellite(x1: Any, x2: Any, bar: Any, scale: Any, fn: Functions) -> Vector:
+def satellite(x1: Any, x2: Any, bar: Any, scale: Any, xp: Any = np) -> Vector:
     """S_k + e_2 (eq. 1.38), bar = alpha + k rho: the satellite, and G_eps (eq. 3.60') where it is the nearest one.
 
     G_eps as printed is G_0 o H_eps^(-1) on Z^0* only; elsewhere that product has k rho/eps more in x1. This formula is
     the one that maps M* onto the free part of the plane.
     """
-    return x1 + fn.sin(scale * bar) / scale, x2 + fn.rise(scale * bar) / scale
+    return x1 + xp.sin(scale * bar) / scale, x2 + rise(scale * bar, xp) / scale
 
 
-def satellite_differential(bar: Any, scale: Any, fn: Functions) -> Matrix:
+def satellite_differential(bar: Any, scale: Any, xp: Any = np) -> Matrix:
     """The differential of `satellite` in (x1, x2, alpha): dG_eps (eq. 3.66)."""
-    return (1, 0, fn.cos(scale * bar)), (0, 1, fn.sin(scale * bar))
+    return (1, 0, xp.cos(scale * bar)), (0, 1, xp.sin(scale * bar))
 
 
-def roll(s1: Any, s2: Any, bar: Any, scale: Any, fn: Functions) -> Vector:
+def roll(s1: Any, s2: Any, bar: Any, scale: Any, xp: Any = np) -> Vector:
     """The centre of the disk whose contact satellite is at (s1, s2): F (eq. 4.4) and f* (eq. 3.56, corrected)."""
-    return s1 - fn.sin(scale * bar) / scale, s2 - fn.rise(scale * bar) / scale
+    return s1 - xp.sin(scale * bar) / scale, s2 - rise(scale * bar, xp) / scale
 
 
-def bend(y1: Any, y2: Any, bar: Any, scale: Any, fn: Functions) -> Vector:
+def bend(y1: Any, y2: Any, bar: Any, scale: Any, xp: Any = np) -> Vector:
     """The centre to which H_1 (eq. 4.43) and H_eps (eq. 3.54) take a point of the cylinder; alpha stays."""
-    return y1 + fn.slip(scale * bar) / scale, y2 - fn.rise(scale * bar) / scale
+    return y1 + slip(scale * bar, xp) / scale, y2 - rise(scale * bar, xp) / scale
 
 
-def straighten(x1: Any, x2: Any, bar: Any, scale: Any, fn: Functions) -> Vector:
+def straighten(x1: Any, x2: Any, bar: Any, scale: Any, xp: Any = np) -> Vector:
     """The inverse of `bend`."""
-    return x1 - fn.slip(scale * bar) / scale, x2 + fn.rise(scale * bar) / scale
+    return x1 - slip(scale * bar, xp) / scale, x2 + rise(scale * bar, xp) / scale
 
 
-def bend_differential(bar: Any, scale: Any, fn: Functions) -> Matrix:
+def bend_differential(bar: Any, scale: Any, xp: Any = np) -> Matrix:
     """The differential of H_1 or H_eps in (x1, x2, alpha)."""
-    return (1, 0, fn.rise(scale * bar)), (0, 1, -fn.sin(scale * bar)), (0, 0, 1)
+    return (1, 0, rise(scale * bar, xp)), (0, 1, -xp.sin(scale * bar)), (0, 0, 1)
 
 
 def project(x1: Any, x2: Any, alpha: Any, v1: Any, v2: Any, omega: Any) -> Vector:
@@ -106,36 +84,26 @@ def project_differential(x2: Any, v1: Any, v2: Any, omega: Any) -> Matrix:
     return (1, -v1 / v2, 0, -time, time * v1 / v2, 0), (0, -omega / v2, 1, 0, time * omega / v2, -time)
 
 
-def transfer(x1: Any, alpha: Any, bar: Any, velocity: Vector, scale: Any, fn: Functions) -> Vector:
+def transfer(x1: Any, alpha: Any, bar: Any, velocity: Vector, scale: Any, xp: Any = np) -> Vector:
     """phi_w, the position of eta = Psi o H_1 (eq. 4.75; section 5.2, where all corrections have the wrong sign)."""
-    y1, y2 = bend(x1, 0, bar, scale, fn)
+    y1, y2 = bend(x1, 0, bar, scale, xp)
     return project(y1, y2, alpha, *velocity)
 
 
-def transfer_differential(bar: Any, velocity: Vector, scale: Any, fn: Functions) -> Matrix:
+def transfer_differential(bar: Any, velocity: Vector, scale: Any, xp: Any = np) -> Matrix:
     """The differential of `transfer` in (x1, alpha, v1, v2, omega); the first two columns are d phi_w (corrected)."""
     v1, v2, omega = velocity
-    rise, sin = fn.rise(scale * bar), fn.sin(scale * bar)
-    time = rise / scale / v2
+    up, sin = rise(scale * bar, xp), xp.sin(scale * bar)
+    time = up / scale / v2
     return (
-        (1, rise + sin * v1 / v2, time, -time * v1 / v2, 0),
+        (1, up + sin * v1 / v2, time, -time * v1 / v2, 0),
         (0, 1 + sin * omega / v2, 0, -time * omega / v2, time),
     )
 
 
-def contact_normal(k1: Any, k2: Any, angle: Any, mass: Any, inertia: Any, fn: Functions) -> Vector:
-    """n(q) (eq. 3.26, corrected): the unit normal of M where the satellite at ``angle`` = alpha + j rho touches.
-
-    (k1, k2) is the wall's unit normal there, out of the wall. Printed are alpha - j rho and a misplaced parenthesis.
-    """
-    arm = k1 * fn.cos(angle) + k2 * fn.sin(angle)
-    norm = fn.sqrt(1 / mass + arm**2 / inertia)
-    return k1 / mass / norm, k2 / mass / norm, arm / inertia / norm
-
-
-def gap_radius(depth: Any, spacing: Any, fn: Functions) -> Any:
+def gap_radius(depth: Any, spacing: Any, xp: Any = np) -> Any:
     """delta_0: beyond it from odd multiples of rho/2 adjacent satellites differ in height by more than ``depth``.
 
     Their heights differ by 2 sin(rho/2) sin(rho/2 - bar), so the radius is sharp (section 4.1, Claim 4.2.1).
     """
-    return fn.asin(depth / (2 * fn.sin(spacing / 2)))
+    return xp.asin(depth / (2 * xp.sin(spacing / 2)))

@@ -8,7 +8,7 @@ import shapely
 from asperity import geometry as geo
 from asperity.errors import InputError
 from asperity.geometry import rolling
-from asperity.geometry.rolling import NUMERIC, SERIES_ANGLE
+from asperity.geometry.rolling import SERIES_ANGLE
 
 CHARTS = [geo.RollingCharts(2 * np.pi / 40), geo.RollingCharts(2 * np.pi / 9000, scale=1e-8)]
 IN_UNITS = pytest.mark.parametrize("charts", CHARTS, ids=["unzoomed", "zoomed"])
@@ -107,9 +107,7 @@ def test_linear_rolling_is_the_linear_part_of_rolling():
 def test_the_differential_of_bending(charts):
     c = configurations(charts)
     bar = charts.residual(c[:, 2])
-    expected = complex_steps(
-        lambda x1, x2, b: (*rolling.bend(x1, x2, b, charts.scale, NUMERIC), b), [c[:, 0], c[:, 1], bar]
-    )
+    expected = complex_steps(lambda x1, x2, b: (*rolling.bend(x1, x2, b, charts.scale), b), [c[:, 0], c[:, 1], bar])
     np.testing.assert_allclose(charts.bend_differential(c), expected, rtol=1e-13, atol=1e-18)
     np.testing.assert_allclose(np.linalg.det(charts.bend_differential(c)), 1.0, rtol=1e-15)
 
@@ -118,9 +116,7 @@ def test_the_differential_of_bending(charts):
 def test_the_differential_of_the_contact(charts):
     c = configurations(charts)
     bar = charts.residual(c[:, 2])
-    expected = complex_steps(
-        lambda x1, x2, b: rolling.satellite(x1, x2, b, charts.scale, NUMERIC), [c[:, 0], c[:, 1], bar]
-    )
+    expected = complex_steps(lambda x1, x2, b: rolling.satellite(x1, x2, b, charts.scale), [c[:, 0], c[:, 1], bar])
     np.testing.assert_allclose(charts.contact_differential(c), expected, rtol=1e-13, atol=1e-18)
 
 
@@ -128,9 +124,7 @@ def test_the_differential_of_the_contact(charts):
 def test_the_differential_of_the_transfer(charts):
     c, w = configurations(charts), velocities()
     bar = charts.residual(c[:, 2])
-    expected = complex_steps(
-        lambda x1, b, *v: rolling.transfer(x1, b, b, v, charts.scale, NUMERIC), [c[:, 0], bar, *w.T]
-    )
+    expected = complex_steps(lambda x1, b, *v: rolling.transfer(x1, b, b, v, charts.scale), [c[:, 0], bar, *w.T])
     found = charts.transfer_differential(c[:, [0, 2]], w)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-15)
     jacobian = 1.0 + np.sin(charts.scale * bar) * w[:, 2] / w[:, 1]
@@ -179,8 +173,8 @@ def test_the_slip_is_accurate_on_both_sides_of_the_change_of_formula():
     x = np.concatenate([np.geomspace(1e-12, 3.0, 200), SERIES_ANGLE + np.array([-1e-15, 0.0, 1e-15])])
     with mpmath.workdps(60):
         exact = np.array([float(mpmath.mpf(v) - mpmath.sin(mpmath.mpf(v))) for v in x])
-    np.testing.assert_allclose(NUMERIC.slip(x), exact, rtol=2e-15)
-    np.testing.assert_array_equal(NUMERIC.slip(-x), -NUMERIC.slip(x))
+    np.testing.assert_allclose(rolling.slip(x), exact, rtol=2e-15)
+    np.testing.assert_array_equal(rolling.slip(-x), -rolling.slip(x))
 
 
 def fitted_order(defect) -> float:
@@ -201,7 +195,7 @@ def test_bending_is_the_identity_up_to_the_square_of_the_spacing():
         c = np.stack([0.0 * alpha, 0.0 * alpha, alpha], axis=-1)
         moved = np.linalg.norm(charts.bend(c) - c, axis=-1).max()
         half = 0.5 * charts.spacing
-        assert moved <= NUMERIC.slip(half) + NUMERIC.rise(half)
+        assert moved <= rolling.slip(half) + rolling.rise(half)
         return moved
 
     assert fitted_order(defect) == pytest.approx(2.0, abs=0.01)
@@ -329,7 +323,7 @@ def test_the_normal_is_the_kinetic_gradient_of_the_satellites_distance():
         found = space.normal(alpha, number, k)
 
         def distance(x1, x2, angle, k=k, number=number, space=space):
-            s1, s2 = rolling.satellite(x1, x2, angle + number * space.spacing, 1.0, NUMERIC)
+            s1, s2 = rolling.satellite(x1, x2, angle + number * space.spacing, 1.0)
             return (k[:, 0] * s1 + k[:, 1] * s2,)
 
         gradient = complex_steps(distance, [0 * alpha, 0 * alpha, alpha])[:, 0]
