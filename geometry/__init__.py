@@ -9,6 +9,8 @@ from ..verification.identity import verify
 from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
+from .charts import RollingCharts, plane_crossing, plane_crossing_differential
+from .configuration import ConfigurationSpace, default_spacing
 from .curve import Curve
 from .disk import Disk
 from .drawing import draw_wall
@@ -38,15 +40,18 @@ __all__ = [
     "WALLS",
     "Arc",
     "Bezier",
+    "ConfigurationSpace",
     "Curve",
     "Disk",
     "Hollow",
     "NamedWall",
+    "RollingCharts",
     "Segment",
     "Status",
     "Trace",
     "TracePlan",
     "Wall",
+    "default_spacing",
     "dispersing_arcs",
     "double_parabola",
     "draw_wall",
@@ -56,6 +61,8 @@ __all__ = [
     "koch",
     "load_wall",
     "mushrooms",
+    "plane_crossing",
+    "plane_crossing_differential",
     "read_profile",
     "rectangular_teeth",
     "symbolic",
