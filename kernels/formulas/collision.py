@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -151,7 +152,7 @@ def bounce_on_the_cylinder(disk: Disk, wall: Wall, place: Any, velocity: Any) ->
         along = np.array([velocity[0] + velocity[2], velocity[1]])
         point = np.array([position[0] + position[2], position[1]])
         time, side = (-point[1] / along[1], -1) if along[1] > 0 and last >= 0 else (math.inf, -1)
-        for index, (a, b) in enumerate(zip(vertices[:-1], vertices[1:], strict=True)):
+        for index, (a, b) in enumerate(pairwise(vertices)):
             edge = b - a
             cross = along[0] * edge[1] - along[1] * edge[0]
             if index == last or cross == 0:
@@ -174,13 +175,13 @@ def bounce_on_the_cylinder(disk: Disk, wall: Wall, place: Any, velocity: Any) ->
     id="S2.28",
     section="5.1, 1.3.7",
     equation="3.10 and the law of rough collisions",
-    statement="On the cylinder a collision is reflection by the foreshortened wall in θ, and free in the other direction.",
+    statement="On the cylinder a collision is reflection by the foreshortened wall, and free along χ.",
     printed=Formula(
         r"K_{\mathrm{cyl}}(\theta, \psi) = (P^{\tilde\Sigma}(\theta), \pi - \psi)",
         lambda wall, disk: wall.foreshorten(disk),
     ),
     perturbed=lambda wall, disk: wall.unforeshorten(disk),
-    reason="Simulated in three dimensions with the kinetic-energy normal, the disk leaves as the traced particle of the "
+    reason="Simulated in three dimensions with the kinetic-energy normal, the disk leaves as the particle of the "
     "foreshortened wall does. With the inverse exponent the angles differ.",
     kind="numeric",
 )

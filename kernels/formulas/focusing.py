@@ -150,7 +150,7 @@ def hits_on_an_arc(step_and_number: Code) -> Verdict:
         r" \Theta' = \theta + N \Delta\gamma + \pi \text{ else}",
         lambda turned, forward: turned + np.where(forward, -np.pi, np.pi),
     ),
-    reason="The incoming velocity has the angle π + θ, so the formula is right mod π, for lines without orientation. In "
+    reason="The incoming velocity has the angle π + θ, so the formula is right mod π, for unoriented lines. In "
     "(0, π) it needs the π, as in the law of the library.",
     kind="numeric",
 )
@@ -236,8 +236,8 @@ def range_of_the_arccosine(condition: Code) -> Verdict:
         r"\gamma = \theta - \arccos(X \cos(\theta - \xi) + (1 - X) \cos(\theta + \xi))",
         lambda theta, delta: theta - delta,
     ),
-    reason="It solves the corrected eq. 2.18, in which θ − γ lies in (0, π). The printed sign puts the hit elsewhere for "
-    "every ray.",
+    reason="It solves the corrected eq. 2.18, in which θ − γ lies in (0, π). The printed sign puts the hit elsewhere "
+    "for every ray.",
     kind="numeric",
 )
 def first_hit_from_the_entry(position: Code) -> Verdict:
@@ -258,7 +258,7 @@ def first_hit_from_the_entry(position: Code) -> Verdict:
         lambda theta, gamma, xi, xp: xp.sin(theta - gamma) / (2 * xp.sin(theta) * xp.sin(xi)),
     ),
     perturbed=lambda theta, gamma, xi, xp: xp.sin(theta + gamma) / (2 * xp.sin(theta) * xp.sin(xi)),
-    reason="This is the derivative of the corrected eq. 2.18, and it is positive because θ − γ lies in (0, π). So X and "
+    reason="This is the derivative of the corrected eq. 2.18, and it is positive because θ − γ is in (0, π). So X and "
     "γ determine each other.",
 )
 def entry_increases_with_the_hit(derivative: Code) -> Verdict:
