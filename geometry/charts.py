@@ -134,7 +134,7 @@ class RollingCharts:
         """Return (s1 - alpha, s2, alpha): f_lin, the linear part of `roll` at alpha = 0 and the chart of M_cyl."""
         s1, s2 = _split("point", point, 2)
         turned = finite_array("alpha", alpha)
-        return _join((s1 - turned, s2, turned))
+        return _join(rolling.roll_linear(s1, s2, turned))
 
     def bend(self, configuration: ArrayLike) -> Floats:
         """Return H_1 (eq. 4.43), or H_eps (eq. 3.54), of configurations (..., 3).

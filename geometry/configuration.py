@@ -166,7 +166,7 @@ class ConfigurationSpace:
         values = finite_array("configuration", configuration)
         if values.ndim == 0 or values.shape[-1] != 3:
             raise InputError(f"configuration: expected an array of shape (..., 3), got shape {values.shape}")
-        place = np.stack([values[..., 0] + values[..., 2], values[..., 1]], axis=-1)
+        place = np.stack(rolling.straight_contact(*np.moveaxis(values, -1, 0)), axis=-1)
         return ~in_solid(self.wall, place / self.scale)
 
     def normal(self, alpha: ArrayLike, number: ArrayLike, wall_normal: ArrayLike) -> Floats:
