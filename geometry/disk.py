@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, angles, finite_array, frozen, positive_number
 from ..errors import InputError
-from .kinetics import direction, frame_rows
+from .kinetics import direction, foreshortening, frame_rows
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Disk:
     @property
     def foreshortening(self) -> float:
         """kappa = (1 + m/J)^(-1/2) < 1: how much the disk's rotation compresses a wall along x."""
-        return 1.0 / math.sqrt(1.0 + self.mass / self.inertia)
+        return float(foreshortening(self.mass, self.inertia))
 
     @property
     def frame(self) -> Floats:

@@ -29,6 +29,11 @@ def direction(theta: Any, psi: Any, xp: Any = np) -> list[Any]:
     return [xp.cos(theta) * xp.sin(psi), xp.sin(theta) * xp.sin(psi), xp.cos(psi)]
 
 
+def foreshortening(mass: Any, inertia: Any, xp: Any = np) -> Any:
+    """kappa = (1 + m/J)^(-1/2), by which the disk's rotation compresses a wall along x (eq. 1.66)."""
+    return 1 / xp.sqrt(1 + mass / inertia)
+
+
 def branch_block(sign: Any, cosine: Any, sine: Any) -> list[list[Any]]:
     """In the frame, the matrix of theta' = sign theta + offset, psi' = pi - psi, given cos and sin of the offset.
 

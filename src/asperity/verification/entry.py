@@ -45,7 +45,8 @@ class Entry:
     corrected : Formula or None
         What is right instead, or under the named convention; None for a verified row.
     perturbed : callable or None
-        Of a verified row: a formula that is slightly wrong, which the check must refute.
+        A formula that is slightly wrong, which the check must refute: of a verified row, and of an erratum whose
+        printed formula the audit describes but does not quote.
     status : {"verified", "erratum", "convention"}
     reason : str
         Two sentences: why it is right or wrong, and what follows or how it is checked.
@@ -99,7 +100,7 @@ class Entry:
 
     @property
     def wrong(self) -> Code | None:
-        """The formula that the check must refute: as printed in an erratum, perturbed in a verified row."""
+        """The formula that the check must refute: as printed where that is wrong, else perturbed."""
         return self.perturbed if self.perturbed is not None else self.printed.code
 
     def run(self) -> Finding:
@@ -147,24 +148,24 @@ def verified(
 
 def erratum(
     *, id: str, section: str, statement: str, printed: Formula, corrected: Formula, reason: str,
-    kind: Kind = "symbolic", equation: str = "",
+    kind: Kind = "symbolic", equation: str = "", perturbed: Code | None = None,
 ) -> Callable[[Check], Entry]:  # fmt: skip
     """Make a check the entry of a formula that is wrong or misprinted."""
 
     def entry(check: Check) -> Entry:
-        return Entry(id, section, statement, printed, "erratum", reason, kind, corrected, None, equation, check)
+        return Entry(id, section, statement, printed, "erratum", reason, kind, corrected, perturbed, equation, check)
 
     return entry
 
 
 def convention(
     *, id: str, section: str, statement: str, printed: Formula, corrected: Formula, reason: str,
-    kind: Kind = "symbolic", equation: str = "",
+    kind: Kind = "symbolic", equation: str = "", perturbed: Code | None = None,
 ) -> Callable[[Check], Entry]:  # fmt: skip
     """Make a check the entry of a formula that is right only under a convention that the text does not name."""
 
     def entry(check: Check) -> Entry:
-        return Entry(id, section, statement, printed, "convention", reason, kind, corrected, None, equation, check)
+        return Entry(id, section, statement, printed, "convention", reason, kind, corrected, perturbed, equation, check)
 
     return entry
 

@@ -61,14 +61,16 @@ def holds(condition: ArrayLike, of_what: str, **where: ArrayLike) -> Verdict:
 def _judged(
     left: np.ndarray, right: np.ndarray, defect: np.ndarray, allowed: float, words: str, where: dict[str, ArrayLike]
 ) -> Verdict:
-    # a NaN is a defect, and the worst one
-    badness = np.where(np.isnan(defect), np.inf, defect)
-    index = np.unravel_index(int(np.argmax(badness)), badness.shape)
-    evidence = words.format(worst=f"{float(badness[index]):.2g}") + f", allowed {allowed:.2g}"
-    if badness[index] <= allowed:
+    broken = np.isnan(defect)
+    index = np.unravel_index(int(np.argmax(np.where(broken, np.inf, defect))), defect.shape)
+    place = _place(index, defect.shape, where)
+    if broken.any():
+        # neither for the formula nor against it
+        return Verdict("undecided", f"not a number at {int(broken.sum())} of {defect.size} places", place)
+    evidence = words.format(worst=f"{float(defect[index]):.2g}") + f", allowed {allowed:.2g}"
+    if defect[index] <= allowed:
         return Verdict("agrees", evidence)
-    values = (f"{float(left[index]):.6g}", f"{float(right[index]):.6g}")
-    return Verdict("refuted", evidence, _place(index, badness.shape, where), values)
+    return Verdict("refuted", evidence, place, (f"{float(left[index]):.6g}", f"{float(right[index]):.6g}"))
 
 
 def _place(index: tuple[np.intp, ...], shape: tuple[int, ...], where: dict[str, ArrayLike]) -> dict[str, float]:
