@@ -13,6 +13,8 @@ from ..errors import InputError
 from . import rolling
 from .rolling import Matrix, Vector
 
+# With fewer satellites the lowest of them may turn to the side of the disk.
+FEWEST = 4
 # How far 2 pi/spacing may be from a whole number because the spacing was computed or written with 12 digits.
 WHOLE_NUMBER = 1e-9
 
@@ -27,7 +29,7 @@ class RollingCharts:
     Parameters
     ----------
     spacing : float
-        rho in radians, 2 pi over a whole number of at least 3 (to 1e-9).
+        rho in radians, 2 pi over a whole number of at least 4 (to 1e-9).
     scale : float
         Unit of length, greater than 0: 1 for the maps F, f_lin, H_1, eta of Rudzis 2022, section 4; eps for the zoomed
         maps f*, H_eps, G_eps of section 5.3. The third coordinate is in the same unit: alpha/scale.
@@ -48,7 +50,8 @@ class RollingCharts:
     -----
     Arrays broadcast. Heights, of centres and of satellites, are measured from where a satellite at the lowest point of
     the rim touches the tops of the wall, as in `Wall`; the paper's heights of satellites are less by 1/scale. Nothing
-    cancels for small angles: 1 - cos and x - sin x are computed as such.
+    cancels for small angles: 1 - cos and x - sin x are computed as such. The formulas are those of
+    `asperity.geometry.rolling`, which takes ``xp=sympy`` too; the ledger proves them.
 
     Examples
     --------
@@ -67,10 +70,10 @@ class RollingCharts:
     def __post_init__(self) -> None:
         spacing = positive_number("spacing", self.spacing)
         count = round(2.0 * math.pi / spacing)
-        if count < 3 or abs(2.0 * math.pi / spacing - count) > WHOLE_NUMBER * count:
+        if count < FEWEST or abs(2.0 * math.pi / spacing - count) > WHOLE_NUMBER * count:
             raise InputError(
-                f"spacing: expected 2 pi over a whole number of at least 3, got {spacing!r}; the nearest such is "
-                f"{2.0 * math.pi / max(count, 3)!r}"
+                f"spacing: expected 2 pi over a whole number of at least {FEWEST}, got {spacing!r}; the "
+                f"nearest such is {2.0 * math.pi / max(count, FEWEST)!r}"
             )
         object.__setattr__(self, "spacing", 2.0 * math.pi / count)
         object.__setattr__(self, "scale", positive_number("scale", self.scale))
@@ -134,7 +137,7 @@ class RollingCharts:
         """Return (s1 - alpha, s2, alpha): f_lin, the linear part of `roll` at alpha = 0 and the chart of M_cyl."""
         s1, s2 = _split("point", point, 2)
         turned = finite_array("alpha", alpha)
-        return _join((s1 - turned, s2, turned))
+        return _join(rolling.roll_linear(s1, s2, turned))
 
     def bend(self, configuration: ArrayLike) -> Floats:
         """Return H_1 (eq. 4.43), or H_eps (eq. 3.54), of configurations (..., 3).

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats, finite_array, positive_number
 from ..errors import InputError
 from . import rolling
-from .charts import RollingCharts
+from .charts import FEWEST, RollingCharts
 from .disk import Disk
 from .kinetics import contact_normal
 from .solid import in_solid
@@ -40,7 +40,7 @@ def default_spacing(scale: float, depth: float = 1.0) -> float:
     Raises
     ------
     InputError
-        If the wall is too deep for any disk with 3 satellites.
+        If the wall is too deep for a disk with 4 satellites.
 
     Examples
     --------
@@ -53,10 +53,10 @@ def default_spacing(scale: float, depth: float = 1.0) -> float:
     if 0.0 < reach < 2.0:
         # 1 - cos(rho) = 2 sin^2(rho/2) > reach
         count = min(count, math.ceil(math.pi / math.asin(math.sqrt(0.5 * reach))) - 1)
-    if reach >= 2.0 or count < 3:
+    if reach >= 2.0 or count < FEWEST:
         raise InputError(
             f"scale: expected a wall much smaller than the disk of radius 1, got scale {eps:g} and depth {depth:g}, "
-            "which leave no room for 3 satellites; take a smaller scale"
+            f"which leave no room for {FEWEST} satellites; take a smaller scale"
         )
     return 2.0 * math.pi / count
 
@@ -166,7 +166,7 @@ class ConfigurationSpace:
         values = finite_array("configuration", configuration)
         if values.ndim == 0 or values.shape[-1] != 3:
             raise InputError(f"configuration: expected an array of shape (..., 3), got shape {values.shape}")
-        place = np.stack([values[..., 0] + values[..., 2], values[..., 1]], axis=-1)
+        place = np.stack(rolling.straight_contact(*np.moveaxis(values, -1, 0)), axis=-1)
         return ~in_solid(self.wall, place / self.scale)
 
     def normal(self, alpha: ArrayLike, number: ArrayLike, wall_normal: ArrayLike) -> Floats:

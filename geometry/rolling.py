@@ -58,6 +58,19 @@ def roll(s1: Any, s2: Any, bar: Any, scale: Any, xp: Any = np) -> Vector:
     return s1 - xp.sin(scale * bar) / scale, s2 - rise(scale * bar, xp) / scale
 
 
+def roll_linear(s1: Any, s2: Any, alpha: Any) -> Vector:
+    """f_lin: the linear part of `roll` at alpha = 0, with alpha; the chart of M_cyl (section 4.2)."""
+    return s1 - alpha, s2, alpha
+
+
+def straight_contact(x1: Any, x2: Any, alpha: Any) -> Vector:
+    """G_0, the inverse of `roll_linear` for each alpha: a point is in M_cyl if this is in the free part of the plane.
+
+    Section 4.2; section 1.3.3 prints (x1 + alpha, alpha).
+    """
+    return x1 + alpha, x2
+
+
 def bend(y1: Any, y2: Any, bar: Any, scale: Any, xp: Any = np) -> Vector:
     """The centre to which H_1 (eq. 4.43) and H_eps (eq. 3.54) take a point of the cylinder; alpha stays."""
     return y1 + slip(scale * bar, xp) / scale, y2 - rise(scale * bar, xp) / scale

@@ -6,6 +6,7 @@ import pytest
 import shapely
 
 from asperity import geometry as geo
+from asperity import ledger
 from asperity.errors import InputError
 from asperity.geometry import rolling
 from asperity.geometry.rolling import SERIES_ANGLE
@@ -268,6 +269,18 @@ def test_a_configuration_is_free_if_no_satellite_is_in_the_solid(wall):
     assert 0.05 < free.mean() < 0.95
 
 
+def test_islands_are_solid_and_what_is_under_them_is_free():
+    disc = [geo.Arc((0.4, -0.4), 0.2, 0.0, -2.0 * np.pi)]
+    wall = geo.Wall([geo.Segment((0.0, -1.0), (1.0, -1.0))], islands=[disc])
+    space = geo.ConfigurationSpace(wall, geo.Disk(), scale=0.01)
+    rng = np.random.default_rng(9)
+    x, y = rng.uniform(-2, 2, 3000), rng.uniform(-1.2, 0.2, 3000)
+    free = (np.hypot(np.mod(x, 1.0) - 0.4, y + 0.4) >= 0.2) & (y >= -1.0)
+    places = np.stack([x, y, 0.0 * x], axis=-1) * space.scale
+    np.testing.assert_array_equal(space.contains(places), free)
+    np.testing.assert_array_equal(space.cylinder_contains(places), free)
+
+
 def test_the_boundary_of_the_solid_is_free():
     space = geo.ConfigurationSpace(geo.rectangular_teeth(1.0), geo.Disk(), scale=0.5**6)
     eps = space.scale
@@ -354,9 +367,9 @@ def test_the_default_spacing_is_the_least_that_keeps_a_third_satellite_off(scale
     ("make", "message"),
     [
         (lambda: geo.RollingCharts(1.0), "2 pi over a whole number"),
-        (lambda: geo.RollingCharts(4.0), "at least 3"),
+        (lambda: geo.RollingCharts(4.0), "at least 4"),
         (lambda: geo.RollingCharts(np.pi / 4, scale=0.0), "scale: expected a number greater than 0"),
-        (lambda: geo.default_spacing(0.5, 10.0), "no room for 3 satellites"),
+        (lambda: geo.default_spacing(0.5, 10.0), "no room for 4 satellites"),
         (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "a Wall and a Disk"),
         (lambda: geo.ConfigurationSpace(geo.koch(2), geo.Disk(), 0.1, np.pi / 50), "at most two satellites"),
         (lambda: geo.ConfigurationSpace(geo.flat(), geo.Disk(), 0.1).contains([0.0, 1.0]), r"shape \(..., 3\)"),
@@ -369,6 +382,24 @@ def test_the_default_spacing_is_the_least_that_keeps_a_third_satellite_off(scale
 def test_bad_input_is_refused_with_advice(make, message):
     with pytest.raises(InputError, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    ("row", "formula"),
+    [
+        ("S4.04", rolling.gap_radius),
+        ("S4.12", rolling.roll_linear),
+        ("S4.13", rolling.bend),
+        ("S4.16", rolling.straight_contact),
+        ("S4.19", rolling.project),
+        ("S5.09", rolling.transfer),
+        ("S5.15", rolling.bend),
+        ("S5.18", rolling.satellite_differential),
+    ],
+)
+def test_the_ledger_checks_the_very_formula_that_the_charts_use(row, formula):
+    (entry,) = ledger.selected([row])
+    assert entry.right is formula
 
 
 def test_arrays_broadcast():
