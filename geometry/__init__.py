@@ -20,6 +20,7 @@ from .named import (
 )
 from .plan import TracePlan
 from .profile import read_profile
+from .rigid import RigidCollision, collide
 from .segment import Segment
 from .tracing import Status, Trace, trace, trajectory
 from .wall import Wall
@@ -33,11 +34,13 @@ __all__ = [
     "Disk",
     "Hollow",
     "NamedWall",
+    "RigidCollision",
     "Segment",
     "Status",
     "Trace",
     "TracePlan",
     "Wall",
+    "collide",
     "dispersing_arcs",
     "double_parabola",
     "draw_wall",
