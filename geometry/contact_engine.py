@@ -28,11 +28,17 @@ from numba import njit
 from .engine import CORNER, ESCAPED, GRAZING, LINE, NO_PIECE, SIDE, near_end, on_arc
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
+# an array that is passed costs ten arguments: small functions are inlined
+_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 # A contact is clear, or double precision does not settle it; the codes are those of the statuses of rays.
 CLEAR = ESCAPED
+# numba compiles a function again for every literal that it is called with, but not for constants of these types
+NOTHING, ZERO, NO = np.int64(-1), np.int64(0), np.bool_(False)
 # The series of `half_turn` are cut after the tenth power: below this angle the rest is less than 2e-18.
 SMALL_TURN = 0.1
+S3, S5, S7, S9 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362880.0
+C2, C4, C6, C8, C10 = -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3628800.0
 # Of the slack, 16 rounding errors, a root's own error may be this share.
 ROOT_SHARE = 1.0 / 16.0
 # Incidences below 1e-6 radians are treated as that one, so that the slack stays far below the pieces' lengths.
@@ -44,33 +50,34 @@ ROOT_STEPS = 400
 ARC = 8
 
 
-@_compile
+@_inline
 def half_turn(h):
     """Sine and cosine of h, quickly where h is small."""
     if abs(h) < SMALL_TURN:
         z = h * h
-        sine = h * (1.0 - z / 6.0 * (1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0))))
-        cosine = 1.0 - 0.5 * z * (1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * (1.0 - z / 90.0))))
-        return sine, cosine
+        sine = h + h * z * (S3 + z * (S5 + z * (S7 + z * S9)))
+        return sine, 1.0 + z * (C2 + z * (C4 + z * (C6 + z * (C8 + z * C10))))
     return math.sin(h), math.cos(h)
 
 
-@_compile
+@_inline
 def satellite_after(t, turn, motion):
     """Displacement (2) of a satellite after the time t, and the sine and cosine of its angle then.
 
     ``turn`` is (sin a, cos a) at the start, ``motion`` is (v1, v2, omega, scale).
     """
-    v1, v2, omega, scale = motion
     sine, cosine = turn
+    if t == 0.0:
+        return 0.0, 0.0, sine, cosine
+    v1, v2, omega, scale = motion
     half_sine, half_cosine = half_turn(0.5 * scale * omega * t)
     sin_d, versed_d = 2.0 * half_sine * half_cosine, 2.0 * half_sine * half_sine
-    dx = v1 * t + (cosine * sin_d - sine * versed_d) / scale
-    dy = v2 * t + (sine * sin_d + cosine * versed_d) / scale
-    return dx, dy, sine - sine * versed_d + cosine * sin_d, cosine - cosine * versed_d - sine * sin_d
+    d_sine, fall = cosine * sin_d - sine * versed_d, sine * sin_d + cosine * versed_d
+    radius = 1.0 / scale
+    return v1 * t + d_sine * radius, v2 * t + fall * radius, sine + d_sine, cosine - fall
 
 
-@_compile
+@_inline
 def safe_step(f, f1, c):
     """First positive root of the parabola f + f1 t + c t^2/2 with f >= 0, or inf; 0 only where f = 0 > f1."""
     disc = f1 * f1 - 2.0 * c * f
@@ -131,7 +138,7 @@ def next_root(sign, leaving, piece, t, end, state, turn, motion, fastest, patien
     return np.inf, state, CLEAR
 
 
-@_compile
+@_inline
 def where_on_line(joints, lines, j, x, y, slack):
     """How a point of the line through segment j lies to the segment: inside, and within the slack of a corner."""
     along = (x - joints[j, 0]) * lines[j, 0] + (y - joints[j, 1]) * lines[j, 1]
@@ -141,7 +148,7 @@ def where_on_line(joints, lines, j, x, y, slack):
     return from_start >= -slack and from_end >= -slack, corner
 
 
-@_compile
+@_inline
 def first_on_piece(kind, index, own, x, y, t, end, state, turn, motion, fastest, size, slack, joints, lines, arcs):
     """First contact in [t, end) of one satellite with the front of one piece, the state there, and a code.
 
@@ -190,10 +197,10 @@ def first_on_piece(kind, index, own, x, y, t, end, state, turn, motion, fastest,
         leaving = True
 
 
-@_compile
+@_inline
 def first_in_hollow(
-    hollows, h, own_kind, own_index, came_from, x, y, t, end, state, turn, motion, fastest, slack, is_open, joints, lines,
-    arcs,
+    hollows, h, own_kind, own_index, came_from, x, y, t, end, state, turn, motion, fastest, slack, is_open, joints,
+    lines, arcs,
 ):  # fmt: skip
     """First contact of one satellite with the pieces of the hollow h: time (inf), kind, index, state and code.
 
@@ -201,22 +208,16 @@ def first_in_hollow(
     in through the left or the right one.
     """
     kind, index, code, where, size = NO_PIECE, -1, CLEAR, state, hollows[h, 2]
-    for j in range(int(hollows[h, 3]), int(hollows[h, 4])):
-        if joints[j, 3] > 0.0:
-            own = own_kind == LINE and own_index == j
-            hit, place, unclear = first_on_piece(
-                LINE, j, own, x, y, t, end, state, turn, motion, fastest, size, slack, joints, lines, arcs
-            )
-            if hit < end:
-                end, kind, index, code, where = hit, LINE, j, unclear, place
-    for part in (5, 7):
+    for part in (3, 5, 7):
+        tried = LINE if part == 3 else ARC
         for k in range(int(hollows[h, part]), int(hollows[h, part + 1])):
-            own = own_kind == ARC and own_index == k
-            hit, place, unclear = first_on_piece(
-                ARC, k, own, x, y, t, end, state, turn, motion, fastest, size, slack, joints, lines, arcs
-            )
-            if hit < end:
-                end, kind, index, code, where = hit, ARC, k, unclear, place
+            if tried == ARC or joints[k, 3] > 0.0:
+                own = own_kind == tried and own_index == k
+                hit, place, unclear = first_on_piece(
+                    tried, k, own, x, y, t, end, state, turn, motion, fastest, size, slack, joints, lines, arcs
+                )
+                if hit < end:
+                    end, kind, index, code, where = hit, tried, k, unclear, place
     if is_open:
         for side in (-1, 1):
             edge = hollows[h, 0] if side < 0 else hollows[h, 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -209,4 +210,4 @@ def _tables(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
 def _slack(scene: Scene, ring: Satellites, scale: float) -> float:
     """The rounding error of places: of the wall's size, and of the distance from the lowest point to a satellite."""
     size = float(scene.hollows[:, 2].max()) if len(scene.hollows) else 0.0
-    return SLACK * (size + scene.cell + np.sin(ring.reach) / scale)
+    return SLACK * (size + scene.cell + math.sin(ring.reach) / scale)

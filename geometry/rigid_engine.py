@@ -10,17 +10,19 @@ import math
 import numpy as np
 from numba import njit
 
-from .contact_engine import ARC, CLEAR, first_in_hollow, next_root, satellite_after
-from .engine import BOUNCE_LIMIT, CIRCLE, CORNER, ELLIPSE, ESCAPED, LINE, NO_PIECE, SIDE
+from .contact_engine import CLEAR, NO, NOTHING, ZERO, first_in_hollow, next_root, satellite_after
+from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
 
 TOP = 7
 # Cells that one satellite may pass, and satellites that may pass the lowest point, in one flight.
 MOST_CELLS = 1_000_000
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
+# an array that is passed costs ten arguments: small functions are inlined
+_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
-@_compile
+@_inline
 def hollow_at(hollows, place):
     """The hollow over which a place of the cell lies, or -1 over a flat top."""
     low, high = 0, hollows.shape[0]
@@ -34,7 +36,7 @@ def hollow_at(hollows, place):
     return h if h >= 0 and place < hollows[h, 1] else -1
 
 
-@_compile
+@_inline
 def near_edge(hollows, place, slack):
     """Whether a place at height 0 is within the slack of an end of a hollow that is a corner."""
     for h in range(hollows.shape[0]):
@@ -47,13 +49,13 @@ def near_edge(hollows, place, slack):
 
 @_compile
 def dive(x, y, t, end, state, turn, motion, fastest, slack, cell, is_open, hollows):
-    """When and where a satellite comes below the tops in [t, end): time (inf), state, hollow, its cell's left end, code.
+    """When and where a satellite comes below the tops in [t, end).
 
-    The hollow is -1 where it meets a flat top.
+    Returns the time (inf if it does not), state, hollow (-1 where it meets a flat top), its cell's left end and code.
     """
     if y + state[1] > 0.0:
         lid = (y, 0.0, 1.0, 0.0, 1.0)
-        t, state, code = next_root(1.0, False, lid, t, end, state, turn, motion, fastest, np.inf, slack)
+        t, state, code = next_root(1.0, NO, lid, t, end, state, turn, motion, fastest, np.inf, slack)
         if t >= end or code != CLEAR:
             return np.inf, state, -1, 0.0, CLEAR
     base = math.floor((x + state[0]) / cell) * cell
@@ -76,7 +78,7 @@ def first_contact(
     in the hollow ``h`` of the cell that begins at ``base``, or above the tops if h is -1. Returns time (inf if none),
     kind, index, hollow, its cell's left end, state and code.
     """
-    v1, v2, omega, scale = motion
+    v1, v2, omega, _ = motion
     fastest = math.sqrt(v1 * v1 + v2 * v2) + abs(omega)
     state = satellite_after(t, turn, motion)
     if own_kind == TOP:
@@ -88,7 +90,7 @@ def first_contact(
             return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
         if h < 0 or code != CLEAR:
             return t, TOP, -1, -1, base, state, code
-    came_from = 0
+    came_from = ZERO
     for _ in range(MOST_CELLS):
         t, kind, index, state, code = first_in_hollow(
             hollows, h, own_kind, own_index, came_from, x - base, y, t, end, state, turn, motion, fastest, slack,
@@ -100,11 +102,11 @@ def first_contact(
             return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
         base += index * cell
         came_from = -index
-        own_kind = NO_PIECE
+        own_kind = ZERO
     return t, NO_PIECE, -1, h, base, state, BOUNCE_LIMIT
 
 
-@_compile
+@_inline
 def surface(kind, index, x, y, joints, lines, arcs):
     """The point (x, y) put back on the piece that it hit, and the unit normal there, towards the free side."""
     if kind == LINE:
@@ -127,14 +129,14 @@ def surface(kind, index, x, y, joints, lines, arcs):
     return arcs[index, 0] + qx, arcs[index, 1] + qy / stretch, n1 * norm, n2 * norm
 
 
-@_compile
+@_inline
 def satellite_at(x, y, angle, j, spacing, scale):
     """Where the j-th satellite after the one at (x, y) and ``angle`` is, without cancellation."""
     middle, chord = angle + 0.5 * j * spacing, 2.0 * math.sin(0.5 * j * spacing) / scale
     return x + chord * math.cos(middle), y + chord * math.sin(middle)
 
 
-@_compile
+@_inline
 def within_reach(other, rate, reach):
     """When a satellite at the angle ``other`` first comes within reach of the wall: 0 if it is, inf if it leaves."""
     if abs(other) <= reach:
@@ -142,7 +144,7 @@ def within_reach(other, rate, reach):
     return (abs(other) - reach) / abs(rate) if other * rate < 0.0 else np.inf
 
 
-@_compile
+@_inline
 def first_of_all(own, below, x, y, angle, turn, motion, end, ring, cell, is_open, hollows, joints, lines, arcs):
     """First contact of any satellite before ``end``.
 
@@ -159,7 +161,8 @@ def first_of_all(own, below, x, y, angle, turn, motion, end, ring, cell, is_open
     # the others in the order in which they come within reach of the wall
     rate = scale * motion[2]
     step = -1 if rate > 0.0 else 1
-    j = -step * int(math.floor((reach + step * angle) / spacing))
+    # numba's floor is a float
+    j = -step * int(math.floor((reach + step * angle) / spacing))  # noqa: RUF046
     for _ in range(MOST_CELLS):
         other = angle + j * spacing
         start = within_reach(other, rate, reach)
@@ -170,9 +173,9 @@ def first_of_all(own, below, x, y, angle, turn, motion, end, ring, cell, is_open
             sine = math.sin(other)
             # the path bends upward, so that it stays above its first tangent
             if start > 0.0 or y_other <= 0.0 or y_other + (motion[1] + motion[2] * sine) * time < 0.0:
-                inside, left = (below[1], below[2]) if j == below[0] else (-1, 0.0)
+                inside, left = (below[1], below[2]) if j == below[0] else (NOTHING, 0.0)
                 t, kind, index, hollow, left, state, unclear = first_contact(
-                    NO_PIECE, -1, inside, left, x_other, y_other, start, time, (sine, math.cos(other)), motion, slack,
+                    ZERO, NOTHING, inside, left, x_other, y_other, start, time, (sine, math.cos(other)), motion, slack,
                     cell, is_open, hollows, joints, lines, arcs,
                 )  # fmt: skip
                 if t < time:
@@ -191,7 +194,7 @@ def left_below(own, below, x, y, angle, time, chosen, place, motion, ring, cell,
     """
     scale, spacing, reach, _, slack = ring
     if is_open:
-        return 0, -1, 0.0
+        return ZERO, NOTHING, 0.0
     later = angle + scale * motion[2] * time + chosen * spacing
     for side in (-1, 1):
         if abs(later + side * spacing) <= reach:
@@ -213,10 +216,10 @@ def left_below(own, below, x, y, angle, time, chosen, place, motion, ring, cell,
                 )
                 if t < time:
                     return j, h, base
-    return 0, -1, 0.0
+    return ZERO, NOTHING, 0.0
 
 
-@_compile
+@_inline
 def reflect(v1, v2, omega, n1, n2, turn, disk):
     """Velocities after an impulse along the wall's normal n at a satellite: specular in the kinetic metric."""
     mass, inertia = disk
@@ -232,7 +235,7 @@ def reflect(v1, v2, omega, n1, n2, turn, disk):
     return scale * v1, scale * v2, scale * omega
 
 
-@_compile
+@_inline
 def angle_data(angle):
     """(sine, cosine) of an angle, and 1 - cosine without cancellation."""
     half = math.sin(0.5 * angle)
@@ -240,7 +243,7 @@ def angle_data(angle):
     return (2.0 * half * math.cos(0.5 * angle), 1.0 - versed), versed
 
 
-@_compile
+@_inline
 def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, hollows, joints, lines, arcs):
     """One collision of a disk that comes down at height 0, its lowest satellite at ``angle`` from the lowest point.
 
@@ -253,7 +256,7 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, 
     travel, turned, contacts, two = 0.0, 0.0, 0, False
     turn, versed = angle_data(angle)
     x, y, height = place + turn[0] / scale, versed / scale, 0.0
-    own, below = (NO_PIECE, -1, -1), (0, -1, 0.0)
+    own, below = (ZERO, NOTHING, NOTHING), (ZERO, NOTHING, 0.0)
     while True:
         motion = (v1, v2, omega, scale)
         # by then it is back, or would be lower than it can be
@@ -303,7 +306,7 @@ def collide_disks(
     for i in range(position.shape[0]):
         norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
         place = (position[i, 0] - math.floor(position[i, 0] / width) * width) / scale
-        angle = position[i, 1] - spacing * np.round(position[i, 1] / spacing)
+        angle = position[i, 1] - spacing * round(position[i, 1] / spacing)
         travel, turned, v1, v2, omega, contacts[i], two_satellites[i], status[i] = collide_disk(
             place, angle, velocity[i, 0] / norm, velocity[i, 1] / norm, velocity[i, 2] / norm, disk, ring, limit,
             cell, is_open, hollows, joints, lines, arcs,
