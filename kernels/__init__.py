@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from .collision_matrices import no_slip_matrix, smooth_matrix
     from .composition import Composition, Power
     from .density import DensityLaw
+    from .difference import DifferenceTest, difference_test
     from .discretisation import discretise
+    from .distances import Distance, distance
     from .estimation import estimate
     from .ideal import lambertian, maxwell, retroreflection, specular
     from .involution import InvolutionLaw
@@ -48,6 +50,8 @@ _HOMES = {
     "Composition": "composition",
     "Defect": "symmetry",
     "DensityLaw": "density",
+    "DifferenceTest": "difference",
+    "Distance": "distances",
     "DrivenLaw": "law",
     "InvolutionLaw": "involution",
     "KernelMatrix": "matrix",
@@ -65,7 +69,9 @@ _HOMES = {
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
     "WallLaw": "wall_law",
+    "difference_test": "difference",
     "discretise": "discretisation",
+    "distance": "distances",
     "estimate": "estimation",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
@@ -91,6 +97,8 @@ __all__ = [
     "Composition",
     "Defect",
     "DensityLaw",
+    "DifferenceTest",
+    "Distance",
     "DrivenLaw",
     "InvolutionLaw",
     "KernelMatrix",
@@ -106,7 +114,9 @@ __all__ = [
     "TensorBasis",
     "TriangularTeethLaw",
     "WallLaw",
+    "difference_test",
     "discretise",
+    "distance",
     "estimate",
     "henyey_greenstein",
     "lambertian",
