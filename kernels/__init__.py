@@ -20,9 +20,13 @@ if TYPE_CHECKING:
     from .discretisation import discretise
     from .distances import Distance, distance
     from .estimation import estimate
+    from .extremal import ExtremalResistance, extremal_resistance
+    from .functional import air_resistance, resistance
     from .ideal import lambertian, maxwell, retroreflection, specular
+    from .interval_exchange import IntervalExchangeLaw
     from .involution import InvolutionLaw
     from .law import BranchLaw, DrivenLaw, Law
+    from .least_resistance import LeastResistanceLaw
     from .legendre import Legendre
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
@@ -53,9 +57,12 @@ _HOMES = {
     "DifferenceTest": "difference",
     "Distance": "distances",
     "DrivenLaw": "law",
+    "ExtremalResistance": "extremal",
+    "IntervalExchangeLaw": "interval_exchange",
     "InvolutionLaw": "involution",
     "KernelMatrix": "matrix",
     "Law": "law",
+    "LeastResistanceLaw": "least_resistance",
     "Legendre": "legendre",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
@@ -69,16 +76,19 @@ _HOMES = {
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
     "WallLaw": "wall_law",
+    "air_resistance": "functional",
     "difference_test": "difference",
     "discretise": "discretisation",
     "distance": "distances",
     "estimate": "estimation",
+    "extremal_resistance": "extremal",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
     "load_matrix": "matrixfile",
     "maxwell": "ideal",
     "mixture": "weighted_sum",
     "no_slip_matrix": "collision_matrices",
+    "resistance": "functional",
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
@@ -100,9 +110,12 @@ __all__ = [
     "DifferenceTest",
     "Distance",
     "DrivenLaw",
+    "ExtremalResistance",
+    "IntervalExchangeLaw",
     "InvolutionLaw",
     "KernelMatrix",
     "Law",
+    "LeastResistanceLaw",
     "Legendre",
     "MatrixLaw",
     "Panels",
@@ -114,16 +127,19 @@ __all__ = [
     "TensorBasis",
     "TriangularTeethLaw",
     "WallLaw",
+    "air_resistance",
     "difference_test",
     "discretise",
     "distance",
     "estimate",
+    "extremal_resistance",
     "henyey_greenstein",
     "lambertian",
     "load_matrix",
     "maxwell",
     "mixture",
     "no_slip_matrix",
+    "resistance",
     "retroreflection",
     "smooth_matrix",
     "specular",

@@ -27,7 +27,7 @@ class Directions(Basis):
     Examples
     --------
     >>> Directions().evaluate(0.0).round(12).tolist()
-    [1.0, 1.732050807569, -3.526231448951]
+    [1.0, 1.732050807569, -3.518874256629]
     """
 
     @property
