@@ -164,7 +164,7 @@ def contact_time(curve, bend, s, px, py, vx, vy):
 
 @_compile
 def bezier_hit(curve, own_s, px, py, vx, vy, slack):
-    """First front hit of one Bezier piece: flight time (inf if none), parameter, and 1 if it is tangent within rounding.
+    """First front hit of one Bezier piece: flight time (inf if none), parameter, 1 if it is tangent within rounding.
 
     ``own_s`` < 0: the ray does not start on this piece.
     """
