@@ -51,6 +51,7 @@ def test_the_formulas_are_balanced_latex():
                     r"\rightarrow"
                 ), entry.id
                 assert re.findall(r"\\begin\{(\w+)\}", latex) == re.findall(r"\\end\{(\w+)\}", latex), entry.id
+                assert not re.search(r"\\quad[a-zA-Z]", latex), entry.id
                 assert latex.isascii(), f"{entry.id}: {latex}"
 
 
