@@ -257,7 +257,7 @@ def normal_of_the_boundary(normal: Code) -> Verdict:
     ),
     corrected=Formula(
         r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))\bigr),\quad"
-        r"R = \bigl(m^{-1} + J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))^2\bigr)^{1/2}",
+        r" R = \bigl(m^{-1} + J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))^2\bigr)^{1/2}",
         lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha + turn, xp),
     ),
     reason="S_j is at the angle α + jρ of the rim. In R a parenthesis is misplaced too, and n(q) would not have norm "

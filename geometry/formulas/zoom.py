@@ -27,7 +27,7 @@ def _zoom(sp: Any) -> Any:
     printed=Formula(r"\bar\alpha^* = \alpha - \bar k^*\rho", lambda alpha, k, rho, eps: alpha - k * rho),
     corrected=Formula(
         r"\bar\alpha^* = \alpha - \bar k^*\rho/\varepsilon,\quad"
-        r"f^*(x) = \varepsilon^{-1}f(\varepsilon x_1, \varepsilon(x_2 + 1) - 1, \varepsilon\alpha)",
+        r" f^*(x) = \varepsilon^{-1}f(\varepsilon x_1, \varepsilon(x_2 + 1) - 1, \varepsilon\alpha)",
         lambda alpha, k, rho, eps: alpha - k * rho / eps,
     ),
     reason="Zoomed satellites are ρ/ε apart. As printed |ᾱ*| exceeds ρ/(2ε) many times; the right-hand side of eq. "
