@@ -150,22 +150,20 @@ class ConfigurationSpace:
         Only the two lowest satellites are looked at, as no third one reaches the wall; and where the centre is so low
         that the lowest satellite is below the whole wall, it is in the solid.
         """
-        values = finite_array("configuration", configuration)
-        low = self.zoomed.contact(values / self.scale)
-        bar = self.charts.residual(values[..., 2])
-        second = self.zoomed.satellite(
-            values / self.scale, np.where(bar > 0.0, -1, 1) - self.charts.nearest(values[..., 2])
-        )
-        return ~(in_solid(self.wall, low) | in_solid(self.wall, second))
+        values = _configurations(configuration)
+        bar, zoomed = self.charts.residual(values[..., 2]), values / self.scale
+        # one k for both: two roundings of a tie would give the same satellite twice
+        lowest = -self.charts.nearest(values[..., 2])
+        beside = lowest + np.where(bar > 0.0, -1, 1)
+        places = (self.zoomed.satellite(zoomed, number) for number in (lowest, beside))
+        return ~np.any([in_solid(self.wall, place) for place in places], axis=0)
 
     def cylinder_contains(self, configuration: ArrayLike) -> NDArray[np.bool_]:
         """Return whether configurations (..., 3) are in M_cyl: (x1 + alpha, x2) is not in the interior of the solid.
 
         Section 4.2; section 1.3.3 prints (x1 + alpha, alpha).
         """
-        values = finite_array("configuration", configuration)
-        if values.ndim == 0 or values.shape[-1] != 3:
-            raise InputError(f"configuration: expected an array of shape (..., 3), got shape {values.shape}")
+        values = _configurations(configuration)
         place = np.stack(rolling.straight_contact(*np.moveaxis(values, -1, 0)), axis=-1)
         return ~in_solid(self.wall, place / self.scale)
 
@@ -198,3 +196,10 @@ class ConfigurationSpace:
         angle = finite_array("alpha", alpha) + np.asarray(number) * self.spacing
         n = contact_normal(self.disk.mass, self.disk.inertia, (k[..., 0], k[..., 1]), angle)
         return np.stack(np.broadcast_arrays(*n), axis=-1)
+
+
+def _configurations(value: ArrayLike) -> Floats:
+    array = finite_array("configuration", value)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise InputError(f"configuration: expected (x1, x2, alpha) of shape (..., 3), got shape {array.shape}")
+    return array

@@ -1,5 +1,7 @@
 """The configurations of disk and wall, against rigid motions, high precision, and brute force."""
 
+from itertools import pairwise
+
 import mpmath
 import numpy as np
 import pytest
@@ -269,6 +271,21 @@ def test_a_configuration_is_free_if_no_satellite_is_in_the_solid(wall):
     assert 0.05 < free.mean() < 0.95
 
 
+def test_halfway_between_satellites_both_are_looked_at():
+    space = geo.ConfigurationSpace(geo.triangular_teeth(1.2), geo.Disk(), scale=1e-5)
+    rng = np.random.default_rng(10)
+    k = rng.integers(-300, 300, 4000)
+    alpha = (k + 0.5) * space.spacing * (1.0 + rng.integers(-2, 3, 4000) * 2.0**-53)
+    x2 = rng.uniform(-1.0, 0.0, 4000) * space.depth - 2.0 * np.sin(0.25 * space.spacing) ** 2
+    c = np.stack([rng.uniform(-1, 1, 4000) * space.scale, x2, alpha], axis=-1)
+    places = space.charts.satellite(c[:, np.newaxis], -k[:, np.newaxis] - [0, 1]) / space.scale
+    height = -space.wall.depth * (1.0 - np.abs(2.0 * np.mod(places[..., 0], 1.0) - 1.0))
+    above = places[..., 1] - height
+    clear = np.abs(above).min(axis=-1) > 1e-9
+    np.testing.assert_array_equal(space.contains(c)[clear], (above > 0).all(axis=-1)[clear])
+    assert 0.1 < np.mean((above > 0).any(axis=-1) & ~(above > 0).all(axis=-1))
+
+
 def test_islands_are_solid_and_what_is_under_them_is_free():
     disc = [geo.Arc((0.4, -0.4), 0.2, 0.0, -2.0 * np.pi)]
     wall = geo.Wall([geo.Segment((0.0, -1.0), (1.0, -1.0))], islands=[disc])
@@ -279,6 +296,16 @@ def test_islands_are_solid_and_what_is_under_them_is_free():
     places = np.stack([x, y, 0.0 * x], axis=-1) * space.scale
     np.testing.assert_array_equal(space.contains(places), free)
     np.testing.assert_array_equal(space.cylinder_contains(places), free)
+
+
+def test_the_boundary_of_an_island_is_free_also_from_below():
+    corners = [(0.25, -0.25), (0.75, -0.25), (0.75, -0.75), (0.25, -0.75), (0.25, -0.25)]
+    island = [geo.Segment(a, b) for a, b in pairwise(corners)]
+    wall = geo.Wall([geo.Segment((0.0, -1.0), (1.0, -1.0))], islands=[island])
+    space = geo.ConfigurationSpace(wall, geo.Disk(), scale=0.5**8)
+    sides = [(0.5, -0.25), (0.5, -0.75), (0.25, -0.5), (0.75, -0.5), *corners]
+    assert space.cylinder_contains([[space.scale * x, space.scale * y, 0.0] for x, y in sides]).all()
+    assert not space.cylinder_contains([0.5 * space.scale, -0.5 * space.scale, 0.0])
 
 
 def test_the_boundary_of_the_solid_is_free():
