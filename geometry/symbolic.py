@@ -68,7 +68,7 @@ def volume_density(chart: Any, parameters: Any) -> Any:
 def branch_matrix(sign: Any, offset: Any) -> Any:
     """The velocity matrix of theta' = sign theta + offset, psi' = pi - psi, incoming to outgoing."""
     block = sp.Matrix(branch_block(sign, cos(offset), sin(offset)))
-    return sp.simplify(frame.T * block * frame * metric)
+    return (frame.T * block * frame * metric).applyfunc(sp.cancel)
 
 
 def satellite_normal(number: Any) -> Any:

@@ -11,7 +11,7 @@ Imported only by functions, because it imports sympy.
 
 from __future__ import annotations
 
-from math import lcm
+from math import comb, lcm
 from typing import Any
 
 import sympy as sp
@@ -34,7 +34,7 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
     at their ends too."""
     e = parameters.normal(expression)
     # functions without a normal form of their own: equal ones have become one expression
-    e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function)})
+    e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function) if f.func is not sp.Abs})
     roots: dict[Any, tuple[Any, int]] = {}
     e = _without_roots(e, roots)
     e = sp.together(e).as_numer_denom()[0]
@@ -118,11 +118,12 @@ class Parameters:
 
     @staticmethod
     def _multiple(times: int, sine: Any, cosine: Any) -> tuple[Any, Any]:
-        z = sp.Poly((cosine + sp.Symbol("_i") * sine) ** abs(times), sp.Symbol("_i"))
-        parts = [sp.Integer(0), sp.Integer(0)]
-        for (power,), coefficient in z.terms():
-            parts[power % 2] += coefficient * (-1) ** (power // 2)
-        return (parts[1] if times >= 0 else -parts[1]), parts[0]
+        """Sine and cosine of a multiple, by the binomial formula."""
+        n = abs(times)
+        if n == 1:
+            return times * sine, cosine
+        terms = [comb(n, k) * (-1) ** (k // 2) * cosine ** (n - k) * sine**k for k in range(n + 1)]
+        return (1 if times > 0 else -1) * sp.Add(*terms[1::2]), sp.Add(*terms[::2])
 
     def _unit_circle(self, unit: Any) -> tuple[Any, Any]:
         """Sine and cosine of ``unit`` divided by its divisor."""
@@ -212,15 +213,20 @@ def _without_roots(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
     """Replace every root by a symbol; ``roots`` receives the radicands, inner roots first."""
     if not e.args:
         return e
+    if e.func is sp.Abs:
+        return _root(_without_roots(e.args[0], roots) ** 2, 2, roots)
     if e.is_Pow and e.exp.is_Rational and not e.exp.is_Integer:
-        base = _without_roots(e.base, roots)
-        for symbol, (radicand, index) in roots.items():
-            if radicand == base and index == e.exp.q:
-                return symbol**e.exp.p
-        symbol = sp.Dummy("r")
-        roots[symbol] = base, int(e.exp.q)
-        return symbol**e.exp.p
+        return _root(_without_roots(e.base, roots), int(e.exp.q), roots) ** e.exp.p
     return e.func(*(_without_roots(part, roots) for part in e.args))
+
+
+def _root(radicand: Any, index: int, roots: dict[Any, tuple[Any, int]]) -> Any:
+    for symbol, known in roots.items():
+        if known == (radicand, index):
+            return symbol
+    symbol = sp.Dummy("r")
+    roots[symbol] = radicand, index
+    return symbol
 
 
 def _reduced(e: Any, symbol: Any, index: int, power: Any) -> Any:
