@@ -156,7 +156,7 @@ class ConfigurationSpace:
         lowest = -self.charts.nearest(values[..., 2])
         beside = lowest + np.where(bar > 0.0, -1, 1)
         places = (self.zoomed.satellite(zoomed, number) for number in (lowest, beside))
-        return ~np.any([in_solid(self.wall, place) for place in places], axis=0)
+        return np.asarray(~np.any([in_solid(self.wall, place) for place in places], axis=0))
 
     def cylinder_contains(self, configuration: ArrayLike) -> NDArray[np.bool_]:
         """Return whether configurations (..., 3) are in M_cyl: (x1 + alpha, x2) is not in the interior of the solid.
