@@ -28,6 +28,7 @@ from .named import (
 )
 from .plan import TracePlan
 from .profile import read_profile
+from .rigid import RigidCollision, collide
 from .segment import Segment
 from .tracing import Status, Trace, trace, trajectory
 from .wall import Wall
@@ -45,12 +46,14 @@ __all__ = [
     "Disk",
     "Hollow",
     "NamedWall",
+    "RigidCollision",
     "RollingCharts",
     "Segment",
     "Status",
     "Trace",
     "TracePlan",
     "Wall",
+    "collide",
     "default_spacing",
     "dispersing_arcs",
     "double_parabola",

@@ -40,7 +40,9 @@ HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 # Far beyond the numbers of the pieces.
 BEND_SHIFT = 40
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+# The loop over rays takes in the loop over flights: passing some ten tables from one to the other would cost as much as
+# a bounce or two. Other callers go through a function of their own that calls `trace_ray` at one place.
+_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 @_compile
@@ -139,8 +141,33 @@ def falling_root(a0, a1, a2, a3, low, high):
 
 
 @_compile
+def curve_size(curve):
+    """A bound of a Bezier piece's extent: the sum of its coefficients but the constant ones."""
+    return abs(curve[2]) + abs(curve[3]) + abs(curve[4]) + abs(curve[5]) + abs(curve[6]) + abs(curve[7])
+
+
+@_compile
+def contact_time(curve, bend, s, px, py, vx, vy):
+    """Time to the point s, where the ray's line touches the curve from its free side; inf where from the other.
+
+    ``bend`` is the second derivative of g there. Of the two hits that merge at s the front one came first exactly if
+    the curve runs along the ray where g has a minimum, or against it where g has a maximum.
+    """
+    tx = (3.0 * curve[6] * s + 2.0 * curve[4]) * s + curve[2]
+    ty = (3.0 * curve[7] * s + 2.0 * curve[5]) * s + curve[3]
+    if not 0.0 < s < 1.0 or bend * (tx * vx + ty * vy) <= 0.0:
+        return np.inf
+    dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
+    dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
+    return dx * vx + dy * vy
+
+
+@_compile
 def bezier_hit(curve, own_s, px, py, vx, vy, slack):
-    """First front hit of one Bezier piece: flight time (inf if none) and parameter; ``own_s`` < 0: not on it."""
+    """First front hit of one Bezier piece: flight time (inf if none), parameter, and 1 if it is tangent within rounding.
+
+    ``own_s`` < 0: the ray does not start on this piece.
+    """
     share_slack = JOINT_ULPS * EPS
     # b(s) - p in the power basis; columns 0-7 hold x and y coefficients of 1, s, s^2, s^3
     a0 = (curve[0] - px) * vy - (curve[1] - py) * vx
@@ -154,8 +181,13 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
         b2 = a3
         best_t, best_s = np.inf, 0.0
         disc = b1 * b1 - 4.0 * b2 * b0
+        if abs(disc) <= TANGENT_ULPS * EPS * (b1 * b1 + 4.0 * abs(b2 * b0)) and b2 != 0.0:
+            s = own_s - 0.5 * b1 / b2
+            t = contact_time(curve, 6.0 * a3 * s + 2.0 * a2, s, px, py, vx, vy)
+            if t > slack:
+                return t, s, 1
         if disc < 0.0:
-            return best_t, best_s
+            return best_t, best_s, 0
         q = -0.5 * (b1 + math.copysign(math.sqrt(disc), b1))
         for root in range(2):
             bottom, top = (b2, q) if root == 0 else (q, b0)
@@ -170,8 +202,10 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
                 t = dx * vx + dy * vy
                 if slope <= 0.0 and 0.0 < t < best_t:
                     best_t, best_s = t, s
-        return best_t, best_s
+        return best_t, best_s, 0
     n = curve.shape[0]
+    # g is a sum of products of numbers of this size
+    spread = max(abs(vx), abs(vy)) * (abs(curve[0] - px) + abs(curve[1] - py) + curve_size(curve))
     # split [0, 1] at the critical points of g; it can fall through zero once on each part
     c1, c2 = 2.0, 2.0
     disc = a2 * a2 - 3.0 * a3 * a1
@@ -183,8 +217,8 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
             c2 = a1 / q
         if c1 > c2:
             c1, c2 = c2, c1
-    best_t, best_s = np.inf, 0.0
-    low = 0.0
+    best_t, best_s, tangent = np.inf, 0.0, 0
+    low, touches = 0.0, False
     value_low = a0
     for part in range(3):
         high = 1.0 if part == 2 else (c1 if part == 0 else c2)
@@ -192,20 +226,27 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
             if part < 2:
                 continue
             high = 1.0
+        touched, touches = touches, False
         if high == 1.0:
             # the joint itself, so that the next piece sees the same number
             value_high = (curve[n - 4] - px) * vy - (curve[n - 3] - py) * vx
         else:
             value_high = bezier_value(a0, a1, a2, a3, high)
-        if value_low >= 0.0 >= value_high and value_low > value_high:
+            if abs(value_high) <= TANGENT_ULPS * EPS * spread:
+                t = contact_time(curve, 6.0 * a3 * high + 2.0 * a2, high, px, py, vx, vy)
+                touches = t > slack and t < np.inf
+                if touches and t < best_t:
+                    best_t, best_s, tangent = t, high, 1
+        # the root beside a contact is the contact itself, within rounding
+        if value_low >= 0.0 >= value_high and value_low > value_high and not touched and not touches:
             s = falling_root(a0, a1, a2, a3, low, high)
             dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
             dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
             t = dx * vx + dy * vy
             if -slack <= t < best_t:
-                best_t, best_s = max(t, 0.0), s
+                best_t, best_s, tangent = max(t, 0.0), s, 0
         low, value_low = high, value_high
-    return best_t, best_s
+    return best_t, best_s, tangent
 
 
 @_compile
@@ -360,9 +401,9 @@ def trace_ray(
         if beziers is not None:
             for k in range(bezier_low, bezier_high):
                 start_s = own_s if own_kind == BEZIER and own_index == k else -1.0
-                t, s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
+                t, s, touch = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
                 if t < time:
-                    time, kind, index, hit_s, tangent = t, BEZIER, k, s, 0
+                    time, kind, index, hit_s, tangent = t, BEZIER, k, s, touch
 
         # segments, by the signs of the joints: of all of them, or of those in the cells that the ray passes
         walking = False
@@ -508,9 +549,11 @@ def trace_ray(
 def near_end(piece, px, py, slack):
     """Whether a hit is within rounding of a joint that is a corner; both tables keep the ends in their last columns."""
     n = piece.shape[0]
-    if piece[n - 2] > 0.0 and math.hypot(px - piece[n - 6], py - piece[n - 5]) <= slack:
+    x, y = px - piece[n - 6], py - piece[n - 5]
+    if piece[n - 2] > 0.0 and x * x + y * y <= slack * slack:
         return True
-    return piece[n - 1] > 0.0 and math.hypot(px - piece[n - 4], py - piece[n - 3]) <= slack
+    x, y = px - piece[n - 4], py - piece[n - 3]
+    return piece[n - 1] > 0.0 and x * x + y * y <= slack * slack
 
 
 @_compile
