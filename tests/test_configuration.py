@@ -379,9 +379,10 @@ def test_the_normal_is_the_kinetic_gradient_of_the_satellites_distance():
 
 
 @pytest.mark.parametrize("scale", [1e-1, 1e-2, 1e-5, 1e-8])
-@pytest.mark.parametrize("depth", [0.0, 0.5, 5.0])
+@pytest.mark.parametrize("depth", [1e-3, 0.5, 5.0])
 def test_the_default_spacing_is_the_least_that_keeps_a_third_satellite_off(scale, depth):
-    rho = geo.default_spacing(scale, depth)
+    wall = geo.Wall.from_vertices([(0, 0), (0.5, -depth), (1, 0)])
+    rho = geo.ConfigurationSpace(wall, geo.Disk(), scale).spacing
     finer = 2 * np.pi / (round(2 * np.pi / rho) + 1)
 
     def allowed(r):
@@ -390,13 +391,36 @@ def test_the_default_spacing_is_the_least_that_keeps_a_third_satellite_off(scale
     assert allowed(rho) and not allowed(finer)
 
 
+def test_a_collision_with_the_flat_wall_is_a_reflection_at_the_normal():
+    disk, scale, count = geo.Disk(1.3, 0.4), 0.01, 3000
+    space = geo.ConfigurationSpace(geo.flat(), disk, scale)
+    rng = np.random.default_rng(11)
+    w = rng.normal(size=(count, 3)) * [1.0, 1.0, 0.2]
+    w[:, 1] = -np.abs(w[:, 1]) - 0.5
+    alpha = rng.uniform(-3, 3, count)
+    found = geo.collide(disk, geo.flat(), scale, np.stack([0 * alpha, alpha], axis=-1), w)
+    lowest = -space.charts.nearest(alpha)
+    place = np.stack([0 * alpha, 0 * alpha, alpha], axis=-1)
+    for _ in range(30):  # the height of the lowest satellite along the flight, by Newton
+        height = space.charts.satellite(place, lowest)[:, 1]
+        sinking = w[:, 1] + np.sin(place[:, 2] + lowest * space.spacing) * w[:, 2]
+        place = place - (height / sinking)[:, np.newaxis] * w
+    n = space.normal(place[:, 2], lowest, [0.0, 1.0])
+    reflected = w - 2.0 * disk.inner(w, n)[:, np.newaxis] * n
+    same = (found.contacts == 1) & (space.charts.nearest(place[:, 2]) == -lowest)
+    assert same.mean() > 0.5
+    np.testing.assert_allclose(found.velocity[same], reflected[same], rtol=0, atol=1e-12)
+    back = geo.plane_crossing(place[same], reflected[same])
+    np.testing.assert_allclose(found.position[same], back, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: geo.RollingCharts(1.0), "2 pi over a whole number"),
-        (lambda: geo.RollingCharts(4.0), "at least 4"),
+        (lambda: geo.RollingCharts(1.0), "2 pi divided by a whole number"),
+        (lambda: geo.RollingCharts(2 * np.pi / 3), "at least 4"),
         (lambda: geo.RollingCharts(np.pi / 4, scale=0.0), "scale: expected a number greater than 0"),
-        (lambda: geo.default_spacing(0.5, 10.0), "no room for 4 satellites"),
+        (lambda: geo.ConfigurationSpace(geo.koch(2), geo.Disk(), 5.0), "at most two satellites"),
         (lambda: geo.ConfigurationSpace(geo.flat(), None, 0.1), "a Wall and a Disk"),
         (lambda: geo.ConfigurationSpace(geo.koch(2), geo.Disk(), 0.1, np.pi / 50), "at most two satellites"),
         (lambda: geo.ConfigurationSpace(geo.flat(), geo.Disk(), 0.1).contains([0.0, 1.0]), r"shape \(..., 3\)"),
