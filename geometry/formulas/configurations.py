@@ -139,7 +139,7 @@ def measure_of_the_gaps(order: Code) -> Verdict:
         lambda eps, rho: (-eps - rho**2 / 8, -1.0),
     ),
     reason="The rolling centre sinks by up to 1 - cos(ρ/2), and the other satellites are just above the tops, which "
-    "are at -1. The proposition itself is not affected.",
+    "are at -1. A search finds both bounds nearly attained.",
 )
 def heights_while_rolling(bounds: Code) -> Verdict:
     rng = generator()

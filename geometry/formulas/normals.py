@@ -35,7 +35,7 @@ def normal_of_the_boundary(normal: Code) -> Verdict:
         lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha - turn, xp),
     ),
     corrected=Formula(
-        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))\bigr),\quad"
+        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))\bigr),\quad "
         r"R = \bigl(m^{-1} + J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))^2\bigr)^{1/2}",
         lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha + turn, xp),
     ),

@@ -23,7 +23,7 @@ DEPTH = 0.7
     "reflected in the foreshortened wall.",
     kind="numeric",
     printed=Formula(
-        r"\theta' = P^{\widetilde W}(x, \theta),\quad \widetilde W = (1 + m/J)^{-1/2}\,W_1\times W_2",
+        r"\theta' = P^{\widetilde W}(x, \theta),\quad \widetilde W = \{((1 + m/J)^{-1/2}x_1, x_2) : x\in W\}",
         lambda m, J: (1 + m / J) ** -0.5,
     ),
     perturbed=lambda m, J: (1 + m / J) ** -0.25,
