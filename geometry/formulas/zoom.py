@@ -181,8 +181,7 @@ def lengths_under_the_linear_contact(norm: Code) -> Verdict:
         lambda x: np.stack([-np.cos(x), -np.sin(x), np.ones_like(x)]),
     ),
     reason="The null direction of dG_ε turns with the disk: at w = χ any multiple of sin φ is 0, but dG_ε(χ) is not. "
-    "Additively sin φ - (m/J)^(1/2)|x| ≤ ‖dG_ε(w)‖ ≤ (1 + m/J)^(1/2) sin φ + (m/J)^(1/2)|x|, which is all that is "
-    "used later.",
+    "Additively sin φ - (m/J)^(1/2)|x| ≤ ‖dG_ε(w)‖ ≤ (1 + m/J)^(1/2) sin φ + (m/J)^(1/2)|x|.",
 )
 def lengths_under_the_contact(null: Code) -> Verdict:
     rng = generator()
