@@ -21,7 +21,7 @@ RANDOM_POINTS = 24
 CLOSEST = 1e-6
 FARTHEST = 1e4
 # A point of the domain is looked for so many times before the conditions are taken for empty.
-ATTEMPTS = 4000
+ATTEMPTS = 1000
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Domain:
         for attempt in range(ATTEMPTS):
             simple = attempt < ATTEMPTS // 4 and found < RANDOM_POINTS // 2
             point = {symbol: self._value(symbol, simple, rng) for symbol in self.intervals}
-            if all(condition.subs(point) == True for condition in self.conditions):  # noqa: E712 - a sympy relation
+            if all(condition.xreplace(point) == True for condition in self.conditions):  # noqa: E712 - a sympy relation
                 found += 1
                 yield point
             if found >= RANDOM_POINTS:
