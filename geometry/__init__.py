@@ -10,7 +10,7 @@ from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
-from .configuration import ConfigurationSpace, default_spacing
+from .configuration import ConfigurationSpace
 from .curve import Curve
 from .disk import Disk
 from .drawing import draw_wall
@@ -54,7 +54,6 @@ __all__ = [
     "TracePlan",
     "Wall",
     "collide",
-    "default_spacing",
     "dispersing_arcs",
     "double_parabola",
     "draw_wall",
