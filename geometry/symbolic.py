@@ -1,0 +1,84 @@
+r"""The coordinates of the disk as sympy objects, to verify formulas of one's own with `verify`.
+
+Attributes
+----------
+m, J : Symbol
+    Mass and moment of inertia, positive.
+theta, psi : Symbol
+    The angles of a velocity, real; `ANGLES` says that they lie in (0, pi).
+alpha, rho, k1, k2 : Symbol
+    Angle of the disk, spacing of its satellites, and the components of the wall's unit normal.
+metric : Matrix
+    Of the kinetic energy, diag(m, m, J).
+chi_perp, e2_hat, chi : Matrix
+    The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
+G : Matrix
+    The chart (theta, psi) -> w of the upper half of the unit sphere.
+
+Examples
+--------
+>>> from asperity import verify
+>>> from asperity.geometry import symbolic as sym
+>>> verify(sym.inner(sym.G, sym.G), 1).answer
+'proved'
+>>> verify(sym.inner(sym.G, sym.e2), sym.sin(sym.theta) * sym.sin(sym.psi), sym.ANGLES).answer
+'refuted'
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+from sympy import cos, sin
+
+from .kinetics import branch_block, contact_normal, direction, frame_rows
+
+__all__ = [
+    "ANGLES", "G", "J", "alpha", "branch_matrix", "chi", "chi_perp", "cos", "e2", "e2_hat", "frame", "inner",
+    "k1", "k2", "lambda2", "m", "metric", "no_slip", "psi", "rho", "satellite_normal", "sin", "smooth", "theta",
+    "volume_density",
+]  # fmt: skip
+
+m, J = sp.symbols("m J", positive=True)
+theta, psi, alpha = sp.symbols("theta psi alpha", real=True)
+rho = sp.Symbol("rho", positive=True)
+k1, k2 = sp.symbols("k1 k2", real=True)
+
+ANGLES = (theta > 0, theta < sp.pi, psi > 0, psi < sp.pi)
+
+metric = sp.diag(m, m, J)
+frame = sp.Matrix(frame_rows(m, J, sp))
+chi_perp, e2_hat, chi = (frame.row(i).T for i in range(3))
+e2 = sp.Matrix([0, 1, 0])
+G = frame.T * sp.Matrix(direction(theta, psi, sp))
+
+
+def inner(w: Any, w2: Any) -> Any:
+    """The kinetic-energy inner product of two velocities."""
+    return (sp.Matrix(w).T * metric * sp.Matrix(w2))[0, 0]
+
+
+def volume_density(chart: Any, parameters: Any) -> Any:
+    """The density of the kinetic-energy area of a parametrised surface or curve: the root of its Gram determinant."""
+    jacobian = sp.Matrix(chart).jacobian(sp.Matrix(parameters))
+    return sp.sqrt(sp.simplify((jacobian.T * metric * jacobian).det()))
+
+
+def branch_matrix(sign: Any, offset: Any) -> Any:
+    """The velocity matrix of theta' = sign theta + offset, psi' = pi - psi, incoming to outgoing."""
+    block = sp.Matrix(branch_block(sign, cos(offset), sin(offset)))
+    return sp.simplify(frame.T * block * frame * metric)
+
+
+def satellite_normal(number: Any) -> Any:
+    """The inward unit normal n(q) at a configuration where satellite ``number`` touches a wall of unit normal k.
+
+    Source: Rudzis 2022, remark 4.6 and eq. 3.26, corrected; see `kinetics.contact_normal`.
+    """
+    return sp.Matrix(contact_normal(m, J, (k1, k2), alpha + number * rho, sp))
+
+
+smooth = branch_matrix(-1, sp.pi)
+no_slip = branch_matrix(1, 0)
+lambda2 = sin(theta) * sin(psi) ** 2

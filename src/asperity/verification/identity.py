@@ -1,0 +1,76 @@
+"""Identities of a user's own: proved, refuted with a counterexample, or undecided."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from ..errors import InputError
+from .verdict import Verdict, every
+
+SEED = 0
+
+
+def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] = ()) -> Verdict:
+    """Decide whether two expressions are equal wherever both are defined.
+
+    Parameters
+    ----------
+    lhs, rhs : sympy expressions, numbers, matrices or nested sequences of them
+        Both of one shape; they are compared entry by entry. Decimal numbers are taken as the fractions that they are
+        in binary.
+    assumptions : iterable of sympy relations
+        Inequalities such as ``0 < theta`` or ``theta < sympy.pi``, beside those that the symbols carry themselves
+        (``positive=True``). Symbols stand for real numbers.
+
+    Returns
+    -------
+    Verdict
+        ``"proved"`` rests on an exact derivation. ``"refuted"`` has a rational counterexample that meets the
+        assumptions, and both values there. ``"undecided"`` means that neither was found: no counterexample among the
+        points tried, no proof among the routes known.
+
+    Raises
+    ------
+    InputError
+        If the shapes differ, an assumption is not an inequality, or no point meets the assumptions.
+
+    Examples
+    --------
+    >>> import sympy
+    >>> theta, m = sympy.Symbol("theta"), sympy.Symbol("m", positive=True)
+    >>> verify(sympy.sqrt(m**2 * sympy.sin(theta) ** 2), m * sympy.sin(theta), [0 < theta, theta < sympy.pi]).answer
+    'proved'
+    >>> print(verify(sympy.sqrt(sympy.sin(theta) ** 2), sympy.sin(theta), [theta < 0]).counterexample)
+    {'theta': '-1/3'}
+    """
+    import sympy as sp
+
+    left, right = _entries(sp, lhs), _entries(sp, rhs)
+    if len(left) != len(right):
+        raise InputError(f"lhs, rhs: expected one shape, got {len(left)} and {len(right)} entries")
+    given = list(assumptions)
+    return every(*(_decided(a, b, given) for a, b in zip(left, right, strict=True)))
+
+
+def _entries(sp: Any, side: Any) -> list[Any]:
+    if isinstance(side, sp.MatrixBase | list | tuple):
+        return [entry for part in side for entry in _entries(sp, part)]
+    return [sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(e))]
+
+
+def _decided(left: Any, right: Any, assumptions: list[Any]) -> Verdict:
+    import numpy as np
+
+    from .derivation import derive_equality
+    from .domain import Domain
+    from .refutation import refute_equality
+
+    domain = Domain.of(left.free_symbols | right.free_symbols, assumptions)
+    refuted = refute_equality(left, right, domain.points(np.random.default_rng(SEED)))
+    if refuted is not None:
+        return refuted
+    route = derive_equality(left, right, domain)
+    if route is not None:
+        return Verdict("proved", route)
+    return Verdict("undecided", "no counterexample among the points tried, and no proof among the routes known")
