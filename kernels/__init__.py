@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .involution import InvolutionLaw
     from .law import BranchLaw, DrivenLaw, Law
     from .legendre import Legendre
+    from .limit_study import LimitStudy, limit_study
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
     from .matrixfile import load_matrix
@@ -53,6 +54,7 @@ _HOMES = {
     "KernelMatrix": "matrix",
     "Law": "law",
     "Legendre": "legendre",
+    "LimitStudy": "limit_study",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
     "PolygonLaw": "polygon_law",
@@ -69,6 +71,7 @@ _HOMES = {
     "estimate": "estimation",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
+    "limit_study": "limit_study",
     "load_matrix": "matrixfile",
     "maxwell": "ideal",
     "mixture": "weighted_sum",
@@ -96,6 +99,7 @@ __all__ = [
     "KernelMatrix",
     "Law",
     "Legendre",
+    "LimitStudy",
     "MatrixLaw",
     "Panels",
     "PolygonLaw",
@@ -110,6 +114,7 @@ __all__ = [
     "estimate",
     "henyey_greenstein",
     "lambertian",
+    "limit_study",
     "load_matrix",
     "maxwell",
     "mixture",
