@@ -11,6 +11,7 @@ from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
 from .configuration import ConfigurationSpace, default_spacing
+from .container import Container
 from .curve import Curve
 from .cylinder import CylinderCollision, collide_cylinder, collide_modified
 from .disk import Disk
@@ -43,6 +44,7 @@ __all__ = [
     "Arc",
     "Bezier",
     "ConfigurationSpace",
+    "Container",
     "Curve",
     "CylinderCollision",
     "Disk",

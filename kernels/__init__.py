@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .basis import Basis
+    from .billiard import BilliardRecord, Reflector, play
     from .bins import Bins
     from .circular import CircularArcLaw
     from .collision import CollisionLaw
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from .phase_function import henyey_greenstein
     from .polygon_law import PolygonLaw
     from .rectangular import RectangularTeethLaw
+    from .satellite_law import SatelliteLaw
     from .specular_frame import SpecularFrame
     from .symmetry import Defect, SymmetryDefect
     from .tensor import TensorBasis
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "AngularMeasure": "measure",
     "Basis": "basis",
+    "BilliardRecord": "billiard",
     "Bins": "bins",
     "BranchLaw": "law",
     "CircularArcLaw": "circular",
@@ -60,8 +63,10 @@ _HOMES = {
     "PolygonLaw": "polygon_law",
     "Power": "composition",
     "RectangularTeethLaw": "rectangular",
+    "Reflector": "billiard",
     "SINE": "measure",
     "SINE_SQUARED": "measure",
+    "SatelliteLaw": "satellite_law",
     "SpecularFrame": "specular_frame",
     "SymmetryDefect": "symmetry",
     "TensorBasis": "tensor",
@@ -76,6 +81,7 @@ _HOMES = {
     "maxwell": "ideal",
     "mixture": "weighted_sum",
     "no_slip_matrix": "collision_matrices",
+    "play": "billiard",
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
@@ -86,6 +92,7 @@ __all__ = [
     "SINE_SQUARED",
     "AngularMeasure",
     "Basis",
+    "BilliardRecord",
     "Bins",
     "BranchLaw",
     "CircularArcLaw",
@@ -105,6 +112,8 @@ __all__ = [
     "PolygonLaw",
     "Power",
     "RectangularTeethLaw",
+    "Reflector",
+    "SatelliteLaw",
     "SpecularFrame",
     "SymmetryDefect",
     "TensorBasis",
@@ -119,6 +128,7 @@ __all__ = [
     "maxwell",
     "mixture",
     "no_slip_matrix",
+    "play",
     "retroreflection",
     "smooth_matrix",
     "specular",
