@@ -10,8 +10,10 @@ from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
-from .configuration import ConfigurationSpace
+from .configuration import ConfigurationSpace, default_spacing
+from .container import Container
 from .curve import Curve
+from .cylinder import CylinderCollision, collide_cylinder, collide_modified
 from .disk import Disk
 from .drawing import draw_wall
 from .hollow import Hollow
@@ -42,7 +44,9 @@ __all__ = [
     "Arc",
     "Bezier",
     "ConfigurationSpace",
+    "Container",
     "Curve",
+    "CylinderCollision",
     "Disk",
     "Hollow",
     "NamedWall",
@@ -54,6 +58,9 @@ __all__ = [
     "TracePlan",
     "Wall",
     "collide",
+    "collide_cylinder",
+    "collide_modified",
+    "default_spacing",
     "dispersing_arcs",
     "double_parabola",
     "draw_wall",

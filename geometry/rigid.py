@@ -133,18 +133,18 @@ def collide(
     """
     from .rigid_engine import collide_disks
 
-    ring = ring_of(disk, wall, scale, spacing)
-    eps = float(scale)
+    check_kinds(disk, wall)
+    eps = positive_number("scale", scale)
+    ring = Satellites.around(eps, eps * wall.depth, spacing)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
     n = len(at)
     out_position, out_velocity = np.empty_like(at), np.empty_like(moving)
     contacts, two, status = np.empty(n, np.int64), np.empty(n, np.bool_), np.empty(n, np.uint8)
     scene = wall.scene
-    tables = _tables(scene)
-    total = disk.mass + disk.inertia
-    masses = (disk.mass / total, disk.inertia / total)
-    numbers = (eps, ring.spacing, ring.reach * (1.0 + ROOM), ring.lowest / eps * (1.0 + ROOM), _slack(scene, ring, eps))
+    tables, masses = rigid_tables(scene), shares(disk)
+    slack = rounding_of_places(scene, math.sin(ring.reach) / eps)
+    numbers = (eps, ring.spacing, ring.reach * (1.0 + ROOM), ring.lowest / eps * (1.0 + ROOM), slack)
 
     def run(part: slice) -> None:
         collide_disks(
@@ -159,8 +159,8 @@ def collide(
     return RigidCollision(*results)
 
 
-def ring_of(disk: Disk, wall: Wall, scale: float, spacing: float | None) -> Satellites:
-    """Check disk, wall, scale and spacing together, and return the disk's satellites."""
+def check_kinds(disk: Disk, wall: Wall) -> None:
+    """Refuse what is not a disk and a wall of segments and arcs."""
     if not isinstance(disk, Disk):
         raise InputError(f"disk: expected a Disk such as geo.Disk(mass=1.0, inertia=0.5), got {disk!r}")
     if not isinstance(wall, Wall):
@@ -171,8 +171,6 @@ def ring_of(disk: Disk, wall: Wall, scale: float, spacing: float | None) -> Sate
             f"wall: expected segments and arcs, got {beziers} Bezier pieces; replace each by a polyline, "
             "geo.Wall.from_vertices(wall.outline(tolerance))"
         )
-    eps = positive_number("scale", scale)
-    return Satellites.around(eps, eps * wall.depth, spacing)
 
 
 def checked_states(position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
@@ -196,7 +194,7 @@ def checked_states(position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Fl
     return np.ascontiguousarray(rows[0]), np.ascontiguousarray(rows[1])
 
 
-def _tables(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
+def rigid_tables(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
     """Hollows, joints, lines and arcs: circles and ellipses have the same columns and become one table."""
     none = np.empty((0, 0))
     circles, ellipses = (none if table is None else table for table in (scene.circles, scene.ellipses))
@@ -207,7 +205,13 @@ def _tables(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
     return hollows, scene.joints, lines, np.concatenate(arcs) if arcs else none
 
 
-def _slack(scene: Scene, ring: Satellites, scale: float) -> float:
-    """The rounding error of places: of the wall's size, and of the distance from the lowest point to a satellite."""
+def shares(disk: Disk) -> tuple[float, float]:
+    """Mass and inertia in the unit m + J: laws know only their ratio."""
+    total = disk.mass + disk.inertia
+    return disk.mass / total, disk.inertia / total
+
+
+def rounding_of_places(scene: Scene, farthest: float) -> float:
+    """How far off a satellite may be by rounding: of the wall's size and of its distance from the disk's centre."""
     size = float(scene.hollows[:, 2].max()) if len(scene.hollows) else 0.0
-    return SLACK * (size + scene.cell + math.sin(ring.reach) / scale)
+    return SLACK * (size + scene.cell + farthest)

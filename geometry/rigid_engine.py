@@ -17,6 +17,9 @@ TOP = 7
 # Cells that one satellite may pass, and satellites that may pass the lowest point, in one flight.
 MOST_CELLS = 1_000_000
 
+# A time that no flight takes, but that is not infinite: bounds are multiplied by it.
+FOREVER = 1e30
+
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 # an array that is passed costs ten arguments: small functions are inlined
 _inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -314,3 +317,64 @@ def collide_disks(
         out_position[i, 0] = position[i, 0] + scale * travel
         out_position[i, 1] = position[i, 1] + turned
         out_velocity[i, 0], out_velocity[i, 1], out_velocity[i, 2] = norm * v1, norm * v2, norm * omega
+
+
+@_inline
+def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs):
+    """One collision on the cylinder: the contact moves on a straight line with the velocity (v1 + omega, v2).
+
+    It starts at (place, 0); ``deepest`` is the wall's depth. Returns the disk's displacement, its turn, the time, the
+    velocities, contacts and status.
+    """
+    travel, turned, passed, contacts = 0.0, 0.0, 0.0, 0
+    x, y = place, 0.0
+    own = (ZERO, NOTHING, NOTHING)
+    while True:
+        motion = (v1 + omega, v2, 0.0, 1.0)
+        end = FOREVER
+        if v2 > 0.0:
+            end = -y / v2
+        elif v2 < 0.0:
+            end = min(2.0 * (y + deepest + cell) / -v2, FOREVER)
+        time, kind, index, hollow, base, state, code = first_contact(
+            own[0], own[1], own[2], 0.0, x, y, 0.0, end, (0.0, 1.0), motion, slack, cell, is_open, hollows, joints,
+            lines, arcs,
+        )  # fmt: skip
+        time = min(time, end)
+        travel += v1 * time
+        turned += omega * time
+        passed += time
+        if code == CLEAR and kind == NO_PIECE:
+            code = ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
+            return travel, turned, passed, v1, v2, omega, contacts, code
+        if code == CLEAR and contacts >= limit:
+            code = BOUNCE_LIMIT
+        if code != CLEAR:
+            return travel, turned, passed, v1, v2, omega, contacts, code
+        contacts += 1
+        own, x, y, n1, n2 = (kind, index, hollow), x + state[0] - base, y + state[1], 0.0, 1.0
+        if kind == TOP:
+            y = 0.0
+        else:
+            x, y, n1, n2 = surface(kind, index, x, y, joints, lines, arcs)
+        v1, v2, omega = reflect(v1, v2, omega, n1, n2, (0.0, 1.0), disk)
+
+
+@_compile
+def roll_disks(
+    position, velocity, disk, scale, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs, out_position,
+    out_velocity, times, contacts, status,
+):  # fmt: skip
+    """Collide a block of disks on the cylinder; fills the five output arrays."""
+    mass, inertia = disk
+    for i in range(position.shape[0]):
+        norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
+        place = (position[i, 0] + position[i, 1]) / scale
+        travel, turned, time, v1, v2, omega, contacts[i], status[i] = roll_disk(
+            place - math.floor(place / cell) * cell, velocity[i, 0] / norm, velocity[i, 1] / norm,
+            velocity[i, 2] / norm, disk, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs,
+        )  # fmt: skip
+        out_position[i, 0] = position[i, 0] + scale * travel
+        out_position[i, 1] = position[i, 1] + scale * turned
+        out_velocity[i, 0], out_velocity[i, 1], out_velocity[i, 2] = norm * v1, norm * v2, norm * omega
+        times[i] = scale * time / norm

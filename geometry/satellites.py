@@ -6,15 +6,13 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ..checks import positive_number
 from ..errors import InputError
+from . import rolling
+from .charts import RollingCharts
+from .configuration import default_spacing
 
-# The theorem asks for spacings that tend to 0 while scale/spacing^2 tends to 0; two fifths is in the middle.
-SPACING_POWER = 0.4
 # With fewer satellites the lowest of them may turn to the side of the disk.
 FEWEST = 4
-# 2 pi/n and what a caller computes for it differ by a few rounding errors.
-DIVISOR_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -64,25 +62,13 @@ class Satellites:
         InputError
             If the spacing does not divide the circle, or is too small for the depth.
         """
-        if spacing is not None:
-            gap = positive_number("spacing", spacing)
-            count = round(2.0 * math.pi / gap)
-            if count < 1 or abs(count * gap - 2.0 * math.pi) > DIVISOR_TOLERANCE * 2.0 * math.pi:
-                below, above = (2.0 * math.pi / max(n, 1) for n in (math.ceil(2.0 * math.pi / gap), count or 1))
-                raise InputError(
-                    f"spacing: expected 2 pi divided by a whole number, got {gap!r}; for example {below!r} or {above!r}"
-                )
-            return cls(count, depth)
-        count = max(FEWEST, math.floor(2.0 * math.pi / scale**SPACING_POWER))
-        while count > FEWEST and not depth < cls.deepest_for(count):
-            count -= 1
-        return cls(count, depth)
+        gap = default_spacing(scale, depth / scale) if spacing is None else spacing
+        return cls(RollingCharts(gap).satellites, depth)
 
     @staticmethod
     def deepest_for(count: int) -> float:
         """The depth below which at most two of ``count`` satellites are between the wall's tops and its bottom."""
-        # 1 - cos as a product keeps its digits for small spacings
-        return min(2.0 * math.sin(math.pi / count) ** 2, math.cos(math.pi / count))
+        return min(float(rolling.rise(2.0 * math.pi / count)), math.cos(math.pi / count))
 
     @property
     def deepest(self) -> float:
@@ -97,10 +83,9 @@ class Satellites:
     @property
     def reach(self) -> float:
         """The largest angle from the lowest point at which a satellite can be below the wall's tops."""
-        lift = 2.0 * math.sin(0.25 * self.spacing) ** 2 + self.depth
-        return 2.0 * math.asin(math.sqrt(0.5 * lift))
+        return 2.0 * math.asin(math.sqrt(0.5 * self.lowest))
 
     @property
     def lowest(self) -> float:
         """How far the disk's centre can come below height 0: -x2 <= depth + 1 - cos(spacing/2)."""
-        return self.depth + 2.0 * math.sin(0.25 * self.spacing) ** 2
+        return self.depth + float(rolling.rise(0.5 * self.spacing))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .basis import Basis
+    from .billiard import BilliardRecord, Reflector, play
     from .bins import Bins
     from .circular import CircularArcLaw
     from .collision import CollisionLaw
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from .law import BranchLaw, DrivenLaw, Law
     from .least_resistance import LeastResistanceLaw
     from .legendre import Legendre
+    from .limit_study import LimitStudy, limit_study
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
     from .matrixfile import load_matrix
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from .phase_function import henyey_greenstein
     from .polygon_law import PolygonLaw
     from .rectangular import RectangularTeethLaw
+    from .satellite_law import SatelliteLaw
     from .specular_frame import SpecularFrame
     from .symmetry import Defect, SymmetryDefect
     from .tensor import TensorBasis
@@ -46,6 +49,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "AngularMeasure": "measure",
     "Basis": "basis",
+    "BilliardRecord": "billiard",
     "Bins": "bins",
     "BranchLaw": "law",
     "CircularArcLaw": "circular",
@@ -64,13 +68,16 @@ _HOMES = {
     "Law": "law",
     "LeastResistanceLaw": "least_resistance",
     "Legendre": "legendre",
+    "LimitStudy": "limit_study",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
     "PolygonLaw": "polygon_law",
     "Power": "composition",
     "RectangularTeethLaw": "rectangular",
+    "Reflector": "billiard",
     "SINE": "measure",
     "SINE_SQUARED": "measure",
+    "SatelliteLaw": "satellite_law",
     "SpecularFrame": "specular_frame",
     "SymmetryDefect": "symmetry",
     "TensorBasis": "tensor",
@@ -84,11 +91,13 @@ _HOMES = {
     "extremal_resistance": "extremal",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
+    "limit_study": "limit_study",
     "load_matrix": "matrixfile",
     "maxwell": "ideal",
     "mixture": "weighted_sum",
     "no_slip_matrix": "collision_matrices",
     "resistance": "functional",
+    "play": "billiard",
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
@@ -99,6 +108,7 @@ __all__ = [
     "SINE_SQUARED",
     "AngularMeasure",
     "Basis",
+    "BilliardRecord",
     "Bins",
     "BranchLaw",
     "CircularArcLaw",
@@ -117,11 +127,14 @@ __all__ = [
     "Law",
     "LeastResistanceLaw",
     "Legendre",
+    "LimitStudy",
     "MatrixLaw",
     "Panels",
     "PolygonLaw",
     "Power",
     "RectangularTeethLaw",
+    "Reflector",
+    "SatelliteLaw",
     "SpecularFrame",
     "SymmetryDefect",
     "TensorBasis",
@@ -135,10 +148,12 @@ __all__ = [
     "extremal_resistance",
     "henyey_greenstein",
     "lambertian",
+    "limit_study",
     "load_matrix",
     "maxwell",
     "mixture",
     "no_slip_matrix",
+    "play",
     "resistance",
     "retroreflection",
     "smooth_matrix",

@@ -1,0 +1,81 @@
+"""The true disk approaches the limit law of the foreshortened wall, with orders that the theorem allows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import InputError
+
+TEETH = geo.triangular_teeth(1.2)
+
+
+@pytest.fixture(scope="module")
+def study():
+    scales = [1e-3, 1e-4, 1e-5, 1e-6]
+    return ker.limit_study(geo.Disk(1.0, 1.0), TEETH, scales, np.random.default_rng(0), samples=(24, 24, 24))
+
+
+def correlation(wall):
+    return float(ker.discretise(ker.WallLaw(wall), ker.Legendre(2)).array[1, 1])
+
+
+def test_the_distance_to_the_limit_falls_to_the_sampling_floor(study):
+    excess = study.distance - study.psi_defect - study.floor
+    assert np.all(np.diff(study.distance) < 0.0)
+    assert abs(excess[-1]) < 0.2 * study.distance[0]
+
+
+def test_psi_goes_over_into_pi_minus_psi_with_order_one_in_the_spacing(study):
+    order = study.order("psi_defect", "spacings")
+    # fact 15: about 0.2 rho; the collisions with two satellites, fewer at smaller scales, lower the slope by some 0.08
+    assert abs(float(order) - 1.0) < 0.15
+    assert np.all((study.psi_defect / study.spacings > 0.15) & (study.psi_defect / study.spacings < 0.3))
+
+
+def test_the_share_of_collisions_with_two_satellites_is_of_the_order_of_scale_over_spacing_squared(study):
+    ratio = study.two_satellites / (study.scales / study.spacings**2)
+    assert np.all((ratio > 0.4) & (ratio < 0.9))
+    # the paper's good set leaves out more angles than those at which two satellites do touch
+    assert np.all(study.two_satellites < study.gap_share)
+    # collisions in which one satellite takes part follow the modified law, but for a few near corners
+    assert np.all(study.strays < study.two_satellites)
+
+
+def test_the_disk_comes_back_where_it_was_within_the_size_of_a_few_cells(study):
+    assert np.all(study.drift < 3.0 * study.scales)
+    assert float(study.order("drift", "scales")) > 0.85
+
+
+def test_the_limit_is_the_law_of_the_foreshortened_wall_and_not_of_the_wall():
+    # fact 15: 0.0902 and not 0.554
+    disk = geo.Disk(1.0, 1.0)
+    study = ker.limit_study(disk, TEETH, [1e-6], np.random.default_rng(2), samples=(64, 24, 24))
+    foreshortened, plain = correlation(TEETH.foreshorten(disk)), correlation(TEETH)
+    assert foreshortened == pytest.approx(0.0902, abs=5e-5) and plain == pytest.approx(0.554, abs=5e-4)
+    assert abs(study.shift[0]) < 4.0 * study.errors["shift"][0] + 2.0 * study.psi_defect[0]
+    assert abs(foreshortened + study.shift[0] - plain) > 0.4
+
+
+def test_an_alternating_sequence_of_cells_has_no_limit():
+    disk, scales = geo.Disk(1.0, 1.0), [1e-5, 1e-6]
+    rng, samples = np.random.default_rng(1), (16, 24, 24)
+    constant = ker.limit_study(disk, TEETH, scales, rng, samples=samples).distance
+    other = ker.limit_study(disk, geo.focusing_arcs(1.2), scales, rng, samples=samples, limit=TEETH).distance
+    assert constant[-1] < 0.02 and other[-1] > 0.3
+
+
+def test_bad_input_is_refused(study):
+    rng = np.random.default_rng(0)
+    with pytest.raises(InputError, match="psi"):
+        ker.limit_study(geo.Disk(), TEETH, [0.01], rng, psi=4.0)
+    with pytest.raises(InputError, match="repetitions"):
+        ker.limit_study(geo.Disk(), TEETH, [0.01], rng, repetitions=1)
+    with pytest.raises(InputError, match="spacing"):
+        ker.limit_study(geo.Disk(), TEETH, [0.01], rng, spacing=lambda eps: 2 * np.pi / 500)
+    with pytest.raises(InputError, match="column"):
+        study.order("speed")
+    with pytest.raises(InputError, match="against"):
+        study.order("drift", "time")
