@@ -12,6 +12,7 @@ from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from .deflation import coarser_grids, off_constants
+from .parity import Parity, halves
 from .sampling import sampling_errors
 
 if TYPE_CHECKING:
@@ -77,6 +78,9 @@ class Spectrum:
         How the matrix was made.
     matrix_error : float
         The part of the discretisation errors that comes from the entries of an unsampled matrix.
+    parity : tuple of {"even", "odd", "none"}
+        Of every eigenfunction under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric. In
+        the other convention the odd eigenvalues have the opposite sign.
     """
 
     values: Floats
@@ -90,6 +94,7 @@ class Spectrum:
     basis: Basis
     method: str
     matrix_error: float = 0.0
+    parity: tuple[Parity, ...] = ()
 
     @property
     def intervals(self) -> Floats:
@@ -105,6 +110,23 @@ class Spectrum:
     def eigenfunction(self, index: int, theta: Any) -> Floats:
         """Values of the eigenfunction of ``values[index]`` at the angles theta; mean square 1 under the measure."""
         return np.asarray(self.basis.evaluate(theta) @ self.vectors[:, index])
+
+    def implied_time_scales(self) -> tuple[Floats, Floats]:
+        """-1/ln|lambda| in steps, for all but the constants, and the intervals, shape (k - 1, 2), of the eigenvalues'.
+
+        Infinite at the end where the interval of an eigenvalue reaches modulus 1.
+        """
+        modulus, width = np.abs(self.values[1:]), self.errors.total()[1:]
+        ends = np.stack([np.maximum(modulus - width, 0.0), np.minimum(modulus + width, 1.0)], axis=1)
+        with np.errstate(divide="ignore"):
+            scales, intervals = (-1.0 / np.log(np.minimum(part, 1.0)) for part in (modulus, ends))
+        return scales, np.asarray(intervals)
+
+    def plot_eigenfunctions(self, ax: Axes | None = None) -> Axes:
+        """Draw the eigenfunctions off the constants against the incoming angle."""
+        from .picture import draw_eigenfunctions
+
+        return draw_eigenfunctions(self, ax)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the eigenvalues with their intervals."""
@@ -157,7 +179,7 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     check_reversible(matrix)
     array = 0.5 * (matrix.symmetric + matrix.symmetric.T)
     constant = np.asarray(matrix.basis.constant)
-    rest, rest_vectors = off_constants(array, constant)
+    rest, rest_vectors, parity = _solved(matrix, array, constant)
     chosen = np.sort(np.argsort(-np.abs(rest), kind="stable")[: k - 1])[::-1]
     values = np.concatenate([[constant @ array @ constant], rest[chosen]])
     vectors = np.column_stack([constant, rest_vectors[:, chosen]])
@@ -183,7 +205,27 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         basis=matrix.basis,
         method=matrix.method,
         matrix_error=0.0 if matrix.samples else float(matrix.error),
+        parity=("even" if parity else "none", *(parity[i] if parity else "none" for i in chosen)),
     )
+
+
+def _solved(matrix: KernelMatrix, array: Floats, constant: Floats) -> tuple[Floats, Floats, list[Parity]]:
+    """Eigenvalues off the constants, ascending, with vectors and, for mirror-symmetric laws, parities.
+
+    Even and odd functions do not mix there, and two matrices of half the size take a quarter of the work.
+    """
+    split = halves(matrix)
+    if split is None:
+        return *off_constants(array, constant), []
+    even, odd = split
+    values, vectors = off_constants(even.T @ array @ even, even.T @ constant)
+    from scipy.linalg import eigh
+
+    odd_values, odd_vectors = eigh(odd.T @ array @ odd) if odd.size else (np.empty(0), np.empty((0, 0)))
+    everything = np.concatenate([values, odd_values])
+    order = np.argsort(everything, kind="stable")
+    names: list[Parity] = ["even" if place < len(values) else "odd" for place in order]
+    return everything[order], np.concatenate([even @ vectors, odd @ odd_vectors], axis=1)[:, order], names
 
 
 def _errors(
@@ -275,5 +317,6 @@ def _both_signs(half: Spectrum, k: int) -> Spectrum:
         values=frozen(values[order]),
         vectors=frozen(half.vectors[:, pick]),
         residuals=frozen(half.residuals[pick]),
+        parity=tuple(half.parity[i] for i in pick),
         errors=SpectrumErrors(*(frozen(part[pick]) for part in parts)),
     )

@@ -15,7 +15,7 @@ from ..kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ..kernels.fold import Rules, fold, made_of_isometries
 from ..kernels.ideal import LambertianLaw
 from ..kernels.phase_function import HenyeyGreensteinLaw
-from .grazing import grazing_limit
+from .grazing import GrazingLimit, grazing_limit
 
 if TYPE_CHECKING:
     from ..geometry import Wall
@@ -65,6 +65,7 @@ class _Part:
     kept: tuple[float, float]
     grazing: Floats
     error: float
+    entry_error: float
     certain: bool
     notes: tuple[str, ...] = ()
 
@@ -96,7 +97,7 @@ def essential_edge(law: Law) -> EssentialEdge:
     >>> essential_edge(0.25 * ker.lambertian() + 0.75 * ker.TriangularTeethLaw(0.7)).value
     0.75
     """
-    part = fold(law, Rules(_leaf, _mixture, _chain, _turned))
+    part = _taken_apart(law)
     matrix = part.grazing
     root = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
     low = min(max(part.kept[0], root - part.error), 1.0)
@@ -108,24 +109,36 @@ def essential_edge(law: Law) -> EssentialEdge:
     return EssentialEdge(low, high, "bound" if part.certain and low == high else "estimate", notes)
 
 
+def grazing_symbol(law: Law) -> GrazingLimit:
+    """`grazing_limit` of a law, from its parts: sums and products of laws have sums and products of these matrices."""
+    part = _taken_apart(law)
+    return GrazingLimit(part.grazing, part.error, part.entry_error)
+
+
+def _taken_apart(law: Law) -> _Part:
+    return fold(law, Rules(_leaf, _mixture, _chain, _turned))
+
+
 def _leaf(law: Law) -> _Part:
     if isinstance(law, (LambertianLaw, HenyeyGreensteinLaw, MatrixLaw)):
-        return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, True, (f"{law!r} is compact",))
+        return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
     if made_of_isometries(law):
         limit = grazing_limit(law) if not hasattr(law, "retro") else None
         grazing = limit.matrix if limit else (np.eye(2) if getattr(law, "retro", False) else SWAP)
         # an isometric law cannot enlarge anything: what its grazing limit is matters in sums with other walls only
         note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
-        return _Part((1.0, 1.0), grazing, limit.error if limit else 0.0, True, (note,))
+        errors = (limit.error, limit.entry_error) if limit else (0.0, 0.0)
+        return _Part((1.0, 1.0), grazing, *errors, True, (note,))
     limit = grazing_limit(law)
+    errors = (limit.error, limit.entry_error)
     note = (
         f"{law!r}: grazing rays, E[sin(theta)/sin(theta')] -> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
     )
     if isinstance(law, DensityLaw):
-        return _Part((0.0, 0.0), limit.matrix, limit.error, False, (note, f"{law!r} has a density, taken as bounded"))
+        return _Part((0.0, 0.0), limit.matrix, *errors, False, (note, f"{law!r} has a density, taken as bounded"))
     if isinstance(law, InvolutionLaw):
         reason = f"{law!r} is an involution: f + f o T is kept for every f"
-        return _Part((1.0, 1.0), limit.matrix, limit.error, True, (reason,))
+        return _Part((0.0, 1.0), limit.matrix, *errors, True, (reason,))
     kept = (0.0, 0.0)
     notes = [note]
     if isinstance(law, WallLaw):
@@ -133,7 +146,7 @@ def _leaf(law: Law) -> _Part:
         if kept[1] > 0.0:
             share = f"{kept[0]:.6g}" if kept[0] == kept[1] else f"{kept[0]:.4g} to {kept[1]:.4g}"
             notes.append(f"a share {share} of the rays meets straight pieces only, an isometry")
-    return _Part(kept, limit.matrix, limit.error, False, tuple(notes))
+    return _Part(kept, limit.matrix, *errors, False, tuple(notes))
 
 
 def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:
@@ -141,13 +154,14 @@ def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:
         (sum(w * part.kept[0] for w, part in terms), sum(w * part.kept[1] for w, part in terms)),
         sum((w * part.grazing for w, part in terms), np.zeros((2, 2))),
         sum(w * part.error for w, part in terms),
+        sum(w * part.entry_error for w, part in terms),
         all(part.certain for _, part in terms),
         tuple(note for _, part in terms for note in part.notes),
     )
 
 
 def _chain(parts: Sequence[_Part]) -> _Part:
-    return reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, True))
+    return reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, 0.0, True))
 
 
 def _product(first: _Part, second: _Part) -> _Part:
@@ -156,13 +170,14 @@ def _product(first: _Part, second: _Part) -> _Part:
         first.grazing @ second.grazing,
         # sums of rows are at most 1 but for the errors
         first.error + second.error + first.error * second.error,
+        2.0 * (first.entry_error + second.entry_error + first.entry_error * second.entry_error),
         first.certain and second.certain,
         first.notes + second.notes,
     )
 
 
 def _turned(part: _Part) -> _Part:
-    return _Part(part.kept, part.grazing @ SWAP, part.error, part.certain, part.notes)
+    return _Part(part.kept, part.grazing @ SWAP, part.error, part.entry_error, part.certain, part.notes)
 
 
 def _straight_share(law: WallLaw) -> tuple[float, float]:

@@ -32,11 +32,14 @@ class GrazingLimit:
     ----------
     matrix : array of shape (2, 2)
     error : float
-        Estimated error of every entry's row sum.
+        Estimated error of the sums of rows.
+    entry_error : float
+        Estimated error of the entries: in deep hollows the ends share a row in a way that never settles.
     """
 
     matrix: Floats
     error: float
+    entry_error: float
 
     @property
     def root(self) -> float:
@@ -75,11 +78,16 @@ def grazing_limit(law: Law) -> GrazingLimit:
     values, noise = values[known], noise[known]
     matrix, sums = values[-1], values.sum(axis=2)
     if len(values) < 3:
-        return GrazingLimit(matrix, float(noise[-1] + np.ptp(sums)))
+        spread = float(noise[-1] + np.ptp(values, axis=0).max())
+        return GrazingLimit(matrix, float(noise[-1] + np.ptp(sums)), spread)
     limit = _aitken(sums[-3], sums[-2], sums[-1], float(noise[-3:].max()))
     scale = np.divide(limit, sums[-1], out=np.ones(2), where=sums[-1] > 0.0)
     moved = np.abs(limit - sums[-1]) + np.minimum(np.abs(sums[-1] - sums[-2]), np.abs(limit - sums[-1]) + noise[-1])
-    return GrazingLimit(matrix * scale[:, None], float(np.max(moved) + noise[-3:].max()))
+    error = float(np.max(moved) + noise[-3:].max())
+    # what shrinks from one power of ten to the next is settled; what does not, as rays that alternate, is not
+    steps = np.abs(np.diff(values[-3:], axis=0)).max(axis=(1, 2))
+    unsettled = float(steps[1]) if steps[1] < 0.5 * steps[0] else float(np.ptp(values, axis=0).max())
+    return GrazingLimit(matrix * scale[:, None], error, max(error, unsettled))
 
 
 def _aitken(first: Floats, second: Floats, third: Floats, noise: float) -> Floats:
