@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .estimation import estimate
     from .extremal import ExtremalResistance, extremal_resistance
     from .functional import air_resistance, resistance
+    from .hollow_search import BestHollow, best_hollow
     from .ideal import lambertian, maxwell, retroreflection, specular
     from .interval_exchange import IntervalExchangeLaw
     from .involution import InvolutionLaw
@@ -36,22 +37,28 @@ if TYPE_CHECKING:
     from .phase_function import henyey_greenstein
     from .polygon_law import PolygonLaw
     from .rectangular import RectangularTeethLaw
+    from .rough_body import RoughBody
     from .specular_frame import SpecularFrame
     from .symmetry import Defect, SymmetryDefect
     from .tensor import TensorBasis
     from .triangular import TriangularTeethLaw
+    from .two_mirrors import TwoMirrorHollow, two_mirrors
+    from .wall_convergence import Convergence, ConvergenceStep, study_convergence
     from .wall_law import WallLaw
     from .weighted_sum import Combination, mixture
 
 _HOMES = {
     "AngularMeasure": "measure",
     "Basis": "basis",
+    "BestHollow": "hollow_search",
     "Bins": "bins",
     "BranchLaw": "law",
     "CircularArcLaw": "circular",
     "CollisionLaw": "collision",
     "Combination": "weighted_sum",
     "Composition": "composition",
+    "Convergence": "wall_convergence",
+    "ConvergenceStep": "wall_convergence",
     "Defect": "symmetry",
     "DensityLaw": "density",
     "DifferenceTest": "difference",
@@ -69,14 +76,17 @@ _HOMES = {
     "PolygonLaw": "polygon_law",
     "Power": "composition",
     "RectangularTeethLaw": "rectangular",
+    "RoughBody": "rough_body",
     "SINE": "measure",
     "SINE_SQUARED": "measure",
     "SpecularFrame": "specular_frame",
     "SymmetryDefect": "symmetry",
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
+    "TwoMirrorHollow": "two_mirrors",
     "WallLaw": "wall_law",
     "air_resistance": "functional",
+    "best_hollow": "hollow_search",
     "difference_test": "difference",
     "discretise": "discretisation",
     "distance": "distances",
@@ -92,6 +102,8 @@ _HOMES = {
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
+    "study_convergence": "wall_convergence",
+    "two_mirrors": "two_mirrors",
 }
 
 __all__ = [
@@ -99,12 +111,15 @@ __all__ = [
     "SINE_SQUARED",
     "AngularMeasure",
     "Basis",
+    "BestHollow",
     "Bins",
     "BranchLaw",
     "CircularArcLaw",
     "CollisionLaw",
     "Combination",
     "Composition",
+    "Convergence",
+    "ConvergenceStep",
     "Defect",
     "DensityLaw",
     "DifferenceTest",
@@ -122,12 +137,15 @@ __all__ = [
     "PolygonLaw",
     "Power",
     "RectangularTeethLaw",
+    "RoughBody",
     "SpecularFrame",
     "SymmetryDefect",
     "TensorBasis",
     "TriangularTeethLaw",
+    "TwoMirrorHollow",
     "WallLaw",
     "air_resistance",
+    "best_hollow",
     "difference_test",
     "discretise",
     "distance",
@@ -143,6 +161,8 @@ __all__ = [
     "retroreflection",
     "smooth_matrix",
     "specular",
+    "study_convergence",
+    "two_mirrors",
 ]
 
 
