@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .estimation import estimate
     from .extremal import ExtremalResistance, extremal_resistance
     from .functional import air_resistance, resistance
+    from .hollow_search import BestHollow, best_hollow
     from .ideal import lambertian, maxwell, retroreflection, specular
     from .interval_exchange import IntervalExchangeLaw
     from .involution import InvolutionLaw
@@ -38,11 +39,14 @@ if TYPE_CHECKING:
     from .phase_function import henyey_greenstein
     from .polygon_law import PolygonLaw
     from .rectangular import RectangularTeethLaw
+    from .rough_body import RoughBody
     from .satellite_law import SatelliteLaw
     from .specular_frame import SpecularFrame
     from .symmetry import Defect, SymmetryDefect
     from .tensor import TensorBasis
     from .triangular import TriangularTeethLaw
+    from .two_mirrors import TwoMirrorHollow, two_mirrors
+    from .wall_convergence import Convergence, ConvergenceStep, study_convergence
     from .wall_law import WallLaw
     from .weighted_sum import Combination, mixture
 
@@ -50,12 +54,15 @@ _HOMES = {
     "AngularMeasure": "measure",
     "Basis": "basis",
     "BilliardRecord": "billiard",
+    "BestHollow": "hollow_search",
     "Bins": "bins",
     "BranchLaw": "law",
     "CircularArcLaw": "circular",
     "CollisionLaw": "collision",
     "Combination": "weighted_sum",
     "Composition": "composition",
+    "Convergence": "wall_convergence",
+    "ConvergenceStep": "wall_convergence",
     "Defect": "symmetry",
     "DensityLaw": "density",
     "DifferenceTest": "difference",
@@ -75,6 +82,7 @@ _HOMES = {
     "Power": "composition",
     "RectangularTeethLaw": "rectangular",
     "Reflector": "billiard",
+    "RoughBody": "rough_body",
     "SINE": "measure",
     "SINE_SQUARED": "measure",
     "SatelliteLaw": "satellite_law",
@@ -82,8 +90,10 @@ _HOMES = {
     "SymmetryDefect": "symmetry",
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
+    "TwoMirrorHollow": "two_mirrors",
     "WallLaw": "wall_law",
     "air_resistance": "functional",
+    "best_hollow": "hollow_search",
     "difference_test": "difference",
     "discretise": "discretisation",
     "distance": "distances",
@@ -101,6 +111,8 @@ _HOMES = {
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
+    "study_convergence": "wall_convergence",
+    "two_mirrors": "two_mirrors",
 }
 
 __all__ = [
@@ -108,6 +120,7 @@ __all__ = [
     "SINE_SQUARED",
     "AngularMeasure",
     "Basis",
+    "BestHollow",
     "BilliardRecord",
     "Bins",
     "BranchLaw",
@@ -115,6 +128,8 @@ __all__ = [
     "CollisionLaw",
     "Combination",
     "Composition",
+    "Convergence",
+    "ConvergenceStep",
     "Defect",
     "DensityLaw",
     "DifferenceTest",
@@ -134,13 +149,16 @@ __all__ = [
     "Power",
     "RectangularTeethLaw",
     "Reflector",
+    "RoughBody",
     "SatelliteLaw",
     "SpecularFrame",
     "SymmetryDefect",
     "TensorBasis",
     "TriangularTeethLaw",
+    "TwoMirrorHollow",
     "WallLaw",
     "air_resistance",
+    "best_hollow",
     "difference_test",
     "discretise",
     "distance",
@@ -158,6 +176,8 @@ __all__ = [
     "retroreflection",
     "smooth_matrix",
     "specular",
+    "study_convergence",
+    "two_mirrors",
 ]
 
 

@@ -27,6 +27,9 @@ def dual_bound(potential: Floats, cost: CostFunction, curvature: float) -> float
     E c >= E phi + E psi for every coupling of sin(theta)/2 d theta with itself. For c with second derivatives of at
     most L in either variable, c(., y) - phi is above its least value at the nodes less L h^2/8; and psi, an infimum of
     functions with second derivatives at most L, is above its chords less L h^2/8.
+    E c >= E phi + E psi for every coupling of sin(theta)/2 d theta with itself. For c with second derivatives at most
+    L in either variable, c(., y) - phi is above its least value at the nodes less L h^2/8; and psi, an infimum
+    of functions with second derivatives at most L, is above its chords less L h^2/8.
     """
     count = potential.size
     nodes = np.linspace(0.0, np.pi, count)
