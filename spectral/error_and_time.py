@@ -26,6 +26,7 @@ def work_precision(
     *,
     repeats: int = 5,
     seconds: float = 60.0,
+    warm_up: bool = True,
     threads: int = 1,
     path: str | PathLike[str] | None = None,
     runner: Runner = measure,
@@ -40,15 +41,19 @@ def work_precision(
     budgets : sequence of numbers, or mapping from a method's name to one
         What every method is given; smaller ones come first.
     repeats : int
-        Timed runs of each. One more, at the smallest budget, goes before them: it loads what is loaded once.
+        Timed runs of each.
     seconds : float
-        Time limit of a row, all repeats together. Once it is met, larger budgets of the method are left out.
+        Time limit of a row, all repeats together: when it has passed, no further one is begun, and larger budgets of
+        the method are left out. A run itself is ended only by a ``runner`` that can.
+    warm_up : bool
+        Whether one run more, at a method's smallest budget, goes before the others: it loads what is loaded once.
     threads : int
         Number of cores that the measurement is pinned to, and of threads of the linear algebra.
     path : path-like, optional
         A JSON file that is written after every row. If it exists, its rows are taken over and the rest is measured.
     runner : callable
         Makes a row from problem, method, budget, repeats and seconds; by default in this process.
+        Compiled code must not be interrupted inside a process: one with a hard limit works in another one.
 
     Returns
     -------
@@ -77,12 +82,10 @@ def work_precision(
     file = None if path is None else Path(path)
     if file is not None and file.exists():
         report = report.continued(WorkReport.of_json(file.read_text(encoding="utf-8")))
-    known = {(row.method, row.budget): row for row in report.rows}
     with on_few_cores(threads):
         for method in methods:
-            missing = [budget for budget in ladders[method.name] if (method.name, budget) not in known]
-            exhausted = any(row.status == "timed out" for key, row in known.items() if key[0] == method.name)
-            for row in _climb(problem, method, missing, exhausted, repeats, seconds, runner):
+            earlier = [row for row in report.rows if row.method == method.name]
+            for row in _climb(problem, method, ladders[method.name], earlier, (repeats, seconds, warm_up, runner)):
                 report = report.with_row(row)
                 if file is not None:
                     _write(file, report.to_json())
@@ -90,20 +93,27 @@ def work_precision(
 
 
 def _climb(
-    problem: WorkProblem, method: WorkMethod, ladder: list[float], exhausted: bool, repeats: int, seconds: float,
-    runner: Runner,
+    problem: WorkProblem, method: WorkMethod, ladder: list[float], earlier: list[WorkRow],
+    how: tuple[int, float, bool, Runner],
 ) -> Iterator[WorkRow]:  # fmt: skip
-    """The rows of one method, until the time limit is met."""
-    if ladder and not exhausted:
-        runner(problem, method, ladder[0], 1, seconds)
-    for budget in ladder:
+    """The rows of one method that are not there yet; once the time limit is met they are left out."""
+    repeats, seconds, warm_up, runner = how
+    missing = [budget for budget in ladder if budget not in {row.budget for row in earlier}]
+    exhausted = any(_met_the_limit(row, repeats) for row in earlier)
+    if warm_up and missing and not exhausted:
+        runner(problem, method, missing[0], 1, seconds)
+    for budget in missing:
         if exhausted:
             yield WorkRow(method.name, budget, "left out", note="a smaller budget met the time limit")
             continue
         row = runner(problem, method, budget, repeats, seconds)
-        # the repeats were cut short: the next budget would hardly have its first one
-        exhausted = row.status == "timed out" or (row.is_done and len(row.seconds) < repeats)
+        exhausted = _met_the_limit(row, repeats)
         yield row
+
+
+def _met_the_limit(row: WorkRow, repeats: int) -> bool:
+    """Whether a run was ended, or its repeats were cut short: the next budget would hardly have its first one."""
+    return row.status == "timed out" or (row.is_done and len(row.seconds) < repeats)
 
 
 def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[float]]:

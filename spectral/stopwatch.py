@@ -1,13 +1,8 @@
-"""Run one method at one budget: its times, its value, and an end to it when its time is up."""
+"""Run one method at one budget: its times, its errors, or why there are none."""
 
 from __future__ import annotations
 
-import signal
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -23,59 +18,25 @@ from .work_row import WorkRow
 SEED = 20220
 
 
-class OutOfTime(Exception):
-    """The time limit has passed."""
-
-
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise `OutOfTime` in the main thread after so many seconds.
-
-    A compiled loop is interrupted when it returns; what can hang inside one belongs into a process of its own. Outside
-    the main thread, and on systems without alarms, there is no limit.
-    """
-    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        raise OutOfTime
-
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-
-
 def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
     """One row; repeats end early, but not before the first, when together they take longer than ``seconds``.
 
-    What goes wrong becomes a row: errors of ours, of linear algebra and of memory with their message, and time-outs.
+    Errors of ours, of arithmetic, of linear algebra and of memory become a row with their message.
     """
     times: list[float] = []
     errors: list[dict[str, float]] = []
-    reported: float | None = None
-    note = ""
     try:
-        with time_limit(seconds):
-            for repeat in range(repeats):
-                start = time.perf_counter()
-                result = _solve(method, budget, repeat)
-                times.append(time.perf_counter() - start)
-                value, reported, note = _parts(result)
-                errors.append(problem.errors(value, method.name))
-    except OutOfTime:
-        if not errors:
-            return WorkRow(method.name, budget, "timed out", seconds=(seconds,), note=f"stopped after {seconds:g} s")
+        while len(times) < repeats and sum(times) <= seconds:
+            start = time.perf_counter()
+            result = _solve(method, budget, len(times))
+            times.append(time.perf_counter() - start)
+            value, reported, note = _parts(result)
+            errors.append(problem.errors(value, method.name))
     except (AsperityError, ArithmeticError, MemoryError, np.linalg.LinAlgError) as reason:
         words = " ".join(f"{type(reason).__name__}: {reason}".split())
         return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=words)
-    # an alarm between the end of a run and its error leaves a time without an error
     norms = {name: float(np.sqrt(np.mean([one[name] ** 2 for one in errors]))) for name in problem.norms}
-    return WorkRow(method.name, budget, "done", norms, tuple(times[: len(errors)]), reported, note)
+    return WorkRow(method.name, budget, "done", norms, tuple(times), reported, note)
 
 
 def _solve(method: WorkMethod, budget: float, repeat: int) -> Any:
