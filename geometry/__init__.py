@@ -10,7 +10,7 @@ from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
-from .configuration import ConfigurationSpace, default_spacing
+from .configuration import ConfigurationSpace
 from .container import Container
 from .curve import Curve
 from .cylinder import CylinderCollision, collide_cylinder, collide_modified
@@ -60,7 +60,6 @@ __all__ = [
     "collide",
     "collide_cylinder",
     "collide_modified",
-    "default_spacing",
     "dispersing_arcs",
     "double_parabola",
     "draw_wall",

@@ -24,9 +24,6 @@ def dual_bound(potential: Floats, cost: CostFunction, curvature: float) -> float
     r"""A lower bound of E c(theta, theta') over all symmetric laws, from any potential on equally spaced angles.
 
     phi is the potential, linear between the nodes 0, h, ..., pi, and psi(y) = inf over x of c(x, y) - phi(x). Then
-    E c >= E phi + E psi for every coupling of sin(theta)/2 d theta with itself. For c with second derivatives of at
-    most L in either variable, c(., y) - phi is above its least value at the nodes less L h^2/8; and psi, an infimum of
-    functions with second derivatives at most L, is above its chords less L h^2/8.
     E c >= E phi + E psi for every coupling of sin(theta)/2 d theta with itself. For c with second derivatives at most
     L in either variable, c(., y) - phi is above its least value at the nodes less L h^2/8; and psi, an infimum
     of functions with second derivatives at most L, is above its chords less L h^2/8.

@@ -26,8 +26,6 @@ def _zoom(sp: Any) -> Any:
     kind="numeric",
     printed=Formula(r"\bar\alpha^* = \alpha - \bar k^*\rho", lambda alpha, k, rho, eps: alpha - k * rho),
     corrected=Formula(
-        r"\bar\alpha^* = \alpha - \bar k^*\rho/\varepsilon,\quad"
-        r" f^*(x) = \varepsilon^{-1}f(\varepsilon x_1, \varepsilon(x_2 + 1) - 1, \varepsilon\alpha)",
         r"\bar\alpha^* = \alpha - \bar k^*\rho/\varepsilon,\quad "
         r"f^*(x) = \varepsilon^{-1}f(\varepsilon x_1, \varepsilon(x_2 + 1) - 1, \varepsilon\alpha)",
         lambda alpha, k, rho, eps: alpha - k * rho / eps,
