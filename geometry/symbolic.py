@@ -14,6 +14,13 @@ chi_perp, e2_hat, chi : Matrix
     The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
 G : Matrix
     The chart (theta, psi) -> w of the upper half of the unit sphere.
+x1, x2, v1, v2, omega, epsilon : Symbol
+    Centre of the disk, its velocity (v2 positive), and the scale of the charts.
+roll, roll_linear, bend, straighten : Matrix
+    The charts f*, f_lin, H_eps and its inverse at (x1, x2, alpha), on Z^0* and heights from the tops as in
+    `RollingCharts`; with epsilon = 1 they are F, f_lin, H_1 and its inverse.
+contact, plane_crossing, transfer : Matrix
+    G_eps, the position of Psi and the position phi_w of eta, on Z^0* too.
 
 Examples
 --------
@@ -23,6 +30,9 @@ Examples
 'proved'
 >>> verify(sym.inner(sym.G, sym.e2), sym.sin(sym.theta) * sym.sin(sym.psi), sym.ANGLES).answer
 'refuted'
+>>> dphi = sym.transfer.jacobian([sym.x1, sym.alpha])
+>>> verify(dphi.det(), 1 + sym.sin(sym.epsilon * sym.alpha) * sym.omega / sym.v2).answer
+'proved'
 """
 
 from __future__ import annotations
@@ -32,18 +42,22 @@ from typing import Any
 import sympy as sp
 from sympy import cos, sin
 
+from . import rolling
 from .kinetics import branch_block, contact_normal, direction, frame_rows
 
 __all__ = [
-    "ANGLES", "G", "J", "alpha", "branch_matrix", "chi", "chi_perp", "cos", "e2", "e2_hat", "frame", "inner",
-    "k1", "k2", "lambda2", "m", "metric", "no_slip", "psi", "rho", "satellite_normal", "sin", "smooth", "theta",
-    "volume_density",
+    "ANGLES", "G", "J", "alpha", "bend", "branch_matrix", "chi", "chi_perp", "contact", "cos", "e2", "e2_hat",
+    "epsilon", "frame", "inner", "k1", "k2", "lambda2", "m", "metric", "no_slip", "omega", "plane_crossing", "psi",
+    "rho", "roll", "roll_linear", "satellite_normal", "sin", "smooth", "straighten", "theta", "transfer", "v1", "v2",
+    "volume_density", "x1", "x2",
 ]  # fmt: skip
 
 m, J = sp.symbols("m J", positive=True)
 theta, psi, alpha = sp.symbols("theta psi alpha", real=True)
 rho = sp.Symbol("rho", positive=True)
 k1, k2 = sp.symbols("k1 k2", real=True)
+x1, x2, v1, omega = sp.symbols("x1 x2 v1 omega", real=True)
+v2, epsilon = sp.symbols("v2 epsilon", positive=True)
 
 ANGLES = (theta > 0, theta < sp.pi, psi > 0, psi < sp.pi)
 
@@ -82,3 +96,11 @@ def satellite_normal(number: Any) -> Any:
 smooth = branch_matrix(-1, sp.pi)
 no_slip = branch_matrix(1, 0)
 lambda2 = sin(theta) * sin(psi) ** 2
+
+roll = sp.Matrix([*rolling.roll(x1, x2, alpha, epsilon, sp), alpha])
+roll_linear = sp.Matrix(rolling.roll_linear(x1, x2, alpha))
+bend = sp.Matrix([*rolling.bend(x1, x2, alpha, epsilon, sp), alpha])
+straighten = sp.Matrix([*rolling.straighten(x1, x2, alpha, epsilon, sp), alpha])
+contact = sp.Matrix(rolling.satellite(x1, x2, alpha, epsilon, sp))
+plane_crossing = sp.Matrix(rolling.project(x1, x2, alpha, v1, v2, omega))
+transfer = sp.Matrix(rolling.transfer(x1, alpha, alpha, (v1, v2, omega), epsilon, sp))
