@@ -10,7 +10,7 @@ from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
-from .configuration import ConfigurationSpace, default_spacing
+from .configuration import ConfigurationSpace
 from .curve import Curve
 from .disk import Disk
 from .drawing import draw_wall
@@ -28,6 +28,7 @@ from .named import (
 )
 from .plan import TracePlan
 from .profile import read_profile
+from .rigid import RigidCollision, collide
 from .segment import Segment
 from .tracing import Status, Trace, trace, trajectory
 from .wall import Wall
@@ -45,13 +46,14 @@ __all__ = [
     "Disk",
     "Hollow",
     "NamedWall",
+    "RigidCollision",
     "RollingCharts",
     "Segment",
     "Status",
     "Trace",
     "TracePlan",
     "Wall",
-    "default_spacing",
+    "collide",
     "dispersing_arcs",
     "double_parabola",
     "draw_wall",

@@ -16,11 +16,17 @@ if TYPE_CHECKING:
     from .collision_matrices import no_slip_matrix, smooth_matrix
     from .composition import Composition, Power
     from .density import DensityLaw
+    from .difference import DifferenceTest, difference_test
     from .discretisation import discretise
+    from .distances import Distance, distance
     from .estimation import estimate
+    from .extremal import ExtremalResistance, extremal_resistance
+    from .functional import air_resistance, resistance
     from .ideal import lambertian, maxwell, retroreflection, specular
+    from .interval_exchange import IntervalExchangeLaw
     from .involution import InvolutionLaw
     from .law import BranchLaw, DrivenLaw, Law
+    from .least_resistance import LeastResistanceLaw
     from .legendre import Legendre
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
@@ -48,10 +54,15 @@ _HOMES = {
     "Composition": "composition",
     "Defect": "symmetry",
     "DensityLaw": "density",
+    "DifferenceTest": "difference",
+    "Distance": "distances",
     "DrivenLaw": "law",
+    "ExtremalResistance": "extremal",
+    "IntervalExchangeLaw": "interval_exchange",
     "InvolutionLaw": "involution",
     "KernelMatrix": "matrix",
     "Law": "law",
+    "LeastResistanceLaw": "least_resistance",
     "Legendre": "legendre",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
@@ -65,14 +76,19 @@ _HOMES = {
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
     "WallLaw": "wall_law",
+    "air_resistance": "functional",
+    "difference_test": "difference",
     "discretise": "discretisation",
+    "distance": "distances",
     "estimate": "estimation",
+    "extremal_resistance": "extremal",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
     "load_matrix": "matrixfile",
     "maxwell": "ideal",
     "mixture": "weighted_sum",
     "no_slip_matrix": "collision_matrices",
+    "resistance": "functional",
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
@@ -91,10 +107,15 @@ __all__ = [
     "Composition",
     "Defect",
     "DensityLaw",
+    "DifferenceTest",
+    "Distance",
     "DrivenLaw",
+    "ExtremalResistance",
+    "IntervalExchangeLaw",
     "InvolutionLaw",
     "KernelMatrix",
     "Law",
+    "LeastResistanceLaw",
     "Legendre",
     "MatrixLaw",
     "Panels",
@@ -106,14 +127,19 @@ __all__ = [
     "TensorBasis",
     "TriangularTeethLaw",
     "WallLaw",
+    "air_resistance",
+    "difference_test",
     "discretise",
+    "distance",
     "estimate",
+    "extremal_resistance",
     "henyey_greenstein",
     "lambertian",
     "load_matrix",
     "maxwell",
     "mixture",
     "no_slip_matrix",
+    "resistance",
     "retroreflection",
     "smooth_matrix",
     "specular",

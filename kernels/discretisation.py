@@ -16,6 +16,7 @@ from .circular import CircularArcLaw
 from .composition import Composition, Power
 from .density import DensityLaw
 from .entry_quadrature import entry_matrix
+from .fold import lists_branches
 from .involution import InvolutionLaw
 from .isometry import table_of
 from .kernel_quadrature import action_is_affordable, action_matrix, density_matrix, map_matrix
@@ -45,9 +46,8 @@ DISPLACED = np.finfo(np.float64).eps
 SEED_WITHOUT_RNG = 0
 # Rays of adaptive rows that nobody asked for by name: a second or a few; beyond them the shortfall is reported.
 QUICK_RAYS = 2_000_000
-# Methods that a sum has if all its terms have them; asked of a law to see whether it lists isometries.
+# Methods that a sum has if all its terms have them.
 SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
-FEW_KINKS, PROBE = 8, 1.0
 
 
 def discretise(
@@ -175,7 +175,7 @@ class _Maker:
         found: tuple[Method, ...]
         if closed_form is not None:
             found = (*self.methods(closed_form)[:-1], *driven)
-        elif isometries and made_of_isometries(law):
+        elif isometries and lists_branches(law):
             found = ("exact", "quadrature", *driven)
         elif isinstance(law, Combination):
             each = [self.methods(term) for _, term in law.terms_checked()]
@@ -327,16 +327,6 @@ class _Maker:
         return KernelMatrix(symmetric, self.basis, frobenius_error(error, kind, how), method=method)
 
 
-def made_of_isometries(law: Law) -> bool:
-    """Whether a law lists its branches and its kinks."""
-    try:
-        law.kinks(FEW_KINKS)
-        law.branches(PROBE)
-    except InputError:
-        return False
-    return True
-
-
 def _replacement(law: Law) -> Law | None:
     """The exact law of a wall, in closed form or as a table of isometries; None for other laws."""
     found = getattr(law, "closed_form", None)
@@ -344,7 +334,7 @@ def _replacement(law: Law) -> Law | None:
 
 
 def _is_sum_of_others(law: Law) -> bool:
-    return isinstance(law, Combination) and not made_of_isometries(law)
+    return isinstance(law, Combination) and not lists_branches(law)
 
 
 def _factors(law: Composition | Power) -> tuple[Law, ...]:

@@ -75,6 +75,8 @@ class Spectrum:
     basis : Basis
     method : str
         How the matrix was made.
+    matrix_error : float
+        The part of the discretisation errors that comes from the entries of an unsampled matrix.
     """
 
     values: Floats
@@ -87,6 +89,7 @@ class Spectrum:
     convention: str
     basis: Basis
     method: str
+    matrix_error: float = 0.0
 
     @property
     def intervals(self) -> Floats:
@@ -179,6 +182,7 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         convention=matrix.frame,
         basis=matrix.basis,
         method=matrix.method,
+        matrix_error=0.0 if matrix.samples else float(matrix.error),
     )
 
 
