@@ -14,14 +14,19 @@ chi_perp, e2_hat, chi : Matrix
     The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
 G : Matrix
     The chart (theta, psi) -> w of the upper half of the unit sphere.
+lambda2 : Expr
+    The density sin(theta) sin(psi)^2 of the invariant measure Lambda^2 in the angles.
+smooth, no_slip : Matrix
+    The velocity matrices of smooth and no-slip collisions, incoming to outgoing.
 
 Examples
 --------
+>>> import sympy
 >>> from asperity import verify
 >>> from asperity.geometry import symbolic as sym
 >>> verify(sym.inner(sym.G, sym.G), 1).answer
 'proved'
->>> verify(sym.inner(sym.G, sym.e2), sym.sin(sym.theta) * sym.sin(sym.psi), sym.ANGLES).answer
+>>> verify(sym.inner(sym.G, sym.e2), sympy.sin(sym.theta) * sympy.sin(sym.psi), sym.ANGLES).answer
 'refuted'
 """
 
@@ -35,8 +40,8 @@ from sympy import cos, sin
 from .kinetics import branch_block, contact_normal, direction, frame_rows
 
 __all__ = [
-    "ANGLES", "G", "J", "alpha", "branch_matrix", "chi", "chi_perp", "cos", "e2", "e2_hat", "frame", "inner",
-    "k1", "k2", "lambda2", "m", "metric", "no_slip", "psi", "rho", "satellite_normal", "sin", "smooth", "theta",
+    "ANGLES", "G", "J", "alpha", "branch_matrix", "chi", "chi_perp", "e2", "e2_hat", "frame", "inner",
+    "k1", "k2", "lambda2", "m", "metric", "no_slip", "psi", "rho", "satellite_normal", "smooth", "theta",
     "volume_density",
 ]  # fmt: skip
 

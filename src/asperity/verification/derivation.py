@@ -24,13 +24,13 @@ def derive_equality(left: Any, right: Any, domain: Domain) -> str | None:
 
     The conditions that tie symbols together are not used: what is derived without them holds with them.
     """
-    parameters = Parameters(domain)
     if sp.expand(left - right) == 0:
         return "expansion"
     if domain.closed and not _CONTINUOUS.issuperset(f.func for f in (left - right).atoms(sp.Function)):
         # the parameters leave out the ends, and at a jump nothing follows for them
         return None
-    if vanishes(left - right, parameters):
+    parameters = Parameters(domain, half_angles=True)
+    if vanishes(left - right, Parameters(domain, half_angles=False)) or vanishes(left - right, parameters):
         return "polynomial normal form"
     if all(parameters.factored(side).is_nonnegative for side in (left, right)) and vanishes(
         left**2 - right**2, parameters
