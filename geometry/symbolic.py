@@ -12,8 +12,8 @@ metric : Matrix
     Of the kinetic energy, diag(m, m, J).
 chi_perp, e2_hat, chi : Matrix
     The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
-G : Matrix
-    The chart (theta, psi) -> w of the upper half of the unit sphere.
+G, G_jacobian : Matrix
+    The chart (theta, psi) -> w of the upper half of the unit sphere, and its Jacobian, 3 by 2.
 lambda2 : Expr
     The density sin(theta) sin(psi)^2 of the invariant measure Lambda^2 in the angles.
 smooth, no_slip : Matrix
@@ -40,7 +40,7 @@ from sympy import cos, sin
 from .kinetics import branch_block, contact_normal, direction, frame_rows
 
 __all__ = [
-    "ANGLES", "G", "J", "alpha", "branch_matrix", "chi", "chi_perp", "e2", "e2_hat", "frame", "inner",
+    "ANGLES", "G", "G_jacobian", "J", "alpha", "branch_matrix", "chi", "chi_perp", "e2", "e2_hat", "frame", "inner",
     "k1", "k2", "lambda2", "m", "metric", "no_slip", "psi", "rho", "satellite_normal", "smooth", "theta",
     "volume_density",
 ]  # fmt: skip
@@ -57,6 +57,7 @@ frame = sp.Matrix(frame_rows(m, J, sp))
 chi_perp, e2_hat, chi = (frame.row(i).T for i in range(3))
 e2 = sp.Matrix([0, 1, 0])
 G = frame.T * sp.Matrix(direction(theta, psi, sp))
+G_jacobian = G.jacobian([theta, psi])
 
 
 def inner(w: Any, w2: Any) -> Any:
