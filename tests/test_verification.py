@@ -182,6 +182,23 @@ def test_the_symbols_of_the_disk_are_those_of_its_numbers():
         )
 
 
+def test_points_have_the_properties_that_their_symbols_carry():
+    even, whole = sp.Symbol("n", even=True), sp.Symbol("n", integer=True)
+    odd = sp.Symbol("k", odd=True, positive=True)
+    assert verify(sp.floor(even / 2), even / 2).answer != "refuted"
+    assert verify(sp.floor(whole / 2), whole / 2).answer == "refuted"
+    assert verify(sp.Mod(odd, 2), 0).answer == "refuted"
+    assert verify(sp.Abs(odd), odd).answer == "proved"
+    with pytest.raises(InputError, match="substitute 0"):
+        verify(sp.Symbol("z", zero=True) * x, 1)
+
+
+def test_intervals_may_be_shorter_than_floats_can_tell():
+    tiny = sp.Rational(1, 10**30)
+    assert verify(x**2, 2 * x, [x > 1, x < 1 + tiny]).answer == "refuted"
+    assert verify(sp.sqrt(x**2), x, [x > 1, x < 1 + tiny]).answer == "proved"
+
+
 def test_complex_symbols_are_refused():
     with pytest.raises(InputError, match="real symbol"):
         verify(sp.Symbol("z", imaginary=True), 0)

@@ -26,7 +26,7 @@ def derive_equality(left: Any, right: Any, domain: Domain) -> str | None:
     """
     if sp.expand(left - right) == 0:
         return "expansion"
-    if domain.closed and not _CONTINUOUS.issuperset(f.func for f in (left - right).atoms(sp.Function)):
+    if domain.closed and not _is_made_of_continuous_functions(left - right):
         # the parameters leave out the ends, and at a jump nothing follows for them
         return None
     parameters = Parameters(domain, half_angles=True)
@@ -41,6 +41,11 @@ def derive_equality(left: Any, right: Any, domain: Domain) -> str | None:
     ):
         return "the derivatives of the difference vanish on a connected domain, and so does it at one point"
     return None
+
+
+def _is_made_of_continuous_functions(e: Any) -> bool:
+    # roots and logarithms jump only in the complex plane
+    return _CONTINUOUS.issuperset(f.func for f in e.atoms(sp.Function)) and not e.has(sp.I)
 
 
 def _is_constant(difference: Any, parameters: Parameters) -> bool:
@@ -72,7 +77,7 @@ def _is_continuous(e: Any, parameters: Parameters) -> bool:
 
 
 def _places(domain: Domain) -> list[dict[Any, Any]]:
-    """Points at which inverse functions have known values: all symbols take the same one of a few places, or differ."""
+    """Points inside, at which inverse functions have known values."""
     inside = {s: [p for p in PLACES if bool(low < p) and bool(p < high)] for s, (low, high) in domain.intervals.items()}
     depth = min((len(values) for values in inside.values()), default=0)
     return [{symbol: values[index] for symbol, values in inside.items()} for index in range(depth)]
