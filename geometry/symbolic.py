@@ -12,43 +12,18 @@ metric : Matrix
     Of the kinetic energy, diag(m, m, J).
 chi_perp, e2_hat, chi : Matrix
     The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
-G, G_jacobian : Matrix
-    The chart (theta, psi) -> w of the upper half of the unit sphere, and its Jacobian, 3 by 2.
-lambda2 : Expr
-    The density sin(theta) sin(psi)^2 of the invariant measure Lambda^2 in the angles.
-smooth, no_slip : Matrix
-    The velocity matrices of smooth and no-slip collisions, incoming to outgoing.
-
-Examples
---------
->>> import sympy
->>> from asperity import verify
->>> from asperity.geometry import symbolic as sym
->>> verify(sym.inner(sym.G, sym.G), 1).answer
-'proved'
->>> verify(sym.inner(sym.G, sym.e2), sympy.sin(sym.theta) * sympy.sin(sym.psi), sym.ANGLES).answer
-'refuted'
-"""
-
-from __future__ import annotations
-
-from typing import Any
-
-import sympy as sp
-from sympy import cos, sin
-
-from .kinetics import branch_block, contact_normal, direction, frame_rows
-
-__all__ = [
-    "ANGLES", "G", "G_jacobian", "J", "alpha", "branch_matrix", "chi", "chi_perp", "e2", "e2_hat", "frame", "inner",
-    "k1", "k2", "lambda2", "m", "metric", "no_slip", "psi", "rho", "satellite_normal", "smooth", "theta",
-    "volume_density",
+    "ANGLES", "G", "G_jacobian", "J", "alpha", "bend", "branch_matrix", "chi", "chi_perp", "contact", "e2", "e2_hat",
+    "epsilon", "frame", "inner", "k1", "k2", "lambda2", "m", "metric", "no_slip", "omega", "plane_crossing", "psi",
+    "rho", "roll", "roll_linear", "satellite_normal", "smooth", "straighten", "theta", "transfer", "v1", "v2",
+    "volume_density", "x1", "x2",
 ]  # fmt: skip
 
 m, J = sp.symbols("m J", positive=True)
 theta, psi, alpha = sp.symbols("theta psi alpha", real=True)
 rho = sp.Symbol("rho", positive=True)
 k1, k2 = sp.symbols("k1 k2", real=True)
+x1, x2, v1, omega = sp.symbols("x1 x2 v1 omega", real=True)
+v2, epsilon = sp.symbols("v2 epsilon", positive=True)
 
 ANGLES = (theta > 0, theta < sp.pi, psi > 0, psi < sp.pi)
 
@@ -88,3 +63,11 @@ def satellite_normal(number: Any) -> Any:
 smooth = branch_matrix(-1, sp.pi)
 no_slip = branch_matrix(1, 0)
 lambda2 = sin(theta) * sin(psi) ** 2
+
+roll = sp.Matrix([*rolling.roll(x1, x2, alpha, epsilon, sp), alpha])
+roll_linear = sp.Matrix(rolling.roll_linear(x1, x2, alpha))
+bend = sp.Matrix([*rolling.bend(x1, x2, alpha, epsilon, sp), alpha])
+straighten = sp.Matrix([*rolling.straighten(x1, x2, alpha, epsilon, sp), alpha])
+contact = sp.Matrix(rolling.satellite(x1, x2, alpha, epsilon, sp))
+plane_crossing = sp.Matrix(rolling.project(x1, x2, alpha, v1, v2, omega))
+transfer = sp.Matrix(rolling.transfer(x1, alpha, alpha, (v1, v2, omega), epsilon, sp))

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 import shapely
+import sympy
 
 from asperity import geometry as geo
 from asperity import ledger
@@ -486,6 +487,29 @@ def test_bad_input_is_refused_with_advice(make, message):
 def test_the_ledger_checks_the_very_formula_that_the_charts_use(row, formula):
     (entry,) = ledger.selected([row])
     assert entry.right is formula
+
+
+def test_the_symbolic_charts_are_the_maps_that_arrays_go_through():
+    charts, sym = CHARTS[1], geo.symbolic
+    x1, x2, bar = configurations(charts, 1)[0] * [1.0, 1.0, 0.1]
+    v1, v2, omega = velocities(1)[0]
+    values = {sym.x1: x1, sym.x2: x2, sym.alpha: bar, sym.v1: v1, sym.v2: v2, sym.omega: omega, sym.epsilon: 1e-8}
+
+    def number(expressions):
+        return [float(e.subs({s: sympy.Rational(float(v)) for s, v in values.items()}).evalf(40)) for e in expressions]
+
+    c, w = [x1, x2, bar], [v1, v2, omega]
+    pairs = [
+        (sym.roll, charts.roll(c[:2], bar)),
+        (sym.roll_linear, charts.roll_linear(c[:2], bar)),
+        (sym.bend, charts.bend(c)),
+        (sym.straighten, charts.straighten(c)),
+        (sym.contact, charts.contact(c)),
+        (sym.plane_crossing, geo.plane_crossing(c, w)),
+        (sym.transfer, charts.transfer([x1, bar], w)),
+    ]
+    for expressions, found in pairs:
+        np.testing.assert_allclose(found, number(expressions), rtol=1e-14)
 
 
 def test_arrays_broadcast():
