@@ -12,6 +12,45 @@ metric : Matrix
     Of the kinetic energy, diag(m, m, J).
 chi_perp, e2_hat, chi : Matrix
     The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
+G, G_jacobian : Matrix
+    The chart (theta, psi) -> w of the upper half of the unit sphere, and its Jacobian, 3 by 2.
+lambda2 : Expr
+    The density sin(theta) sin(psi)^2 of the invariant measure Lambda^2 in the angles.
+smooth, no_slip : Matrix
+    The velocity matrices of smooth and no-slip collisions, incoming to outgoing.
+x1, x2, v1, v2, omega, epsilon : Symbol
+    Centre of the disk, its velocity (v2 positive), and the scale of the charts.
+roll, roll_linear, bend, straighten : Matrix
+    The charts f*, f_lin, H_eps and its inverse at (x1, x2, alpha), on Z^0* and heights from the tops as in
+    `RollingCharts`; with epsilon = 1 they are F, f_lin, H_1 and its inverse.
+contact, plane_crossing, transfer : Matrix
+    G_eps, the position of Psi and the position phi_w of eta, on Z^0* too.
+
+Examples
+--------
+>>> import sympy
+>>> from asperity import verify
+>>> from asperity.geometry import symbolic as sym
+>>> verify(sym.inner(sym.G, sym.G), 1).answer
+'proved'
+>>> verify(sym.inner(sym.G, sym.e2), sympy.sin(sym.theta) * sympy.sin(sym.psi), sym.ANGLES).answer
+'refuted'
+>>> dphi = sym.transfer.jacobian([sym.x1, sym.alpha])
+>>> verify(dphi.det(), 1 + sympy.sin(sym.epsilon * sym.alpha) * sym.omega / sym.v2).answer
+'proved'
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+from sympy import cos, sin
+
+from . import rolling
+from .kinetics import branch_block, contact_normal, direction, frame_rows
+
+__all__ = [
     "ANGLES", "G", "G_jacobian", "J", "alpha", "bend", "branch_matrix", "chi", "chi_perp", "contact", "e2", "e2_hat",
     "epsilon", "frame", "inner", "k1", "k2", "lambda2", "m", "metric", "no_slip", "omega", "plane_crossing", "psi",
     "rho", "roll", "roll_linear", "satellite_normal", "smooth", "straighten", "theta", "transfer", "v1", "v2",
