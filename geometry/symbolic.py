@@ -12,8 +12,12 @@ metric : Matrix
     Of the kinetic energy, diag(m, m, J).
 chi_perp, e2_hat, chi : Matrix
     The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
-G : Matrix
-    The chart (theta, psi) -> w of the upper half of the unit sphere.
+G, G_jacobian : Matrix
+    The chart (theta, psi) -> w of the upper half of the unit sphere, and its Jacobian, 3 by 2.
+lambda2 : Expr
+    The density sin(theta) sin(psi)^2 of the invariant measure Lambda^2 in the angles.
+smooth, no_slip : Matrix
+    The velocity matrices of smooth and no-slip collisions, incoming to outgoing.
 x1, x2, v1, v2, omega, epsilon : Symbol
     Centre of the disk, its velocity (v2 positive), and the scale of the charts.
 roll, roll_linear, bend, straighten : Matrix
@@ -24,14 +28,15 @@ contact, plane_crossing, transfer : Matrix
 
 Examples
 --------
+>>> import sympy
 >>> from asperity import verify
 >>> from asperity.geometry import symbolic as sym
 >>> verify(sym.inner(sym.G, sym.G), 1).answer
 'proved'
->>> verify(sym.inner(sym.G, sym.e2), sym.sin(sym.theta) * sym.sin(sym.psi), sym.ANGLES).answer
+>>> verify(sym.inner(sym.G, sym.e2), sympy.sin(sym.theta) * sympy.sin(sym.psi), sym.ANGLES).answer
 'refuted'
 >>> dphi = sym.transfer.jacobian([sym.x1, sym.alpha])
->>> verify(dphi.det(), 1 + sym.sin(sym.epsilon * sym.alpha) * sym.omega / sym.v2).answer
+>>> verify(dphi.det(), 1 + sympy.sin(sym.epsilon * sym.alpha) * sym.omega / sym.v2).answer
 'proved'
 """
 
@@ -46,9 +51,9 @@ from . import rolling
 from .kinetics import branch_block, contact_normal, direction, frame_rows
 
 __all__ = [
-    "ANGLES", "G", "J", "alpha", "bend", "branch_matrix", "chi", "chi_perp", "contact", "cos", "e2", "e2_hat",
+    "ANGLES", "G", "G_jacobian", "J", "alpha", "bend", "branch_matrix", "chi", "chi_perp", "contact", "e2", "e2_hat",
     "epsilon", "frame", "inner", "k1", "k2", "lambda2", "m", "metric", "no_slip", "omega", "plane_crossing", "psi",
-    "rho", "roll", "roll_linear", "satellite_normal", "sin", "smooth", "straighten", "theta", "transfer", "v1", "v2",
+    "rho", "roll", "roll_linear", "satellite_normal", "smooth", "straighten", "theta", "transfer", "v1", "v2",
     "volume_density", "x1", "x2",
 ]  # fmt: skip
 
@@ -66,6 +71,7 @@ frame = sp.Matrix(frame_rows(m, J, sp))
 chi_perp, e2_hat, chi = (frame.row(i).T for i in range(3))
 e2 = sp.Matrix([0, 1, 0])
 G = frame.T * sp.Matrix(direction(theta, psi, sp))
+G_jacobian = G.jacobian([theta, psi])
 
 
 def inner(w: Any, w2: Any) -> Any:

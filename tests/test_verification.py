@@ -12,6 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity import InputError, Verdict, verify
+from asperity import geometry as geo
+from asperity import kernels as ker
 from asperity.geometry import symbolic as sym
 from asperity.verification import agreement, every, holds, no_excess
 from asperity.verification.enclosure import enclose
@@ -152,6 +154,49 @@ def test_matrices_are_compared_entry_by_entry_and_shapes_must_agree():
 def test_unsuitable_assumptions_are_refused_in_words(assumptions, words):
     with pytest.raises(InputError, match=words):
         verify(x, y, assumptions)
+
+
+def test_assumptions_may_be_one_relation_or_intervals():
+    root = sp.sqrt(1 - sp.cos(theta) ** 2)
+    assert verify(root, sp.sin(theta), {theta: (0, sp.pi)}).answer == "proved"
+    assert verify(root, sp.sin(theta), sp.And(theta > 0, theta < sp.pi)).answer == "proved"
+    assert verify(root, sp.sin(theta), {theta: (0, 4)}).answer == "refuted"
+    assert verify(sp.sqrt(x**2), x, x > 0).answer == "proved"
+
+
+def test_the_symbols_of_the_disk_are_those_of_its_numbers():
+    disk = geo.Disk(mass=2.0, inertia=0.7)
+    point = {sym.m: 2.0, sym.J: 0.7, sym.theta: 1.1, sym.psi: 0.4}
+    assert np.allclose(np.array(sym.frame.subs(point), dtype=float), disk.frame)
+    assert np.allclose(np.array(sym.G.subs(point), dtype=float)[:, 0], disk.from_angles(1.1, 0.4))
+    assert np.allclose(np.array(sym.smooth.subs(point), dtype=float), ker.smooth_matrix(disk))
+    assert np.allclose(np.array(sym.no_slip.subs(point), dtype=float), ker.no_slip_matrix(disk))
+    step = 1e-6
+    numeric = (disk.from_angles(1.1, 0.4 + step) - disk.from_angles(1.1, 0.4 - step)) / (2 * step)
+    assert np.allclose(np.array(sym.G_jacobian.subs(point), dtype=float)[:, 1], numeric, atol=1e-9)
+    law = ker.TriangularTeethLaw(0.8)
+    for _, matrix in ker.CollisionLaw(law, disk).branches(0.5):
+        assert any(
+            np.allclose(matrix, np.array(sym.branch_matrix(sign, turn).subs(point), dtype=float))
+            for sign, turn in ((1, sp.pi - 2 * sp.Rational(4, 5)), (-1, sp.Rational(4, 5)))
+        )
+
+
+def test_points_have_the_properties_that_their_symbols_carry():
+    even, whole = sp.Symbol("n", even=True), sp.Symbol("n", integer=True)
+    odd = sp.Symbol("k", odd=True, positive=True)
+    assert verify(sp.floor(even / 2), even / 2).answer != "refuted"
+    assert verify(sp.floor(whole / 2), whole / 2).answer == "refuted"
+    assert verify(sp.Mod(odd, 2), 0).answer == "refuted"
+    assert verify(sp.Abs(odd), odd).answer == "proved"
+    with pytest.raises(InputError, match="substitute 0"):
+        verify(sp.Symbol("z", zero=True) * x, 1)
+
+
+def test_intervals_may_be_shorter_than_floats_can_tell():
+    tiny = sp.Rational(1, 10**30)
+    assert verify(x**2, 2 * x, [x > 1, x < 1 + tiny]).answer == "refuted"
+    assert verify(sp.sqrt(x**2), x, [x > 1, x < 1 + tiny]).answer == "proved"
 
 
 def test_complex_symbols_are_refused():

@@ -15,6 +15,7 @@ from ...verification.entry import Code
 
 # Rounding of a dozen reflections.
 TRACED = 1e-10
+MOST_BOUNCES = 1000
 
 
 def explicit_matrices(m: Any, J: Any) -> list[list[list[Any]]]:
@@ -139,36 +140,40 @@ def symmetry_of_the_two_laws(maps: Code) -> Verdict:
     return every(check(0), check(1))
 
 
+def next_side(vertices: Any, point: Any, along: Any, last: int) -> tuple[float, int]:
+    """When a particle in the plane of a polygonal wall next hits a side, and which; -1 is the line y = 0."""
+    time, side = (-point[1] / along[1], -1) if along[1] > 0 and last >= 0 else (math.inf, -1)
+    for index, (start, end) in enumerate(pairwise(vertices)):
+        edge, offset = end - start, start - point
+        cross = along[0] * edge[1] - along[1] * edge[0]
+        if index == last or cross == 0:
+            continue
+        when = (offset[0] * edge[1] - offset[1] * edge[0]) / cross
+        share = (offset[0] * along[1] - offset[1] * along[0]) / cross
+        if 0 <= when < time and 0 <= share <= 1:
+            time, side = when, index
+    return time, side
+
+
 def bounce_on_the_cylinder(disk: Disk, wall: Wall, place: Any, velocity: Any) -> Any:
     """The outgoing velocity of a disk on the cylinder over a polygonal wall, by reflections in three dimensions.
 
     The free configurations are those with (x1 + alpha, x2) outside the wall; at a side with unit normal k the velocity
-    is reflected at n = `contact_normal` in the kinetic-energy metric.
+    is reflected at n = `contact_normal` in the kinetic-energy metric. Not a number after too many bounces.
     """
-    vertices = wall.vertices
+    vertices, last = wall.vertices, -1
     position, velocity = np.array(place, dtype=float), np.array(velocity, dtype=float)
-    last = -1
-    while True:
-        along = np.array([velocity[0] + velocity[2], velocity[1]])
+    for _ in range(MOST_BOUNCES):
         point = np.array([position[0] + position[2], position[1]])
-        time, side = (-point[1] / along[1], -1) if along[1] > 0 and last >= 0 else (math.inf, -1)
-        for index, (a, b) in enumerate(pairwise(vertices)):
-            edge = b - a
-            cross = along[0] * edge[1] - along[1] * edge[0]
-            if index == last or cross == 0:
-                continue
-            offset = a - point
-            when = (offset[0] * edge[1] - offset[1] * edge[0]) / cross
-            share = (offset[0] * along[1] - offset[1] * along[0]) / cross
-            if 0 <= when < time and 0 <= share <= 1:
-                time, side = when, index
-        position = position + time * velocity
-        if side < 0:
+        along = np.array([velocity[0] + velocity[2], velocity[1]])
+        time, last = next_side(vertices, point, along, last)
+        if last < 0:
             return velocity
-        edge = vertices[side + 1] - vertices[side]
+        position = position + time * velocity
+        edge = vertices[last + 1] - vertices[last]
         normal = np.array(contact_normal(disk.mass, disk.inertia, (-edge[1], edge[0]) / np.hypot(*edge), 0.0))
         velocity = velocity - 2 * disk.inner(velocity, normal) * normal
-        last = side
+    return np.full(3, np.nan)
 
 
 @verified(

@@ -23,7 +23,11 @@ SHOWN = 20
 def refute_equality(left: Any, right: Any, points: Iterable[dict[Any, Any]]) -> Verdict | None:
     """Return a refutation at the first of the points where left and right differ, or None."""
     symbols = sorted(left.free_symbols | right.free_symbols, key=str)
-    sides = [sp.lambdify(symbols, side, "mpmath") for side in (left, right)]
+    try:
+        sides = [sp.lambdify(symbols, side, "mpmath") for side in (left, right)]
+    except NotImplementedError:
+        # an integral without bounds, or another expression without a value
+        return None
     for point in points:
         rationals = [point[symbol] for symbol in symbols]
         a, b = (_value(side, rationals, DIGITS) for side in sides)
