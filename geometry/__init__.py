@@ -10,6 +10,7 @@ from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
+from .collision_drawing import collision_path, draw_collision, draw_configurations
 from .configuration import ConfigurationSpace, default_spacing
 from .container import Container
 from .curve import Curve
@@ -60,9 +61,12 @@ __all__ = [
     "collide",
     "collide_cylinder",
     "collide_modified",
+    "collision_path",
     "default_spacing",
     "dispersing_arcs",
     "double_parabola",
+    "draw_collision",
+    "draw_configurations",
     "draw_wall",
     "elliptical_arcs",
     "flat",

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .involution import InvolutionLaw
     from .law import BranchLaw, DrivenLaw, Law
     from .legendre import Legendre
+    from .limit_picture import draw_limit
     from .limit_study import LimitStudy, limit_study
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
@@ -73,6 +74,7 @@ _HOMES = {
     "TriangularTeethLaw": "triangular",
     "WallLaw": "wall_law",
     "discretise": "discretisation",
+    "draw_limit": "limit_picture",
     "estimate": "estimation",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
@@ -120,6 +122,7 @@ __all__ = [
     "TriangularTeethLaw",
     "WallLaw",
     "discretise",
+    "draw_limit",
     "estimate",
     "henyey_greenstein",
     "lambertian",
