@@ -10,7 +10,8 @@ from .arc import Arc
 from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
-from .configuration import ConfigurationSpace
+from .collision_drawing import collision_path, draw_collision, draw_configurations
+from .configuration import ConfigurationSpace, default_spacing
 from .container import Container
 from .curve import Curve
 from .cylinder import CylinderCollision, collide_cylinder, collide_modified
@@ -60,8 +61,12 @@ __all__ = [
     "collide",
     "collide_cylinder",
     "collide_modified",
+    "collision_path",
+    "default_spacing",
     "dispersing_arcs",
     "double_parabola",
+    "draw_collision",
+    "draw_configurations",
     "draw_wall",
     "elliptical_arcs",
     "flat",

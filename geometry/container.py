@@ -90,7 +90,8 @@ class Container:
         if not np.all(turns > 0.0) or turned > 3.0 * math.pi:
             raise InputError("vertices: expected a convex polygon with its vertices counterclockwise")
         lengths = np.hypot(edges[:, 0], edges[:, 1])[:, None]
-        return cls(corners, np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths)
+        # adding 0 makes 0 of -0
+        return cls(corners, np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths + 0.0)
 
     @property
     def tangents(self) -> Floats:

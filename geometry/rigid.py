@@ -38,6 +38,8 @@ class RigidCollision:
         (x1, alpha) where the disk is back at x2 = 0, both unfolded; elsewhere where it was last.
     velocity : array of shape (n, 3)
         Outgoing (v1, v2, omega), v2 > 0 where it came back; elsewhere the last one.
+    time : array of shape (n,)
+        From the start to there.
     contacts : array of int, shape (n,)
         How often a satellite touched the wall.
     two_satellites : array of bool, shape (n,)
@@ -49,6 +51,7 @@ class RigidCollision:
 
     position: Floats
     velocity: Floats
+    time: Floats
     contacts: NDArray[np.int64]
     two_satellites: NDArray[np.bool_]
     status: NDArray[np.uint8]
@@ -128,7 +131,7 @@ def collide(
 
     >>> from asperity import geometry as geo
     >>> hit = geo.collide(geo.Disk(), geo.flat(), 0.01, [[0.5, 0.0]], [[0.0, -1.0, 0.0]])
-    >>> hit.velocity.tolist(), hit.contacts.tolist(), hit.counts()["escaped"]
+    >>> hit.velocity.round(12).tolist(), hit.contacts.tolist(), hit.counts()["escaped"]
     ([[0.0, 1.0, 0.0]], [1], 1)
     """
     from .rigid_engine import collide_disks
@@ -139,7 +142,7 @@ def collide(
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
     n = len(at)
-    out_position, out_velocity = np.empty_like(at), np.empty_like(moving)
+    out_position, out_velocity, time = np.empty_like(at), np.empty_like(moving), np.empty(n)
     contacts, two, status = np.empty(n, np.int64), np.empty(n, np.bool_), np.empty(n, np.uint8)
     scene = wall.scene
     tables, masses = rigid_tables(scene), shares(disk)
@@ -149,11 +152,11 @@ def collide(
     def run(part: slice) -> None:
         collide_disks(
             at[part], moving[part], masses, numbers, max_contacts, scene.cell, scene.is_open, *tables,
-            out_position[part], out_velocity[part], contacts[part], two[part], status[part],
+            out_position[part], out_velocity[part], time[part], contacts[part], two[part], status[part],
         )  # fmt: skip
 
     in_blocks(run, n, threads)
-    results = (out_position, out_velocity, contacts, two, status)
+    results = (out_position, out_velocity, time, contacts, two, status)
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)

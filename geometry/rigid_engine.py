@@ -252,11 +252,11 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, 
 
     ``disk`` is (m, J) with m + J = 1, ``ring`` is (scale, spacing, reach, floor, slack): satellites farther than
     ``reach`` from the lowest point are above the wall, and ``-floor`` is as low as the disk can be. The velocities
-    have kinetic norm 1. Returns the disk's displacement, its turn, the velocities, contacts, whether two satellites
-    took part, and the status.
+    have kinetic norm 1. Returns the disk's displacement, its turn, the time, the velocities, contacts, whether two
+    satellites took part, and the status.
     """
     scale, spacing, _, floor, _ = ring
-    travel, turned, contacts, two = 0.0, 0.0, 0, False
+    travel, turned, passed, contacts, two = 0.0, 0.0, 0.0, 0, False
     turn, versed = angle_data(angle)
     x, y, height = place + turn[0] / scale, versed / scale, 0.0
     own, below = (ZERO, NOTHING, NOTHING), (ZERO, NOTHING, 0.0)
@@ -270,18 +270,19 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, 
         elif omega != 0.0:
             end = MOST_CELLS * spacing / abs(scale * omega)
         else:
-            return travel, turned, v1, v2, omega, contacts, two, BOUNCE_LIMIT
+            return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
         time, hit, base, chosen, touched, code = first_of_all(
             own, below, x, y, angle, turn, motion, end, ring, cell, is_open, hollows, joints, lines, arcs
         )
         travel += v1 * time
         turned += scale * omega * time
+        passed += time
         if code != CLEAR:
-            return travel, turned, v1, v2, omega, contacts, two, code
+            return travel, turned, passed, v1, v2, omega, contacts, two, code
         if hit[0] == NO_PIECE:
-            return travel, turned, v1, v2, omega, contacts, two, ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
+            return travel, turned, passed, v1, v2, omega, contacts, two, ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
         if contacts >= limit:
-            return travel, turned, v1, v2, omega, contacts, two, BOUNCE_LIMIT
+            return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
         number, hollow, left = left_below(
             own, below, x, y, angle, time, chosen, touched, motion, ring, cell, is_open, hollows
         )
@@ -300,9 +301,9 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, 
 @_compile
 def collide_disks(
     position, velocity, disk, ring, limit, cell, is_open, hollows, joints, lines, arcs, out_position,
-    out_velocity, contacts, two_satellites, status,
+    out_velocity, times, contacts, two_satellites, status,
 ):  # fmt: skip
-    """Collide a block of disks; fills the five output arrays."""
+    """Collide a block of disks; fills the output arrays."""
     mass, inertia = disk
     scale, spacing = ring[0], ring[1]
     width = scale * cell
@@ -310,13 +311,14 @@ def collide_disks(
         norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
         place = (position[i, 0] - math.floor(position[i, 0] / width) * width) / scale
         angle = position[i, 1] - spacing * round(position[i, 1] / spacing)
-        travel, turned, v1, v2, omega, contacts[i], two_satellites[i], status[i] = collide_disk(
+        travel, turned, time, v1, v2, omega, contacts[i], two_satellites[i], status[i] = collide_disk(
             place, angle, velocity[i, 0] / norm, velocity[i, 1] / norm, velocity[i, 2] / norm, disk, ring, limit,
             cell, is_open, hollows, joints, lines, arcs,
         )  # fmt: skip
         out_position[i, 0] = position[i, 0] + scale * travel
         out_position[i, 1] = position[i, 1] + turned
         out_velocity[i, 0], out_velocity[i, 1], out_velocity[i, 2] = norm * v1, norm * v2, norm * omega
+        times[i] = scale * time / norm
 
 
 @_inline
@@ -365,7 +367,7 @@ def roll_disks(
     position, velocity, disk, scale, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs, out_position,
     out_velocity, times, contacts, status,
 ):  # fmt: skip
-    """Collide a block of disks on the cylinder; fills the five output arrays."""
+    """Collide a block of disks on the cylinder; fills the output arrays."""
     mass, inertia = disk
     for i in range(position.shape[0]):
         norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)

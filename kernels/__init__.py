@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .law import BranchLaw, DrivenLaw, Law
     from .least_resistance import LeastResistanceLaw
     from .legendre import Legendre
+    from .limit_picture import draw_limit
     from .limit_study import LimitStudy, limit_study
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
@@ -97,6 +98,7 @@ _HOMES = {
     "difference_test": "difference",
     "discretise": "discretisation",
     "distance": "distances",
+    "draw_limit": "limit_picture",
     "estimate": "estimation",
     "extremal_resistance": "extremal",
     "henyey_greenstein": "phase_function",
@@ -162,6 +164,7 @@ __all__ = [
     "difference_test",
     "discretise",
     "distance",
+    "draw_limit",
     "estimate",
     "extremal_resistance",
     "henyey_greenstein",

@@ -161,8 +161,8 @@ def limit_study(
     >>> from asperity import geometry as geo, kernels as ker
     >>> study = ker.limit_study(geo.Disk(1.0, 1.0), geo.triangular_teeth(1.2), [1e-3, 1e-4, 1e-5],
     ...                         np.random.default_rng(0), samples=(8, 16, 16))
-    >>> bool(np.all(np.diff(study.psi_defect) < 0)), round(float(study.order("psi_defect", "spacings")), 1)
-    (True, 1.0)
+    >>> bool(np.all(np.diff(study.psi_defect) < 0)), abs(float(study.order("psi_defect", "spacings")) - 1.0) < 0.2
+    (True, True)
     """
     from ..geometry.configuration import ConfigurationSpace
 

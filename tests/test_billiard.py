@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -147,3 +149,17 @@ def test_bad_input_is_refused():
         geo.Container.polygon([(0, 0), (0, 1), (1, 0)])
     with pytest.raises(InputError, match="unit vectors"):
         geo.Container([[0, 0]], [[0, 2]])
+
+
+def test_the_example_finds_the_strip_bounded_and_the_wedge_periodic_until_the_walls_are_rough():
+    path = Path(__file__).parents[1] / "docs" / "examples" / "disk_in_a_strip.py"
+    spec = importlib.util.spec_from_file_location("disk_in_a_strip", path)
+    example = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(example)
+    found = example.main(disks=10, collisions=300)
+    widths = [value for name, value in found.items() if "width/bound" in name and "arcs" not in name]
+    assert len(widths) == 20 and max(widths) <= 1 + 1e-12
+    assert found["focusing arcs, median width/bound"] > 1.0
+    assert found["no-slip wedge, share that stays"] > 0.05
+    assert found["no-slip wedge, displacement in ten collisions"] < 1e-10
+    assert found["rough wedge, share that stays"] < found["no-slip wedge, share that stays"]

@@ -23,7 +23,16 @@ def load(name):
 
 
 def test_every_example_has_a_test():
-    tested = {"gallery", "maxwell_or_rough", "measured_profile", "no_slip_or_smooth", "published_gap"}
+    tested = {
+        "disk_in_a_strip",
+        "gallery",
+        "maxwell_or_rough",
+        "measured_profile",
+        "no_slip_or_smooth",
+        "published_gap",
+        "true_disk",
+        "true_disk_pictures",
+    }
     assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -79,3 +82,53 @@ def test_bad_input_is_refused(study):
         study.order("speed")
     with pytest.raises(InputError, match="against"):
         study.order("drift", "time")
+
+
+EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
+
+
+def load(name):
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_example_finds_the_foreshortened_wall_and_both_cases_of_the_dichotomy():
+    found = load("true_disk").main(ratios=(2.0,), scales=(1e-4, 1e-5, 1e-6), samples=(24, 16, 16))
+    case = found["m/J = 2"]
+    assert abs(case["correlation"] - case["foreshortened wall"]) < 5 * case["its error"] + 0.002
+    assert abs(case["correlation"] - case["unforeshortened wall"]) > 0.3
+    sequences = found["dichotomy"]
+    assert sequences["constant sequence, last"] < 0.02
+    assert sequences["alternating sequence, greatest of the last two"] > 0.3
+    assert sequences["alternating sequence, least of the last two"] < 0.03
+
+
+def test_the_pictures_of_the_page_are_drawn(tmp_path):
+    found = load("true_disk_pictures").main(tmp_path, samples=500)
+    assert found["contacts"] == 4 and abs(found["energy gained"]) < 1e-13
+    committed = EXAMPLES.parent / "theory" / "true-disk"
+    page = (EXAMPLES.parent / "theory" / "true-disk.md").read_text(encoding="utf-8")
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in committed.iterdir()}
+    for path in committed.iterdir():
+        assert f"true-disk/{path.name}" in page and path.stat().st_size < 150_000
+
+
+def test_the_path_of_a_collision_has_its_contacts_on_the_wall():
+    disk, scale = geo.Disk(1.0, 0.7), 0.05
+    space = geo.ConfigurationSpace(TEETH, disk, scale)
+    rng, lengths = np.random.default_rng(5), []
+    for _ in range(20):
+        place = [rng.random() * scale, (rng.random() - 0.5) * space.spacing]
+        w = -disk.from_angles(rng.uniform(0.5, 2.5), rng.uniform(0.5, 2.5))
+        path = geo.collision_path(disk, TEETH, scale, place, w)
+        lengths.append(len(path))
+        assert abs(path[-1, 1]) < 1e-13
+        low = np.array([space.zoomed.satellite(path[1:-1] / scale, n - space.charts.nearest(path[1:-1, 2]))
+                        for n in (-1, 0, 1)])  # fmt: skip
+        # distance from the teeth of apex angle 1.2, below their tops
+        across = np.abs((low[..., 0] + 0.5) % 1.0 - 0.5)
+        depth = (low[..., 1] + across / np.tan(0.6)) * np.sin(0.6)
+        np.testing.assert_allclose(np.abs(depth).min(axis=0), 0.0, atol=1e-10)
+    assert max(lengths) > 4
