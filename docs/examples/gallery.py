@@ -14,7 +14,7 @@ from asperity.study_picture import draw_gallery
 
 
 def main(folder: Path, tolerance: float = 1e-3) -> dict[str, Study]:
-    """Write the named walls, the least resistance, the study of focusing arcs and that of the measured profile; returns the studies."""
+    """Write the named walls, the least resistance, and two studies, which are returned."""
     folder.mkdir(parents=True, exist_ok=True)
     draw_gallery(folder / "walls.png", overwrite=True)
     least_resistance.main(picture=folder / "least-resistance.png")
