@@ -15,6 +15,7 @@ from .branch_quadrature import branch_matrix
 from .circular import CircularArcLaw
 from .composition import Composition, Power
 from .density import DensityLaw
+from .directions import Directions
 from .entry_quadrature import entry_matrix
 from .fold import lists_branches
 from .involution import InvolutionLaw
@@ -228,7 +229,8 @@ class _Maker:
         if isinstance(law, SpecularFrame):
             return self._flipped(law)
         how = "difference of the last two levels of quadrature"
-        if isinstance(law, DensityLaw):
+        if isinstance(law, DensityLaw) and not isinstance(self.basis, Directions):
+            # three smooth functions are integrated row by row below, on the law's own panels
             symmetric, error = density_matrix(law, self.basis, self.tolerance)
         elif isinstance(law, InvolutionLaw):
             symmetric, error = map_matrix(law.map, self.basis, self.tolerance)

@@ -82,7 +82,7 @@ def distance(
     matrices by resampling. That distance can be far below that of the laws if these vary within cells: two
     involutions may have the same matrix.
 
-    *Joint* distances of matrices are exact up to 4 million pairs of occupied cells (250 MB); beyond, cells are merged,
+    *Joint* distances of matrices are exact up to 4 million pairs of occupied cells (160 MB); beyond, cells are merged,
     and the error says what that may have done. Laws are compared on 128 bins.
 
     *The pseudometric* is the sum over k, l >= 0 of 2^(-k-l-2) times the difference of the means of

@@ -48,7 +48,8 @@ class IntervalExchangeLaw(Law):
     Notes
     -----
     Any symmetric law is thus a limit of involutions, and those are limits of walls' laws: the first step from a law to
-    a wall. Source: A. Plakhov, "Exterior Billiards" (2012), ch. 4; Rudzis 2022, section 1.2.5.
+    a wall. Images are computed from shares of the measure, so that within 1e-8 of 0 and pi they are good to 1e-8 only.
+    Source: A. Plakhov, "Exterior Billiards" (2012), ch. 4; Rudzis 2022, section 1.2.5.
 
     Examples
     --------

@@ -13,9 +13,11 @@ from .bins import Bins
 from .circular import CircularArcLaw
 from .composition import Composition, Power
 from .density import DensityLaw
+from .interval_exchange import IntervalExchangeLaw
 from .involution import InvolutionLaw
 from .kernel_quadrature import row_intervals
 from .law import BranchLaw, DrivenLaw, Law
+from .least_resistance import LeastResistanceLaw
 from .measure import gauss_on_intervals, gauss_rule
 from .row_transport import Distributions
 from .specular_frame import SpecularFrame
@@ -60,6 +62,17 @@ def _(law: BranchLaw, theta: Floats, edges: Floats) -> Parts:
 def _(law: InvolutionLaw, theta: Floats, edges: Floats) -> Parts:
     image = np.asarray(law.map(theta), dtype=np.float64)
     return np.zeros((theta.size, edges.size)), kept_inside(image)[:, None], np.ones((theta.size, 1))
+
+
+@parts_of.register
+def _(law: IntervalExchangeLaw, theta: Floats, edges: Floats) -> Parts:
+    return np.zeros((theta.size, edges.size)), law.image(theta)[:, None], np.ones((theta.size, 1))
+
+
+@parts_of.register
+def _(law: LeastResistanceLaw, theta: Floats, edges: Floats) -> Parts:
+    probability, outgoing = law.outcomes(theta)
+    return np.zeros((theta.size, edges.size)), outgoing, probability
 
 
 @parts_of.register
