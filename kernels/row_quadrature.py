@@ -82,6 +82,14 @@ def row_matrix(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), error, rays
 
 
+def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS) -> tuple[Floats, float]:
+    """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
+    integrator = _Integrator(wall, basis, tolerance, most_rays)
+    _, error, _ = integrator.run()
+    edges = np.union1d(integrator.panels.low, integrator.panels.high)
+    return np.union1d(edges, np.pi - edges) if integrator.halved else edges, error
+
+
 class _Integrator:
     """One matrix in the making."""
 
