@@ -43,8 +43,8 @@ def work_precision(
     repeats : int
         Timed runs of each.
     seconds : float
-        Time limit of a row, all repeats together: when it has passed, no further one is begun, and larger budgets of
-        the method are left out. A run itself is ended only by a ``runner`` that can.
+        When the repeats of a row have taken so long, no further one is begun; when a single run has, larger budgets of
+        its method are left out. A run itself is ended only by a ``runner`` that can.
     warm_up : bool
         Whether one run more, at a method's smallest budget, goes before the others: it loads what is loaded once.
     threads : int
@@ -99,7 +99,7 @@ def _climb(
     """The rows of one method that are not there yet; once the time limit is met they are left out."""
     repeats, seconds, warm_up, runner = how
     missing = [budget for budget in ladder if budget not in {row.budget for row in earlier}]
-    exhausted = any(_met_the_limit(row, repeats) for row in earlier)
+    exhausted = any(_met_the_limit(row, seconds) for row in earlier)
     if warm_up and missing and not exhausted:
         runner(problem, method, missing[0], 1, seconds)
     for budget in missing:
@@ -107,13 +107,13 @@ def _climb(
             yield WorkRow(method.name, budget, "left out", note="a smaller budget met the time limit")
             continue
         row = runner(problem, method, budget, repeats, seconds)
-        exhausted = _met_the_limit(row, repeats)
+        exhausted = _met_the_limit(row, seconds)
         yield row
 
 
-def _met_the_limit(row: WorkRow, repeats: int) -> bool:
-    """Whether a run was ended, or its repeats were cut short: the next budget would hardly have its first one."""
-    return row.status == "timed out" or (row.is_done and len(row.seconds) < repeats)
+def _met_the_limit(row: WorkRow, seconds: float) -> bool:
+    """Whether a run was ended or took so long that the next budget would hardly be done in time."""
+    return row.status == "timed out" or (row.is_done and row.least > seconds)
 
 
 def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[float]]:

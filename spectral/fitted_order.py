@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,6 +14,10 @@ from ..errors import InputError
 # Fits need this many points to have a confidence interval.
 FEWEST_POINTS = 3
 CONFIDENCE = 0.95
+# Orders are told apart to this: the next ones worth a name are a quarter away.
+ALLOWANCE = 0.15
+
+OrderVerdict = Literal["agrees", "differs", "not resolved"]
 
 
 @dataclass(frozen=True)
@@ -33,9 +38,21 @@ class FittedOrder:
     high: float
     points: int
 
-    def agrees_with(self, declared: float, allowance: float = 0.15) -> bool:
-        """Whether the declared order is within the allowance of the fitted one."""
-        return abs(self.order - declared) <= allowance
+    def agrees_with(self, declared: float) -> bool:
+        """Whether the declared order is within 0.15 of the fitted one."""
+        return abs(self.order - declared) <= ALLOWANCE
+
+    def verdict(self, declared: float) -> OrderVerdict:
+        """Whether the declared order is within 0.15; if not, whether the interval excludes it.
+
+        Examples
+        --------
+        >>> FittedOrder(1.5, 1.2, 1.8, 4).verdict(1.75), FittedOrder(1.5, 1.4, 1.6, 4).verdict(1.75)
+        ('not resolved', 'differs')
+        """
+        if self.agrees_with(declared):
+            return "agrees"
+        return "not resolved" if self.low <= declared <= self.high else "differs"
 
     def __str__(self) -> str:
         return f"{self.order:.2f} [{self.low:.2f}, {self.high:.2f}]"

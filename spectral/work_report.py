@@ -122,14 +122,15 @@ class WorkReport:
     def choice(self) -> float | None:
         """Time of the method that chooses over that of the best other one at equal error, the worst of its rows.
 
-        Between the rows of a method its time is interpolated in the logarithms. None without rows of both kinds.
+        Between the rows of a method its time is interpolated in the logarithms. An error that its reference cannot
+        tell from zero counts as what the method reports, if that is less. None without rows of both kinds.
         """
         ratios = []
         for row in self._done(self.auto):
             times = [
                 time
                 for name in self.methods
-                if name != self.auto and (time := self._time_to(name, self._level(row))) is not None
+                if name != self.auto and (time := self._time_to(name, self._claim(row))) is not None
             ]
             if times:
                 ratios.append(row.least / min(times))
@@ -179,12 +180,20 @@ class WorkReport:
         """The row's error, not below what can be told from zero."""
         return max(self.error(row), self.methods[row.method].floor)
 
+    def _claim(self, row: WorkRow) -> float:
+        """The row's error; the reported one where the reference cannot tell."""
+        floor = self.methods[row.method].floor
+        if self.error(row) > ABOVE_REFERENCE * floor or row.reported is None:
+            return self._level(row)
+        # no claim is better than rounding
+        return max(min(row.reported, self._level(row)), min(floor, ROUNDED))
+
     def _time_to(self, method: str, error: float) -> float | None:
         """The time after which a method has an error, or None if it has not."""
         best: list[tuple[float, float]] = []
         for row in sorted(self._done(method), key=lambda row: row.least):
-            if not best or self._level(row) < best[-1][1]:
-                best.append((row.least, self._level(row)))
+            if not best or self._claim(row) < best[-1][1]:
+                best.append((row.least, self._claim(row)))
         if not best or best[-1][1] > error:
             return None
         if best[0][1] <= error:

@@ -23,8 +23,8 @@ def table_of(report: WorkReport) -> str:
             words += f"; fitted order {fitted}"
         if facts.declared_order is not None:
             words += f", declared {facts.declared_order:g}"
-            if fitted is not None and not fitted.agrees_with(facts.declared_order):
-                words += ", **they differ**"
+            if fitted is not None:
+                words += f": {fitted.verdict(facts.declared_order)}"
         lines.append(words)
     choice = report.choice()
     if choice is not None:

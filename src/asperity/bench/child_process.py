@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -71,12 +72,17 @@ class ChildProcess:
             return result
         raise result
 
-    def _end(self) -> None:
-        if self._process is not None:
-            self._process.kill()
-            self._process.join(LEAVE_SECONDS)
-            assert self._pipe is not None
+    def _end(self, kindly: bool = False) -> None:
+        """End the process; kindly: let it leave by itself, which it does when its pipe is closed."""
+        if self._process is None:
+            return
+        assert self._pipe is not None
+        if kindly:
             self._pipe.close()
+            self._process.join(LEAVE_SECONDS)
+        self._process.kill()
+        self._process.join(LEAVE_SECONDS)
+        self._pipe.close()
         self._process = self._pipe = None
 
     def __enter__(self) -> ChildProcess:
@@ -85,11 +91,15 @@ class ChildProcess:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._end()
+        self._end(kindly=True)
 
 
 def _serve(pipe: Connection) -> None:
     """Answer calls until the other side is gone."""
+    from tqdm import tqdm
+
+    # its usual lock is one between processes, which a process that is killed leaves behind
+    tqdm.set_lock(threading.RLock())
     while True:
         try:
             function, arguments = pipe.recv()
