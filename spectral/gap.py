@@ -11,11 +11,11 @@ from ..checks import positive_number
 from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind, Estimate
 from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, discretise
-from ..kernels.fold import made_of_isometries
+from ..kernels.algebra import made_of_isometries
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge, essential_edge
-from .ideal_spectrum import ideal_spectrum
+from .ideal_parts import ideal_spectrum
 from .refinement import EIGENVALUES, Refinement, refined
 from .separation import lambertian_share
 

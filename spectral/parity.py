@@ -42,7 +42,8 @@ def _halves(basis: Basis) -> tuple[Floats, Floats] | None:
     if np.any(np.abs(sign) < ENTRY) or np.any(image[image] != here):
         return None
     fixed, pairs = image == here, image > here
-    even, odd = [], []
+    even: list[Floats] = []
+    odd: list[Floats] = []
     for chosen, target in ((fixed & (sign > 0.0), even), (fixed & (sign < 0.0), odd)):
         part = np.zeros((basis.size, int(chosen.sum())))
         part[here[chosen], np.arange(part.shape[1])] = 1.0

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import Basis, CircularArcLaw, Law, Legendre, Panels, SpecularFrame, discretise
-from .eigenvalues import NORMAL_95, Spectrum, spectrum
+from .eigenvalues import Spectrum, spectrum
 from .essential import EssentialEdge
 
 # Eigenvalues that a gap carries along in its spectrum.
@@ -130,7 +130,9 @@ class _OneArc:
 
 
 def _noise(level: Spectrum) -> float:
-    return float(level.gap_errors.algebraic[0] + level.matrix_error + NORMAL_95 * level.gap_errors.sampling[0])
+    return float(
+        level.gap_errors.algebraic[0] + level.matrix_error + level.gap_errors.quantile * level.gap_errors.sampling[0]
+    )
 
 
 def _converges(levels: list[Spectrum], tolerance: float) -> bool:
