@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .eigenvalues import Spectrum, SpectrumErrors, spectrum
     from .enclosure import Enclosure, Enclosures, enclosures
     from .essential import EssentialEdge, essential_edge
-    from .gap import SpectralGap, spectral_gap
+    from .gap import SpectralGap, gaps_in_both_conventions, spectral_gap
     from .laplacian import LaplacianComparison, laplacian_comparison, mean_squared_slope
     from .leading import LeadingEigenvalues, leading_eigenvalues
     from .relaxation import MixingTime, mixing_time
@@ -41,6 +41,7 @@ _HOMES = {
     "essential_edge": "essential",
     "exit_times": "channel",
     "laplacian_comparison": "laplacian",
+    "gaps_in_both_conventions": "gap",
     "leading_eigenvalues": "leading",
     "mean_squared_slope": "laplacian",
     "mixing_time": "relaxation",
@@ -67,6 +68,7 @@ __all__ = [
     "enclosures",
     "essential_edge",
     "exit_times",
+    "gaps_in_both_conventions",
     "laplacian_comparison",
     "leading_eigenvalues",
     "mean_squared_slope",
