@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import Floats, finite_number, generator, whole_number
 from ..errors import InputError
+from .algebra import lists_branches
 from .arc_quadrature import arc_matrix
 from .basis import Basis
 from .branch_quadrature import branch_matrix
@@ -17,7 +18,6 @@ from .composition import Composition, Power
 from .density import DensityLaw
 from .directions import Directions
 from .entry_quadrature import entry_matrix
-from .fold import lists_branches
 from .involution import InvolutionLaw
 from .isometry import table_of
 from .kernel_quadrature import action_is_affordable, action_matrix, density_matrix, map_matrix

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..estimates import ErrorKind, Estimate
 from ..kernels import Law
 from .essential import grazing_symbol
-from .ideal_spectrum import ideal_spectrum
+from .ideal_parts import ideal_spectrum
 
 Arrangement = Literal["mirror", "half-turn"]
 ARRANGEMENTS: tuple[Arrangement, ...] = ("mirror", "half-turn")

@@ -13,7 +13,7 @@ from ..errors import AccuracyError, InputError
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from .deflation import coarser_grids, off_constants
 from .parity import Parity, halves
-from .sampling import sampling_errors
+from .sampling import NORMAL_95, sampling_errors, sampling_quantile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +27,6 @@ REVERSIBLE_Z = 5.0
 REVERSIBLE_ROUNDING = 1e-12
 # With order 2, the lowest of the bases, the change by the last doubling is this share of the one before.
 EARLIER_SHARE = 0.25
-NORMAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True)
@@ -43,15 +42,19 @@ class SpectrumErrors:
         is larger (``inf`` where there is no coarser basis), plus the Frobenius error of a matrix that was not sampled.
     sampling : array
         Estimate: one standard error from the rays' randomness; 0 for matrices that were not sampled.
+    quantile : float
+        Of how many standard errors an interval of 95 % has on each side: 1.96, or Student's quantile where the standard
+        error comes from the spread of a few randomisations.
     """
 
     algebraic: Floats
     discretisation: Floats
     sampling: Floats
+    quantile: float = NORMAL_95
 
     def total(self) -> Floats:
-        """Half width of an interval of about 95 %: bounds and two-grid differences in full, sampling times 1.96."""
-        return np.asarray(self.algebraic + self.discretisation + NORMAL_95 * self.sampling)
+        """Half width of an interval of about 95 %: bounds and two-grid differences in full, sampling by quantile."""
+        return np.asarray(self.algebraic + self.discretisation + self.quantile * self.sampling)
 
 
 @dataclass(frozen=True)
@@ -187,7 +190,8 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     changes = _two_grids(matrix, rest)
     errors = _errors(matrix, values, vectors, residuals, np.concatenate([[0.0], changes[chosen]]))
     # without a second function the gap is 1 by convention, and nothing is known of it
-    gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(*(frozen([np.inf]) for _ in range(3)))
+    unknown = frozen([np.inf])
+    gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(unknown, unknown, unknown)
     if len(rest):
         top = rest_vectors[:, -1:]
         residual = np.linalg.norm(array @ top - rest[-1] * top, axis=0)
@@ -237,6 +241,7 @@ def _errors(
         # an entry's error moves an eigenvalue by no more than the Frobenius norm; sampled ones have their own part
         discretisation=frozen(changes + (0.0 if matrix.samples else float(matrix.error))),
         sampling=frozen(sampling_errors(matrix, vectors, values)),
+        quantile=sampling_quantile(matrix),
     )
 
 
@@ -311,12 +316,17 @@ def _both_signs(half: Spectrum, k: int) -> Spectrum:
     order = np.argsort(-np.abs(values), kind="stable")[:k]
     order = order[np.argsort(-values[order], kind="stable")]
     pick = index[order]
-    parts = (half.errors.algebraic, half.errors.discretisation, half.errors.sampling)
+    errors = half.errors
     return replace(
         half,
         values=frozen(values[order]),
         vectors=frozen(half.vectors[:, pick]),
         residuals=frozen(half.residuals[pick]),
         parity=tuple(half.parity[i] for i in pick),
-        errors=SpectrumErrors(*(frozen(part[pick]) for part in parts)),
+        errors=SpectrumErrors(
+            frozen(errors.algebraic[pick]),
+            frozen(errors.discretisation[pick]),
+            frozen(errors.sampling[pick]),
+            errors.quantile,
+        ),
     )

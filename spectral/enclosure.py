@@ -16,8 +16,8 @@ from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, Matr
 from ..kernels.measure import SINE
 from .deflation import off_constants
 from .eigenvalues import check_reversible
-from .residuals import EPS, Residuals, images, residuals
-from .separation import Separation, separation
+from .separation import Separation, rest_of_spectrum
+from .trials import EPS, Residuals, images, residuals
 
 Label = Literal["indexed", "contains-spectrum"]
 
@@ -179,7 +179,7 @@ def _first_that_separates(
         if modulus[number - 1] - joint <= following[number - 1] and number > 1:
             # the next trial function itself is not apart: a multiple value, or one that is not resolved
             continue
-        apart = separation(law, listed, joint, float(following[number - 1]))
+        apart = rest_of_spectrum(law, listed, joint, float(following[number - 1]))
         if modulus[number - 1] - joint > apart.radius:
             return number, apart
         refused = apart if refused is None else refused

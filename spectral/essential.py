@@ -12,7 +12,7 @@ import numpy as np
 from ..checks import Floats
 from ..estimates import ErrorKind
 from ..kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
-from ..kernels.fold import Rules, fold, made_of_isometries
+from ..kernels.algebra import Rules, fold, made_of_isometries
 from ..kernels.ideal import LambertianLaw
 from ..kernels.phase_function import HenyeyGreensteinLaw
 from .grazing import GrazingLimit, grazing_limit

@@ -11,12 +11,12 @@ from ..checks import positive_number
 from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind, Estimate
 from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, discretise
-from ..kernels.fold import made_of_isometries
+from ..kernels.algebra import made_of_isometries
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge, essential_edge
-from .ideal_spectrum import ideal_spectrum
-from .refinement import EIGENVALUES, Refinement, refined
+from .ideal_parts import ideal_spectrum
+from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .separation import lambertian_share
 
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
@@ -108,7 +108,32 @@ def spectral_gap(
             "Use law @ law.adjoint() if that is what you mean",
             np.inf,
         )
-    return _by_theorem(law) or _by_refinement(law, tolerance, rng or np.random.default_rng(0))
+    return _by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng or np.random.default_rng(0)))
+
+
+def gaps_in_both_conventions(
+    law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None
+) -> tuple[SpectralGap, SpectralGap]:
+    """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
+
+    Raises
+    ------
+    InputError
+        If the law is not known to be mirror-symmetric: in the other convention it need not be self-adjoint then.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> [float(gap) for gap in gaps_in_both_conventions(0.5 * ker.specular() + 0.5 * ker.lambertian())]
+    [0.5, 0.5]
+    """
+    positive_number("tolerance", tolerance)
+    if not law.reversible or not law.mirror_symmetric:
+        raise InputError(f"law: expected a reversible and mirror-symmetric one, got {law!r}")
+    matrices = SharedMatrices(rng or np.random.default_rng(0))
+    other = law.in_specular_frame()
+    first, second = (_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
+    return first, second
 
 
 def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
@@ -164,7 +189,7 @@ def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
     return SpectralGap(min(found.gap, 1.0), error, "bound", method, "isolated", (reason,), found.convention, found)
 
 
-def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
     edge = essential_edge(law)
     if edge.low >= 1.0 - tolerance:
         # nothing fits between the edge and 1 that the tolerance could tell
@@ -173,7 +198,7 @@ def _by_refinement(law: Law, tolerance: float, rng: np.random.Generator) -> Spec
         enclosed = _by_enclosure(law, tolerance)
         if enclosed is not None:
             return enclosed
-    steps = refined(law, tolerance, rng, edge)
+    steps = refined(law, tolerance, matrices, edge)
     found, error = steps.finest, steps.error
     reasons = (*edge.reasons, *steps.evidence, *_lower_bound(law))
     top = 1.0 - found.gap

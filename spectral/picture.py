@@ -67,7 +67,7 @@ def draw_spectrum(found: Spectrum, ax: Axes | None = None, gap: SpectralGap | No
 
 
 def draw_eigenfunctions(found: Spectrum, ax: Axes | None = None) -> Axes:
-    """Draw the eigenfunctions off the constants, of mean square 1 for the invariant measure, with their eigenvalues."""
+    """Draw the eigenfunctions off the constants, of mean square 1 under the measure, with their eigenvalues."""
     if ax is None:
         from matplotlib import pyplot
 

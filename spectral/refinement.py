@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels import Basis, CircularArcLaw, Law, Legendre, Panels, SpecularFrame, discretise
-from .eigenvalues import NORMAL_95, Spectrum, spectrum
+from ..kernels import Basis, CircularArcLaw, KernelMatrix, Law, Legendre, Panels, SpecularFrame, discretise
+from ..kernels.reflection import is_mirror_symmetric
+from .eigenvalues import Spectrum, spectrum
 from .essential import EssentialEdge
 
 # Eigenvalues that a gap carries along in its spectrum.
@@ -83,15 +84,32 @@ class Refinement:
         return "change by the last refinement + algebraic + matrix + 1.96 x sampling error"
 
 
-def refined(law: Law, tolerance: float, rng: np.random.Generator, edge: EssentialEdge) -> Refinement:
+class SharedMatrices:
+    """Matrices of one law, made when they are first asked for: both conventions of a mirror-symmetric law use them."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+        self._made: dict[tuple[Basis, int, float], KernelMatrix] = {}
+
+    def __call__(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
+        """The matrix of a law, by a flip where it is the other convention's."""
+        if isinstance(law, SpecularFrame) and law.reversible and is_mirror_symmetric(basis):
+            return self(law.law, basis, samples, tolerance).in_specular_frame()
+        key = (basis, samples, tolerance)
+        if key not in self._made:
+            self._made[key] = discretise(law, basis, tolerance=tolerance, samples=samples, rng=self.rng)
+        return self._made[key]
+
+
+def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> Refinement:
     """Refine until the changes shrink and the error is below the tolerance, or the means are spent."""
     levels: list[Spectrum] = []
     evidence: list[str] = []
     steps = Refinement((), False, ())
     near_edge = edge.low > NEGLIGIBLE
-    for basis, samples in _steps(law, near_edge):
+    for basis, samples in _steps(law):
         wanted = max(MATRIX_SHARE * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
-        matrix = discretise(law, basis, tolerance=wanted, samples=samples, rng=rng)
+        matrix = matrices(law, basis, samples, wanted)
         found = spectrum(matrix, k=EIGENVALUES)
         levels.append(found)
         evidence.append(f"{basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
@@ -99,7 +117,11 @@ def refined(law: Law, tolerance: float, rng: np.random.Generator, edge: Essentia
         near_edge = near_edge and 1.0 - found.gap - found.gap_error < edge.high
         if len(levels) >= FEWEST_LEVELS and steps.converges and steps.error <= tolerance:
             break
-        if near_edge and (basis.size >= DEGREE_AT_EDGE and (samples >= SAMPLES_AT_EDGE or not matrix.samples)):
+        if (
+            near_edge
+            and len(levels) > 1
+            and (basis.size >= DEGREE_AT_EDGE and (samples >= SAMPLES_AT_EDGE or not matrix.samples))
+        ):
             break
         if len(levels) > FEWEST_LEVELS and steps.finest is not found:
             # a larger basis would only have more noise
@@ -107,12 +129,12 @@ def refined(law: Law, tolerance: float, rng: np.random.Generator, edge: Essentia
     return steps
 
 
-def _steps(law: Law, near_edge: bool) -> Iterator[tuple[Basis, int]]:
+def _steps(law: Law) -> Iterator[tuple[Basis, int]]:
     """Bases and numbers of rays; for sampled laws the basis stops growing before the rays do."""
     inner = law.law if isinstance(law, SpecularFrame) else law
     if getattr(inner, "closed_form", None) is not None:
         inner = inner.closed_form  # type: ignore[attr-defined]
-    if isinstance(inner, CircularArcLaw) and inner.half_angle > SHALLOW and not near_edge:
+    if isinstance(inner, CircularArcLaw) and inner.half_angle > SHALLOW:
         for degree, smallest in ARC_PANELS:
             yield Panels.for_wall(_OneArc(inner.half_angle), degree, smallest), FIRST_SAMPLES
         return
@@ -130,7 +152,9 @@ class _OneArc:
 
 
 def _noise(level: Spectrum) -> float:
-    return float(level.gap_errors.algebraic[0] + level.matrix_error + NORMAL_95 * level.gap_errors.sampling[0])
+    return float(
+        level.gap_errors.algebraic[0] + level.matrix_error + level.gap_errors.quantile * level.gap_errors.sampling[0]
+    )
 
 
 def _converges(levels: list[Spectrum], tolerance: float) -> bool:

@@ -15,7 +15,7 @@ from ..kernels import DensityLaw, KernelMatrix, Law
 from ..kernels.measure import SINE
 from .eigenvalues import Spectrum, spectrum
 from .essential import essential_edge
-from .ideal_spectrum import ideal_spectrum
+from .ideal_parts import ideal_spectrum
 
 Distance = Literal["L2", "total variation", "chi-square"]
 DISTANCES: tuple[Distance, ...] = ("L2", "total variation", "chi-square")
@@ -181,7 +181,7 @@ def _distance_of(density: Callable[[Floats], Floats]) -> float:
 def _distance_after_a_step(kernel: object, start: float) -> float:
     if not isinstance(kernel, DensityLaw):
         raise InputError(
-            "start: expected a law with a density, whose first step has one in L^2; otherwise give an initial density"
+            "start: expected a law with a density, whose first step has one in L^2; give other laws an initial density"
         )
     theta = np.array([number_between("start", start, 0.0, np.pi)])
     edges = np.unique(np.concatenate([kernel.panels(theta)[0], np.linspace(0.0, np.pi, PANELS + 1)]))

@@ -9,12 +9,12 @@ import numpy as np
 from ..checks import Floats
 from ..estimates import ErrorKind
 from ..kernels import DensityLaw, Law, MatrixLaw
-from ..kernels.fold import Rules, fold
+from ..kernels.algebra import Rules, fold
 from ..kernels.ideal import LambertianLaw
 from ..kernels.measure import gauss_rule
 from ..kernels.phase_function import HenyeyGreensteinLaw
 from .essential import essential_edge
-from .residuals import EPS
+from .trials import EPS
 
 # The power P^p of a law with eigenvalues g^l is chosen so that g^p is about this: the sum of the squares that are left
 # out, x^(2 m)/(1 - x^2), is then below the last square that is kept, x^(2 m - 2), and rounding is not yet.
@@ -40,7 +40,7 @@ class Separation:
     reason: str
 
 
-def separation(law: Law, values: Floats, width: float, next_value: float) -> Separation:
+def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) -> Separation:
     """What bounds the spectrum beyond the listed eigenvalues.
 
     Parameters

@@ -43,7 +43,7 @@ class Saving:
     difference : float
         Largest difference of the results, or that in units of their errors where they have some.
     is_same : bool
-        Whether the results are the same: to rounding, or within their errors; within five of those that come from samples.
+        Whether the results are the same: to rounding, or within their errors; within five of those of samples.
     """
 
     scene: str

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels import Law
-from ..kernels.fold import Rules, fold
+from ..kernels.algebra import Rules, fold
 from ..kernels.ideal import IsometryLaw, LambertianLaw
 
 EPS = float(np.finfo(np.float64).eps)

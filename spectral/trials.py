@@ -15,7 +15,7 @@ from ..kernels.law import AngleFunction
 from ..kernels.measure import SINE, gauss_on_intervals
 
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
-SHARE, MOST_ROWS, NARROWEST = 0.05, 3_000, 1e-9
+SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
 # Functions of the basis times outgoing angles held at a time.
 CHUNK_ROWS = 128
 # A Gauss rule with n nodes on a panel of width h follows cos(l theta) to rounding for l h up to about this times n.
