@@ -41,8 +41,9 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[A
     >>> theta, m = sympy.Symbol("theta"), sympy.Symbol("m", positive=True)
     >>> verify(sympy.sqrt(m**2 * sympy.sin(theta) ** 2), m * sympy.sin(theta), [0 < theta, theta < sympy.pi]).answer
     'proved'
-    >>> print(verify(sympy.sqrt(sympy.sin(theta) ** 2), sympy.sin(theta), [theta < 0]).counterexample)
-    {'theta': '-1/3'}
+    >>> verdict = verify(sympy.sqrt(m**2), -m)
+    >>> verdict.answer, sorted(verdict.counterexample)
+    ('refuted', ['m'])
     """
     import sympy as sp
 
