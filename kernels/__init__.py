@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .collision import CollisionLaw
     from .collision_matrices import no_slip_matrix, smooth_matrix
     from .composition import Composition, Power
+    from .convergence import LimitStudy, limit_study
     from .density import DensityLaw
     from .discretisation import discretise
     from .estimation import estimate
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from .law import BranchLaw, DrivenLaw, Law
     from .legendre import Legendre
     from .limit_picture import draw_limit
-    from .limit_study import LimitStudy, limit_study
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
     from .matrixfile import load_matrix
@@ -58,7 +58,7 @@ _HOMES = {
     "KernelMatrix": "matrix",
     "Law": "law",
     "Legendre": "legendre",
-    "LimitStudy": "limit_study",
+    "LimitStudy": "convergence",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
     "PolygonLaw": "polygon_law",
@@ -78,7 +78,7 @@ _HOMES = {
     "estimate": "estimation",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
-    "limit_study": "limit_study",
+    "limit_study": "convergence",
     "load_matrix": "matrixfile",
     "maxwell": "ideal",
     "mixture": "weighted_sum",
