@@ -50,7 +50,7 @@ def collision_path(
     >>> from asperity import geometry as geo
     >>> path = collision_path(geo.Disk(), geo.triangular_teeth(2.0), 0.01, [0.0025, 0.0], [0.0, -1.0, 0.0])
     >>> path.shape, bool(path[0, 1] == 0.0), bool(path[1, 1] < 0.0), abs(float(path[-1, 1])) < 1e-15
-    ((3, 3), True, True, True)
+    ((4, 3), True, True, True)
     """
     start, moving = np.array([position], dtype=float), np.array([velocity], dtype=float)
     whole = collide(disk, wall, scale, start, moving, spacing)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, finite_array, frozen, number_between, positive_number
 from ..errors import InputError
@@ -105,6 +105,6 @@ class Container:
             raise InputError(f"position: expected shape (n, 2), got {places.shape}")
         return np.asarray(np.einsum("nki,ki->nk", places[:, None, :] - self.points, self.normals))
 
-    def contains(self, position: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+    def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
         """Return which of the places (n, 2) are inside or on the boundary."""
         return np.asarray(np.all(self.distances(position) >= 0.0, axis=1))

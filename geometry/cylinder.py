@@ -12,7 +12,7 @@ from .blocks import in_blocks
 from .charts import RollingCharts
 from .disk import Disk
 from .rigid import check_kinds, checked_states, rigid_tables, rounding_of_places, shares
-from .tracing import MAX_COLLISIONS, Status
+from .tracing import MAX_COLLISIONS, Status, counts_by_name
 from .wall import Wall
 
 # Newton's method on a convex function halves its error at worst, and squares it soon.
@@ -47,6 +47,10 @@ class CylinderCollision:
         """Mask of the disks that came back to height 0."""
         return np.asarray(self.status == Status.ESCAPED)
 
+    def counts(self) -> dict[str, int]:
+        """Number of disks by the name of their status; every name is there."""
+        return counts_by_name(self.status)
+
 
 def collide_cylinder(
     disk: Disk,
@@ -63,7 +67,7 @@ def collide_cylinder(
     It is reflected specularly in the kinetic metric, so that -m v1 + J omega is conserved and its conjugate coordinate
     moves uniformly: in the plane across chi the motion is the billiard in the foreshortened wall,
 
-        theta' = that of `trace`(wall.foreshorten(disk), (x1 + alpha)/scale, theta),   psi' = pi - psi.
+        theta' = trace(wall.foreshorten(disk), (x1 + alpha)/scale, theta).theta,   psi' = pi - psi.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from .bezier import Bezier
 from .blocks import in_blocks
 from .disk import Disk
 from .satellites import Satellites
-from .tracing import MAX_COLLISIONS, Status
+from .tracing import MAX_COLLISIONS, Status, counts_by_name
 from .wall import Wall
 
 if TYPE_CHECKING:
@@ -63,8 +63,7 @@ class RigidCollision:
 
     def counts(self) -> dict[str, int]:
         """Number of disks by the name of their status; every name is there."""
-        numbers = np.bincount(self.status, minlength=len(Status))
-        return {status.name.lower(): int(numbers[status]) for status in Status}
+        return counts_by_name(self.status)
 
 
 def collide(

@@ -65,10 +65,11 @@ def dive(x, y, t, end, state, turn, motion, fastest, slack, cell, is_open, hollo
     if is_open:
         return t, state, 0, base, CLEAR
     place = x + state[0] - base
-    down = abs(motion[1] + motion[2] * state[2])
+    rising = motion[1] + motion[2] * state[2]
     # at a shallow incidence a rounding error of the height is a longer way along the tops
-    near = near_edge(hollows, place, slack * max(1.0, fastest / down))
-    return t, state, hollow_at(hollows, place), base, CORNER if near else CLEAR
+    near = near_edge(hollows, place, slack * max(1.0, fastest / abs(rising)))
+    # one that rises from below the tops has not come in by a known way: it touches them together with another one
+    return t, state, hollow_at(hollows, place), base, CORNER if near or rising >= 0.0 else CLEAR
 
 
 @_compile

@@ -82,8 +82,13 @@ class Trace:
         >>> geo.trace(geo.flat(), [0.2, 0.7], 1.0).counts()
         {'escaped': 2, 'corner': 0, 'grazing': 0, 'bounce_limit': 0}
         """
-        numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
-        return {status.name.lower(): int(numbers[status]) for status in Status}
+        return counts_by_name(self.status)
+
+
+def counts_by_name(status: NDArray[np.uint8]) -> dict[str, int]:
+    """Number of entries for every `Status`, by its name in lower case."""
+    numbers = np.bincount(np.ravel(status), minlength=len(Status))
+    return {outcome.name.lower(): int(numbers[outcome]) for outcome in Status}
 
 
 def trace(

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .collision import CollisionLaw
     from .collision_matrices import no_slip_matrix, smooth_matrix
     from .composition import Composition, Power
+    from .convergence import LimitStudy, limit_study
     from .density import DensityLaw
     from .difference import DifferenceTest, difference_test
     from .discretisation import discretise
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from .least_resistance import LeastResistanceLaw
     from .legendre import Legendre
     from .limit_picture import draw_limit
-    from .limit_study import LimitStudy, limit_study
     from .matrix import KernelMatrix
     from .matrix_law import MatrixLaw
     from .matrixfile import load_matrix
@@ -76,7 +76,7 @@ _HOMES = {
     "Law": "law",
     "LeastResistanceLaw": "least_resistance",
     "Legendre": "legendre",
-    "LimitStudy": "limit_study",
+    "LimitStudy": "convergence",
     "MatrixLaw": "matrix_law",
     "Panels": "panels",
     "PolygonLaw": "polygon_law",
@@ -103,7 +103,7 @@ _HOMES = {
     "extremal_resistance": "extremal",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
-    "limit_study": "limit_study",
+    "limit_study": "convergence",
     "load_matrix": "matrixfile",
     "maxwell": "ideal",
     "mixture": "weighted_sum",

@@ -68,21 +68,30 @@ def test_a_collision_is_an_involution_within_its_conditioning_and_keeps_the_ener
 
 @pytest.mark.parametrize(
     ("name", "scale", "n"),
-    [("triangular", 0.1, 600), ("triangular", 0.01, 600), ("rectangular", 0.1, 100), ("focusing", 0.01, 300),
-     ("dispersing", 0.1, 300)],
-)  # fmt: skip
+    [
+        ("triangular", 1e-1, 2500),
+        ("triangular", 1e-2, 2500),
+        ("rectangular", 1e-1, 750),
+        ("rectangular", 1e-3, 750),
+        ("focusing", 1e-2, 2000),
+        ("dispersing", 1e-1, 1500),
+    ],
+)
 def test_no_contact_is_missed_by_comparison_with_steps_of_the_distance(name, scale, n):
     wall = WALLS[name]
-    position, velocity = states(wall, scale, n, seed=3)
+    position, velocity = states(wall, scale, n, seed=77)
     spacing = Satellites.around(scale, scale * wall.depth).spacing
     out = geo.collide(DISK, wall, scale, position, velocity)
     place, outgoing, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
-    assert np.array_equal(contacts, out.contacts)
+    # the twin gives up where a satellite creeps along a piece, farther from it than its limit, for 20,000 steps
+    done = ~np.isnan(outgoing[:, 0])
+    assert done.mean() > 0.998
+    assert np.array_equal(contacts[done], out.contacts[done])
     # the twin stops at 1e-11 from the wall, and a few contacts on curved pieces magnify that
-    np.testing.assert_allclose(outgoing, out.velocity, atol=1e-7)
-    np.testing.assert_allclose(place, out.position, atol=1e-7)
+    np.testing.assert_allclose(outgoing[done], out.velocity[done], atol=1e-7)
+    np.testing.assert_allclose(place[done], out.position[done], atol=1e-7)
     if name == "triangular":
-        assert np.count_nonzero(out.two_satellites) > 3
+        assert np.count_nonzero(out.two_satellites) > 100
 
 
 def test_an_overhang_keeps_the_satellites_that_are_below_it():
