@@ -16,7 +16,7 @@ from .kernel_quadrature import jumps_of_map
 from .law import Law
 from .matrix import KernelMatrix
 from .measure import SINE, gauss_on_intervals
-from .outgoing import outgoing_distributions
+from .outgoing import ENTRY_POINTS, outgoing_distributions
 from .resampling import matrix_error
 from .row_transport import wasserstein
 from .specular_frame import SpecularFrame
@@ -27,7 +27,8 @@ from .weighted_sum import Combination
 NODES, PANELS, KINKS, CELLS = 4, 12, 24, 64
 # Rows times cells of a level: some seconds.
 MOST_CORNERS = 2**23
-ROWS_AT_ONCE = 2**19
+# Corners held at a time, counting every row with as many atoms as those of walls of many pieces have.
+CORNERS_AT_ONCE, MOST_ATOMS = 2**21, ENTRY_POINTS
 FEWEST_LEVELS = 3
 # A level halves the error at least where the distance jumps as a function of the incoming angle, at places unknown.
 # The difference of two levels is then the error of the finer one; chance may make it smaller, the one before it not.
@@ -122,7 +123,7 @@ def _nodes(low: Floats, high: Floats, sup: bool) -> tuple[Floats, Floats]:
 
 
 def _rows(first: Law, second: Law, angle: Floats, edges: Floats, order: float) -> Floats:
-    step = max(1, ROWS_AT_ONCE // edges.size)
+    step = max(1, CORNERS_AT_ONCE // max(edges.size, MOST_ATOMS))
     parts = []
     for start in range(0, angle.size, step):
         theta = angle[start : start + step]

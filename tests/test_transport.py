@@ -297,6 +297,20 @@ def test_the_best_isosceles_triangle_is_stationary_and_better_than_its_neighbour
     assert len(best.tried) >= 12 and best.tried[:, 1].max() <= best.resistance.value + 1e-12
 
 
+def parabola_pair(focal_length):
+    """Two parabolas with their vertices at the tips; with 1 the focus of each is the other's tip."""
+    depth = np.sqrt(2 * focal_length)
+    sides = [(0, 0), (0, -depth / 2), (0.5, -depth)], [(0.5, -depth), (1, -depth / 2), (1, 0)]
+    return geo.Wall([geo.Bezier(side) for side in sides], period=1.0)
+
+
+def test_the_best_pair_of_parabolas_has_each_focus_in_the_others_tip():
+    # the resistance has a corner there, which Brent's method finds to the width of its last bracket
+    best = ker.best_hollow(parabola_pair, [(0.8, 1.25)], tolerance=1e-4, grid=3)
+    assert best.parameters[0] == pytest.approx(1.0, abs=5e-3)
+    assert best.resistance.value == pytest.approx(1.4965, abs=2e-3)
+
+
 def test_two_parameters_are_searched_together():
     # a mixture of three laws whose resistance is quadratic in the shares, with the maximum 1.5 at (0.3, 0.6)
     def member(a, b):
