@@ -7,6 +7,8 @@ import ot
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.polynomial.chebyshev import cheb2poly
+from numpy.polynomial.legendre import poly2leg
 from scipy.stats import binomtest, wasserstein_distance
 
 from asperity import InputError
@@ -139,6 +141,21 @@ def test_the_pseudometric_is_its_series():
         assert found.error <= max(1.2 * tolerance, 1e-11) and found.kind == "bound"
 
 
+def test_the_pseudometric_of_henyey_greenstein_laws_is_a_sum_over_their_eigenvalues():
+    # cos(k theta) = T_k(u) in Legendre polynomials, whose squares have the mean 1/(2 l + 1); eigenvalues g^l
+    last = 40
+    coefficients = np.zeros((last + 1, last + 1))
+    for k in range(last + 1):
+        found = cheb2poly(np.eye(last + 1)[k])
+        coefficients[k, : found.size] = poly2leg(found)[: last + 1]
+    degree = np.arange(last + 1)
+    eigenvalues = (0.5**degree - 0.3**degree) / (2 * degree + 1)
+    weight = 0.5 ** (degree + 1)
+    exact = weight @ np.abs((coefficients * eigenvalues) @ coefficients.T) @ weight
+    found = ker.distance(ker.henyey_greenstein(0.5), ker.henyey_greenstein(0.3), kind="pseudometric", tolerance=1e-8)
+    assert abs(found.value - exact) <= found.error < 2e-8
+
+
 def test_the_slots_of_the_test_functions_are_incoming_and_outgoing():
     # ledger S6.07: G nu(K x X) = nu(K) whatever G is, also for a law that does not keep nu
     rows = np.array([[0.9, 0.1], [0.8, 0.2]])
@@ -184,6 +201,12 @@ def test_the_joint_distance_of_small_matrices_is_the_linear_programme(monkeypatc
     exact = linprog(cost.ravel(), A_eq=sums, b_eq=np.concatenate([one.flux.ravel(), other.flux.ravel()])).fun
     found = ker.distance(one, other, kind="joint")
     assert found.value == pytest.approx(exact, abs=1e-10) and found.kind == "bound"
+
+
+def test_diagonal_and_antidiagonal_are_as_far_apart_as_their_second_moments():
+    # (s, s) and (t, -t) are at the squared distance 2 s^2 + 2 t^2, whatever the coupling
+    found = ker.distance(ker.specular(), ker.retroreflection(), 2, "joint")
+    assert abs(found.value - np.sqrt(np.pi**2 - 8)) <= found.error < 0.01
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -330,6 +330,16 @@ def test_blunt_teeth_converge_to_a_mirror_with_order_1():
     assert str(study).count("\n") == 3 and all(step.seconds > 0 for step in study.steps)
 
 
+def test_a_profile_converges_as_its_resolution_grows():
+    walls = []
+    for samples in (4, 8, 16):
+        x = np.linspace(0.0, 1.0, samples + 1)
+        walls.append(geo.Wall.from_profile(x, 0.1 * np.cos(2 * np.pi * x)))
+    study = ker.study_convergence(walls, names=["4", "8", "16"], tolerance=3e-2)
+    assert len(study.steps) == 2 and study.target == "the next member"
+    assert study.ratios[0] < 0.75
+
+
 def test_deep_crevices_converge_weakly_but_not_row_by_row():
     laws = [ker.RectangularTeethLaw(2.0**k) for k in (1, 3)]
     limit = 0.75 * ker.specular() + 0.25 * ker.retroreflection()
