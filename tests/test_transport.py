@@ -151,9 +151,18 @@ def test_transport_on_a_grid_brackets_the_same_values():
     assert abs(np.sum(least.plan.flux * slack)) < 1e-4 < 0.05 * np.mean(slack)
 
 
+def cells(n):
+    """The bins of n that lie in (0, 0.4) and in (1.9, 2.2)."""
+    middle = np.arccos(1 - 2 * (np.arange(n) + 0.5) / n)
+    return np.nonzero(middle < 0.4)[0], np.nonzero((middle > 1.9) & (middle < 2.2))[0]
+
+
 def test_plans_are_symmetric_stochastic_matrices_of_their_laws():
     found = ker.extremal_resistance(64)
     plan = found.plan
+    uneven = ker.discretise(found.law, ker.Bins([0.0, 0.4, 1.1, 1.9, 2.2, np.pi]))
+    assert uneven.stochastic_defect() < 1e-13
+    assert abs(uneven.flux[0, 3] - np.sum(ker.discretise(found.law, ker.Bins(1024)).flux[np.ix_(*cells(1024))])) < 2e-3
     assert plan.stochastic_defect() < 1e-13 and plan.symmetry_defect() < 1e-13
     rng = np.random.default_rng(3)
     theta = ker.SINE.sample(200_000, rng)
