@@ -108,6 +108,12 @@ def test_laws_of_maxwell_differ_by_what_the_diffuse_share_moves(kind, share):
     assert abs(found.value - 0.5 * share) <= found.error < 1e-4
 
 
+def test_a_supremum_at_grazing_is_within_the_error():
+    # a ray that crosses a crevice an odd number of times comes back, from theta = 0 instead of to pi
+    found = ker.distance(ker.RectangularTeethLaw(0.5), ker.specular(), kind="sup")
+    assert 0.0 < np.pi / 2 - found.value <= found.error < 0.01
+
+
 def test_the_diffuse_shift_between_laws_of_a_density_is_found_with_its_error():
     # p(theta, .) = (1 + c cos(theta')) sin(theta')/2: the distribution functions differ by c sin^2/4, W_1 = c pi/8
     def tilted(c):
