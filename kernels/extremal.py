@@ -16,11 +16,10 @@ from .functional import air_resistance
 from .ideal import retroreflection
 from .interval_exchange import IntervalExchangeLaw
 from .law import Law
-from .least_resistance import SPLIT_BEGINS, LeastResistanceLaw
+from .least_resistance import LeastResistanceLaw
 from .matrix import KernelMatrix
 from .matrix_algebra import frobenius_error
 from .matrix_law import MatrixLaw
-from .measure import SINE
 from .transport_bounds import CostFunction, dual_bound, transport_plan
 
 # 3/4 of the second derivatives of the cosine, at most.
@@ -121,7 +120,7 @@ def extremal_resistance(
     # the potential of 1 + cos is that of cos and half of the 1 for each of the two angles
     potential = 0.75 * (0.5 + law.potential(np.linspace(0.0, np.pi, n + 1)))
     lower = dual_bound(potential, air_resistance, AIR_CURVATURE) - ROUNDING
-    return ExtremalResistance(lower, 0.75 * (1.0 + law.mean_cosine) + ROUNDING, _least_plan(law, Bins(n)), law)
+    return ExtremalResistance(lower, 0.75 * (1.0 + law.mean_cosine) + ROUNDING, discretise(law, Bins(n)), law)
 
 
 def _by_transport(n: int, which: str, cost: CostFunction, curvature: float | None) -> ExtremalResistance:
@@ -151,27 +150,3 @@ def _matrix(flux: Floats, cells: Bins, law: str) -> KernelMatrix:
     symmetric = flux * cells.heights[:, None] * cells.heights
     error = frobenius_error(ROUNDING * cells.size, "bound", "masses of intervals, to rounding")
     return KernelMatrix(symmetric, cells, error, method="exact", law=law, reversible=True)
-
-
-def _least_plan(law: LeastResistanceLaw, cells: Bins) -> KernelMatrix:
-    """The matrix of the closed form: masses of the intervals between edges of cells and what is mapped to edges."""
-    b = law.split_ends
-    centred = cells.edges - 0.5 * np.pi
-    ends = (0.0, SPLIT_BEGINS, b, np.pi - 3.0 * b, 0.5 * np.pi)
-    cuts = [np.asarray(ends), centred, -centred, (centred + np.pi) / 3.0, np.pi + 3.0 * centred]
-    cuts.append(np.arcsin(np.clip(np.sin(centred) + np.sin(b) + np.sin(3.0 * b), -1.0, 1.0)))
-    x = np.unique(np.clip(np.concatenate(cuts), 0.0, 0.5 * np.pi))
-    low, high = x[:-1], x[1:]
-    middle = 0.5 * (low + high)
-    whole = SINE.mass(low + 0.5 * np.pi, high + 0.5 * np.pi)
-    # -3 cos(3 x)/2 is the density of what is not specular in the range of splitting
-    split = 0.5 * (np.sin(3.0 * low) - np.sin(3.0 * high))
-    away = np.where(middle < SPLIT_BEGINS, 0.0, np.where(middle < b, split, whole))
-    image = law.outcomes(middle + 0.5 * np.pi)[1]
-    source = cells.index(middle + 0.5 * np.pi)
-    flux = np.zeros((cells.size, cells.size))
-    for target, mass in ((image[:, 0], whole - away), (image[:, 1], away)):
-        np.add.at(flux, (source, cells.index(target)), mass)
-        # the mirror image
-        np.add.at(flux, (cells.index(np.pi - middle - 0.5 * np.pi), cells.index(np.pi - target)), mass)
-    return _matrix(0.5 * (flux + flux.T), cells, repr(law))

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 # Members looked at on a grid, in each parameter, before the best of them is improved.
 GRID = 12
-# The search compares resistances computed to this share of the wanted error in them.
-SEARCH_SHARE = 0.1
+# On the grid resistances may have this multiple of the wanted error: neighbours differ by more.
+GRID_SLACK = 10.0
 MOST_STEPS = 200
 
 
@@ -111,18 +111,19 @@ class _Search:
 
     def __init__(self, family: Callable[..., Wall | Law], limits: Floats, sign: float, tolerance: float) -> None:
         self.family, self.limits, self.sign, self.tolerance = family, limits, sign, tolerance
+        self.slack = GRID_SLACK
         self.tried: list[list[float]] = []
 
-    def estimate(self, parameters: Floats, share: float = 1.0) -> Estimate:
+    def estimate(self, parameters: Floats) -> Estimate:
         member = self.family(*np.asarray(parameters, dtype=np.float64).tolist())
         law = member if isinstance(member, Law) else WallLaw(member)
-        return resistance(law, share * self.tolerance)
+        return resistance(law, self.slack * self.tolerance)
 
     def __call__(self, shares: Floats) -> float:
         """The resistance, signed so that the best is the least; beyond the bounds that of the nearest member."""
         inside = np.clip(np.atleast_1d(shares), 0.0, 1.0)
         parameters = self.limits[:, 0] + inside * (self.limits[:, 1] - self.limits[:, 0])
-        value = float(self.estimate(parameters, SEARCH_SHARE))
+        value = float(self.estimate(parameters))
         self.tried.append([*parameters.tolist(), value])
         return self.sign * value
 
@@ -134,6 +135,7 @@ class _Search:
     def improve(self, start: Floats, spacing: float) -> None:
         from scipy.optimize import minimize, minimize_scalar
 
+        self.slack = 1.0
         # scipy's types ask for functions of one kind of array only
         objective: Any = self
         if start.size == 1:

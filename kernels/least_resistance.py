@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from ..checks import Floats
+from .bins import Bins
 from .law import AngleFunction, Law
 from .measure import SINE, gauss_on_intervals
 from .stable_angles import kept_inside
@@ -94,6 +95,29 @@ class LeastResistanceLaw(Law):
         angle, mass = SINE.quadrature(fine, NODES)
         probability, outgoing = self.outcomes(angle)
         return float(mass @ np.sum(probability * np.cos(outgoing - angle[:, None]), axis=1) / mass.sum())
+
+    def flux(self, cells: Bins) -> Floats:
+        """The mass of sin(theta)/2 d theta that goes from each cell to each other one, shape (n, n), to rounding."""
+        b = self.split_ends
+        edges = cells.edges - 0.5 * np.pi
+        edges = np.concatenate((edges, -edges))
+        ends = [0.0, SPLIT_BEGINS, b, np.pi - 3.0 * b, 0.5 * np.pi]
+        # the edges, and what is mapped to them
+        middle_range = np.arcsin(np.clip(np.sin(edges) + np.sin(b) + np.sin(3.0 * b), -1.0, 1.0))
+        cuts = np.concatenate((ends, edges, (edges + np.pi) / 3.0, np.pi + 3.0 * edges, middle_range))
+        cuts = np.unique(np.clip(cuts, 0.0, 0.5 * np.pi))
+        low, high = cuts[:-1], cuts[1:]
+        middle = 0.5 * (low + high)
+        whole = SINE.mass(low + 0.5 * np.pi, high + 0.5 * np.pi)
+        # -3 cos(3 x)/2 is the density of what is not specular in the range of splitting
+        split = 0.5 * (np.sin(3.0 * low) - np.sin(3.0 * high))
+        away = np.where(middle < SPLIT_BEGINS, 0.0, np.where(middle < b, split, whole))
+        theta, flux = middle + 0.5 * np.pi, np.zeros((cells.size, cells.size))
+        image = self.outcomes(theta)[1]
+        for target, mass in ((image[:, 0], whole - away), (image[:, 1], away)):
+            np.add.at(flux, (cells.index(theta), cells.index(target)), mass)
+            np.add.at(flux, (cells.index(np.pi - theta), cells.index(np.pi - target)), mass)
+        return np.asarray(0.5 * (flux + flux.T))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         probability, outgoing = self.outcomes(theta)

@@ -41,14 +41,14 @@ def moment_distance(first: Law | KernelMatrix, second: Law | KernelMatrix, toler
         if isinstance(matrix.basis, Legendre):
             last = min(last, matrix.size - 1)
     weight = 0.5 ** (np.arange(last + 1) + 1.0)
-    difference = np.abs(_means(matrices[0], last) - _means(matrices[1], last))
+    difference = np.abs(flux_means(matrices[0], last) - flux_means(matrices[1], last))
     rest = 2.0 * (2.0 - 0.5 ** (last + 1)) * 0.5 ** (last + 1)
     error = float(matrices[0].error) + float(matrices[1].error) + rest
     how = f"cosines up to order {last}: errors of both matrices, and 2^{1 - last} for the rest of the sum"
     return Estimate(float(weight @ difference @ weight), error, joint_kind(matrices[0], matrices[1]), how)
 
 
-def _means(matrix: KernelMatrix, last: int) -> Floats:
+def flux_means(matrix: KernelMatrix, last: int) -> Floats:
     """Means of cos(k theta) cos(l theta') under the flux measure, k, l = 0, ..., last."""
     cosines = _cosines(matrix.basis, last)
     return np.asarray(cosines @ matrix.symmetric @ cosines.T)

@@ -16,7 +16,7 @@ from .kernel_quadrature import jumps_of_map
 from .law import Law
 from .matrix import KernelMatrix
 from .measure import SINE, gauss_on_intervals
-from .outgoing import outgoing_distributions
+from .outgoing import ENTRY_POINTS, outgoing_distributions, parts_of
 from .resampling import matrix_error
 from .row_transport import wasserstein
 from .specular_frame import SpecularFrame
@@ -25,13 +25,18 @@ from .weighted_sum import Combination
 # Gauss nodes on a panel in the incoming angle, panels without kinks, kinks and cells of the outgoing angle on the
 # coarsest level; every level doubles all of them.
 NODES, PANELS, KINKS, CELLS = 4, 12, 24, 64
-# Rows times cells of a level: some seconds.
-MOST_CORNERS = 2**23
-ROWS_AT_ONCE = 2**19
+# Rows times cells of a level: some seconds. Rows without cells count as these many atoms.
+MOST_CORNERS, FEW_ATOMS = 2**23, 32
+# Any angle; whether rows have densities does not depend on it.
+PROBE = 1.0
+# Corners held at a time, counting every row with as many atoms as those of walls of many pieces have.
+CORNERS_AT_ONCE, MOST_ATOMS = 2**21, ENTRY_POINTS
 FEWEST_LEVELS = 3
 # A level halves the error at least where the distance jumps as a function of the incoming angle, at places unknown.
 # The difference of two levels is then the error of the finer one; chance may make it smaller, the one before it not.
 MEMORY = 0.25
+# A supremum at grazing, behind infinitely many kinks, is approached with order 1 exactly.
+SUPREMUM_FACTOR = 2.0
 # The supremum is approached from inside the panels, to this share of their width.
 INSET = 1e-9
 # Rounding of some hundred sums of angles and probabilities.
@@ -46,10 +51,11 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
     """
     found: list[float] = []
     error = np.inf
+    smooth = not (_is_atomic(first) and _is_atomic(second))
     for level in count():
         low, high = _panels(first, second, level)
-        edges = _edges(first, second, level)
-        corners = low.size * NODES * edges.size
+        edges = _edges(first, second, level) if smooth else np.array([0.0, np.pi])
+        corners = low.size * NODES * (edges.size + FEW_ATOMS)
         if level >= FEWEST_LEVELS and corners > MOST_CORNERS:
             break
         angle, mass = _nodes(low, high, sup)
@@ -58,7 +64,8 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
         if level == 0:
             continue
         steps = np.abs(np.diff(found))
-        error = float(steps[-1] if level == 1 else max(steps[-1], MEMORY * steps[-2])) + ROUNDING
+        error = float(steps[-1] if level == 1 else max(steps[-1], MEMORY * steps[-2]))
+        error = (SUPREMUM_FACTOR if sup else 1.0) * error + ROUNDING
         if level >= FEWEST_LEVELS - 1 and error <= tolerance:
             break
     return Estimate(found[-1], error, "estimate", f"Gauss rules on {low.size} panels; difference of two refinements")
@@ -87,6 +94,11 @@ def kinks_of(law: Law, limit: int) -> Floats:
         return law.kinks(limit)[0]
     except InputError:
         return np.empty(0)
+
+
+def _is_atomic(law: Law) -> bool:
+    """Whether rows consist of atoms, so that no cells are needed to resolve them."""
+    return not np.any(parts_of(law, np.array([PROBE]), np.array([0.0, np.pi]))[0])
 
 
 def _panels(first: Law, second: Law, level: int) -> tuple[Floats, Floats]:
@@ -122,7 +134,7 @@ def _nodes(low: Floats, high: Floats, sup: bool) -> tuple[Floats, Floats]:
 
 
 def _rows(first: Law, second: Law, angle: Floats, edges: Floats, order: float) -> Floats:
-    step = max(1, ROWS_AT_ONCE // edges.size)
+    step = max(1, CORNERS_AT_ONCE // max(edges.size, MOST_ATOMS))
     parts = []
     for start in range(0, angle.size, step):
         theta = angle[start : start + step]

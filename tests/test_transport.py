@@ -151,9 +151,18 @@ def test_transport_on_a_grid_brackets_the_same_values():
     assert abs(np.sum(least.plan.flux * slack)) < 1e-4 < 0.05 * np.mean(slack)
 
 
+def cells(n):
+    """The bins of n that lie in (0, 0.4) and in (1.9, 2.2)."""
+    middle = np.arccos(1 - 2 * (np.arange(n) + 0.5) / n)
+    return np.nonzero(middle < 0.4)[0], np.nonzero((middle > 1.9) & (middle < 2.2))[0]
+
+
 def test_plans_are_symmetric_stochastic_matrices_of_their_laws():
     found = ker.extremal_resistance(64)
     plan = found.plan
+    uneven = ker.discretise(found.law, ker.Bins([0.0, 0.4, 1.1, 1.9, 2.2, np.pi]))
+    assert uneven.stochastic_defect() < 1e-13
+    assert abs(uneven.flux[0, 3] - np.sum(ker.discretise(found.law, ker.Bins(1024)).flux[np.ix_(*cells(1024))])) < 2e-3
     assert plan.stochastic_defect() < 1e-13 and plan.symmetry_defect() < 1e-13
     rng = np.random.default_rng(3)
     theta = ker.SINE.sample(200_000, rng)
@@ -297,6 +306,21 @@ def test_the_best_isosceles_triangle_is_stationary_and_better_than_its_neighbour
     assert len(best.tried) >= 12 and best.tried[:, 1].max() <= best.resistance.value + 1e-12
 
 
+def parabola_pair(focal_length):
+    """Two parabolas with their vertices at the tips; with 1 the focus of each is the other's tip."""
+    depth = np.sqrt(2 * focal_length)
+    sides = [(0, 0), (0, -depth / 2), (0.5, -depth)], [(0.5, -depth), (1, -depth / 2), (1, 0)]
+    return geo.Wall([geo.Bezier(side) for side in sides], period=1.0)
+
+
+def test_the_best_pair_of_parabolas_has_each_focus_in_the_others_tip():
+    # a search of the whole family takes a minute; the resistance has a corner at 1
+    found = [ker.resistance(ker.WallLaw(parabola_pair(focal)), 1e-3) for focal in (0.9, 1.0, 1.1)]
+    below, best, above = (value.value for value in found)
+    assert best == pytest.approx(1.4965, abs=1e-3)
+    assert best - below > 0.08 and best - above > 0.08
+
+
 def test_two_parameters_are_searched_together():
     # a mixture of three laws whose resistance is quadratic in the shares, with the maximum 1.5 at (0.3, 0.6)
     def member(a, b):
@@ -313,6 +337,16 @@ def test_blunt_teeth_converge_to_a_mirror_with_order_1():
     study = ker.study_convergence(walls, geo.flat(), names=[f"{offset}" for offset in offsets])
     assert np.all(np.abs(np.log2(1 / study.ratios) - 1.0) < 0.05)
     assert str(study).count("\n") == 3 and all(step.seconds > 0 for step in study.steps)
+
+
+def test_a_profile_converges_as_its_resolution_grows():
+    walls = []
+    for samples in (4, 8, 16):
+        x = np.linspace(0.0, 1.0, samples + 1)
+        walls.append(geo.Wall.from_profile(x, 0.1 * np.cos(2 * np.pi * x)))
+    study = ker.study_convergence(walls, names=["4", "8", "16"], tolerance=3e-2)
+    assert len(study.steps) == 2 and study.target == "the next member"
+    assert study.ratios[0] < 0.75
 
 
 def test_deep_crevices_converge_weakly_but_not_row_by_row():
