@@ -34,7 +34,7 @@ END_SAMPLES, END_RATIO = 10, 0.3
 # Pieces of a row that its neighbours start from.
 MOST_SEEDS = 128
 # Rounding of the mean of a row, and of the place of a change as a share of the opening. Rays are good to a few units of
-# EPS times the derivative of their map, which is seldom above some hundreds except next to a change: measured, not proved.
+# EPS times the derivative of their map, seldom above some hundreds except next to a change: measured, not proved.
 ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
 # The first and the last sample are this share of the row's tolerance, or of the opening, away from the ends.
 MARGIN = 1e-3
