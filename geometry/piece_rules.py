@@ -20,8 +20,9 @@ ORDERS = (4, 7, 12, 20, 32)
 MOST_NODES = 1 << 17
 # Nodes that the margins and gaps of a row may need beyond those.
 SPARE = 4
-# A Gauss rule's error is taken as the last difference times the last ratio of differences, at least this, twice.
-LEAST_RATIO = 1e-3
+# A Gauss rule's error is taken as the last difference times the last ratio of differences, at least this, twice: where
+# differences shrink by chance rather than regularly, smaller ratios have proved too hopeful.
+LEAST_RATIO = 0.03
 # Pieces are not halved below this share of the opening.
 NARROWEST = 1e-9
 MOST_HALVINGS = 40
