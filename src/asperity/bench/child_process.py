@@ -65,6 +65,7 @@ class ChildProcess:
                 raise OutOfTime
             good, result = self._pipe.recv()
         except EOFError as reason:
+            self._process.join(LEAVE_SECONDS)
             code = self._process.exitcode
             self._end()
             raise ChildCrashed(f"the process ended with code {code}") from reason

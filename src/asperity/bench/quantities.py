@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .. import geometry as geo
 from ..checks import Floats
 from ..estimates import Estimate
-from ..geometry import Disk
-from ..kernels import Bins, CollisionLaw, KernelMatrix, Legendre, Panels, WallLaw, discretise
+from ..kernels import Bins, CollisionLaw, KernelMatrix, Legendre, Panels, WallLaw
 from ..spectral import ReferenceValue, WorkMethod, spectral_gap, spectrum
 from .matrix_references import matrix_references
 from .routes import Route, routes_for
@@ -23,13 +23,15 @@ if TYPE_CHECKING:
 
 LAW_BASIS, MOMENT_BASIS = Bins(32), Legendre(2)
 # A disk of uniform mass.
-DISK = Disk(1.0, 0.5)
+DISK = geo.Disk(1.0, 0.5)
 # lambda_2 of a law made of isometries is the supremum of its essential spectrum.
 POLYGONAL_EDGE = 1.0
 # Means over Lambda^2 of sin(psi)^2 and cos(psi)^2.
 SINE_MEAN, COSINE_MEAN = 0.75, 0.25
-# Panels of the reference for lambda_2: their degree.
-REFERENCE_DEGREE = 8
+# Panels of the reference for lambda_2: degrees and smallest angles, the finer ones last.
+QUICK_PANELS, FULL_PANELS = ((2, 1e-2), (3, 1e-2)), ((3, 1e-2), (4, 1e-3))
+# True disks at every scale: their noise is about 0.002.
+TRUE_DISKS = 2**18
 
 
 @dataclass(frozen=True)
@@ -211,9 +213,35 @@ def _eigenvalue_references(wall: Wall, quick: bool) -> tuple[ReferenceValue, ...
         return (ReferenceValue(POLYGONAL_EDGE, 0.0, "theorem: 1 is in the essential spectrum of isometries"),)
     if WallLaw(wall).closed_form is None:
         return ()
-    basis = Panels.for_wall(wall, degree=4 if quick else REFERENCE_DEGREE)
-    found = _second(discretise(WallLaw(wall), basis))
-    return (ReferenceValue(found.value, found.error, f"graded panels of degree {basis.degree}"),)
+    coarse, fine = (
+        _second(WallLaw(wall), basis=Panels.for_wall(wall, degree=degree, smallest=smallest))
+        for degree, smallest in (QUICK_PANELS if quick else FULL_PANELS)
+    )
+    source = "two families of graded panels, the error their difference"
+    return (ReferenceValue(fine.value, abs(fine.value - coarse.value), source),)
+
+
+def _disk_methods(wall: Wall) -> Methods:
+    scales = (10.0, 100.0, 1000.0)
+    method = WorkMethod("true disk, budget 1/eps", lambda inverse, rng: _by_true_disks(wall, 1.0 / inverse, rng), True)
+    return [(method, scales, (*scales, 1e4, 1e5))]
+
+
+def _disk_references(wall: Wall, quick: bool) -> tuple[ReferenceValue, ...]:
+    """Those of the limit; none without the rigid tracer, and none for pieces that it does not have."""
+    if not hasattr(geo, "collide") or "beziers" in wall.scene.primitives:
+        return ()
+    return _collision_references(wall, quick)
+
+
+def _by_true_disks(wall: Wall, scale: float, rng: np.random.Generator) -> float:
+    """<v1, K v1>/<v1, v1> of the disk with satellites above a wall of this scale."""
+    incoming = -sampled_velocities(TRUE_DISKS, rng)
+    position = np.column_stack([scale * wall.period * rng.random(TRUE_DISKS), 2.0 * np.pi * rng.random(TRUE_DISKS)])
+    # the incoming velocities follow sin(theta), as the flux through x2 = 0 does
+    hit = geo.collide(DISK, wall, scale, position, incoming)  # type: ignore[attr-defined, unused-ignore]
+    found = float(np.mean((-incoming[:, 0] * hit.velocity[:, 0])[hit.escaped]))
+    return found / _square_of_v1()
 
 
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
@@ -231,6 +259,7 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
             Quantity(
                 "collision", "<v1, K v1>/<v1, v1> of a uniform disk", _collision_methods, _collision_references
             ),
+            Quantity("disk", "that of the true disk at scale eps", _disk_methods, _disk_references),
         )
     }
 )  # fmt: skip
