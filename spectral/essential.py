@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import lru_cache, reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ..kernels.algebra import Rules, fold, made_of_isometries
 from ..kernels.ideal import LambertianLaw
 from ..kernels.phase_function import HenyeyGreensteinLaw
-from .grazing import GrazingLimit, grazing_limit
+from .grazing import REMEMBERED, GrazingLimit, grazing_limit
 
 if TYPE_CHECKING:
     from ..geometry import Wall
@@ -180,6 +180,7 @@ def _turned(part: _Part) -> _Part:
     return _Part(part.kept, part.grazing @ SWAP, part.error, part.entry_error, part.certain, part.notes)
 
 
+@lru_cache(maxsize=REMEMBERED)
 def _straight_share(law: WallLaw) -> tuple[float, float]:
     """Bounds of the top of the spectrum of the part of a wall's law that is made by straight pieces alone."""
     wall = law.wall

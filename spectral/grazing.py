@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from ..checks import Floats
-from ..kernels import DensityLaw, DrivenLaw, Law
+from ..kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
 from ..kernels.sampling import responder
 
 # Grazing angles, down to where the outgoing angle, good to some 1e-15, still has seven digits.
 ANGLES = 10.0 ** -np.arange(3.0, 9.0)
 # Adaptive quadrature in the entry point: first panels, error asked for, and rays that it may take.
-FIRST_PANELS, QUADRATURE_TOLERANCE, MOST_RAYS, NARROWEST = 8, 1e-9, 40_000, 1e-13
+FIRST_PANELS, QUADRATURE_TOLERANCE, MOST_RAYS, NARROWEST = 8, 1e-9, 20_000, 1e-13
 # Shifted lattices where there are too many changes of itinerary: their spread is the error.
 LATTICES, LATTICE_POINTS = 8, 2048
 # Two powers of ten between which the sums of rows change by less than this are enough.
 SETTLED = 2e-8
+# Walls whose limits are kept.
+REMEMBERED = 32
 # Relative accuracy of an outgoing angle of the size of the incoming one.
 ANGLE_ROUNDING = 4e-15
 
@@ -66,6 +69,16 @@ def grazing_limit(law: Law) -> GrazingLimit:
     >>> grazing_limit(ker.specular()).matrix.round(6).tolist()
     [[0.0, 1.0], [1.0, 0.0]]
     """
+    return _limit_of_wall(law) if isinstance(law, (CircularArcLaw, WallLaw)) else _limit(law)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _limit_of_wall(law: Law) -> GrazingLimit:
+    """The gaps in both conventions and the diffusivity ask for the same limit."""
+    return _limit(law)
+
+
+def _limit(law: Law) -> GrazingLimit:
     rows: list[list[tuple[Floats, float]]] = []
     for angle in ANGLES:
         rows.append([_row(law, angle, end) for end in (0, 1)])

@@ -93,22 +93,32 @@ def study(
 @click.argument("wall")
 @click.option("--specular", is_flag=True, help="In Feres' convention, where specular reflection is the identity.")
 @click.option("--tolerance", default=1e-6, show_default=True, help="Error asked for.")
+@click.option("--enclose", default=0, type=click.IntRange(min=0), help="Also enclose this many eigenvalues.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def gap(wall: str, specular: bool, tolerance: float, as_json: bool) -> None:
-    """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence."""
+def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool) -> None:
+    """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence.
+
+    The first line can be pasted into a paper: value, error, whether that is a bound or an estimate, verdict,
+    convention, method.
+    """
     import json
 
     from .geometry import wall_from_text
     from .kernels import WallLaw
-    from .spectral import spectral_gap
-    from .study_text import gap_as_dict
+    from .spectral import enclosures, spectral_gap
+    from .study_text import enclosures_as_list, gap_as_dict, quotation
 
     law = WallLaw(wall_from_text(wall))
-    found = spectral_gap(law.in_specular_frame() if specular else law, tolerance)
+    chosen = law.in_specular_frame() if specular else law
+    found = spectral_gap(chosen, tolerance)
+    enclosed = enclosures(chosen, enclose) if enclose else None
     if as_json:
-        click.echo(json.dumps(gap_as_dict(found), indent=2, allow_nan=False))
-    else:
-        click.echo("\n".join([str(found), *(f"  {line}" for line in found.evidence)]))
+        extra = {} if enclosed is None else {"enclosures": enclosures_as_list(enclosed)}
+        click.echo(json.dumps({**gap_as_dict(found), **extra}, indent=2, allow_nan=False))
+        return
+    click.echo("\n".join([quotation(found), *(f"  {line}" for line in found.evidence)]))
+    if enclosed is not None:
+        click.echo("\n".join(["enclosures:", *(f"  {item}" for item in enclosed)]))
 
 
 @main.command()
