@@ -30,15 +30,15 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[A
         assumptions, and both values there. ``"undecided"`` means that neither was found: no counterexample among the
         points tried, no proof among the routes known.
 
-    Notes
-    -----
-    Sums and products of sines take tenths of a second. Roots and absolute values of sums of angles are factored, which
-    may take a minute before the answer is *undecided*; bounds for the angles and fewer of them help.
-
     Raises
     ------
     InputError
         If the shapes differ, an assumption is not an inequality, or no point meets the assumptions.
+
+    Notes
+    -----
+    Sums and products of sines take tenths of a second. Roots and absolute values of sums of angles are factored, which
+    may take a minute before the answer is *undecided*; bounds for the angles and fewer of them help.
 
     Examples
     --------
