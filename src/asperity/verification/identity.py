@@ -55,6 +55,8 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[A
     left, right = _entries(sp, lhs), _entries(sp, rhs)
     if len(left) != len(right):
         raise InputError(f"lhs, rhs: expected one shape, got {len(left)} and {len(right)} entries")
+    if isinstance(lhs, sp.MatrixBase) and isinstance(rhs, sp.MatrixBase) and lhs.shape != rhs.shape:
+        raise InputError(f"lhs, rhs: expected matrices of one shape, got {lhs.shape} and {rhs.shape}")
     given = _relations(sp, assumptions)
     return every(*(_decided(a, b, given) for a, b in zip(left, right, strict=True)))
 
