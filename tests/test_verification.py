@@ -140,6 +140,8 @@ def test_matrices_are_compared_entry_by_entry_and_shapes_must_agree():
     assert verdict.answer == "refuted" and "y" in verdict.counterexample
     with pytest.raises(InputError, match="one shape"):
         verify([1, 2], [1, 2, 3])
+    with pytest.raises(InputError, match="one shape"):
+        verify(sp.ones(2, 3), sp.ones(3, 2))
 
 
 @pytest.mark.parametrize(

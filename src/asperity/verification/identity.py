@@ -35,6 +35,11 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[A
     InputError
         If the shapes differ, an assumption is not an inequality, or no point meets the assumptions.
 
+    Notes
+    -----
+    Sums and products of sines take tenths of a second. Roots and absolute values of sums of angles are factored, which
+    may take a minute before the answer is *undecided*; bounds for the angles and fewer of them help.
+
     Examples
     --------
     >>> import sympy
@@ -50,6 +55,8 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[A
     left, right = _entries(sp, lhs), _entries(sp, rhs)
     if len(left) != len(right):
         raise InputError(f"lhs, rhs: expected one shape, got {len(left)} and {len(right)} entries")
+    if isinstance(lhs, sp.MatrixBase) and isinstance(rhs, sp.MatrixBase) and lhs.shape != rhs.shape:
+        raise InputError(f"lhs, rhs: expected matrices of one shape, got {lhs.shape} and {rhs.shape}")
     given = _relations(sp, assumptions)
     return every(*(_decided(a, b, given) for a, b in zip(left, right, strict=True)))
 
