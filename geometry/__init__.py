@@ -11,7 +11,7 @@ from .bezier import Bezier
 from .catalogue import WALLS, NamedWall, wall_from_text
 from .charts import RollingCharts, plane_crossing, plane_crossing_differential
 from .collision_drawing import collision_path, draw_collision, draw_configurations
-from .configuration import ConfigurationSpace, default_spacing
+from .configuration import ConfigurationSpace
 from .container import Container
 from .curve import Curve
 from .cylinder import CylinderCollision, collide_cylinder, collide_modified
@@ -62,7 +62,6 @@ __all__ = [
     "collide_cylinder",
     "collide_modified",
     "collision_path",
-    "default_spacing",
     "dispersing_arcs",
     "double_parabola",
     "draw_collision",

@@ -12,9 +12,7 @@ from ..checks import Floats, finite_array, positive_number
 from ..errors import InputError
 from . import rolling
 from .rolling import Matrix, Vector
-
-# How far 2 pi/spacing may be from a whole number because the spacing was computed or written with 12 digits.
-WHOLE_NUMBER = 1e-9
+from .satellites import Satellites
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class RollingCharts:
     Parameters
     ----------
     spacing : float
-        rho in radians, 2 pi over a whole number of at least 3 (to 1e-9).
+        rho in radians, 2 pi over a whole number of at least 4 (to rounding).
     scale : float
         Unit of length, greater than 0: 1 for the maps F, f_lin, H_1, eta of Rudzis 2022, section 4; eps for the zoomed
         maps f*, H_eps, G_eps of section 5.3. The third coordinate is in the same unit: alpha/scale.
@@ -48,7 +46,8 @@ class RollingCharts:
     -----
     Arrays broadcast. Heights, of centres and of satellites, are measured from where a satellite at the lowest point of
     the rim touches the tops of the wall, as in `Wall`; the paper's heights of satellites are less by 1/scale. Nothing
-    cancels for small angles: 1 - cos and x - sin x are computed as such.
+    cancels for small angles: 1 - cos and x - sin x are computed as such. The formulas are those of
+    `asperity.geometry.rolling`, which takes ``xp=sympy`` too; the ledger proves them.
 
     Examples
     --------
@@ -65,14 +64,7 @@ class RollingCharts:
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        spacing = positive_number("spacing", self.spacing)
-        count = round(2.0 * math.pi / spacing)
-        if count < 3 or abs(2.0 * math.pi / spacing - count) > WHOLE_NUMBER * count:
-            raise InputError(
-                f"spacing: expected 2 pi over a whole number of at least 3, got {spacing!r}; the nearest such is "
-                f"{2.0 * math.pi / max(count, 3)!r}"
-            )
-        object.__setattr__(self, "spacing", 2.0 * math.pi / count)
+        object.__setattr__(self, "spacing", Satellites.around(1.0, 0.0, self.spacing).spacing)
         object.__setattr__(self, "scale", positive_number("scale", self.scale))
 
     @property

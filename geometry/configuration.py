@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,51 +13,9 @@ from . import rolling
 from .charts import RollingCharts
 from .disk import Disk
 from .kinetics import contact_normal
+from .satellites import Satellites
 from .solid import in_solid
 from .wall import Wall
-
-# The spacing of satellites is of the order of scale^0.4: it must vanish more slowly than scale^(1/2), so that few
-# trajectories meet two satellites (their share is of the order of scale/spacing^2).
-SPACING_EXPONENT = 0.4
-
-
-def default_spacing(scale: float, depth: float = 1.0) -> float:
-    """Return the least 2 pi/N above scale^0.4 at which no three satellites reach a wall of depth ``scale depth``.
-
-    Parameters
-    ----------
-    scale : float
-        eps, the period of the wall, greater than 0.
-    depth : float
-        Depth of the wall of period 1.
-
-    Returns
-    -------
-    float
-        rho with scale depth < 1 - cos(rho).
-
-    Raises
-    ------
-    InputError
-        If the wall is too deep for any disk with 3 satellites.
-
-    Examples
-    --------
-    >>> round(2 * math.pi / default_spacing(1e-5))
-    628
-    """
-    eps = positive_number("scale", scale)
-    count = math.floor(2.0 * math.pi / math.pow(eps, SPACING_EXPONENT))
-    reach = eps * depth
-    if 0.0 < reach < 2.0:
-        # 1 - cos(rho) = 2 sin^2(rho/2) > reach
-        count = min(count, math.ceil(math.pi / math.asin(math.sqrt(0.5 * reach))) - 1)
-    if reach >= 2.0 or count < 3:
-        raise InputError(
-            f"scale: expected a wall much smaller than the disk of radius 1, got scale {eps:g} and depth {depth:g}, "
-            "which leave no room for 3 satellites; take a smaller scale"
-        )
-    return 2.0 * math.pi / count
 
 
 @dataclass(frozen=True)
@@ -74,7 +31,8 @@ class ConfigurationSpace:
     scale : float
         eps, greater than 0: the disk meets ``wall.scaled(scale)``.
     spacing : float, optional
-        rho, the angle between satellites, 2 pi over a whole number; by default ``default_spacing``.
+        rho, the angle between satellites, 2 pi over a whole number; by default the least of at least scale^0.4 at which
+        no three satellites reach the wall, as in ``collide``.
 
     Attributes
     ----------
@@ -106,15 +64,9 @@ class ConfigurationSpace:
         if not isinstance(wall, Wall) or not isinstance(disk, Disk):
             raise InputError(f"wall, disk: expected a Wall and a Disk, got {wall!r} and {disk!r}")
         eps = positive_number("scale", scale)
-        rho = default_spacing(eps, wall.depth) if spacing is None else RollingCharts(spacing).spacing
-        for name, value in (("wall", wall), ("disk", disk), ("scale", eps), ("spacing", rho)):
+        spacing = Satellites.around(eps, eps * wall.depth, spacing).spacing
+        for name, value in (("wall", wall), ("disk", disk), ("scale", eps), ("spacing", spacing)):
             object.__setattr__(self, name, value)
-        if not self.depth < float(rolling.rise(self.spacing)):
-            raise InputError(
-                f"spacing: expected scale * depth = {self.depth:.3g} below 1 - cos(spacing) = "
-                f"{float(rolling.rise(self.spacing)):.3g}, so that at most two satellites reach the wall; take a "
-                "smaller scale or a larger spacing"
-            )
 
     @property
     def depth(self) -> float:
@@ -150,22 +102,20 @@ class ConfigurationSpace:
         Only the two lowest satellites are looked at, as no third one reaches the wall; and where the centre is so low
         that the lowest satellite is below the whole wall, it is in the solid.
         """
-        values = finite_array("configuration", configuration)
-        low = self.zoomed.contact(values / self.scale)
-        bar = self.charts.residual(values[..., 2])
-        second = self.zoomed.satellite(
-            values / self.scale, np.where(bar > 0.0, -1, 1) - self.charts.nearest(values[..., 2])
-        )
-        return ~(in_solid(self.wall, low) | in_solid(self.wall, second))
+        values = _configurations(configuration)
+        bar, zoomed = self.charts.residual(values[..., 2]), values / self.scale
+        # one k for both: two roundings of a tie would give the same satellite twice
+        lowest = -self.charts.nearest(values[..., 2])
+        beside = lowest + np.where(bar > 0.0, -1, 1)
+        places = (self.zoomed.satellite(zoomed, number) for number in (lowest, beside))
+        return np.asarray(~np.any([in_solid(self.wall, place) for place in places], axis=0))
 
     def cylinder_contains(self, configuration: ArrayLike) -> NDArray[np.bool_]:
         """Return whether configurations (..., 3) are in M_cyl: (x1 + alpha, x2) is not in the interior of the solid.
 
         Section 4.2; section 1.3.3 prints (x1 + alpha, alpha).
         """
-        values = finite_array("configuration", configuration)
-        if values.ndim == 0 or values.shape[-1] != 3:
-            raise InputError(f"configuration: expected an array of shape (..., 3), got shape {values.shape}")
+        values = _configurations(configuration)
         place = np.stack(rolling.straight_contact(*np.moveaxis(values, -1, 0)), axis=-1)
         return ~in_solid(self.wall, place / self.scale)
 
@@ -198,3 +148,10 @@ class ConfigurationSpace:
         angle = finite_array("alpha", alpha) + np.asarray(number) * self.spacing
         n = contact_normal(self.disk.mass, self.disk.inertia, (k[..., 0], k[..., 1]), angle)
         return np.stack(np.broadcast_arrays(*n), axis=-1)
+
+
+def _configurations(value: ArrayLike) -> Floats:
+    array = finite_array("configuration", value)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise InputError(f"configuration: expected (x1, x2, alpha) of shape (..., 3), got shape {array.shape}")
+    return array

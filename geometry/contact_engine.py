@@ -25,7 +25,8 @@ import math
 import numpy as np
 from numba import njit
 
-from .engine import CORNER, ESCAPED, GRAZING, LINE, NO_PIECE, SIDE, near_end, on_arc
+from .arc_engine import on_arc
+from .engine import CORNER, ESCAPED, GRAZING, LINE, NO_PIECE, SIDE, near_end
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 # an array that is passed costs ten arguments: small functions are inlined

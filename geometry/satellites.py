@@ -6,13 +6,16 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from ..checks import positive_number
 from ..errors import InputError
 from . import rolling
-from .charts import RollingCharts
-from .configuration import default_spacing
 
+# The theorem asks for spacings that tend to 0 while scale/spacing^2 tends to 0; two fifths is in the middle.
+SPACING_POWER = 0.4
 # With fewer satellites the lowest of them may turn to the side of the disk.
 FEWEST = 4
+# 2 pi/n and what a caller computes for it differ by a few rounding errors.
+DIVISOR_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,19 @@ class Satellites:
         InputError
             If the spacing does not divide the circle, or is too small for the depth.
         """
-        gap = default_spacing(scale, depth / scale) if spacing is None else spacing
-        return cls(RollingCharts(gap).satellites, depth)
+        if spacing is not None:
+            gap = positive_number("spacing", spacing)
+            count = round(2.0 * math.pi / gap)
+            if count < 1 or abs(count * gap - 2.0 * math.pi) > DIVISOR_TOLERANCE * 2.0 * math.pi:
+                below, above = (2.0 * math.pi / max(n, 1) for n in (math.ceil(2.0 * math.pi / gap), count or 1))
+                raise InputError(
+                    f"spacing: expected 2 pi divided by a whole number, got {gap!r}; for example {below!r} or {above!r}"
+                )
+            return cls(count, depth)
+        count = max(FEWEST, math.floor(2.0 * math.pi / scale**SPACING_POWER))
+        while count > FEWEST and not depth < cls.deepest_for(count):
+            count -= 1
+        return cls(count, depth)
 
     @staticmethod
     def deepest_for(count: int) -> float:

@@ -18,11 +18,18 @@ if TYPE_CHECKING:
     from .composition import Composition, Power
     from .convergence import LimitStudy, limit_study
     from .density import DensityLaw
+    from .difference import DifferenceTest, difference_test
     from .discretisation import discretise
+    from .distances import Distance, distance
     from .estimation import estimate
+    from .extremal import ExtremalResistance, extremal_resistance
+    from .functional import air_resistance, resistance
+    from .hollow_search import BestHollow, best_hollow
     from .ideal import lambertian, maxwell, retroreflection, specular
+    from .interval_exchange import IntervalExchangeLaw
     from .involution import InvolutionLaw
     from .law import BranchLaw, DrivenLaw, Law
+    from .least_resistance import LeastResistanceLaw
     from .legendre import Legendre
     from .limit_picture import draw_limit
     from .matrix import KernelMatrix
@@ -33,11 +40,14 @@ if TYPE_CHECKING:
     from .phase_function import henyey_greenstein
     from .polygon_law import PolygonLaw
     from .rectangular import RectangularTeethLaw
+    from .rough_body import RoughBody
     from .satellite_law import SatelliteLaw
     from .specular_frame import SpecularFrame
     from .symmetry import Defect, SymmetryDefect
     from .tensor import TensorBasis
     from .triangular import TriangularTeethLaw
+    from .two_mirrors import TwoMirrorHollow, two_mirrors
+    from .wall_convergence import Convergence, ConvergenceStep, study_convergence
     from .wall_law import WallLaw
     from .weighted_sum import Combination, mixture
 
@@ -45,18 +55,26 @@ _HOMES = {
     "AngularMeasure": "measure",
     "Basis": "basis",
     "BilliardRecord": "billiard",
+    "BestHollow": "hollow_search",
     "Bins": "bins",
     "BranchLaw": "law",
     "CircularArcLaw": "circular",
     "CollisionLaw": "collision",
     "Combination": "weighted_sum",
     "Composition": "composition",
+    "Convergence": "wall_convergence",
+    "ConvergenceStep": "wall_convergence",
     "Defect": "symmetry",
     "DensityLaw": "density",
+    "DifferenceTest": "difference",
+    "Distance": "distances",
     "DrivenLaw": "law",
+    "ExtremalResistance": "extremal",
+    "IntervalExchangeLaw": "interval_exchange",
     "InvolutionLaw": "involution",
     "KernelMatrix": "matrix",
     "Law": "law",
+    "LeastResistanceLaw": "least_resistance",
     "Legendre": "legendre",
     "LimitStudy": "convergence",
     "MatrixLaw": "matrix_law",
@@ -65,6 +83,7 @@ _HOMES = {
     "Power": "composition",
     "RectangularTeethLaw": "rectangular",
     "Reflector": "billiard",
+    "RoughBody": "rough_body",
     "SINE": "measure",
     "SINE_SQUARED": "measure",
     "SatelliteLaw": "satellite_law",
@@ -72,10 +91,16 @@ _HOMES = {
     "SymmetryDefect": "symmetry",
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
+    "TwoMirrorHollow": "two_mirrors",
     "WallLaw": "wall_law",
+    "air_resistance": "functional",
+    "best_hollow": "hollow_search",
+    "difference_test": "difference",
     "discretise": "discretisation",
+    "distance": "distances",
     "draw_limit": "limit_picture",
     "estimate": "estimation",
+    "extremal_resistance": "extremal",
     "henyey_greenstein": "phase_function",
     "lambertian": "ideal",
     "limit_study": "convergence",
@@ -83,10 +108,13 @@ _HOMES = {
     "maxwell": "ideal",
     "mixture": "weighted_sum",
     "no_slip_matrix": "collision_matrices",
+    "resistance": "functional",
     "play": "billiard",
     "retroreflection": "ideal",
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
+    "study_convergence": "wall_convergence",
+    "two_mirrors": "two_mirrors",
 }
 
 __all__ = [
@@ -94,6 +122,7 @@ __all__ = [
     "SINE_SQUARED",
     "AngularMeasure",
     "Basis",
+    "BestHollow",
     "BilliardRecord",
     "Bins",
     "BranchLaw",
@@ -101,12 +130,19 @@ __all__ = [
     "CollisionLaw",
     "Combination",
     "Composition",
+    "Convergence",
+    "ConvergenceStep",
     "Defect",
     "DensityLaw",
+    "DifferenceTest",
+    "Distance",
     "DrivenLaw",
+    "ExtremalResistance",
+    "IntervalExchangeLaw",
     "InvolutionLaw",
     "KernelMatrix",
     "Law",
+    "LeastResistanceLaw",
     "Legendre",
     "LimitStudy",
     "MatrixLaw",
@@ -115,15 +151,22 @@ __all__ = [
     "Power",
     "RectangularTeethLaw",
     "Reflector",
+    "RoughBody",
     "SatelliteLaw",
     "SpecularFrame",
     "SymmetryDefect",
     "TensorBasis",
     "TriangularTeethLaw",
+    "TwoMirrorHollow",
     "WallLaw",
+    "air_resistance",
+    "best_hollow",
+    "difference_test",
     "discretise",
+    "distance",
     "draw_limit",
     "estimate",
+    "extremal_resistance",
     "henyey_greenstein",
     "lambertian",
     "limit_study",
@@ -132,9 +175,12 @@ __all__ = [
     "mixture",
     "no_slip_matrix",
     "play",
+    "resistance",
     "retroreflection",
     "smooth_matrix",
     "specular",
+    "study_convergence",
+    "two_mirrors",
 ]
 
 

@@ -9,17 +9,21 @@ import numpy as np
 
 from ..checks import Floats, finite_number, generator, whole_number
 from ..errors import InputError
+from .algebra import lists_branches
 from .arc_quadrature import arc_matrix
 from .basis import Basis
+from .bins import Bins
 from .branch_quadrature import branch_matrix
 from .circular import CircularArcLaw
 from .composition import Composition, Power
 from .density import DensityLaw
+from .directions import Directions
 from .entry_quadrature import entry_matrix
 from .involution import InvolutionLaw
 from .isometry import table_of
 from .kernel_quadrature import action_is_affordable, action_matrix, density_matrix, map_matrix
 from .law import DrivenLaw, Law
+from .least_resistance import LeastResistanceLaw
 from .legendre import Legendre
 from .matrix import KernelMatrix
 from .matrix_algebra import frobenius_error
@@ -45,9 +49,8 @@ DISPLACED = np.finfo(np.float64).eps
 SEED_WITHOUT_RNG = 0
 # Rays of adaptive rows that nobody asked for by name: a second or a few; beyond them the shortfall is reported.
 QUICK_RAYS = 2_000_000
-# Methods that a sum has if all its terms have them; asked of a law to see whether it lists isometries.
+# Methods that a sum has if all its terms have them.
 SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
-FEW_KINKS, PROBE = 8, 1.0
 
 
 def discretise(
@@ -175,7 +178,7 @@ class _Maker:
         found: tuple[Method, ...]
         if closed_form is not None:
             found = (*self.methods(closed_form)[:-1], *driven)
-        elif isometries and made_of_isometries(law):
+        elif isometries and lists_branches(law):
             found = ("exact", "quadrature", *driven)
         elif isinstance(law, Combination):
             each = [self.methods(term) for _, term in law.terms_checked()]
@@ -228,8 +231,12 @@ class _Maker:
         if isinstance(law, SpecularFrame):
             return self._flipped(law)
         how = "difference of the last two levels of quadrature"
-        if isinstance(law, DensityLaw):
+        if isinstance(law, DensityLaw) and not isinstance(self.basis, Directions):
+            # three smooth functions are integrated row by row below, on the law's own panels
             symmetric, error = density_matrix(law, self.basis, self.tolerance)
+        elif isinstance(law, LeastResistanceLaw) and isinstance(self.basis, Bins):
+            symmetric, error = self.basis.heights[:, None] * law.flux(self.basis) * self.basis.heights, 0.0
+            how = "masses of intervals, to rounding"
         elif isinstance(law, InvolutionLaw):
             symmetric, error = map_matrix(law.map, self.basis, self.tolerance)
         elif isinstance(law, CircularArcLaw):
@@ -327,16 +334,6 @@ class _Maker:
         return KernelMatrix(symmetric, self.basis, frobenius_error(error, kind, how), method=method)
 
 
-def made_of_isometries(law: Law) -> bool:
-    """Whether a law lists its branches and its kinks."""
-    try:
-        law.kinks(FEW_KINKS)
-        law.branches(PROBE)
-    except InputError:
-        return False
-    return True
-
-
 def _replacement(law: Law) -> Law | None:
     """The exact law of a wall, in closed form or as a table of isometries; None for other laws."""
     found = getattr(law, "closed_form", None)
@@ -344,7 +341,7 @@ def _replacement(law: Law) -> Law | None:
 
 
 def _is_sum_of_others(law: Law) -> bool:
-    return isinstance(law, Combination) and not made_of_isometries(law)
+    return isinstance(law, Combination) and not lists_branches(law)
 
 
 def _factors(law: Composition | Power) -> tuple[Law, ...]:

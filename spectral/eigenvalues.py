@@ -12,7 +12,8 @@ from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from .deflation import coarser_grids, off_constants
-from .sampling import sampling_errors
+from .parity import Parity, halves
+from .sampling import NORMAL_95, sampling_errors, sampling_quantile
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,7 +27,6 @@ REVERSIBLE_Z = 5.0
 REVERSIBLE_ROUNDING = 1e-12
 # With order 2, the lowest of the bases, the change by the last doubling is this share of the one before.
 EARLIER_SHARE = 0.25
-NORMAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True)
@@ -42,15 +42,19 @@ class SpectrumErrors:
         is larger (``inf`` where there is no coarser basis), plus the Frobenius error of a matrix that was not sampled.
     sampling : array
         Estimate: one standard error from the rays' randomness; 0 for matrices that were not sampled.
+    quantile : float
+        Of how many standard errors an interval of 95 % has on each side: 1.96, or Student's quantile where the standard
+        error comes from the spread of a few randomisations.
     """
 
     algebraic: Floats
     discretisation: Floats
     sampling: Floats
+    quantile: float = NORMAL_95
 
     def total(self) -> Floats:
-        """Half width of an interval of about 95 %: bounds and two-grid differences in full, sampling times 1.96."""
-        return np.asarray(self.algebraic + self.discretisation + NORMAL_95 * self.sampling)
+        """Half width of an interval of about 95 %: bounds and two-grid differences in full, sampling by quantile."""
+        return np.asarray(self.algebraic + self.discretisation + self.quantile * self.sampling)
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,11 @@ class Spectrum:
     basis : Basis
     method : str
         How the matrix was made.
+    matrix_error : float
+        The part of the discretisation errors that comes from the entries of an unsampled matrix.
+    parity : tuple of {"even", "odd", "none"}
+        Of every eigenfunction under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric. In
+        the other convention the odd eigenvalues have the opposite sign.
     """
 
     values: Floats
@@ -87,6 +96,8 @@ class Spectrum:
     convention: str
     basis: Basis
     method: str
+    matrix_error: float = 0.0
+    parity: tuple[Parity, ...] = ()
 
     @property
     def intervals(self) -> Floats:
@@ -102,6 +113,23 @@ class Spectrum:
     def eigenfunction(self, index: int, theta: Any) -> Floats:
         """Values of the eigenfunction of ``values[index]`` at the angles theta; mean square 1 under the measure."""
         return np.asarray(self.basis.evaluate(theta) @ self.vectors[:, index])
+
+    def implied_time_scales(self) -> tuple[Floats, Floats]:
+        """-1/ln|lambda| in steps, for all but the constants, and the intervals, shape (k - 1, 2), of the eigenvalues'.
+
+        Infinite at the end where the interval of an eigenvalue reaches modulus 1.
+        """
+        modulus, width = np.abs(self.values[1:]), self.errors.total()[1:]
+        ends = np.stack([np.maximum(modulus - width, 0.0), np.minimum(modulus + width, 1.0)], axis=1)
+        with np.errstate(divide="ignore"):
+            scales, intervals = (-1.0 / np.log(np.minimum(part, 1.0)) for part in (modulus, ends))
+        return scales, np.asarray(intervals)
+
+    def plot_eigenfunctions(self, ax: Axes | None = None) -> Axes:
+        """Draw the eigenfunctions off the constants against the incoming angle."""
+        from .picture import draw_eigenfunctions
+
+        return draw_eigenfunctions(self, ax)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the eigenvalues with their intervals."""
@@ -154,7 +182,7 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     check_reversible(matrix)
     array = 0.5 * (matrix.symmetric + matrix.symmetric.T)
     constant = np.asarray(matrix.basis.constant)
-    rest, rest_vectors = off_constants(array, constant)
+    rest, rest_vectors, parity = _solved(matrix, array, constant)
     chosen = np.sort(np.argsort(-np.abs(rest), kind="stable")[: k - 1])[::-1]
     values = np.concatenate([[constant @ array @ constant], rest[chosen]])
     vectors = np.column_stack([constant, rest_vectors[:, chosen]])
@@ -162,7 +190,8 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     changes = _two_grids(matrix, rest)
     errors = _errors(matrix, values, vectors, residuals, np.concatenate([[0.0], changes[chosen]]))
     # without a second function the gap is 1 by convention, and nothing is known of it
-    gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(*(frozen([np.inf]) for _ in range(3)))
+    unknown = frozen([np.inf])
+    gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(unknown, unknown, unknown)
     if len(rest):
         top = rest_vectors[:, -1:]
         residual = np.linalg.norm(array @ top - rest[-1] * top, axis=0)
@@ -179,7 +208,28 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         convention=matrix.frame,
         basis=matrix.basis,
         method=matrix.method,
+        matrix_error=0.0 if matrix.samples else float(matrix.error),
+        parity=("even" if parity else "none", *(parity[i] if parity else "none" for i in chosen)),
     )
+
+
+def _solved(matrix: KernelMatrix, array: Floats, constant: Floats) -> tuple[Floats, Floats, list[Parity]]:
+    """Eigenvalues off the constants, ascending, with vectors and, for mirror-symmetric laws, parities.
+
+    Even and odd functions do not mix there, and two matrices of half the size take a quarter of the work.
+    """
+    split = halves(matrix)
+    if split is None:
+        return *off_constants(array, constant), []
+    even, odd = split
+    values, vectors = off_constants(even.T @ array @ even, even.T @ constant)
+    from scipy.linalg import eigh
+
+    odd_values, odd_vectors = eigh(odd.T @ array @ odd) if odd.size else (np.empty(0), np.empty((0, 0)))
+    everything = np.concatenate([values, odd_values])
+    order = np.argsort(everything, kind="stable")
+    names: list[Parity] = ["even" if place < len(values) else "odd" for place in order]
+    return everything[order], np.concatenate([even @ vectors, odd @ odd_vectors], axis=1)[:, order], names
 
 
 def _errors(
@@ -191,6 +241,7 @@ def _errors(
         # an entry's error moves an eigenvalue by no more than the Frobenius norm; sampled ones have their own part
         discretisation=frozen(changes + (0.0 if matrix.samples else float(matrix.error))),
         sampling=frozen(sampling_errors(matrix, vectors, values)),
+        quantile=sampling_quantile(matrix),
     )
 
 
@@ -265,11 +316,17 @@ def _both_signs(half: Spectrum, k: int) -> Spectrum:
     order = np.argsort(-np.abs(values), kind="stable")[:k]
     order = order[np.argsort(-values[order], kind="stable")]
     pick = index[order]
-    parts = (half.errors.algebraic, half.errors.discretisation, half.errors.sampling)
+    errors = half.errors
     return replace(
         half,
         values=frozen(values[order]),
         vectors=frozen(half.vectors[:, pick]),
         residuals=frozen(half.residuals[pick]),
-        errors=SpectrumErrors(*(frozen(part[pick]) for part in parts)),
+        parity=tuple(half.parity[i] for i in pick),
+        errors=SpectrumErrors(
+            frozen(errors.algebraic[pick]),
+            frozen(errors.discretisation[pick]),
+            frozen(errors.sampling[pick]),
+            errors.quantile,
+        ),
     )

@@ -1,37 +1,28 @@
-"""The spectral gap of a law: refined until its error meets the tolerance, with a verdict."""
+"""The spectral gap of a law: a number with its error, a verdict and the evidence."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from ..checks import positive_number
-from ..estimates import Estimate
-from ..kernels import Bins, BranchLaw, KernelMatrix, Law, Legendre, MatrixLaw, SpecularFrame, WallLaw, discretise
-from .eigenvalues import NORMAL_95, Spectrum, spectrum
+from ..errors import AccuracyError, InputError
+from ..estimates import ErrorKind, Estimate
+from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, discretise
+from ..kernels.algebra import made_of_isometries
+from .eigenvalues import Spectrum, spectrum
+from .enclosure import enclosures
+from .essential import EssentialEdge, essential_edge
+from .ideal_parts import ideal_spectrum
+from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
+from .separation import lambertian_share
 
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 
-# Eigenvalues that a gap carries along in its spectrum.
-SHOWN_VALUES = 4
-FIRST_DEGREE = 12
-LARGEST_DEGREE = 96
-SAMPLED_DEGREE = 48
-FIRST_SAMPLES = 2**17
-LARGEST_SAMPLES = 2**22
-FEWEST_LEVELS = 3
-# A gap of fewer errors than this is not told from zero.
-SIGNIFICANCE = 10.0
-# Two refinements in a row must each shrink the change of the eigenvalue by this factor before it is called isolated:
-# at an essential edge the change falls only like a power of 1/log(n), by less than this a doubling.
-ISOLATED_SHRINKAGE = 2.0
-# At an essential edge the change by a doubling stays above a hundredth of the gap for every basis in reach.
-NEGLIGIBLE_GAP = 1e-3
-# Changes below this many rounding errors say nothing about convergence.
-ROUNDING_FLOOR = 1e-12
+# Eigenvalues that are enclosed in the search of the largest one off the constants.
+ENCLOSED = 3
 
 
 @dataclass(frozen=True)
@@ -61,14 +52,14 @@ class SpectralGap(Estimate):
 
 
 def spectral_gap(
-    law: Law | KernelMatrix, tolerance: float = 1e-6, rng: np.random.Generator | None = None
+    law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: np.random.Generator | None = None
 ) -> SpectralGap:
     """The gap 1 - sup(spectrum off the constants) of a reversible law.
 
     Parameters
     ----------
-    law : Law or KernelMatrix
-        In the convention that it carries; a matrix is taken as it is.
+    law : Law, CollisionLaw or KernelMatrix
+        In the convention that it carries; a matrix is taken as it is, of a collision law its P~.
     tolerance : float
         The basis grows, and the number of rays with it, until the reported error is below this or the largest basis
         and number of rays are reached; the error says which.
@@ -79,10 +70,18 @@ def spectral_gap(
     -------
     SpectralGap
 
+    Raises
+    ------
+    AccuracyError
+        If the law is not reversible, or its sampled matrix speaks against it.
+
     Notes
     -----
-    Laws made of isometries (polygonal walls, specular, retroreflection) have no gap: 1 is in the essential spectrum,
-    and whatever a grid shows is an artefact of the grid. This is answered by theorem, without computing.
+    First the structure of the law is asked. Laws made of isometries (polygonal walls, specular reflection,
+    retroreflection) have no gap: 1 is in the essential spectrum, and whatever a grid shows is an artefact of the grid.
+    Else `essential_edge` says how far the essential spectrum reaches, and Galerkin matrices, whose eigenvalues above
+    it converge from below, say whether an eigenvalue lies beyond. If one does, the gap is *isolated*; if on all bases
+    all of them stay short of the edge, the gap ends at the *essential edge*.
 
     Examples
     --------
@@ -92,97 +91,165 @@ def spectral_gap(
     (0.5, 'isolated')
     >>> spec.spectral_gap(ker.specular()).verdict
     'no gap'
+    >>> semicircle = spec.spectral_gap(ker.CircularArcLaw(np.pi / 2))
+    >>> round(float(semicircle), 6), semicircle.verdict
+    (0.176041, 'essential edge')
     """
     positive_number("tolerance", tolerance)
+    if isinstance(law, CollisionLaw):
+        law = law.law
     if isinstance(law, KernelMatrix):
-        found = spectrum(law, k=SHOWN_VALUES)
-        method = _method(found, "algebraic + two-grid + 1.96 x sampling error")
-        evidence = ("one matrix: its basis was not refined",)
-        return SpectralGap(
-            found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found
+        return _of_matrix(law)
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a Law, a CollisionLaw or a KernelMatrix, got {law!r}")
+    if law.reversible is False:
+        raise AccuracyError(
+            f"{law!r} is not symmetric with respect to sin(theta) d theta: its spectrum need not be real. "
+            "Use law @ law.adjoint() if that is what you mean",
+            np.inf,
         )
-    if made_of_isometries(law):
+    return _by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng or np.random.default_rng(0)))
+
+
+def gaps_in_both_conventions(
+    law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None
+) -> tuple[SpectralGap, SpectralGap]:
+    """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
+
+    Raises
+    ------
+    InputError
+        If the law is not known to be mirror-symmetric: in the other convention it need not be self-adjoint then.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> [float(gap) for gap in gaps_in_both_conventions(0.5 * ker.specular() + 0.5 * ker.lambertian())]
+    [0.5, 0.5]
+    """
+    positive_number("tolerance", tolerance)
+    if not law.reversible or not law.mirror_symmetric:
+        raise InputError(f"law: expected a reversible and mirror-symmetric one, got {law!r}")
+    matrices = SharedMatrices(rng or np.random.default_rng(0))
+    other = law.in_specular_frame()
+    first, second = (_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
+    return first, second
+
+
+def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
+    found = spectrum(matrix, k=EIGENVALUES)
+    method = _method(found, "algebraic + two-grid + 1.96 x sampling error")
+    evidence = ("one matrix: its basis was not refined",)
+    return SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
+
+
+def _by_theorem(law: Law) -> SpectralGap | None:
+    """What the structure of a law tells without computing."""
+    if made_of_isometries(law) and law.reversible:
         reason = (
             "the law is a mixture of isometries theta' = +-theta + const: 1 belongs to its essential spectrum, "
             "so no L^2 gap exists, and a gap on a grid is an artefact of the grid"
         )
-        return SpectralGap(0.0, 0.0, "bound", "structure of the law", "no gap", (reason,), law.frame)
+        return _stated(law, 0.0, 0.0, "no gap", reason)
+    if isinstance(law, InvolutionLaw):
+        reason = "the law is an involution T: f + f o T is kept for every f, so 1 has infinite multiplicity"
+        return _stated(law, 0.0, 0.0, "no gap", reason)
+    ideal = ideal_spectrum(law)
+    if ideal is not None:
+        reason = (
+            f"the spectrum off the constants consists of two isolated eigenvalues of infinite multiplicity, "
+            f"{ideal.even:.12g} on even functions of cos(theta) and {ideal.odd:.12g} on odd ones"
+        )
+        if lambertian_share(law) == 1.0:
+            reason = "the law is Lambertian: of rank 1, its spectrum off the constants is 0"
+        return _stated(law, 1.0 - ideal.top, ideal.rounding, "isolated", reason)
     if isinstance(law, MatrixLaw):
         return _of_finite_rank(law)
-    return _refined(law, tolerance, rng or np.random.default_rng(0))
+    share = lambertian_share(law)
+    if share > 0.0:
+        edge = essential_edge(law)
+        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * np.finfo(np.float64).eps:
+            reason = (
+                f"a Lambertian share a = {share:.6g} makes the gap at least a, and the essential spectrum reaches 1 - a"
+            )
+            return _stated(law, share, 4.0 * np.finfo(np.float64).eps, "essential edge", reason, *edge.reasons)
+    return None
+
+
+def _stated(law: Law, value: float, error: float, verdict: Verdict, *evidence: str) -> SpectralGap:
+    return SpectralGap(value, error, "bound", "structure of the law", verdict, evidence, law.frame)
 
 
 def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
     """A law that is constant on bins: its own bins hold every eigenvalue but 0, which has infinite multiplicity."""
-    found = spectrum(discretise(law, Bins(law.edges)), k=SHOWN_VALUES)
+    found = spectrum(discretise(law, Bins(law.edges)), k=EIGENVALUES)
     error = float(found.gap_errors.algebraic[0])
     reason = f"the law is constant on {law.edges.size - 1} bins: beyond these its spectrum is 0"
     method = _method(found, "algebraic error; the basis is exact")
     return SpectralGap(min(found.gap, 1.0), error, "bound", method, "isolated", (reason,), found.convention, found)
 
 
-def made_of_isometries(law: Law) -> bool:
-    """Whether the law is known to be a mixture of finitely many isometries for almost every angle."""
-    if isinstance(law, SpecularFrame):
-        return made_of_isometries(law.law)
-    if isinstance(law, WallLaw):
-        return law.wall.is_polygonal
-    return isinstance(law, BranchLaw)
+def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
+    edge = essential_edge(law)
+    if edge.low >= 1.0 - tolerance:
+        # nothing fits between the edge and 1 that the tolerance could tell
+        return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
+    if isinstance(law, DensityLaw):
+        enclosed = _by_enclosure(law, tolerance)
+        if enclosed is not None:
+            return enclosed
+    steps = refined(law, tolerance, matrices, edge)
+    found, error = steps.finest, steps.error
+    reasons = (*edge.reasons, *steps.evidence, *_lower_bound(law))
+    top = 1.0 - found.gap
+    if top - error > edge.high and steps.converges:
+        method = _method(found, steps.how)
+        outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
+        return SpectralGap(found.gap, error, "estimate", method, "isolated", (*reasons, outside), law.frame, found)
+    if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
+        short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
+        return _at_edge(law, edge, (*reasons, short), found)
+    # two grids say nothing where refinement does not converge; the gap of a Galerkin matrix is never too small
+    method = _method(found, "not converged: an upper bound but for its noise")
+    error = max(error, abs(found.gap))
+    return SpectralGap(found.gap, error, "estimate", method, "undecided", reasons, law.frame, found)
 
 
-def _refined(law: Law, tolerance: float, rng: np.random.Generator) -> SpectralGap:
-    levels: list[Spectrum] = []
-    evidence: list[str] = []
-    for matrix in _matrices(law, tolerance, rng):
-        found = spectrum(matrix, k=SHOWN_VALUES)
-        levels.append(found)
-        evidence.append(f"{matrix.basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
-        enough = found.gap_error <= tolerance and len(levels) >= FEWEST_LEVELS
-        if enough and _verdict(levels, tolerance) == "isolated":
-            break
-    return _as_gap(levels[-1], _verdict(levels, tolerance), tuple(evidence))
+def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:
+    """Whether the edge is known better than what refinement leaves open between its largest eigenvalue and the edge."""
+    top = 1.0 - steps.finest.gap
+    return edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
 
 
-def _matrices(law: Law, tolerance: float, rng: np.random.Generator) -> Iterator[KernelMatrix]:
-    """Matrices of growing size; sampled ones keep the basis and grow in rays once the basis is large enough."""
-    samples = FIRST_SAMPLES
-    degree = FIRST_DEGREE
-    while True:
-        matrix = discretise(law, Legendre(degree), tolerance=0.1 * tolerance, samples=samples, rng=rng)
-        yield matrix
-        if matrix.samples:
-            if degree >= SAMPLED_DEGREE and samples >= LARGEST_SAMPLES:
-                return
-            samples = min(4 * samples, LARGEST_SAMPLES)
-            degree = min(2 * degree, SAMPLED_DEGREE)
-        else:
-            if degree >= LARGEST_DEGREE:
-                return
-            degree *= 2
+def _at_edge(law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Spectrum | None = None) -> SpectralGap:
+    method = "edge of the essential spectrum, from the law's action on grazing rays and its isometries"
+    return SpectralGap(
+        1.0 - edge.value, edge.error, "estimate", method, "essential edge", evidence, law.frame, found
+    )  # fmt: skip
 
 
-def _verdict(levels: list[Spectrum], tolerance: float) -> Verdict:
-    """Isolated if each of the last two refinements shrank the change, or left one that is negligible.
+def _by_enclosure(law: Law, tolerance: float) -> SpectralGap | None:
+    """The gap from an indexed enclosure, where the separation of the spectrum is known."""
+    for number in (ENCLOSED, 2 * ENCLOSED):
+        found = enclosures(law, number)
+        listed = [item for item in found if item.label == "indexed" and item.index]
+        if not listed:
+            continue
+        top = max(listed, key=lambda item: item.value)
+        # nothing that is not listed is larger
+        if top.low <= max(found.separation.radius, 0.0) and top.low < 0.0:
+            continue
+        if top.low <= found.separation.radius or 0.5 * top.width > tolerance:
+            continue
+        kind: ErrorKind = top.kind
+        gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
+        return SpectralGap(gap, error, kind, f"indexed enclosure; {found.method}", "isolated", (str(top),), law.frame)
+    return None
 
-    Negligible is what sampling explains, or what is below the tolerance and a small share of the gap.
-    """
-    gaps = np.array([level.gap for level in levels])
-    noise = np.array([NORMAL_95 * level.gap_errors.sampling[0] + ROUNDING_FLOOR for level in levels])
-    change = np.abs(np.diff(gaps))
-    small = np.minimum(tolerance, NEGLIGIBLE_GAP * gaps[2:])
-    settled = (change[1:] * ISOLATED_SHRINKAGE <= change[:-1]) | (
-        change[1:] <= np.maximum(noise[1:-1] + noise[2:], small)
-    )
-    known = levels[-1].gap > SIGNIFICANCE * levels[-1].gap_error
-    return "isolated" if len(settled) and settled[-2:].all() and known else "undecided"
 
-
-def _as_gap(found: Spectrum, verdict: Verdict, evidence: tuple[str, ...]) -> SpectralGap:
-    error, how = found.gap_error, "algebraic + two-grid + 1.96 x sampling error"
-    if verdict == "undecided":
-        # two grids say nothing where refinement does not converge; the gap of a Galerkin matrix is never too small
-        error, how = max(error, abs(found.gap)), "not converged: an upper bound but for its noise"
-    return SpectralGap(found.gap, error, "estimate", _method(found, how), verdict, evidence, found.convention, found)
+def _lower_bound(law: Law) -> tuple[str, ...]:
+    share = lambertian_share(law)
+    return (f"the gap is at least {share:.6g}, the Lambertian share of the law",) if share > 0.0 else ()
 
 
 def _method(found: Spectrum, how: str) -> str:

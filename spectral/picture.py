@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 # Okabe and Ito's blue and vermilion, which stay apart for colour-blind readers.
 KNOWN, UNKNOWN = "#0072B2", "#D55E00"
+# Angles of a curve, and curves that can be told apart.
+ANGLES, SHOWN_FUNCTIONS = 400, 5
 CONVENTIONS = {"paper": "retroreflection is the identity", "specular": "specular reflection is the identity"}
 
 
@@ -61,6 +63,28 @@ def draw_spectrum(found: Spectrum, ax: Axes | None = None, gap: SpectralGap | No
     ax.set_title(f"Spectrum, {found.convention} convention ({CONVENTIONS[found.convention]})", fontsize=11)
     # below the axes: a spectrum may fill any corner
     ax.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=1 if gapless else 2)
+    return ax
+
+
+def draw_eigenfunctions(found: Spectrum, ax: Axes | None = None) -> Axes:
+    """Draw the eigenfunctions off the constants, of mean square 1 under the measure, with their eigenvalues."""
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.figure(layout="constrained").subplots()
+    theta = np.linspace(0.0, np.pi, ANGLES + 2)[1:-1]
+    for index in range(1, min(len(found.values), 1 + SHOWN_FUNCTIONS)):
+        values = found.eigenfunction(index, theta)
+        # the sign is arbitrary: positive at small angles
+        label = f"{found.values[index]:.6g}"
+        if found.parity and found.parity[index] != "none":
+            label += f" ({found.parity[index]})"
+        ax.plot(theta, np.sign(values[0] or 1.0) * values, label=label)
+    ax.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
+    ax.set_xlabel("incoming angle θ")
+    ax.set_ylabel("eigenfunction")
+    ax.set_title(f"Eigenfunctions, {found.convention} convention", fontsize=11)
+    ax.legend(frameon=False, title="eigenvalue")
     return ax
 
 

@@ -124,6 +124,7 @@ def test_a_gap_is_printed_with_its_evidence_and_as_json(convention):
     flags = ["--specular"] if convention == "specular" else []
     text = run("gap", "triangular-teeth", *flags).stdout
     assert "no gap" in text and f"{convention} convention" in text and "essential spectrum" in text
+    assert text.startswith("spectral gap no gap: 0 (bound)")
     gap = json.loads(run("gap", "triangular-teeth", "--json", *flags).stdout)
     assert gap["value"] == 0.0 and gap["error"] == 0.0 and gap["kind"] == "bound" and gap["convention"] == convention
     assert gap["verdict"] == "no gap" and len(gap["evidence"]) == 1

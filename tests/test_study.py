@@ -103,6 +103,18 @@ def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
     assert "paper convention: 0.63" in text and "specular convention: 0.6" in text
 
 
+def test_the_consequences_are_those_of_the_library(arcs, teeth):
+    found = arcs.consequences
+    # the second largest modulus is the paper convention's 0.3670253152
+    assert abs(float(found.slem) - 0.3670253152) <= found.slem.error
+    assert abs(float(found.relaxation_time) + 1 / math.log(0.3670253152)) <= found.relaxation_time.error
+    # a grazing ray leaves an arc at a finite angle: D is that of diffuse walls
+    assert found.diffusion.eta == pytest.approx(1.0, abs=1e-5)
+    assert "relaxation time" in arcs.summary() and "D = 1.27" in arcs.summary()
+    assert not math.isfinite(teeth.consequences.relaxation_time.error)
+    assert "no relaxation time" in teeth.summary()
+
+
 def test_a_tolerance_that_was_not_met_is_said_loudly(teeth):
     missed = replace(teeth.matrix, error=replace(teeth.matrix.error, value=0.5, error=0.5))
     assert "Frobenius error 0.5 (bound), tolerance 0.001 NOT met" in replace(teeth, matrix=missed).summary()
@@ -126,6 +138,7 @@ def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):
         raise AccuracyError("the counts speak against symmetry", 0.5)
 
     monkeypatch.setattr("asperity.study.spectral_gap", refuse)
+    monkeypatch.setattr("asperity.study.gaps_in_both_conventions", refuse)
     monkeypatch.setattr("asperity.study.spectrum", refuse)
     report = study_wall(geo.rectangular_teeth(1.0), bins=8)
     assert set(report.refusals) == {"gap", "specular_gap", "collision_gap", "spectrum"}

@@ -1,4 +1,4 @@
-"""Section 4.1: the configurations M of disk and wall, the chart F, the gaps and the normals."""
+"""Section 4.1: the configurations M of disk and wall, the chart F and the gaps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import numpy as np
 from ...verification import Formula, Verdict, agreement, erratum, every, holds, no_excess, verified, verify
 from ...verification.entry import Code
 from .. import rolling
-from ..kinetics import contact_normal
 from .trials import clearance, generator, is_free, residual, satellites
 
 SATELLITES = 40
@@ -140,7 +139,7 @@ def measure_of_the_gaps(order: Code) -> Verdict:
         lambda eps, rho: (-eps - rho**2 / 8, -1.0),
     ),
     reason="The rolling centre sinks by up to 1 - cos(ρ/2), and the other satellites are just above the tops, which "
-    "are at -1. The proposition itself is not affected.",
+    "are at -1. A search finds both bounds nearly attained.",
 )
 def heights_while_rolling(bounds: Code) -> Verdict:
     rng = generator()
@@ -227,58 +226,3 @@ def distance_of_satellites(distance: Code) -> Verdict:
     places = [rolling.satellite(0, 0, sym.alpha + k * sym.rho, 1, sp) for k in (0, 1)]
     square = sum((a - b) ** 2 for a, b in zip(*places, strict=True))
     return verify(sp.simplify(sp.expand_trig(square - distance(sym.rho, sp) ** 2)), 0)
-
-
-@verified(
-    id="S4.10",
-    section="4.1",
-    equation="remark 4.6",
-    statement="The unit normal n(q) of M where S₀ touches: of norm 1, orthogonal to rolling and to sliding, inward.",
-    printed=Formula(
-        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos\alpha + k_2\sin\alpha)\bigr)",
-        lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha, xp),
-    ),
-    perturbed=lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, -alpha, xp),
-    reason="Rolling about S₀ is (-cos α, -sin α, 1), sliding along the wall (k₂, -k₁, 0). The kinetic-energy metric "
-    "raises the gradient of the satellite's distance.",
-)
-def normal_of_the_boundary(normal: Code) -> Verdict:
-    return _is_unit_normal(normal, turned=False)
-
-
-@erratum(
-    id="S4.11",
-    section="4.1",
-    equation="3.26",
-    statement="The unit normal n(q) of M where the satellite S_j touches.",
-    printed=Formula(
-        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha - j\rho) + k_2\sin(\alpha - j\rho))\bigr)",
-        lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha - turn, xp),
-    ),
-    corrected=Formula(
-        r"n = R^{-1}\bigl(k_1/m,\ k_2/m,\ J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))\bigr),\quad"
-        r"R = \bigl(m^{-1} + J^{-1}(k_1\cos(\alpha + j\rho) + k_2\sin(\alpha + j\rho))^2\bigr)^{1/2}",
-        lambda m, J, k, alpha, turn, xp: contact_normal(m, J, k, alpha + turn, xp),
-    ),
-    reason="S_j is at the angle α + jρ of the rim. In R a parenthesis is misplaced too, and n(q) would not have norm "
-    "1.",
-)
-def normal_at_a_satellite(normal: Code) -> Verdict:
-    return _is_unit_normal(normal, turned=True)
-
-
-def _is_unit_normal(normal: Code, turned: bool) -> Verdict:
-    """Whether it is the kinetic gradient of the satellite's distance from the wall, and of norm 1."""
-    import sympy as sp
-
-    from .. import symbolic as sym
-
-    direction, x1, x2, angle = sp.symbols("direction x1 x2 angle", real=True)
-    turn = sp.Symbol("turn", real=True) if turned else sp.Integer(0)
-    k = sp.cos(direction), sp.sin(direction)
-    place = rolling.satellite(x1, x2, angle, 1, sp)
-    gradient = [sp.diff(k[0] * place[0] + k[1] * place[1], q) for q in (x1, x2, angle)]
-    raised = [g / weight for g, weight in zip(gradient, (sym.m, sym.m, sym.J), strict=True)]
-    n = normal(sym.m, sym.J, k, angle - turn, turn, sp)
-    parallel = [verify(n[i] * raised[0], n[0] * raised[i]) for i in (1, 2)]
-    return every(*parallel, verify(sym.inner(n, n), 1))

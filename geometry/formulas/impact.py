@@ -223,5 +223,6 @@ typography = by_reading(
     statement="Velocities after and before an impact as limits in time.",
     printed=r"w^+ = (v^-, \omega^-),\quad v^\pm(t) := \lim v(t),\quad t_1 < t < \delta",
     corrected=r"w^+ = (v^+, \omega^+),\quad v^\pm(t) := \lim_{s\to t\pm} v(s),\quad t_1 < t < t_1 + \delta",
-    reason="Three slips of the pen. The text around them uses the right forms.",
+    reason="w⁺ is given the velocities before, the limit lacks its variable, and the interval its t₁. No formula is "
+    "affected.",
 )

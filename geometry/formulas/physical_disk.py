@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...verification import Formula, Verdict, agreement, verified
+from ...verification import Formula, Verdict, agreement, every, verified
 from ...verification.entry import Code
 from .trials import generator
 
@@ -23,7 +23,7 @@ DEPTH = 0.7
     "reflected in the foreshortened wall.",
     kind="numeric",
     printed=Formula(
-        r"\theta' = P^{\widetilde W}(x, \theta),\quad \widetilde W = (1 + m/J)^{-1/2}\,W_1\times W_2",
+        r"\theta' = P^{\widetilde W}(x, \theta),\quad \widetilde W = \{((1 + m/J)^{-1/2}x_1, x_2) : x\in W\}",
         lambda m, J: (1 + m / J) ** -0.5,
     ),
     perturbed=lambda m, J: (1 + m / J) ** -0.25,
@@ -34,17 +34,18 @@ def limit_of_the_disk(factor: Code) -> Verdict:
     from .. import Wall
     from ..tracing import trace
 
-    m, J = 2.0, 1.0
-    kappa = factor(m, J)
-    wall = Wall.from_vertices([(0, 0), (0.5 * kappa, -DEPTH), (kappa, 0)])
     rng = generator()
-    theta, psi = rng.uniform(0.3, math.pi - 0.3, RAYS), rng.uniform(0.6, math.pi - 0.6, RAYS)
-    x = rng.uniform(0, 1, RAYS)
-    expected = trace(wall, kappa * x, theta).theta
-    found = np.array([_angle_after(*ray, m, J) for ray in zip(x, theta, psi, strict=True)])
-    far = np.sort(np.abs(found - expected))
-    # a ray that passes next to a corner may be reflected by another side: at most one ray in twenty
-    return agreement(far[: RAYS - RAYS // 20], 0.0, 100 * EPS)
+    verdicts = []
+    for m, J in ((2.0, 1.0), (0.5, 2.0)):
+        kappa = factor(m, J)
+        wall = Wall.from_vertices([(0, 0), (0.5 * kappa, -DEPTH), (kappa, 0)])
+        theta, psi = rng.uniform(0.3, math.pi - 0.3, RAYS), rng.uniform(0.6, math.pi - 0.6, RAYS)
+        x = rng.uniform(0, 1, RAYS)
+        expected = trace(wall, kappa * x, theta).theta
+        found = np.array([_angle_after(*ray, m, J) for ray in zip(x, theta, psi, strict=True)])
+        # a ray that passes next to a corner may be reflected by another side: at most one ray in twenty
+        verdicts.append(agreement(np.sort(np.abs(found - expected))[: RAYS - RAYS // 20], 0.0, 100 * EPS))
+    return every(*verdicts)
 
 
 def _angle_after(x: float, theta: float, psi: float, m: float, J: float) -> float:

@@ -97,8 +97,8 @@ def _dot(a: Any, b: Any) -> Any:
         r" + \langle w_0, n_1\rangle(\tilde n_1 - n_1)",
         lambda new, old, i: _dot(_change(new[0], old[0]), new[1]) * new[1][i],
     ),
-    reason="The first term carries the new normal, as the second does. The bound 3‖w̃ - w‖ + 4‖ñ - n‖ of the "
-    "difference of the reflections is right.",
+    reason="The first term carries the new normal, as the second does (here the slip alone is printed). The bound "
+    "3‖w̃ - w‖ + 4‖ñ - n‖ of the difference of the reflections is right.",
 )
 def splitting_of_a_reflection(first_term: Code) -> Verdict:
     import sympy as sp
@@ -179,8 +179,8 @@ def distance_along_a_curve(bound: Code) -> Verdict:
         r"\tfrac{12}5 + 24\sqrt{10} \le 79,\quad 1 + \tfrac{12}5 + 24\sqrt{10} \le 80", lambda: (79.0, 80.0)
     ),
     perturbed=lambda: (78, 79),
-    reason="The second sum is 79.295. The other estimates of step 4 and eqs. 3.142-3.149 are steps of the proof and follow "
-    "from eq. 3.119.",
+    reason="The second sum is 79.295. The other estimates of step 4 and eqs. 3.142-3.149 are steps of a proof and "
+    "rest on reading.",
 )
 def sum_of_the_constants(bounds: Code) -> Verdict:
     total = 12 / 5 + 24 * np.sqrt(10)
@@ -213,5 +213,5 @@ misprints = by_reading(
     corrected=r"E^1,\quad f\circ\eta^{-1}\circ K,\quad \le,\quad K_{\mathrm{cyl}},\quad A^*\subset\mathbb R^3,\quad"
     r" p^0 + h\xi + f_1(h)u",
     reason="E¹ for E^ε in eq. 4.14; {‖E‖ < 1/i} and dy₁ dy₃ in 4.17 and 4.18; the last term of 3.40; ≤ for = in 3.45 "
-    "and 3.48; K_cyl at the end of I₃; tildes in 3.99. None of them changes an argument.",
+    "and 3.48; K_cyl at the end of I₃; tildes in 3.99. No formula that is computed is among them.",
 )

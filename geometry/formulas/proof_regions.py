@@ -114,7 +114,7 @@ def width_of_the_good_angles(width: Code) -> Verdict:
     printed=Formula(r"\log(1/\rho)^{-5N}", lambda N: 5 * N),
     corrected=Formula(r"\log(1/\rho)^{-(3N+4)}", lambda N: 3 * N + 4),
     reason="As printed it fails for N = 1. The product log^(-(3N+4)) C^(-N) is at least ρ for N ≤ log/(4 loglog) and "
-    "small ρ, which is all that is needed.",
+    "small ρ, and the conclusions hold.",
 )
 def exponent_of_the_lower_bound(exponent: Code) -> Verdict:
     N = np.arange(1, 200)

@@ -1,4 +1,4 @@
-"""Section 5.2: the map phi_w between the entry planes of cylinder and disk, and the tiling of the plane."""
+"""Sections 4.3.3 and 5.2: the map eta between the entry planes of cylinder and disk, and the tiling of the plane."""
 
 from __future__ import annotations
 
@@ -6,10 +6,108 @@ from typing import Any
 
 import numpy as np
 
-from ...verification import Formula, Verdict, erratum, every, holds, verify
+from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, no_excess, verified, verify
 from ...verification.entry import Code
 from .. import rolling
-from .trials import generator, masses
+from .trials import generator, kinetic_norm, masses, unit_velocities
+
+
+@convention(
+    id="S4.18",
+    section="4.3.3",
+    equation="4.65, Lemma 4.13",
+    statement="The velocities S²₊ρ/₂ that cross the graph of u upwards wherever they meet it.",
+    kind="numeric",
+    printed=Formula(r"\{\langle w, e_2\rangle > \sin(\rho/2)\}", lambda m, J, rho: np.sin(rho / 2) / m),
+    corrected=Formula(r"\{v_2 > J^{-1/2}\sin(\rho/2)\}", lambda m, J, rho: np.sin(rho / 2) / np.sqrt(J)),
+    reason="The gradient of u has norm J^(-1/2) |sin ᾱ|, and |ω| is at most J^(-1/2). The printed set is right for m "
+    "= J = 1.",
+)
+def transversal_velocities(floor: Code) -> Verdict:
+    rng = generator()
+    m, J = masses(rng)
+    rho = rng.uniform(0.01, 1, m.size)
+    w = unit_velocities(rng, m, J)
+    low = floor(m, J, rho)
+    # half of the velocities start on the edge of the set, with all the spin that there can be
+    edge = (rng.random(m.size) < 0.5) & (m * low**2 < 1)
+    w[:, edge] = np.stack([0 * low, low * (1 + 1e-9), np.sqrt(np.maximum(0, 1 - m * low**2) / J)])[:, edge]
+    inside = w[1] > low
+    bar = np.where(rng.random(m.size) < 0.5, -0.5, rng.uniform(-0.5, 0.5, m.size)) * rho
+    upward = w[1] + np.sin(bar) * w[2]
+    return no_excess(0.0, upward[inside], m=m[inside], J=J[inside], rho=rho[inside])
+
+
+@verified(
+    id="S4.19",
+    section="4.3.3",
+    equation="4.66",
+    statement="Ψ carries a configuration along its velocity to the plane x₂ = 0.",
+    printed=Formula(r"\Psi(y, w) = (y - (x_2/v_2)\,w,\ w)", rolling.project),
+    perturbed=lambda x1, x2, alpha, v1, v2, omega: (x1 - x2 * v1, alpha - x2 * omega),
+    reason="⟨y, e₂⟩/⟨w, e₂⟩ is x₂/v₂ for every m. The null space of the differential is spanned by (w, 0).",
+)
+def projection_along_velocities(project: Code) -> Verdict:
+    import sympy as sp
+
+    y, t = sp.symbols("x1 x2 alpha", real=True), sp.Symbol("t", real=True)
+    w = (sp.Symbol("v1", real=True), sp.Symbol("v2", positive=True), sp.Symbol("omega", real=True))
+    image = sp.Matrix(project(*y, *w))
+    moved = project(*(a + t * b for a, b in zip(y, w, strict=True)), *w)
+    on_the_plane = project(y[0], 0, y[2], *w)
+    jacobian = image.jacobian(sp.Matrix([*y, *w]))
+    return every(
+        verify(list(moved), list(image)),
+        verify(list(on_the_plane), [y[0], y[2]]),
+        verify(jacobian, sp.Matrix(rolling.project_differential(y[1], *w))),
+        verify(jacobian[:, :3] * sp.Matrix(w), sp.zeros(2, 1)),
+    )
+
+
+@erratum(
+    id="S4.20",
+    section="4.3.3",
+    equation="before 4.75",
+    statement="The first coordinate of H₁(y) - y.",
+    printed=Formula(r"|\alpha - \sin\bar\alpha|", lambda alpha, bar, xp: alpha - xp.sin(bar)),
+    corrected=Formula(r"|\bar\alpha - \sin\bar\alpha|", lambda alpha, bar, xp: bar - xp.sin(bar)),
+    reason="Only with both bars is it of the order ρ³. As printed it grows with α.",
+)
+def slip_of_the_straightening(size: Code) -> Verdict:
+    import sympy as sp
+
+    from .. import symbolic as sym
+
+    x1, x2, bar = sp.symbols("x1 x2 bar", real=True)
+    return verify(rolling.bend(x1, x2, bar, 1, sp)[0] - x1, size(sym.alpha, bar, sp))
+
+
+@verified(
+    id="S4.21",
+    section="4.3.3",
+    equation="4.75",
+    statement="η is within a multiple of ρ of the identity; the constant depends on m and J.",
+    kind="numeric",
+    printed=Formula(r"\|\eta - \mathrm{Id}\| \le C\rho", lambda: 1.0),
+    perturbed=lambda: 2.0,
+    reason="1 - cos ᾱ is of the order ρ², and v₂ may be as small as ρ. The fitted order is 1, and C is J^(1/2)/4 "
+    "where v₂ > J^(-1/2) sin(ρ/2), m/4 on the printed set.",
+)
+def size_of_the_transfer(order: Code) -> Verdict:
+    counts = np.array([100, 400, 1600, 6400])
+    slopes = []
+    for m, J in ((1.0, 1.0), (9.0, 1.0), (1.0, 0.3)):
+        sizes = []
+        for rho in 2 * np.pi / counts:
+            w = unit_velocities(generator(), m, J)
+            floor = np.sin(rho / 2) / np.sqrt(J)
+            w[:, ::2] = np.array([[0.0], [floor], [np.sqrt((1 - m * floor**2) / J)]])
+            w = w[:, w[1] >= floor]
+            bar = np.full(w.shape[1], rho / 2)
+            x1, alpha = rolling.transfer(0.0, bar, bar, (w[0], w[1], w[2]), 1.0)
+            sizes.append(kinetic_norm(np.stack([x1, 0 * x1, alpha - bar]), m, J).max())
+        slopes.append(-np.polyfit(np.log(counts), np.log(sizes), 1)[0])
+    return agreement(slopes, order(), 0.05)
 
 
 def _mirrored(x1: Any, alpha: Any, bar: Any, velocity: Any, scale: Any, xp: Any) -> Any:

@@ -26,7 +26,7 @@ def _zoom(sp: Any) -> Any:
     kind="numeric",
     printed=Formula(r"\bar\alpha^* = \alpha - \bar k^*\rho", lambda alpha, k, rho, eps: alpha - k * rho),
     corrected=Formula(
-        r"\bar\alpha^* = \alpha - \bar k^*\rho/\varepsilon,\quad"
+        r"\bar\alpha^* = \alpha - \bar k^*\rho/\varepsilon,\quad "
         r"f^*(x) = \varepsilon^{-1}f(\varepsilon x_1, \varepsilon(x_2 + 1) - 1, \varepsilon\alpha)",
         lambda alpha, k, rho, eps: alpha - k * rho / eps,
     ),
@@ -76,7 +76,7 @@ def zoomed_straightening(bend: Code) -> Verdict:
         r"\sup|\mathrm{Error}_2| \sim \rho^2/(8\varepsilon) \to \infty", lambda eps, rho: rho**2 / (8 * eps)
     ),
     reason="The disk rises by ρ²/8 between satellites, which is much more than ε. The error vanishes locally "
-    "uniformly in α and its derivatives, at most sin(ρ/2), uniformly; no more is used.",
+    "uniformly in α and its derivatives, at most sin(ρ/2), uniformly.",
 )
 def error_of_the_straightening(size: Code) -> Verdict:
     eps = np.array([1e-3, 1e-5, 1e-7])
@@ -181,8 +181,7 @@ def lengths_under_the_linear_contact(norm: Code) -> Verdict:
         lambda x: np.stack([-np.cos(x), -np.sin(x), np.ones_like(x)]),
     ),
     reason="The null direction of dG_ε turns with the disk: at w = χ any multiple of sin φ is 0, but dG_ε(χ) is not. "
-    "Additively sin φ - (m/J)^(1/2)|x| ≤ ‖dG_ε(w)‖ ≤ (1 + m/J)^(1/2) sin φ + (m/J)^(1/2)|x|, which is all that is "
-    "used later.",
+    "Additively sin φ - (m/J)^(1/2)|x| ≤ ‖dG_ε(w)‖ ≤ (1 + m/J)^(1/2) sin φ + (m/J)^(1/2)|x|.",
 )
 def lengths_under_the_contact(null: Code) -> Verdict:
     rng = generator()

@@ -93,22 +93,32 @@ def study(
 @click.argument("wall")
 @click.option("--specular", is_flag=True, help="In Feres' convention, where specular reflection is the identity.")
 @click.option("--tolerance", default=1e-6, show_default=True, help="Error asked for.")
+@click.option("--enclose", default=0, type=click.IntRange(min=0), help="Also enclose this many eigenvalues.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def gap(wall: str, specular: bool, tolerance: float, as_json: bool) -> None:
-    """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence."""
+def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool) -> None:
+    """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence.
+
+    The first line can be pasted into a paper: value, error, whether that is a bound or an estimate, verdict,
+    convention, method.
+    """
     import json
 
     from .geometry import wall_from_text
     from .kernels import WallLaw
-    from .spectral import spectral_gap
-    from .study_text import gap_as_dict
+    from .spectral import enclosures, spectral_gap
+    from .study_text import enclosures_as_list, gap_as_dict, quotation
 
     law = WallLaw(wall_from_text(wall))
-    found = spectral_gap(law.in_specular_frame() if specular else law, tolerance)
+    chosen = law.in_specular_frame() if specular else law
+    found = spectral_gap(chosen, tolerance)
+    enclosed = enclosures(chosen, enclose) if enclose else None
     if as_json:
-        click.echo(json.dumps(gap_as_dict(found), indent=2, allow_nan=False))
-    else:
-        click.echo("\n".join([str(found), *(f"  {line}" for line in found.evidence)]))
+        extra = {} if enclosed is None else {"enclosures": enclosures_as_list(enclosed)}
+        click.echo(json.dumps({**gap_as_dict(found), **extra}, indent=2, allow_nan=False))
+        return
+    click.echo("\n".join([quotation(found), *(f"  {line}" for line in found.evidence)]))
+    if enclosed is not None:
+        click.echo("\n".join(["enclosures:", *(f"  {item}" for item in enclosed)]))
 
 
 @main.command()
@@ -160,3 +170,31 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
     click.echo(json.dumps([finding_as_dict(one) for one in found], indent=2) if as_json else table_of(found))
     if any(one.as_stated is False for one in found):
         sys.exit(1)
+
+
+@main.command()
+@click.argument("problem", nargs=-1)
+@click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")
+@click.option("--extremes", is_flag=True, help="The stability report instead: stiff and extreme cases.")
+@click.option("--savings", is_flag=True, help="Instead: what each scene leaves out, and what that saves.")
+@click.option("--out", default="bench", show_default=True, type=click.Path(path_type=Path), help="Folder for results.")
+@click.option("--force", is_flag=True, help="Measure again what the folder holds; by default a run goes on.")
+@click.option(
+    "--compare",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="Compare with the bench.json of an earlier run; exit code 1 if something became slower or less exact.",
+)
+def bench(
+    problem: tuple[str, ...], quick: bool, extremes: bool, savings: bool, out: Path, force: bool, compare: Path | None
+) -> None:
+    """Error against run time on the standard set, or on PROBLEMs of it: SCENE, QUANTITY or SCENE/QUANTITY.
+
+    \b
+    Examples:
+      asperity bench --quick
+      asperity bench focusing-arc/moment lambda2 --out my-bench
+      asperity bench --extremes
+    """
+    from .bench.commands import run_bench
+
+    sys.exit(run_bench(problem, quick=quick, extremes=extremes, savings=savings, out=out, force=force, compare=compare))

@@ -1,15 +1,20 @@
-"""The ledger in words: as a table, as JSON, in LaTeX."""
+"""The ledger in words: as a table, as JSON, in LaTeX, and as a page of the documentation."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from .verification.entry import Entry, Finding
 from .verification.verdict import Verdict
 
-WIDTH = 56
+WIDTH = 66
+FOUND = {None: "not checked", True: "as stated", False: "NOT AS STATED"}
+# the order and the headings of the page: errata first
+HEADINGS = {"erratum": "Errata", "convention": "Conventions", "verified": "Verified"}
+# what stands before the second formula of a row
+AMENDED = {"erratum": "corrected", "convention": "under the convention"}
 
 
 def table_of(findings: Sequence[Finding]) -> str:
@@ -24,33 +29,23 @@ def table_of(findings: Sequence[Finding]) -> str:
 
 def _line(finding: Finding) -> str:
     entry = finding.entry
-    found = {None: "not run", True: "as stated", False: "NOT AS STATED"}[finding.as_stated]
     words = entry.statement if len(entry.statement) <= WIDTH else entry.statement[: WIDTH - 1].rstrip() + "…"
-    return f"{entry.id}  {entry.status:10s}  {entry.kind:10s}  {found:13s}  {words}"
+    return f"{entry.id}  {entry.status:10s}  {entry.kind:10s}  {FOUND[finding.as_stated]:13s}  {words}"
 
 
 def _totals(findings: Sequence[Finding]) -> str:
-    status = Counter(finding.entry.status for finding in findings)
-    kinds = Counter(finding.entry.kind for finding in findings)
-    machine = len(findings) - kinds["by reading"]
     wrong = sum(finding.as_stated is False for finding in findings)
+    return f"{totals_of([finding.entry for finding in findings])} {wrong} not as stated."
+
+
+def totals_of(entries: Sequence[Entry]) -> str:
+    """How many rows there are of each status and of each kind, in two sentences."""
+    status, kinds = Counter(entry.status for entry in entries), Counter(entry.kind for entry in entries)
     return (
-        f"{len(findings)} rows: {status['verified']} verified, {status['erratum']} errata, "
-        f"{status['convention']} conventions. {machine} checked by machine ({kinds['symbolic']} by proof, "
-        f"{kinds['numeric']} by numbers), {kinds['by reading']} by reading; {wrong} not as stated."
+        f"{len(entries)} rows: {status['verified']} verified, {status['erratum']} errata, "
+        f"{status['convention']} conventions. {len(entries) - kinds['by reading']} checked by machine "
+        f"({kinds['symbolic']} by proof, {kinds['numeric']} by numbers), {kinds['by reading']} by reading."
     )
-
-
-def latex_of(entries: Sequence[Entry]) -> str:
-    """The formulas in LaTeX, one paragraph a row."""
-    paragraphs = []
-    for entry in entries:
-        lines = [rf"\paragraph{{{entry.id} ({entry.status}, section {entry.section})}} {entry.statement}"]
-        lines.append(rf"\[ {entry.printed.latex} \]")
-        if entry.corrected is not None:
-            lines.append(rf"corrected: \[ {entry.corrected.latex} \]")
-        paragraphs.append("\n".join([*lines, entry.reason]))
-    return "\n\n".join(paragraphs)
 
 
 def finding_as_dict(finding: Finding) -> dict[str, Any]:
@@ -72,3 +67,45 @@ def _verdict(verdict: Verdict | None) -> dict[str, Any] | None:
         "answer": verdict.answer, "evidence": verdict.evidence, "counterexample": dict(verdict.counterexample),
         "values": list(verdict.values) if verdict.values else None,
     }  # fmt: skip
+
+
+def latex_of(entries: Iterable[Entry]) -> str:
+    """The formulas in LaTeX, one paragraph a row; the words need an engine that reads Unicode."""
+    return "\n\n".join(
+        "\n".join(
+            [
+                rf"\paragraph{{{entry.id} ({entry.status}, {_place(entry)}).}} {entry.statement}",
+                *(rf"{name}: \[ {latex} \]" for name, latex in _formulas(entry)),
+                entry.reason,
+            ]
+        )
+        for entry in entries
+    )
+
+
+def page_of(entries: Sequence[Entry]) -> str:
+    """The rows as a page of Markdown with typeset formulas, errata first."""
+    parts = [totals_of(entries)]
+    for status, heading in HEADINGS.items():
+        parts.append(f"## {heading}")
+        for entry in entries:
+            if entry.status == status:
+                parts += [f"({entry.id})=\n**{entry.id}** ({_place(entry)}; {entry.kind}) {entry.statement}"]
+                parts += [f"*{name}*\n\n$$\n{latex}\n$$" for name, latex in _formulas(entry)]
+                parts.append(entry.reason)
+    return "\n\n".join(parts) + "\n"
+
+
+def _place(entry: Entry) -> str:
+    return f"section {entry.section}" + (f", {_equation(entry.equation)}" if entry.equation else "")
+
+
+def _equation(equation: str) -> str:
+    return f"eq. {equation}" if equation[0].isdigit() else equation
+
+
+def _formulas(entry: Entry) -> list[tuple[str, str]]:
+    formulas = [("printed", entry.printed.latex)]
+    if entry.corrected is not None:
+        formulas.append((AMENDED[entry.status], entry.corrected.latex))
+    return formulas

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .checks import positive_number
+from .consequences import Consequences, consequences_of
 from .errors import AccuracyError, FileExistsRefusal, InputError
 from .estimates import Estimate
 from .geometry import Disk, Wall, trace
 from .kernels import Bins, CollisionLaw, KernelMatrix, Law, Legendre, WallLaw, discretise
 from .kernels.measure import SINE
-from .spectral import SpectralGap, Spectrum, spectral_gap, spectrum
+from .spectral import SpectralGap, Spectrum, gaps_in_both_conventions, spectral_gap, spectrum
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -84,6 +85,8 @@ class Study:
         Largest relative change of the kinetic energy and of the rolling momentum in sampled collisions.
     refusals : dict
         By the name of the attribute, why a spectral quantity is missing.
+    consequences : Consequences
+        Relaxation time, diffusivity of a channel, mean squared slope.
     """
 
     name: str
@@ -100,6 +103,7 @@ class Study:
     collision_gap: SpectralGap | None
     conservation: Mapping[str, float]
     refusals: Mapping[str, str]
+    consequences: Consequences
 
     def as_dict(self) -> dict[str, Any]:
         """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
@@ -206,10 +210,16 @@ def study_wall(
         law = WallLaw(wall)
         matrix = discretise(law, basis, tolerance=tolerance, rng=rng)
         progress.update()
-        gap = gap_of(law, "gap")
-        progress.update()
-        specular_gap = gap_of(law.in_specular_frame(), "specular_gap") if wall.is_mirror_symmetric else None
-        progress.update()
+        specular_gap = None
+        if wall.is_mirror_symmetric:
+            try:
+                gap, specular_gap = gaps_in_both_conventions(law, tolerance, rng)
+            except AccuracyError as reason:
+                gap = None
+                refusals |= {"gap": str(reason), "specular_gap": str(reason)}
+        else:
+            gap = gap_of(law, "gap")
+        progress.update(2)
         found = None
         try:
             found = _spectrum(law, matrix, gap, tolerance, rng)
@@ -221,9 +231,11 @@ def study_wall(
         progress.update()
         collision_gap = gap_of(collision.law, "collision_gap")
         progress.update()
+        consequences = consequences_of(wall, law, gap, specular_gap)
     return Study(
         name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, collision, collision_matrix,
         collision_gap, MappingProxyType(_conservation(collision, rng)), MappingProxyType(refusals),
+        consequences,
     )  # fmt: skip
 
 

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .estimates import Estimate
     from .kernels import KernelMatrix
-    from .spectral import SpectralGap
+    from .spectral import Enclosures, SpectralGap
     from .study import Study, TracerCheck
 
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
@@ -45,6 +45,10 @@ def summary_of(study: Study) -> str:
         ]
     lines += [
         f"spectrum   {_spectrum_line(study)}",
+        *(
+            "follows    " * (i == 0) + "           " * (i > 0) + line
+            for i, line in enumerate(study.consequences.lines())
+        ),
         f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
         f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep",
     ]
@@ -176,6 +180,7 @@ def study_as_dict(study: Study) -> dict[str, Any]:
             "mass": disk.mass, "inertia": disk.inertia, "foreshortening": disk.foreshortening,
             "law": _matrix(study.collision_matrix), "gap": _gap(study.collision_gap), **study.conservation,
         },
+        "consequences": study.consequences.as_dict(),
         "refusals": dict(study.refusals),
     }  # fmt: skip
 
@@ -190,6 +195,28 @@ def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
     return {
         **estimate_as_dict(gap), "verdict": gap.verdict, "convention": gap.convention, "evidence": list(gap.evidence),
     }  # fmt: skip
+
+
+def quotation(gap: SpectralGap) -> str:
+    """One line to paste into a paper: value, error, kind, verdict, convention, method, version."""
+    from . import __version__
+
+    number = "no gap: 0" if gap.verdict == "no gap" else rounded(gap)
+    return (
+        f"spectral gap {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; {gap.method}; "
+        f"asperity {__version__}"
+    )
+
+
+def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
+    """Enclosures as plain values, ready for JSON."""
+    return [
+        {
+            "value": item.value, "low": item.low, "high": item.high, "label": item.label, "index": item.index,
+            "residual": item.residual, "kind": item.kind, "reason": item.reason,
+        }
+        for item in found
+    ]  # fmt: skip
 
 
 def _gap(gap: SpectralGap | None) -> dict[str, Any] | None:

@@ -24,13 +24,13 @@ def derive_equality(left: Any, right: Any, domain: Domain) -> str | None:
 
     The conditions that tie symbols together are not used: what is derived without them holds with them.
     """
-    parameters = Parameters(domain)
     if sp.expand(left - right) == 0:
         return "expansion"
-    if domain.closed and not _CONTINUOUS.issuperset(f.func for f in (left - right).atoms(sp.Function)):
+    if domain.closed and not _is_made_of_continuous_functions(left - right):
         # the parameters leave out the ends, and at a jump nothing follows for them
         return None
-    if vanishes(left - right, parameters):
+    parameters = Parameters(domain, half_angles=True)
+    if vanishes(left - right, Parameters(domain, half_angles=False)) or vanishes(left - right, parameters):
         return "polynomial normal form"
     if all(parameters.factored(side).is_nonnegative for side in (left, right)) and vanishes(
         left**2 - right**2, parameters
@@ -41,6 +41,11 @@ def derive_equality(left: Any, right: Any, domain: Domain) -> str | None:
     ):
         return "the derivatives of the difference vanish on a connected domain, and so does it at one point"
     return None
+
+
+def _is_made_of_continuous_functions(e: Any) -> bool:
+    # roots and logarithms jump only in the complex plane
+    return _CONTINUOUS.issuperset(f.func for f in e.atoms(sp.Function)) and not e.has(sp.I)
 
 
 def _is_constant(difference: Any, parameters: Parameters) -> bool:
@@ -72,7 +77,7 @@ def _is_continuous(e: Any, parameters: Parameters) -> bool:
 
 
 def _places(domain: Domain) -> list[dict[Any, Any]]:
-    """Points at which inverse functions have known values: all symbols take the same one of a few places, or differ."""
+    """Points inside, at which inverse functions have known values."""
     inside = {s: [p for p in PLACES if bool(low < p) and bool(p < high)] for s, (low, high) in domain.intervals.items()}
     depth = min((len(values) for values in inside.values()), default=0)
     return [{symbol: values[index] for symbol, values in inside.items()} for index in range(depth)]

@@ -20,8 +20,12 @@ RANDOM_POINTS = 24
 # Some random points lie this close to an end of the interval, or this far out, on a logarithmic scale.
 CLOSEST = 1e-6
 FARTHEST = 1e4
+# So many simple numbers are tried for a symbol.
+SIMPLE_TRIES = 40
+# Random numbers are rounded to so many digits, or to more where the interval is shorter than that.
+DIGITS = (9, 17, 40)
 # A point of the domain is looked for so many times before the conditions are taken for empty.
-ATTEMPTS = 4000
+ATTEMPTS = 1000
 
 
 @dataclass(frozen=True)
@@ -66,47 +70,53 @@ class Domain:
         return cls(intervals, tuple(conditions), closed)
 
     def points(self, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
-        """Rational points inside, simple ones first; conditions are met exactly."""
+        """Rational points inside, simple ones first, that meet the conditions and what the symbols carry, exactly."""
         found = 0
         for attempt in range(ATTEMPTS):
             simple = attempt < ATTEMPTS // 4 and found < RANDOM_POINTS // 2
             point = {symbol: self._value(symbol, simple, rng) for symbol in self.intervals}
-            if all(condition.subs(point) == True for condition in self.conditions):  # noqa: E712 - a sympy relation
+            conditions_met = all(condition.xreplace(point) is sp.true for condition in self.conditions)
+            if conditions_met and all(_fits(symbol, value) for symbol, value in point.items()):
                 found += 1
                 yield point
             if found >= RANDOM_POINTS:
                 return
-        if not found:
+        if not found and self.conditions:
             raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, self.conditions))}")
 
     def _value(self, symbol: Any, simple: bool, rng: np.random.Generator) -> Any:
         low, high = self.intervals[symbol]
         if simple:
-            sign = sp.Integer(rng.choice([-1, 1]))
-            for _ in range(SIMPLE_TRIES):
-                value = sign * SIMPLE[rng.integers(len(SIMPLE))]
-                sign = -sign
-                if bool(low < value) and bool(value < high) and not (symbol.is_integer and value.q != 1):
+            for sign in rng.choice([-1, 1], SIMPLE_TRIES):
+                value = int(sign) * SIMPLE[rng.integers(len(SIMPLE))]
+                if bool(low < value) and bool(value < high) and _fits(symbol, value):
                     return value
-        left, right = float(low), float(high)
-        if np.isinf(left) and np.isinf(right):
-            value = rng.choice([-1.0, 1.0]) * _logarithmic(rng, FARTHEST)
-        elif np.isinf(right):
-            value = left + _logarithmic(rng, FARTHEST)
-        elif np.isinf(left):
-            value = right - _logarithmic(rng, FARTHEST)
-        else:
-            share = rng.random() if rng.random() < 0.5 else _logarithmic(rng, 0.5)
-            value = left + (right - left) * (share if rng.random() < 0.5 else 1.0 - share)
+        value = _between(float(low), float(high), rng)
         if symbol.is_integer:
-            exact = sp.Integer(round(value))
-        else:
-            exact = sp.Rational(np.format_float_positional(value, 9, unique=False, fractional=False))
-        inside = bool(low < exact) and bool(exact < high)
-        return exact if inside else self._value(symbol, simple, rng)
+            return sp.Integer(round(value))
+        for digits in DIGITS:
+            exact = sp.Rational(np.format_float_positional(value, digits, unique=False, fractional=False))
+            if bool(low < exact) and bool(exact < high):
+                return exact
+        # shorter than floats can tell
+        return sp.Rational(str(sp.N((low + high) / 2, DIGITS[-1])))
 
 
-SIMPLE_TRIES = 40
+def _between(low: float, high: float, rng: np.random.Generator) -> float:
+    """A number in an interval: anywhere, or near an end or far out on a logarithmic scale."""
+    if np.isinf(low) and np.isinf(high):
+        return float(rng.choice([-1.0, 1.0])) * _logarithmic(rng, FARTHEST)
+    if np.isinf(high):
+        return low + _logarithmic(rng, FARTHEST)
+    if np.isinf(low):
+        return high - _logarithmic(rng, FARTHEST)
+    share = rng.random() if rng.random() < 0.5 else _logarithmic(rng, 0.5)
+    return low + (high - low) * (share if rng.random() < 0.5 else 1.0 - share)
+
+
+def _fits(symbol: Any, value: Any) -> bool:
+    """Whether a number has the properties that a symbol carries: even, say, or not zero."""
+    return all(getattr(value, f"is_{name}") in (given, None) for name, given in symbol.assumptions0.items())
 
 
 def _logarithmic(rng: np.random.Generator, top: float) -> float:
@@ -129,6 +139,8 @@ def _relations(given: Any) -> list[Any]:
 def _own_interval(symbol: Any) -> tuple[Any, Any]:
     if symbol.is_real is False:
         raise InputError(f"{symbol}: expected a real symbol, because identities are verified over the real numbers")
+    if symbol.is_zero:
+        raise InputError(f"{symbol}: expected a symbol that may differ from 0; substitute 0 for it in both sides")
     if symbol.is_nonnegative:
         return sp.Integer(0), sp.oo
     if symbol.is_nonpositive:

@@ -41,6 +41,8 @@ def _interval(e: Any, point: dict[Any, Any]) -> Any:
         return iv.pi
     if e is sp.E:
         return iv.e
+    if not (e.is_Add or e.is_Mul or e.is_Pow or e.func in _FUNCTIONS):
+        raise _Unknown
     parts = [_interval(argument, point) for argument in e.args]
     if e.is_Add:
         return sum(parts[1:], parts[0])
@@ -51,10 +53,7 @@ def _interval(e: Any, point: dict[Any, Any]) -> Any:
         return product
     if e.is_Pow:
         return _power(parts[0], parts[1], e.exp)
-    known = _FUNCTIONS.get(e.func)
-    if known is None:
-        raise _Unknown
-    return known(*parts)
+    return _FUNCTIONS[e.func](*parts)
 
 
 def _power(base: Any, exponent: Any, exact: Any) -> Any:

@@ -63,10 +63,10 @@ class Entry:
     >>> @erratum(
     ...     id="S9.01", section="0", statement="The area of a disk of radius r.", kind="numeric",
     ...     printed=Formula(r"2\pi r", lambda r: 6.283 * r), corrected=Formula(r"\pi r^2", lambda r: 3.1416 * r**2),
-    ...     reason="The printed formula is the circumference. The area of a disk inscribed in a square is less than 4.",
+    ...     reason="The printed formula is the circumference. A disk inscribed in a square has a smaller area.",
     ... )
     ... def area(formula):
-    ...     return agreement(formula(2.0), 12.566, allowed=1e-3)
+    ...     return agreement(formula(1.0), 3.14159, allowed=1e-4)
     >>> area.run().as_stated
     True
     """

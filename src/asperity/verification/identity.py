@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import InputError
@@ -11,7 +11,7 @@ from .verdict import Verdict, every
 SEED = 0
 
 
-def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] = ()) -> Verdict:
+def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[Any, Any]] = ()) -> Verdict:
     """Decide whether two expressions are equal wherever both are defined.
 
     Parameters
@@ -19,9 +19,9 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] = ()) -> Verdict:
     lhs, rhs : sympy expressions, numbers, matrices or nested sequences of them
         Both of one shape; they are compared entry by entry. Decimal numbers are taken as the fractions that they are
         in binary.
-    assumptions : iterable of sympy relations
-        Inequalities such as ``0 < theta`` or ``theta < sympy.pi``, beside those that the symbols carry themselves
-        (``positive=True``). Symbols stand for real numbers.
+    assumptions : sympy relation, iterable of them, or mapping from symbols to open intervals
+        Inequalities such as ``0 < theta`` or ``theta < sympy.pi``, or ``{theta: (0, sympy.pi)}``, beside what the
+        symbols themselves carry (``positive=True``). Symbols stand for real numbers.
 
     Returns
     -------
@@ -41,15 +41,16 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] = ()) -> Verdict:
     >>> theta, m = sympy.Symbol("theta"), sympy.Symbol("m", positive=True)
     >>> verify(sympy.sqrt(m**2 * sympy.sin(theta) ** 2), m * sympy.sin(theta), [0 < theta, theta < sympy.pi]).answer
     'proved'
-    >>> print(verify(sympy.sqrt(sympy.sin(theta) ** 2), sympy.sin(theta), [theta < 0]).counterexample)
-    {'theta': '-1/3'}
+    >>> verdict = verify(sympy.sqrt(m**2), -m)
+    >>> verdict.answer, sorted(verdict.counterexample)
+    ('refuted', ['m'])
     """
     import sympy as sp
 
     left, right = _entries(sp, lhs), _entries(sp, rhs)
     if len(left) != len(right):
         raise InputError(f"lhs, rhs: expected one shape, got {len(left)} and {len(right)} entries")
-    given = list(assumptions)
+    given = _relations(sp, assumptions)
     return every(*(_decided(a, b, given) for a, b in zip(left, right, strict=True)))
 
 
@@ -57,6 +58,12 @@ def _entries(sp: Any, side: Any) -> list[Any]:
     if isinstance(side, sp.MatrixBase | list | tuple):
         return [entry for part in side for entry in _entries(sp, part)]
     return [sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(e))]
+
+
+def _relations(sp: Any, assumptions: Any) -> list[Any]:
+    if isinstance(assumptions, Mapping):
+        return [side for symbol, (low, high) in assumptions.items() for side in (low < symbol, symbol < high)]
+    return [assumptions] if isinstance(assumptions, sp.Basic) else list(assumptions)
 
 
 def _decided(left: Any, right: Any, assumptions: list[Any]) -> Verdict:

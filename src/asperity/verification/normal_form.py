@@ -1,17 +1,17 @@
 """The normal form in which an expression that is zero becomes the polynomial 0.
 
 Every symbol is replaced by parameters that run over its interval and over nothing else, so that signs are known: an
-angle in (0, pi) by 2 arctan t with t > 0, which makes its sines rational; an angle without bounds by a pair (c, s)
-with c^2 + s^2 = 1; a number in (a, b) by (a + b t)/(1 + t). Roots become symbols with a relation, after factors of
-known sign have been drawn out. What remains is a polynomial in independent quantities: if it is 0, so is the
-expression, at every point of the domain. The converse fails where quantities taken for independent are not.
+angle in (0, pi) by 2 arctan t with t > 0, which makes its sines rational; an angle without bounds, or where signs do
+not matter, by a pair (c, s) with c^2 + s^2 = 1; a number in (a, b) by (a + b t)/(1 + t). Roots become symbols with a
+relation, after factors of known sign have been drawn out. What remains is a polynomial in quantities that are taken for
+independent: if it is 0, so is the expression, at every point of the domain. The converse fails where they are not.
 
 Imported only by functions, because it imports sympy.
 """
 
 from __future__ import annotations
 
-from math import lcm
+from math import comb, lcm
 from typing import Any
 
 import sympy as sp
@@ -34,7 +34,7 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
     at their ends too."""
     e = parameters.normal(expression)
     # functions without a normal form of their own: equal ones have become one expression
-    e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function)})
+    e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function) if f.func is not sp.Abs})
     roots: dict[Any, tuple[Any, int]] = {}
     e = _without_roots(e, roots)
     e = sp.together(e).as_numer_denom()[0]
@@ -47,11 +47,16 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
 
 
 class Parameters:
-    """What stands for the symbols of a domain; filled as expressions are met, so that all of them share it."""
+    """What stands for the symbols of a domain; filled as expressions are met, so that all of them share it.
 
-    def __init__(self, domain: Domain) -> None:
+    Without ``half_angles`` every angle is a pair (c, s): less is known then, but polynomials stay short.
+    """
+
+    def __init__(self, domain: Domain, half_angles: bool) -> None:
         self._domain = domain
+        self._half_angles = half_angles
         self._numbers: dict[Any, Any] = {}
+        self._opaque: dict[Any, Any] = {}
         self._angles: dict[Any, tuple[Any, Any]] = {}
         self._exponentials: dict[Any, Any] = {}
         self._divisors: dict[Any, int] = {}
@@ -94,6 +99,9 @@ class Parameters:
             )
         if not e.args:
             return e
+        if not _is_arithmetic(e):
+            # equal to what is written alike
+            return self._opaque.setdefault(e, sp.Dummy("o"))
         parts = [self._rebuilt(part) for part in e.args]
         if e.is_Pow and parts[1].is_Rational and not parts[1].is_Integer:
             return _power(parts[0], parts[1])
@@ -118,18 +126,20 @@ class Parameters:
 
     @staticmethod
     def _multiple(times: int, sine: Any, cosine: Any) -> tuple[Any, Any]:
-        z = sp.Poly((cosine + sp.Symbol("_i") * sine) ** abs(times), sp.Symbol("_i"))
-        parts = [sp.Integer(0), sp.Integer(0)]
-        for (power,), coefficient in z.terms():
-            parts[power % 2] += coefficient * (-1) ** (power // 2)
-        return (parts[1] if times >= 0 else -parts[1]), parts[0]
+        """Sine and cosine of a multiple, by the binomial formula."""
+        n = abs(times)
+        if n == 1:
+            return times * sine, cosine
+        terms = [comb(n, k) * (-1) ** (k // 2) * cosine ** (n - k) * sine**k for k in range(n + 1)]
+        return (1 if times > 0 else -1) * sp.Add(*terms[1::2]), sp.Add(*terms[::2])
 
     def _unit_circle(self, unit: Any) -> tuple[Any, Any]:
         """Sine and cosine of ``unit`` divided by its divisor."""
         if unit not in self._angles:
             low, high = self._domain.intervals.get(unit, (-sp.oo, sp.oo))
             low, high = low / self._divisors[unit], high / self._divisors[unit]
-            if bool(low >= -sp.pi) and bool(high <= sp.pi):
+            low, high = _plain_end(low, sp.floor), _plain_end(high, sp.ceiling)
+            if self._half_angles and bool(low >= -sp.pi) and bool(high <= sp.pi):
                 ends = (sp.tan(low / 2) if low != -sp.pi else -sp.oo, sp.tan(high / 2) if high != sp.pi else sp.oo)
                 t = _running(ends, unit)
                 self._angles[unit] = 2 * t / (1 + t**2), (1 - t**2) / (1 + t**2)
@@ -143,9 +153,23 @@ class Parameters:
         return self._exponentials.setdefault(unit, sp.Dummy("E", positive=True))
 
 
+def _is_arithmetic(e: Any) -> bool:
+    """Whether it is an operation or a function of numbers; cases, integrals, sums and the like are not."""
+    return bool(e.is_Add or e.is_Mul or e.is_Pow or e.is_Function) and all(isinstance(part, sp.Expr) for part in e.args)
+
+
 def _terms(argument: Any) -> list[tuple[Any, Any]]:
     """An argument as a sum of rational multiples of units."""
     return [term.as_coeff_Mul(rational=True) for term in sp.Add.make_args(sp.expand(argument))]
+
+
+def _plain_end(end: Any, outward: Any) -> Any:
+    """The end of an interval of angles, or a multiple of pi/2 beyond it if its half has no plain tangent.
+
+    What holds on the wider interval holds on the given one.
+    """
+    quarters = 2 * end / sp.pi
+    return end if end.is_infinite or quarters.is_Integer else outward(quarters) * sp.pi / 2
 
 
 def _running(interval: tuple[Any, Any], symbol: Any) -> Any:
@@ -212,15 +236,20 @@ def _without_roots(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
     """Replace every root by a symbol; ``roots`` receives the radicands, inner roots first."""
     if not e.args:
         return e
+    if e.func is sp.Abs:
+        return _root(_without_roots(e.args[0], roots) ** 2, 2, roots)
     if e.is_Pow and e.exp.is_Rational and not e.exp.is_Integer:
-        base = _without_roots(e.base, roots)
-        for symbol, (radicand, index) in roots.items():
-            if radicand == base and index == e.exp.q:
-                return symbol**e.exp.p
-        symbol = sp.Dummy("r")
-        roots[symbol] = base, int(e.exp.q)
-        return symbol**e.exp.p
+        return _root(_without_roots(e.base, roots), int(e.exp.q), roots) ** e.exp.p
     return e.func(*(_without_roots(part, roots) for part in e.args))
+
+
+def _root(radicand: Any, index: int, roots: dict[Any, tuple[Any, int]]) -> Any:
+    for symbol, known in roots.items():
+        if known == (radicand, index):
+            return symbol
+    symbol = sp.Dummy("r")
+    roots[symbol] = radicand, index
+    return symbol
 
 
 def _reduced(e: Any, symbol: Any, index: int, power: Any) -> Any:

@@ -16,22 +16,29 @@ from .verdict import Verdict
 
 # Both sides are first evaluated to this many digits; a difference beyond half of them is worth enclosing.
 DIGITS = 40
+NEGLIGIBLE = mpmath.mpf(10) ** (-DIGITS // 2)
 SHOWN = 20
 
 
 def refute_equality(left: Any, right: Any, points: Iterable[dict[Any, Any]]) -> Verdict | None:
     """Return a refutation at the first of the points where left and right differ, or None."""
+    symbols = sorted(left.free_symbols | right.free_symbols, key=str)
+    try:
+        sides = [sp.lambdify(symbols, side, "mpmath") for side in (left, right)]
+    except NotImplementedError:
+        # an integral without bounds, or another expression without a value
+        return None
     for point in points:
-        a, b = _value(left, point), _value(right, point)
-        if a is None or b is None or abs(a - b) <= mpmath.mpf(10) ** (-DIGITS // 2) * max(abs(a), abs(b), 1):
+        rationals = [point[symbol] for symbol in symbols]
+        a, b = (_value(side, rationals, DIGITS) for side in sides)
+        if a is None or b is None or abs(a - b) <= NEGLIGIBLE * max(abs(a), abs(b), 1):
             continue
         one, other = enclose(left, point), enclose(right, point)
         if one is None or other is None:
-            how = f"{DIGITS} and {2 * DIGITS} digits"
-            again = _value(left, point, 2 * DIGITS), _value(right, point, 2 * DIGITS)
-            slack = mpmath.mpf(10) ** (-DIGITS // 2)
-            if None in again or abs(again[0] - a) + abs(again[1] - b) > slack * abs(a - b):
+            again = [_value(side, rationals, 2 * DIGITS) for side in sides]
+            if None in again or abs(again[0] - a) + abs(again[1] - b) > NEGLIGIBLE * abs(a - b):
                 continue
+            how = f"{DIGITS} and {2 * DIGITS} digits"
         elif one.b < other.a or other.b < one.a:
             how = "interval arithmetic"
         else:
@@ -45,12 +52,12 @@ def refute_equality(left: Any, right: Any, points: Iterable[dict[Any, Any]]) -> 
     return None
 
 
-def _value(expression: Any, point: dict[Any, Any], digits: int = DIGITS) -> Any:
-    try:
-        value = sp.N(expression.subs(point), digits, maxn=4 * digits, strict=True)
-    except (sp.core.evalf.PrecisionExhausted, ZeroDivisionError, ValueError, NotImplementedError):
-        return None
-    if not value.is_number or value.has(sp.nan, sp.zoo, sp.oo, -sp.oo):
-        return None
+def _value(side: Any, rationals: list[Any], digits: int) -> Any:
+    """The value at a rational point, computed to so many digits; None where it is undefined or not a number."""
     with mpmath.workdps(digits):
-        return mpmath.mpmathify(value)
+        try:
+            value = side(*(mpmath.mpf(int(number.p)) / int(number.q) for number in rationals))
+            return value if mpmath.isfinite(value) else None
+        except (ArithmeticError, ValueError, TypeError, NameError, AttributeError):
+            # a pole, or a function that mpmath does not know
+            return None

@@ -1,0 +1,120 @@
+"""A chain of 30 wells: the same matrix for asperity, scipy and, where it is installed, deeptime."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array
+from scipy.sparse.linalg import eigsh, lobpcg
+
+from asperity.spectral import leading_eigenvalues
+
+WELLS, STATES = 30, (10, 333)
+# Rates between the wells: three groups, whose eigenvalues make three clusters of ten.
+RATES = np.repeat([1e-6, 1e-9, 1e-12], [10, 10, 9])
+
+# Some seconds.
+LANCZOS_RESTARTS = 200
+
+
+@dataclass(frozen=True)
+class Metastable:
+    """One solver on one chain.
+
+    Attributes
+    ----------
+    solver : str
+    states : int
+    seconds : float
+        Wall time, ``nan`` where the solver is not installed.
+    wrong : int
+        Of the 30 gaps 1 - lambda, those off by more than a tenth or by 1e-13, whichever is larger; -1 if it failed.
+    claim : str
+        What the solver says of its own answer.
+    """
+
+    solver: str
+    states: int
+    seconds: float
+    wrong: int
+    claim: str
+
+
+def chain(inside: int) -> csr_array[Any]:
+    """Hopping at rate 1/4 within wells of ``inside`` states, and at ``RATES`` between them."""
+    hop = np.full(WELLS * inside - 1, 0.25)
+    hop[inside - 1 :: inside] = RATES
+    diagonal = 1.0 - np.append(hop, 0.0) - np.append(0.0, hop)
+    return csr_array(diags_array([hop, diagonal, hop], offsets=[-1, 0, 1]))
+
+
+def expected_gaps(inside: int) -> np.ndarray[Any, Any]:
+    """1 - lambda to first order in the rates: those of the chain of wells over ``inside``."""
+    coarse = np.diag(np.append(RATES, 0.0) + np.append(0.0, RATES)) - np.diag(RATES, 1) - np.diag(RATES, -1)
+    return np.asarray(np.sort(np.linalg.eigvalsh(coarse)) / inside)
+
+
+def measure_metastable() -> list[Metastable]:
+    """Run every solver on every chain."""
+    solvers: dict[str, Callable[[csr_array[Any]], tuple[np.ndarray[Any, Any], str]]] = {
+        "asperity.leading_eigenvalues": _ours,
+        "scipy eigsh": lambda matrix: (eigsh(matrix, WELLS, which="LA", maxiter=LANCZOS_RESTARTS)[0], "none"),
+        "scipy eigsh, shifted": lambda matrix: (eigsh(matrix.tocsc(), WELLS, sigma=1.0 + 1e-9)[0], "none"),
+        "scipy lobpcg": _lobpcg,
+        "deeptime": _deeptime,
+    }
+    return [_run(name, solve, inside) for inside in STATES for name, solve in solvers.items()]
+
+
+def _run(name: str, solve: Callable[[csr_array[Any]], tuple[np.ndarray[Any, Any], str]], inside: int) -> Metastable:
+    matrix = chain(inside)
+    start = time.perf_counter()
+    try:
+        values, claim = solve(matrix)
+    except ModuleNotFoundError:
+        return Metastable(name, WELLS * inside, np.nan, -1, "not installed")
+    except Exception as reason:  # a peer's failure is a result
+        return Metastable(name, WELLS * inside, time.perf_counter() - start, -1, f"{type(reason).__name__}: {reason}")
+    seconds = time.perf_counter() - start
+    gaps, expected = np.sort(1.0 - np.asarray(values).real)[:WELLS], expected_gaps(inside)
+    wrong = int(np.sum(np.abs(gaps - expected) > np.maximum(0.1 * expected, 1e-13))) + WELLS - len(gaps)
+    return Metastable(name, WELLS * inside, seconds, wrong, claim)
+
+
+def _ours(matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
+    found = leading_eigenvalues(matrix, WELLS)
+    return found.values, f"{'complete' if found.complete else 'not complete'}, error below {found.error:.1e}"
+
+
+def _lobpcg(matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
+    import warnings
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        start = np.random.default_rng(0).normal(size=(matrix.shape[0], WELLS))
+        values = lobpcg(matrix, start, largest=True, tol=1e-12, maxiter=100)[0]
+    return values, "warns" if caught else "none"
+
+
+def _deeptime(matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
+    from deeptime.markov.tools.analysis import eigenvalues
+
+    return eigenvalues(matrix, k=WELLS), "none"
+
+
+def rows() -> list[str]:
+    """The table in Markdown."""
+    found = ["| solver | states | seconds | of 30 gaps wrong | what it says |", "|---|---|---|---|---|"]
+    for row in measure_metastable():
+        seconds = "-" if np.isnan(row.seconds) else f"{row.seconds:.2f}"
+        wrong = "-" if row.wrong < 0 else str(row.wrong)
+        found.append(f"| {row.solver} | {row.states} | {seconds} | {wrong} | {row.claim} |")
+    return found
+
+
+if __name__ == "__main__":
+    print("\n".join(rows()))

@@ -1,0 +1,248 @@
+"""Intervals that hold eigenvalues of a law itself, each with what its claim rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import Floats, whole_number
+from ..errors import AccuracyError, InputError
+from ..estimates import ErrorKind
+from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
+from ..kernels.measure import SINE
+from .deflation import off_constants
+from .eigenvalues import check_reversible
+from .separation import Separation, rest_of_spectrum
+from .trials import EPS, Residuals, images, residuals
+
+Label = Literal["indexed", "contains-spectrum"]
+
+# Trial functions beyond those asked for: the first ones of them show what comes next.
+LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
+MATRIX_TOLERANCE = 1e-8
+# Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
+QUOTIENT_ROUNDING = 4.0 * EPS
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """An interval with spectrum of a law in it.
+
+    Attributes
+    ----------
+    value : float
+        The Rayleigh quotient of the trial function.
+    low, high : float
+        The interval.
+    label : {"indexed", "contains-spectrum"}
+        ``"indexed"``: as many eigenvalues of the law as there are enclosures that overlap this one lie in their union,
+        and it is known how many are larger: ``index`` counts the eigenvalues by modulus, the constants' is 0.
+        ``"contains-spectrum"``: some point of the spectrum is in the interval, nothing more.
+    index : int or None
+    residual : float
+        ||P v - rho v||.
+    kind : {"bound", "estimate"}
+        ``"bound"``: to rounding; ``"estimate"`` where a quadrature or the separation is estimated.
+    reason : str
+        What the label rests on, or why the eigenvalue could not be indexed.
+    """
+
+    value: float
+    low: float
+    high: float
+    label: Label
+    index: int | None
+    residual: float
+    kind: ErrorKind
+    reason: str
+
+    @property
+    def width(self) -> float:
+        """``high - low``."""
+        return self.high - self.low
+
+    def __contains__(self, number: float) -> bool:
+        return self.low <= number <= self.high
+
+    def __str__(self) -> str:
+        return f"[{self.low:.15g}, {self.high:.15g}] {self.label} ({self.kind}: {self.reason})"
+
+
+@dataclass(frozen=True)
+class Enclosures:
+    """Enclosures in the order of their values, descending; iterate over it or index it.
+
+    Attributes
+    ----------
+    items : tuple of Enclosure
+    separation : Separation
+        What the indices rest on.
+    convention : {"paper", "specular"}
+    method : str
+    """
+
+    items: tuple[Enclosure, ...]
+    separation: Separation
+    convention: str
+    method: str
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def __iter__(self) -> Iterator[Enclosure]:
+        return iter(self.items)
+
+    def __getitem__(self, place: int) -> Enclosure:
+        return self.items[place]
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.convention} convention, {self.method}", *map(str, self.items)])
+
+
+def enclosures(
+    law: Law | CollisionLaw, k: int = 4, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
+) -> Enclosures:
+    r"""Enclose the k eigenvalues of largest modulus of a reversible law: of the operator, not of a matrix.
+
+    Parameters
+    ----------
+    law : Law or CollisionLaw
+        Reversible, in the convention that it carries; of a collision law its P~.
+    k : int
+        Number of eigenvalues, the constants' included.
+    basis : Basis, optional
+        Where the trial functions are sought; Legendre polynomials by default.
+    tolerance : float
+        Wanted Frobenius error of the matrix that gives the trial functions. It makes them better, not truer.
+
+    Returns
+    -------
+    Enclosures
+
+    Raises
+    ------
+    AccuracyError
+        If the law is not symmetric within its error.
+
+    Notes
+    -----
+    For a unit vector v with quotient rho and residual r, [rho - r, rho + r] meets the spectrum. If all of the spectrum
+    but m listed points has a modulus of at most s, and the m intervals widened by the joint residual stay beyond s,
+    then they hold m eigenvalues in order of their trial functions (Kahan), and the Kato-Temple bound
+    r^2/(distance to the rest of the spectrum) replaces r. The quadratures' own errors are in r and in rho.
+
+    Source: B. N. Parlett, *The Symmetric Eigenvalue Problem* (1980), sections 10.5 and 11.5; T. Kato, J. Phys. Soc.
+    Japan 4 (1949) 334.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker, spectral as spec
+    >>> found = spec.enclosures(ker.henyey_greenstein(0.5), 3)
+    >>> [item.label for item in found], all(0.5**l in found[l] for l in range(3))
+    (['indexed', 'indexed', 'indexed'], True)
+    >>> max(item.width for item in found) < 1e-13
+    True
+    """
+    whole_number("k", k, 1)
+    if isinstance(law, CollisionLaw):
+        law = law.law
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    if law.reversible is False:
+        raise AccuracyError(f"{law!r} is not reversible: its spectrum need not be real", np.inf)
+    if basis is None:
+        basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
+    values, vectors, next_value = _trial(law, basis, k, tolerance)
+    found = residuals(law, basis, vectors, values)
+    order = np.argsort(-np.abs(found.quotients), kind="stable")
+    apart = _first_that_separates(law, found, order, next_value)
+    method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.rows} rows"
+    exact = isinstance(law, DensityLaw)
+    items = tuple(_enclosed(found, apart, order, place, exact) for place in range(len(values)))
+    return Enclosures(items, apart[1], law.frame, method)
+
+
+def _first_that_separates(
+    law: Law, found: Residuals, order: NDArray[np.intp], next_value: float
+) -> tuple[int, Separation]:
+    """The largest number of leading values that the rest of the spectrum stays away from, and why it does."""
+    modulus = np.abs(found.quotients[order])
+    following = np.append((modulus + found.norms[order])[1:], next_value)
+    refused: Separation | None = None
+    for number in range(len(order), 0, -1):
+        listed = found.quotients[order[:number]]
+        joint = float(np.linalg.norm(found.norms[order[:number]]))
+        if modulus[number - 1] - joint <= following[number - 1] and number > 1:
+            # the next trial function itself is not apart: a multiple value, or one that is not resolved
+            continue
+        apart = rest_of_spectrum(law, listed, joint, float(following[number - 1]))
+        if modulus[number - 1] - joint > apart.radius:
+            return number, apart
+        refused = apart if refused is None else refused
+    return 0, refused or Separation(np.inf, "estimate", "no trial function is apart from the next")
+
+
+def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Floats, float]:
+    """Values and vectors of largest modulus, descending, constants first; and what comes next with its residual."""
+    symmetric = _galerkin(law, basis, tolerance)
+    constant = np.asarray(basis.constant)
+    rest, inner = off_constants(symmetric, constant)
+    order = np.argsort(-np.abs(rest), kind="stable")
+    chosen = np.sort(order[: k - 1])[::-1]
+    values, vectors = np.append(1.0, rest[chosen]), np.column_stack([constant, inner[:, chosen]])
+    following = order[k - 1 : k - 1 + EXTRA]
+    if not following.size:
+        return values, vectors, 0.0
+    after = residuals(law, basis, inner[:, following], rest[following], most_rows=0)
+    return values, vectors, float(np.max(np.abs(after.quotients) + after.norms))
+
+
+def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
+    if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
+        # a density may have a peak that no product rule sees; its rows have panels of their own
+        angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval)
+        image = images(law, basis.evaluate, angle, basis)
+        symmetric = basis.evaluate(angle).T @ (weight[:, None] * image)
+        return np.asarray(0.5 * (symmetric + symmetric.T))
+    matrix = discretise(law, basis, tolerance=tolerance)
+    check_reversible(matrix)
+    return np.asarray(0.5 * (matrix.symmetric + matrix.symmetric.T))
+
+
+def _enclosed(
+    found: Residuals, known: tuple[int, Separation], order: NDArray[np.intp], place: int, exact: bool
+) -> Enclosure:
+    number, apart = known
+    value, norm = float(found.quotients[place]), float(found.norms[place])
+    rank = int(np.flatnonzero(order == place)[0])
+    if rank == 0 and place == 0 and number:
+        return Enclosure(1.0, 1.0, 1.0, "indexed", 0, norm, apart.kind, f"P 1 = 1; {apart.reason}")
+    if rank < number:
+        low, high = _temple(found, apart.radius, order[:number], place)
+        kind: ErrorKind = "bound" if exact and apart.kind == "bound" else "estimate"
+        reason = f"{apart.reason}: the rest is within {apart.radius:.6g}"
+        return Enclosure(value, low, high, "indexed", rank, norm, kind, reason)
+    radius = norm + float(found.quotient_errors[place]) + QUOTIENT_ROUNDING
+    reason = f"not indexed: the rest of the spectrum reaches {apart.radius:.6g} for all that is known ({apart.reason})"
+    kind = "bound" if exact else "estimate"
+    return Enclosure(value, value - radius, min(value + radius, 1.0), "contains-spectrum", None, norm, kind, reason)
+
+
+def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], place: int) -> tuple[float, float]:
+    """Kato-Temple on both sides, with the distances to the neighbouring enclosures or to the rest."""
+    doubt = found.quotient_errors + QUOTIENT_ROUNDING
+    radius = found.norms + doubt
+    value, norm = found.quotients[place], found.norms[place]
+    others = listed[listed != place]
+    near, spread = found.quotients[others], radius[others]
+    above = np.concatenate([(near - spread)[near > value], [-rest] if value < -rest else []])
+    below = np.concatenate([(near + spread)[near <= value], [rest] if value > rest else []])
+    room_above = float(above.min()) - value if above.size else np.inf
+    room_below = value - float(below.max()) if below.size else np.inf
+    up = min(norm**2 / room_below, radius[place]) if room_below > 0.0 else radius[place]
+    down = min(norm**2 / room_above, radius[place]) if room_above > 0.0 else radius[place]
+    return float(value - down - doubt[place]), float(min(value + up + doubt[place], 1.0))

@@ -1,0 +1,80 @@
+"""The spectrum of laws made of specular reflection, retroreflection and Lambertian reflection."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels import Law
+from ..kernels.algebra import Rules, fold
+from ..kernels.ideal import IsometryLaw, LambertianLaw
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class IdealSpectrum:
+    """Off the constants such a law is ``even`` times the identity on even functions of cos(theta), ``odd`` on odd ones.
+
+    Attributes
+    ----------
+    even, odd : float
+    rounding : float
+        Bound for the rounding of both.
+    """
+
+    even: float
+    odd: float
+    rounding: float = 0.0
+
+    @property
+    def top(self) -> float:
+        """The larger of the two."""
+        return max(self.even, self.odd)
+
+
+def ideal_spectrum(law: Law) -> IdealSpectrum | None:
+    """The two eigenvalues off the constants of a law made of ideal ones in any way; None of other laws.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = ideal_spectrum(ker.maxwell(0.25))
+    >>> found.even, found.odd
+    (0.75, -0.75)
+    """
+    return fold(law, Rules(_leaf, _mixture, _chain, _turned))
+
+
+def _leaf(law: Law) -> IdealSpectrum | None:
+    if isinstance(law, LambertianLaw):
+        return IdealSpectrum(0.0, 0.0)
+    if isinstance(law, IsometryLaw):
+        return IdealSpectrum(1.0, 1.0 if law.retro else -1.0)
+    return None
+
+
+def _mixture(terms: Sequence[tuple[float, IdealSpectrum | None]]) -> IdealSpectrum | None:
+    even, odd, rounding = 0.0, 0.0, 0.0
+    for weight, part in terms:
+        if part is None:
+            return None
+        even, odd = even + weight * part.even, odd + weight * part.odd
+        rounding += weight * part.rounding + EPS
+    return IdealSpectrum(even, odd, rounding)
+
+
+def _chain(parts: Sequence[IdealSpectrum | None]) -> IdealSpectrum | None:
+    even, odd, rounding = 1.0, 1.0, 0.0
+    for part in parts:
+        if part is None:
+            return None
+        even, odd = even * part.even, odd * part.odd
+        rounding += part.rounding + EPS
+    return IdealSpectrum(even, odd, rounding)
+
+
+def _turned(part: IdealSpectrum | None) -> IdealSpectrum | None:
+    return None if part is None else IdealSpectrum(part.even, -part.odd, part.rounding)

@@ -1,0 +1,190 @@
+"""How long a chain of reflections takes to forget where it started."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ..checks import Floats, finite_number, number_between
+from ..errors import AccuracyError, InputError
+from ..estimates import ErrorKind, Estimate
+from ..kernels import DensityLaw, KernelMatrix, Law
+from ..kernels.measure import SINE
+from .eigenvalues import Spectrum, spectrum
+from .essential import essential_edge
+from .ideal_parts import ideal_spectrum
+
+Distance = Literal["L2", "total variation", "chi-square"]
+DISTANCES: tuple[Distance, ...] = ("L2", "total variation", "chi-square")
+
+# Eigenvalues among which the one of largest modulus is sought.
+SOUGHT = 6
+# Panels and nodes of the norm of a density.
+PANELS, NODES = 48, 16
+
+
+@dataclass(frozen=True)
+class MixingTime:
+    """The number of steps after which a chain is near its invariant distribution.
+
+    Attributes
+    ----------
+    steps : int
+        Enough for every initial density whose distance to 1 in L^2 is ``initial``.
+    earliest : int
+        For ``distance="L2"`` and ``"chi-square"`` fewer steps than this do not do for the worst such density; for
+        ``"total variation"`` 0, for nothing is claimed.
+    relaxation_time : Estimate
+        -1/ln(slem), in steps.
+    slem : Estimate
+        The largest modulus in the spectrum off the constants.
+    distance : {"L2", "total variation", "chi-square"}
+    initial : float
+        ||f - 1|| in L^2 of the invariant probability measure.
+    kind : {"bound", "estimate"}
+        Of ``steps``: that of ``slem``, whose upper end is used.
+    """
+
+    steps: int
+    earliest: int
+    relaxation_time: Estimate
+    slem: Estimate
+    distance: Distance
+    initial: float
+    kind: ErrorKind
+
+    def __float__(self) -> float:
+        return float(self.steps)
+
+
+def mixing_time(
+    kernel: Law | KernelMatrix | Spectrum,
+    within: float = 0.25,
+    distance: Distance = "total variation",
+    *,
+    density: Callable[[Floats], Floats] | None = None,
+    start: float | None = None,
+    initial: float = 1.0,
+) -> MixingTime:
+    r"""Steps until the distribution is ``within`` of the invariant one, from a density in L^2.
+
+    Parameters
+    ----------
+    kernel : Law, KernelMatrix or Spectrum
+        Reversible.
+    within : float
+        The distance that is allowed.
+    distance : {"L2", "total variation", "chi-square"}
+        ||f_n - 1||, half of the L^1 norm of f_n - 1, or the square of the first.
+    density : callable, optional
+        Initial density with respect to sin(theta)/2 d theta, a vectorised function of the angle.
+    start : float, optional
+        An initial angle. Only for laws with a density: after one step, which is counted, the distribution has one.
+    initial : float
+        ||f - 1|| itself, where neither of these is given.
+
+    Returns
+    -------
+    MixingTime
+
+    Raises
+    ------
+    AccuracyError
+        If the law has no gap, or its slem is not known to be less than 1.
+    InputError
+        If a start is given for a law without a density, or the density is no density.
+
+    Notes
+    -----
+    f_n = P^n f, so ||f_n - 1|| <= slem^n ||f - 1||, and for the worst f this is attained in the limit; the total
+    variation distance is at most half of it, the chi-square distance its square.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = mixing_time(ker.maxwell(0.5), 0.01, "L2")
+    >>> found.steps, found.earliest, round(float(found.relaxation_time), 4)
+    (7, 7, 1.4427)
+    """
+    within = number_between("within", within, 0.0, np.inf)
+    if distance not in DISTANCES:
+        raise InputError(f"distance: expected one of {', '.join(DISTANCES)}, got {distance!r}")
+    steps_before, size = 0, finite_number("initial", initial)
+    if size < 0.0:
+        raise InputError(f"initial: expected a norm, at least 0, got {initial!r}")
+    if density is not None:
+        size = _distance_of(density)
+    elif start is not None:
+        steps_before, size = 1, _distance_after_a_step(kernel, start)
+    slem = largest_modulus(kernel)
+    most, least = min(slem.value + slem.error, 1.0), max(slem.value - slem.error, 0.0)
+    if most >= 1.0:
+        raise AccuracyError(f"the law is not known to have a gap: slem = {slem}, so no mixing time can be given", most)
+    target = {"L2": within, "total variation": 2.0 * within, "chi-square": float(np.sqrt(within))}[distance]
+    steps = steps_before + _steps(most, target / size if size else np.inf)
+    earliest = 0 if distance == "total variation" else _steps(least, target / size if size else np.inf)
+    time, slower, faster = (_time_scale(value) for value in (slem.value, most, least))
+    relaxation = Estimate(time, max(slower - time, time - faster), slem.kind, "-1/ln(slem)")
+    return MixingTime(steps, earliest, relaxation, slem, distance, size, slem.kind)
+
+
+def largest_modulus(kernel: Law | KernelMatrix | Spectrum) -> Estimate:
+    """The slem, sup of the modulus of the spectrum off the constants, with its error."""
+    if isinstance(kernel, Law):
+        ideal = ideal_spectrum(kernel)
+        if ideal is not None:
+            return Estimate(max(abs(ideal.even), abs(ideal.odd)), ideal.rounding, "bound", "structure of the law")
+        edge = essential_edge(kernel)
+        if edge.low >= 1.0:
+            return Estimate(1.0, 0.0, edge.kind, "; ".join(edge.reasons))
+        found = spectrum(kernel, SOUGHT)
+    else:
+        edge = None
+        found = kernel if isinstance(kernel, Spectrum) else spectrum(kernel, SOUGHT)
+    modulus, width = np.abs(found.values[1:]), found.errors.total()[1:]
+    largest = int(np.argmax(modulus)) if modulus.size else 0
+    value, error = (float(modulus[largest]), float(width[largest])) if modulus.size else (0.0, np.inf)
+    if edge is not None and edge.high > value - error:
+        high = max(edge.high, value + error)
+        low = max(edge.low, value - error)
+        return Estimate(0.5 * (low + high), 0.5 * (high - low), "estimate", "eigenvalue or edge of essential spectrum")
+    return Estimate(value, error, "estimate", f"{found.basis!r}, {found.method}")
+
+
+def _steps(factor: float, target: float) -> int:
+    """The least n with factor^n <= target."""
+    if target >= 1.0:
+        return 0
+    if factor <= 0.0:
+        return 1
+    return int(np.ceil(np.log(target) / np.log(factor) * (1.0 - 4.0 * np.finfo(np.float64).eps)))
+
+
+def _time_scale(modulus: float) -> float:
+    return float(-1.0 / np.log(modulus)) if 0.0 < modulus < 1.0 else (np.inf if modulus >= 1.0 else 0.0)
+
+
+def _distance_of(density: Callable[[Floats], Floats]) -> float:
+    angle, weight = SINE.quadrature(np.linspace(0.0, np.pi, PANELS + 1), NODES)
+    values = np.asarray(density(angle), dtype=np.float64)
+    mass = float(weight @ values)
+    if np.min(values) < 0.0 or abs(mass - 1.0) > 1e-6:
+        raise InputError(
+            f"density: expected values of at least 0 and an integral of 1 under sin(theta)/2 d theta, got {mass:.8g}"
+        )
+    return float(np.sqrt(weight @ (values - 1.0) ** 2))
+
+
+def _distance_after_a_step(kernel: object, start: float) -> float:
+    if not isinstance(kernel, DensityLaw):
+        raise InputError(
+            "start: expected a law with a density, whose first step has one in L^2; give other laws an initial density"
+        )
+    theta = np.array([number_between("start", start, 0.0, np.pi)])
+    edges = np.unique(np.concatenate([kernel.panels(theta)[0], np.linspace(0.0, np.pi, PANELS + 1)]))
+    angle, weight = SINE.quadrature(edges, NODES)
+    values = kernel.density(theta[:, None], angle)[0] / SINE.density(angle)
+    return float(np.sqrt(weight @ (values - 1.0) ** 2))

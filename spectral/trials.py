@@ -1,0 +1,161 @@
+"""Residuals of trial functions, for the law itself and not for its matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks import Floats
+from ..kernels import Basis, DensityLaw, Law, Legendre, Panels
+from ..kernels.angle_panels import GAUSS, KRONROD, NODES
+from ..kernels.density import GAUSS_NODES
+from ..kernels.kernel_quadrature import GRAZING_EDGES
+from ..kernels.law import AngleFunction
+from ..kernels.measure import SINE, gauss_on_intervals
+
+# Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
+SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
+# Functions of the basis times outgoing angles held at a time.
+CHUNK_ROWS = 128
+# A Gauss rule with n nodes on a panel of width h follows cos(l theta) to rounding for l h up to about this times n.
+NODES_PER_DEGREE = 1.2
+# Nodes beyond those that the basis asks for, of the two rules that are compared.
+MORE_NODES = (0, 8)
+EPS = float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What quadrature over the incoming angle finds of orthonormal trial functions v_i and a self-adjoint law P.
+
+    Attributes
+    ----------
+    quotients : array of shape (k,)
+        <v_i, P v_i>.
+    quotient_errors : array of shape (k,)
+        Estimated errors of the quotients.
+    norms : array of shape (k,)
+        ||P v_i - rho_i v_i||, the quadrature's own error included.
+    rows : int
+        Angles at which the law was applied.
+    """
+
+    quotients: Floats
+    quotient_errors: Floats
+    norms: Floats
+    rows: int
+
+    @property
+    def joint_norm(self) -> float:
+        """A bound for the norm of P V - V diag(rho): each of the k values has an eigenvalue of its own this near."""
+        return float(np.linalg.norm(self.norms))
+
+
+def residuals(law: Law, basis: Basis, vectors: Floats, values: Floats, most_rows: int = MOST_ROWS) -> Residuals:
+    """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
+
+    ``values``, shape (k,), are the eigenvalues that they are thought to have. ||P v - rho v||^2 is integrated as it
+    stands: as <P v, P v> - rho^2 it would lose half of its digits. Panels in the incoming angle are halved where Gauss
+    and Kronrod differ most; their difference counts as error.
+    """
+    if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
+        return _smooth_residuals(law, basis, vectors, values)
+    low, high = _first_panels(basis)
+    kept, total, error = np.zeros((2, 0)), np.zeros((0, 2, len(values))), np.zeros((0, 2, len(values)))
+    rows = 0
+    while low.size:
+        fresh, doubt = _integrals(law, basis, vectors, values, low, high)
+        rows += low.size * len(NODES)
+        kept = np.concatenate([kept, [low, high]], axis=1)
+        total, error = np.concatenate([total, fresh]), np.concatenate([error, doubt])
+        square = total[:, 1].sum(axis=0)
+        # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
+        wanted = np.stack([SHARE * square + 4.0 * EPS, SHARE * square + (8.0 * EPS) ** 2])
+        share = (error / wanted).max(axis=(1, 2))
+        affordable = max(most_rows - rows, 0) // (2 * len(NODES))
+        worst = np.argsort(-share)[:affordable]
+        worst = worst[(share[worst] * len(share) > 1.0) & (np.diff(kept[:, worst], axis=0)[0] > NARROWEST)]
+        if np.all(error.sum(axis=0) <= wanted):
+            break
+        middle = kept[:, worst].mean(axis=0)
+        low, high = np.append(kept[0, worst], middle), np.append(middle, kept[1, worst])
+        rest = np.setdiff1d(np.arange(len(share)), worst)
+        kept, total, error = kept[:, rest], total[rest], error[rest]
+    correction, square = total.sum(axis=0)
+    correction_error, square_error = error.sum(axis=0)
+    return Residuals(values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), rows)
+
+
+def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -> Residuals:
+    """The same for polynomials and a density, whose images are smooth: two Gauss rules that follow them."""
+    found, rows = [], 0
+    for more in MORE_NODES:
+        angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval + more)
+        rows += angle.size
+        here = expansion(basis, vectors, angle)
+        starts = range(0, angle.size, CHUNK_ROWS)
+        parts = [
+            images(law, lambda theta: expansion(basis, vectors, theta), angle[start : start + CHUNK_ROWS], basis)
+            for start in starts
+        ]
+        rest = np.concatenate(parts) - here * values
+        found.append((weight @ (here * rest), weight @ (rest * rest)))
+    (first, first_square), (second, second_square) = found
+    norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
+    return Residuals(values + second, np.abs(second - first), norms, rows)
+
+
+def _first_panels(basis: Basis) -> tuple[Floats, Floats]:
+    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES)))
+    return edges[:-1], edges[1:]
+
+
+def _integrals(
+    law: Law, basis: Basis, vectors: Floats, values: Floats, low: Floats, high: Floats
+) -> tuple[Floats, Floats]:
+    """Integrals of v (P v - rho v) and of its square over each panel, with the differences of the two rules."""
+    half = 0.5 * (high - low)
+    angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
+    flat = angle.ravel()
+
+    def trial(theta: Floats) -> Floats:
+        return expansion(basis, vectors, theta)
+
+    starts = range(0, flat.size, CHUNK_ROWS)
+    image = np.concatenate([images(law, trial, flat[start : start + CHUNK_ROWS], basis) for start in starts])
+    here = trial(flat)
+    rest = image - here * values
+    shape = (*angle.shape, len(values))
+    parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
+    density = half[:, None] * SINE.density(angle)
+    return (
+        np.einsum("pq,pqjk->pjk", density * KRONROD, parts),
+        np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts)),
+    )
+
+
+def images(law: Law, function: AngleFunction, theta: Floats, basis: Basis) -> Floats:
+    """P f at the angles theta for functions f of the basis, with rows as fine as these functions need."""
+    if not isinstance(law, DensityLaw):
+        return law.apply(function, theta)
+    # a panel's Gauss rule follows polynomials in cos(theta) of a degree below its nodes over its width
+    parts = 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES))
+    panels = law.panels(theta)
+    share = np.arange(parts) / parts
+    fine = (panels[..., :-1, None] + share * np.diff(panels, axis=-1)[..., None]).reshape(*theta.shape, -1)
+    fine = np.concatenate([fine, panels[..., -1:]], axis=-1)
+    outgoing, weight = gauss_on_intervals(fine[:, :-1].ravel(), fine[:, 1:].ravel(), GAUSS_NODES)
+    outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)
+    weight = weight * law.density(theta[:, None], outgoing)
+    weight /= weight.sum(axis=1, keepdims=True)
+    return np.asarray(np.einsum("ij,ij...->i...", weight, function(outgoing)))
+
+
+def expansion(basis: Basis, vectors: Floats, theta: Floats) -> Floats:
+    """Values of the functions with the coefficients ``vectors``, shape ``theta.shape + (k,)``."""
+    if not isinstance(basis, Panels):
+        return np.asarray(basis.evaluate(theta) @ vectors)
+    panel, values = basis.local(theta)
+    coefficients = vectors.reshape(-1, basis.degree + 1, vectors.shape[1])
+    return np.asarray(np.einsum("...d,...dk->...k", values, coefficients[panel]))

@@ -1,0 +1,108 @@
+"""What follows from a wall's gap: relaxation, diffusion in a channel, flatness."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .errors import AsperityError
+from .estimates import Estimate
+from .spectral import diffusivity, mean_squared_slope
+
+if TYPE_CHECKING:
+    from .geometry import Wall
+    from .kernels import Law
+    from .spectral import Diffusivity, SpectralGap
+
+
+@dataclass(frozen=True)
+class Consequences:
+    """What a study derives from the law and its gaps.
+
+    Attributes
+    ----------
+    slem : Estimate or None
+        The largest modulus in the spectrum off the constants; None where the gaps in both conventions are not known.
+    relaxation_time : Estimate or None
+        -1/ln(slem) in steps; its error is ``inf`` where slem may be 1.
+    diffusion : Diffusivity or None
+        Of a channel of half-width 1 and speed 1, the upper wall the mirror image of the lower.
+    flatness : float
+        The mean squared slope h; ``inf`` for walls with vertical pieces or overhangs.
+    refusal : str
+        Why there is no diffusivity, or empty.
+    """
+
+    slem: Estimate | None
+    relaxation_time: Estimate | None
+    diffusion: Diffusivity | None
+    flatness: float
+    refusal: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values; what is not known or infinite is None."""
+        from .study_text import estimate_as_dict, finite
+
+        found = self.diffusion
+        return {
+            "slem": self.slem and estimate_as_dict(self.slem),
+            "relaxation_time": self.relaxation_time and estimate_as_dict(self.relaxation_time),
+            "diffusivity": found and {
+                **estimate_as_dict(found), "eta": found.eta, "eta_error": finite(found.eta_error), "zeta": found.zeta,
+                "zeta_error": finite(found.zeta_error), "arrangement": found.arrangement,
+            },
+            "mean_squared_slope": finite(self.flatness),
+        }  # fmt: skip
+
+    def lines(self) -> list[str]:
+        """One line a fact."""
+        from .study_text import rounded
+
+        lines = []
+        if self.slem is not None and self.relaxation_time is not None:
+            if math.isfinite(self.relaxation_time.error):
+                time = f"relaxation time {rounded(self.relaxation_time)} steps"
+            else:
+                time = "no relaxation time: slem may be 1"
+            lines.append(f"slem {rounded(self.slem)} ({self.slem.kind}: {self.slem.method}), {time}")
+        if self.diffusion is not None:
+            found = self.diffusion
+            eta = Estimate(found.eta, found.eta_error, found.kind, "")
+            lines.append(
+                f"channel of half-width 1, speed 1: D = {rounded(found)}, eta = {rounded(eta)}, "
+                f"zeta = {found.zeta:.6g} ({found.kind}: {found.method})"
+            )
+        else:
+            lines.append(f"diffusivity refused: {self.refusal}")
+        if math.isfinite(self.flatness):
+            lines.append(f"mean squared slope h = {self.flatness:.6g}; for shallow walls the specular gap is about 4 h")
+        return lines
+
+
+def consequences_of(wall: Wall, law: Law, gap: SpectralGap | None, specular_gap: SpectralGap | None) -> Consequences:
+    """Derive what follows; a diffusivity that is infinite or out of reach is None, with the reason."""
+    slem = _slem(gap, specular_gap)
+    diffusion, refusal = None, ""
+    try:
+        diffusion = diffusivity(law)
+    except AsperityError as reason:
+        refusal = str(reason)
+    return Consequences(slem, None if slem is None else _relaxation(slem), diffusion, mean_squared_slope(wall), refusal)
+
+
+def _slem(gap: SpectralGap | None, specular_gap: SpectralGap | None) -> Estimate | None:
+    """For mirror-symmetric laws: odd eigenvalues change sign, so that the larger of both suprema is the modulus."""
+    if gap is None or specular_gap is None:
+        return None
+    nearer = gap if gap.value <= specular_gap.value else specular_gap
+    return Estimate(1.0 - nearer.value, nearer.error, nearer.kind, f"gap in the {nearer.convention} convention")
+
+
+def _relaxation(slem: Estimate) -> Estimate:
+    most, least = slem.value + slem.error, slem.value - slem.error
+    value = -1.0 / math.log(slem.value) if 0.0 < slem.value < 1.0 else (math.inf if slem.value >= 1.0 else 0.0)
+    if most >= 1.0 or not math.isfinite(value):
+        return Estimate(value if math.isfinite(value) else 0.0, math.inf, slem.kind, "-1/ln(slem)")
+    fastest = -1.0 / math.log(least) if least > 0.0 else 0.0
+    return Estimate(value, max(-1.0 / math.log(most) - value, value - fastest), slem.kind, "-1/ln(slem)")

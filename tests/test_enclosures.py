@@ -1,0 +1,109 @@
+"""Enclosures of eigenvalues of laws: they hold, they are narrow, or they are refused with a reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AccuracyError, InputError
+from asperity.spectral.separation import lambertian_share, rest_of_spectrum
+
+EPS = np.finfo(float).eps
+
+
+@pytest.mark.parametrize("k", [1, 4, 10])
+@pytest.mark.parametrize("g", [-0.7, 0.5, 0.9, 0.99, 0.999999])
+def test_every_eigenvalue_of_henyey_greenstein_is_enclosed_and_indexed(g, k):
+    found = spec.enclosures(ker.henyey_greenstein(g), k)
+    exact = np.sort(g ** np.arange(float(k)))[::-1]
+    for item, value in zip(found, exact, strict=True):
+        assert item.label == "indexed" and item.kind == "bound"
+        assert value in item
+        assert item.index == round(np.log(abs(value)) / np.log(abs(g)))
+        # the numbers are right to a few roundings, and the intervals no wider than some dozen
+        assert item.width <= 100.0 * max(abs(item.value - value), EPS)
+
+
+@pytest.mark.parametrize("bins", [16, 64])
+def test_enclosures_by_steps_are_at_most_a_hundred_times_as_wide_as_the_error(bins):
+    """Trial functions of order 1: the error of the quotient is of order 2, and Kato and Temple's interval too."""
+    found = spec.enclosures(ker.henyey_greenstein(0.5), 3, basis=ker.Bins(bins))
+    for item, value in zip(found, [1.0, 0.5, 0.25], strict=True):
+        assert value in item
+        if item.label == "indexed":
+            assert item.width <= 100.0 * max(abs(item.value - value), EPS)
+    assert found[1].label == "indexed"
+
+
+def test_maxwell_has_one_indexed_eigenvalue_and_the_rest_is_refused_with_the_reason():
+    found = spec.enclosures(ker.maxwell(0.3), 3)
+    assert [item.label for item in found] == ["indexed", "contains-spectrum", "contains-spectrum"]
+    assert 1.0 in found[0] and 0.7 in found[1] and 0.7 in found[2]
+    assert "not indexed" in found[1].reason and "Lambertian share" in found[1].reason
+
+
+def test_the_focusing_arc_has_the_published_eigenvalues():
+    """Facts 10: 0.3670253152(3) and -0.311346443 at a half angle of 1.2."""
+    found = spec.enclosures(ker.CircularArcLaw(1.2), 3, basis=ker.Legendre(20))
+    assert [item.label for item in found] == ["indexed"] * 3
+    assert 0.3670253152 in found[1] and -0.311346443 in found[2]
+    assert found[1].width < 100.0 * abs(found[1].value - 0.3670253152)
+    assert found[1].kind == "estimate"
+
+
+SHALLOW_CURVES = [
+    geo.Bezier([(0, 0), (0.3, -0.12), (1, 0)]),
+    geo.Bezier([(0, 0), (0.2, -0.15), (0.7, -0.1), (1, 0)]),
+    geo.Bezier([(0, 0), (0.5, -0.15), (1, 0)]),
+]
+
+
+@pytest.mark.parametrize(
+    "wall",
+    [geo.focusing_arcs(0.3), geo.dispersing_arcs(0.5), *(geo.Wall([curve]) for curve in SHALLOW_CURVES)],
+    ids=["arc", "bumps", "skew", "skew cubic", "parabola"],
+)
+def test_enclosures_of_curved_walls_hold_against_a_finer_run(wall):
+    law = ker.WallLaw(wall)
+    coarse = spec.enclosures(law, 2, basis=ker.Legendre(8), tolerance=1e-5)
+    fine = spec.spectrum(law, 2, basis=ker.Legendre(16), tolerance=1e-6)
+    assert coarse[1].label == "indexed" and coarse[1].index == 1
+    slack = 2.0 * fine.errors.algebraic[1] + fine.matrix_error
+    assert coarse[1].low - slack <= fine.values[1] <= coarse[1].high + slack
+
+
+def test_nothing_is_indexed_below_the_essential_spectrum():
+    found = spec.enclosures(ker.CircularArcLaw(np.pi / 2), 2, basis=ker.Legendre(12))
+    assert found[1].label == "contains-spectrum" and found[1].index is None
+
+
+def test_a_matrix_law_has_finite_rank():
+    found = spec.enclosures(ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]]), 2)
+    assert 0.4 in found[1] and found[1].label == "indexed" and found[1].width < 1e-14
+
+
+@pytest.mark.parametrize("g", [0.3, 0.9, 0.9999])
+def test_the_hilbert_schmidt_remainder_bounds_the_next_eigenvalue(g):
+    apart = rest_of_spectrum(ker.henyey_greenstein(g), g ** np.arange(4.0), 1e-15, np.inf)
+    # g^4 is in the rest, and the remainder is not far above it
+    assert g**4 <= apart.radius < g**3
+
+
+def test_the_lambertian_share_of_sums_and_products():
+    diffuse, turned = ker.lambertian(), ker.specular()
+    assert lambertian_share(0.25 * diffuse + 0.75 * turned) == pytest.approx(0.25)
+    assert lambertian_share(turned @ diffuse) == 1.0
+    assert lambertian_share((0.5 * diffuse + 0.5 * turned) ** 3) == pytest.approx(0.875)
+
+
+def test_what_cannot_be_enclosed_is_refused():
+    with pytest.raises(InputError, match="law: expected"):
+        spec.enclosures(np.eye(3), 2)
+    with pytest.raises(InputError, match="k: expected"):
+        spec.enclosures(ker.lambertian(), 0)
+    rotation = ker.MatrixLaw(np.roll(np.eye(8), 1, axis=1))
+    with pytest.raises(AccuracyError, match="not reversible"):
+        spec.enclosures(rotation, 2)

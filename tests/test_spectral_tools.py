@@ -1,0 +1,222 @@
+"""Parities, mixing times, conductance, the billiard Laplacian, diffusion, large matrices, sampling errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse import diags_array
+from scipy.sparse.linalg import LinearOperator
+from scipy.stats import binomtest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import AccuracyError, InputError
+from asperity.estimates import Estimate
+from asperity.spectral.sampling import sampling_errors
+
+
+# ---- parities ---------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(9), ker.Panels(np.linspace(0, np.pi, 5), 2)], ids=repr)
+def test_eigenvalues_of_mirror_symmetric_laws_are_labelled_even_and_odd(basis):
+    matrix = ker.discretise(ker.henyey_greenstein(0.5), basis)
+    found = spec.spectrum(matrix, k=6)
+    assert found.parity[:4] == ("even", "odd", "even", "odd")
+    assert np.allclose(np.sort(np.linalg.eigvalsh(matrix.symmetric))[::-1][:6], found.values, atol=1e-12)
+    theta = np.array([0.3, 1.1])
+    for place, parity in enumerate(found.parity):
+        mirrored = found.eigenfunction(place, np.pi - theta)
+        assert np.allclose(mirrored, (1 if parity == "even" else -1) * found.eigenfunction(place, theta), atol=1e-12)
+
+
+def test_laws_without_mirror_symmetry_have_no_parities():
+    law = ker.MatrixLaw([[0.6, 0.3, 0.1], [0.3, 0.5, 0.2], [0.1, 0.2, 0.7]])
+    assert set(spec.spectrum(law, k=3, basis=ker.Bins(3)).parity) == {"none"}
+
+
+# ---- mixing -----------------------------------------------------------------------------------------------------
+def test_mixing_times_bound_the_distance_that_powers_of_the_matrix_have():
+    matrix = ker.discretise(ker.henyey_greenstein(0.8), ker.Bins(32))
+    weights = matrix.weights
+    density = np.where(np.arange(32) < 4, 8.0, 0.0)
+    size = np.sqrt(weights @ (density - 1.0) ** 2)
+    for distance, measure in [
+        ("L2", lambda f: np.sqrt(weights @ (f - 1.0) ** 2)),
+        ("total variation", lambda f: 0.5 * weights @ np.abs(f - 1.0)),
+        ("chi-square", lambda f: weights @ (f - 1.0) ** 2),
+    ]:
+        found = spec.mixing_time(matrix, 0.05, distance, initial=size)
+        after = np.linalg.matrix_power(matrix.array, found.steps) @ density
+        assert measure(after) <= 0.05
+        assert found.earliest <= found.steps
+
+
+def test_the_worst_density_takes_as_long_as_the_bound_says():
+    found = spec.mixing_time(ker.maxwell(0.5), 0.01, "L2")
+    assert found.steps == found.earliest == 7  # 2^-7 < 0.01 < 2^-6
+    assert float(found.relaxation_time) == pytest.approx(1 / np.log(2))
+
+
+def test_a_point_needs_a_law_with_a_density():
+    found = spec.mixing_time(ker.henyey_greenstein(0.5), 0.01, start=1.0)
+    assert found.steps > 1
+    with pytest.raises(InputError, match="start: expected a law with a density"):
+        spec.mixing_time(ker.maxwell(0.5), start=1.0)
+    with pytest.raises(AccuracyError, match="not known to have a gap"):
+        spec.mixing_time(ker.specular())
+
+
+def test_implied_time_scales_are_those_of_the_eigenvalues():
+    scales, intervals = spec.spectrum(ker.henyey_greenstein(0.5), k=4).implied_time_scales()
+    assert np.allclose(scales, 1 / (np.log(2) * np.arange(1, 4)))
+    assert np.all(intervals[:, 0] <= scales) and np.all(scales <= intervals[:, 1])
+
+
+# ---- cuts and the Laplacian -------------------------------------------------------------------------------------
+@pytest.mark.parametrize("g", [0.3, 0.9])
+def test_cheegers_bounds_hold(g):
+    found = spec.conductance(ker.discretise(ker.henyey_greenstein(g), ker.Bins(64)))
+    assert found.gap_below <= 1 - g <= found.gap_above + found.error
+
+
+@pytest.mark.parametrize("half_angle", [0.1, 0.2])
+def test_shallow_arcs_tend_to_the_billiard_laplacian(half_angle):
+    found = spec.laplacian_comparison(ker.CircularArcLaw(half_angle), 3)
+    exact = (np.log(1 / np.cos(half_angle) + np.tan(half_angle)) - np.sin(half_angle)) / np.sin(half_angle)
+    assert spec.mean_squared_slope(geo.focusing_arcs(half_angle)) == pytest.approx(exact, rel=1e-6)
+    assert found.flatness == pytest.approx(exact, rel=0.5 * half_angle)
+    assert np.all(np.abs(found.ratios - 1.0) < half_angle)
+
+
+def test_walls_with_vertical_sides_have_no_flatness():
+    assert spec.mean_squared_slope(geo.rectangular_teeth(1.0)) == np.inf
+    assert spec.mean_squared_slope(geo.focusing_arcs(np.pi / 2)) == np.inf
+
+
+# ---- diffusion --------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("a", [0.25, 0.5, 1.0])
+@pytest.mark.parametrize("arrangement", ["mirror", "half-turn"])
+def test_maxwells_walls_have_the_diffusivity_of_smoluchowski(a, arrangement):
+    for law in (ker.maxwell(a), ker.maxwell(a).in_specular_frame()):
+        found = spec.diffusivity(law, radius=0.5, speed=3.0, arrangement=arrangement)
+        assert found.eta == pytest.approx((2 - a) / a, rel=1e-12) and found.zeta == pytest.approx(1 - a, abs=1e-12)
+        assert float(found) == pytest.approx((2 - a) / a * 4 * 0.5 * 3.0 / np.pi, rel=1e-12)
+
+
+def test_the_semicircle_turns_grazing_flights_round():
+    """Of M, its ends' difference: zeta = -(1/8) ln 9."""
+    found = spec.diffusivity(ker.CircularArcLaw(np.pi / 2))
+    zeta = -np.log(9) / 8
+    assert abs(found.zeta - zeta) <= found.zeta_error < 1e-7
+    assert abs(found.eta - (1 + zeta) / (1 - zeta)) <= found.eta_error
+
+
+@pytest.mark.parametrize(
+    ("law", "arrangement"),
+    [
+        (ker.lambertian(), "mirror"),
+        (ker.maxwell(0.5), "mirror"),
+        (ker.maxwell(0.5), "half-turn"),
+        (ker.CircularArcLaw(np.pi / 2), "mirror"),
+    ],
+    ids=str,
+)
+def test_exit_times_agree_with_the_spectral_formula(law, arrangement):
+    lengths = 10.0 * 2.0 ** np.arange(0, 4.5, 0.5)
+    simulated = spec.exit_times(law, lengths, 1500, np.random.default_rng(5), arrangement=arrangement).eta()
+    found = spec.diffusivity(law, arrangement=arrangement)
+    assert abs(float(simulated) - found.eta) <= simulated.error + found.eta_error
+    assert simulated.error < 0.75 * found.eta
+
+
+def test_times_scale_with_width_and_speed():
+    first = spec.exit_times(ker.lambertian(), [5.0, 10.0, 20.0], 50, np.random.default_rng(1))
+    second = spec.exit_times(ker.lambertian(), [10.0, 20.0, 40.0], 50, np.random.default_rng(1), radius=2.0, speed=4.0)
+    assert np.allclose(first.times, 2.0 * second.times)
+
+
+def test_specular_channels_are_refused():
+    with pytest.raises(InputError, match="infinite"):
+        spec.diffusivity(ker.specular())
+    with pytest.raises(InputError, match="arrangement"):
+        spec.diffusivity(ker.lambertian(), arrangement="glide")
+
+
+# ---- large matrices ---------------------------------------------------------------------------------------------
+def wells(barriers: np.ndarray, inside: int):
+    """A chain of wells of ``inside`` states, hopping at rate 1/4 in them and at the rates ``barriers`` between them."""
+    hop = np.full((len(barriers) + 1) * inside - 1, 0.25)
+    hop[inside - 1 :: inside] = barriers
+    return diags_array([hop, 1 - np.append(hop, 0) - np.append(0, hop), hop], offsets=[-1, 0, 1])
+
+
+@pytest.mark.parametrize("inside", [8, 40])
+def test_the_thirty_slow_eigenvalues_of_thirty_wells_are_complete(inside):
+    """To first order in the rates: 1 - lambda are the eigenvalues of the wells' own chain over ``inside``."""
+    rates = 50.0 * np.repeat([1e-6, 1e-9, 1e-12], [10, 10, 9])
+    found = spec.leading_eigenvalues(wells(rates, inside), 30)
+    assert found.complete and found.counted == len(found.values) == 30
+    coarse = np.diag(np.append(rates, 0) + np.append(0, rates)) - np.diag(rates, 1) - np.diag(rates, -1)
+    expected = np.sort(np.linalg.eigvalsh(coarse)) / inside
+    gaps = 1 - found.values
+    assert np.all(np.abs(gaps - expected) <= found.error + 4 * inside * expected * rates.max() + 1e-16)
+    assert found.error < 1e-13
+
+
+def test_copies_of_a_multiple_eigenvalue_are_all_found():
+    values = np.concatenate([np.ones(10), np.full(10, 1 - 1e-9), np.linspace(0, 0.9, 480)])
+    for asked, given in ((10, 10), (12, 20)):
+        found = spec.leading_eigenvalues(diags_array(values), asked)
+        assert found.complete and len(found.values) == given
+        assert np.allclose(found.values, values[:given], rtol=0.0, atol=1e-14)
+
+
+def test_operators_without_entries_are_not_called_complete():
+    values = np.linspace(-0.5, 1.0, 400)
+    operator = LinearOperator((400, 400), matvec=lambda v: values * v.ravel(), dtype=float)
+    found = spec.leading_eigenvalues(operator, 3)
+    assert np.allclose(found.values, values[::-1][:3]) and not found.complete and found.error == np.inf
+
+
+def test_matrices_that_are_not_symmetric_are_refused():
+    with pytest.raises(InputError, match="symmetric"):
+        spec.leading_eigenvalues(np.array([[0.0, 1.0], [0.0, 0.0]]), 1)
+    with pytest.raises(InputError, match="symmetric"):
+        spec.leading_eigenvalues(diags_array([np.ones(99), np.zeros(100)], offsets=[1, 0]), 1)
+
+
+# ---- sampling ---------------------------------------------------------------------------------------------------
+RUNS = 2000
+LAW = ker.MatrixLaw([[0.5, 0.3, 0.2], [0.3, 0.4, 0.3], [0.2, 0.3, 0.5]])
+
+
+@pytest.fixture(scope="module")
+def sampled():
+    """Matrices of 4000 independent pairs each, seeds 0, 1, 2, ..."""
+    basis = ker.Bins(3)
+    flux = ker.discretise(LAW, basis).flux
+    made = []
+    for seed in range(RUNS):
+        counts = np.random.default_rng(seed).multinomial(4000, flux.ravel() / flux.sum()).reshape(3, 3)
+        rows = counts / counts.sum(axis=1, keepdims=True)
+        error = Estimate(0.0, 0.0, "estimate", "not used")
+        made.append(ker.KernelMatrix(rows, basis, error, counts=counts, samples=4000, reversible=True))
+    return made
+
+
+def test_delta_intervals_cover_as_often_as_they_claim(sampled):
+    covered = 0
+    for matrix in sampled:
+        found = spec.spectrum(matrix, k=2)
+        value, error = found.values[1], found.errors.quantile * sampling_errors(matrix, found.vectors, found.values)[1]
+        covered += abs(value - 0.3) <= error
+    assert binomtest(covered, RUNS, 0.95).pvalue > 1e-3, covered
+
+
+def test_bootstrap_intervals_cover_as_often_as_they_claim(sampled):
+    covered = 0
+    for seed, matrix in enumerate(sampled):
+        low, high = spec.bootstrap_intervals(matrix, 1, np.random.default_rng(seed), resamples=200)[0]
+        covered += low <= 0.3 <= high
+    # 200 resamples know their own quantiles to a percent or two only; a miss of two percent is still a good interval
+    assert binomtest(covered, RUNS, 0.93, alternative="less").pvalue > 1e-3, covered
