@@ -26,7 +26,7 @@ from .weighted_sum import Combination
 # coarsest level; every level doubles all of them.
 NODES, PANELS, KINKS, CELLS = 4, 12, 24, 64
 # Rows times cells of a level: some seconds. Rows without cells count as these many atoms.
-MOST_CORNERS, FEW_ATOMS = 2**23, 32
+MOST_CORNERS, FEW_ATOMS = 2**22, 32
 # Any angle; whether rows have densities does not depend on it.
 PROBE = 1.0
 # Corners held at a time, counting every row with as many atoms as those of walls of many pieces have.
