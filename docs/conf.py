@@ -1,6 +1,15 @@
 """How Sphinx builds these pages; it needs asperity installed and no network."""
 
+from pathlib import Path
+
 import asperity
+from asperity.ledger import entries
+from asperity.ledger_text import page_of
+
+# docs/ledger.md includes the rows
+generated = Path(__file__).parent / "generated"
+generated.mkdir(exist_ok=True)
+(generated / "ledger.md").write_text(page_of(entries()), encoding="utf-8")
 
 project = "asperity"
 author = "The asperity developers"
@@ -15,7 +24,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
 ]
-exclude_patterns = ["_build", "_templates"]
+exclude_patterns = ["_build", "_templates", "generated"]
 templates_path = ["_templates"]
 
 html_theme = "furo"

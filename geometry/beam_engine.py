@@ -21,6 +21,8 @@ import math
 import numpy as np
 from numba import njit
 
+from .double_double import add
+
 EPS = 2.0**-52
 # f is a sum of five products of numbers with one to three rounding errors each; every term is counted in `f`'s size.
 FUNCTIONAL_ULPS = 8.0
@@ -41,23 +43,32 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @_compile
-def add_to(high, low, increment, increment_low):
-    """(high + low) + (increment + increment_low), as an unevaluated sum."""
-    total = high + increment
-    part = total - high
-    error = (high - (total - part)) + (increment - part) + low + increment_low
-    result = total + error
-    return result, error - (result - total)
-
-
-@_compile
 def reduced(high, low):
     """An angle in two doubles, modulo 2 pi, in [-pi, pi] within rounding."""
     turns = np.rint(high / (2.0 * PI_HIGH))
     if turns != 0.0:
         # turns is 1 or 2 at most, so its products are exact
-        high, low = add_to(high, low, -2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW)
+        high, low = add((high, low), (-2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW))
     return high, low
+
+
+@_compile
+def offset_of(sign, turn, turn_low, middle):
+    """The offset of theta' = sign (theta + pi - turn), modulo 2 pi, for which the angle ``middle`` leaves upwards."""
+    offset = add((sign * PI_HIGH, sign * PI_LOW), (-sign * turn, -sign * turn_low))
+    turns = np.rint((sign * middle + offset[0] - 0.5 * PI_HIGH) / (2.0 * PI_HIGH))
+    return add(offset, (-2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW))[0]
+
+
+@_compile
+def wall_lines(x, y, turn_high):
+    """The lines of a hollow's walls, one a row: unit normal and distance from the origin, from the nearer end."""
+    lines = np.empty((turn_high.shape[0], 3))
+    for e in range(turn_high.shape[0]):
+        lines[e, 0], lines[e, 1] = -math.sin(turn_high[e]), math.cos(turn_high[e])
+        k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
+        lines[e, 2] = lines[e, 0] * x[k] + lines[e, 1] * y[k]
+    return lines
 
 
 @_compile
@@ -161,15 +172,16 @@ def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
     wall = FIRST_WALL - code
     sign = float(whole[slot, SIGN])
     # the image of the wall's unit normal, whose angle is turn + sign (direction + pi / 2)
-    high, low = add_to(real[slot, TURN], real[slot, TURN_LOW], sign * turn_high[wall], sign * turn_low[wall])
+    turn = sign * turn_high[wall], sign * turn_low[wall]
+    high, low = add((real[slot, TURN], real[slot, TURN_LOW]), turn)
     sine, cosine = math.sin(high), math.cos(high)
     sine, cosine = sine + low * cosine, cosine - low * sine
     dx, dy = -2.0 * distance[wall] * sign * sine, 2.0 * distance[wall] * sign * cosine
-    real[slot, T_X], real[slot, T_X_LOW] = add_to(real[slot, T_X], real[slot, T_X_LOW], dx, 0.0)
-    real[slot, T_Y], real[slot, T_Y_LOW] = add_to(real[slot, T_Y], real[slot, T_Y_LOW], dy, 0.0)
+    real[slot, T_X], real[slot, T_X_LOW] = add((real[slot, T_X], real[slot, T_X_LOW]), (dx, 0.0))
+    real[slot, T_Y], real[slot, T_Y_LOW] = add((real[slot, T_Y], real[slot, T_Y_LOW]), (dy, 0.0))
     real[slot, ERROR_X] += STEP_ULPS * EPS * abs(dx)
     real[slot, ERROR_Y] += STEP_ULPS * EPS * abs(dy)
-    high, low = add_to(high, low, sign * turn_high[wall], sign * turn_low[wall])
+    high, low = add((high, low), turn)
     real[slot, TURN], real[slot, TURN_LOW] = reduced(high, low)
     whole[slot, SIGN] = -whole[slot, SIGN]
     whole[slot, EDGE] = edge
@@ -213,24 +225,20 @@ def put(polygon, count, corners, slot):
 
 
 @_compile
-def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, tolerance, max_beams):
-    """Carry the beams of all rays through the hollow, the largest first.
+def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, tolerance, max_beams, halves):
+    """Carry the beams of all rays through the hollow, the largest first; of the rays with theta < pi/2 if halves is 1.
 
     Returns the tables, the number of slots, the rounding bound (flux) and the number of splits.
     """
     width = x[x.shape[0] - 1]
-    wall_count = turn_high.shape[0]
-    distance = np.empty(wall_count)
-    for e in range(wall_count):
-        k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
-        distance[e] = -math.sin(turn_high[e]) * x[k] + math.cos(turn_high[e]) * y[k]
+    distance = wall_lines(x, y, turn_high)[:, 2]
     room, wide = 1024, 12
     corners = np.empty((room, wide, 5))
     real = np.zeros((room, 9))
     whole = np.zeros((room, 5), np.int64)
     heap = np.empty(room, np.int64)
     used, queue = 0, 0
-    for half in range(2):
+    for half in range(halves):
         polygon = corners[half]
         for i in range(3):
             for k in range(5):
@@ -245,7 +253,7 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
         real[half, FLUX] = polygon_flux(polygon, 3)
         queue = push(heap, queue, real, half)
         used += 1
-    total = real[0, FLUX] + real[1, FLUX]
+    total = real[:halves, FLUX].sum()
     open_flux = total
     rounding = 0.0
     values = np.empty(wide)
@@ -382,12 +390,9 @@ def pieces_of(corners, real, whole, used, width):
             angle[i] = math.atan2(polygon[i, 1], polygon[i, 2])
         cuts = np.sort(angle[:count])
         sign = float(whole[slot, SIGN])
-        # theta' = sign (theta + pi - turn), reduced so that it lies in (0, pi) for the beam's middle
-        high, low = add_to(sign * PI_HIGH, sign * PI_LOW, -sign * real[slot, TURN], -sign * real[slot, TURN_LOW])
         middle = 0.5 * (cuts[0] + cuts[count - 1])
-        turns = np.rint((sign * middle + high - 0.5 * PI_HIGH) / (2.0 * PI_HIGH))
-        high, low = add_to(high, low, -2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW)
-        if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + high <= PI_HIGH:
+        offset = offset_of(sign, real[slot, TURN], real[slot, TURN_LOW], middle)
+        if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + offset <= PI_HIGH:
             # no ray can leave downwards: a sliver within rounding of a corner
             whole[slot, LEAF] = 0
         for k in range(count - 1):
@@ -406,7 +411,7 @@ def pieces_of(corners, real, whole, used, width):
             rows[size, 0], rows[size, 1] = cuts[k], cuts[k + 1]
             rows[size, 2] = (polygon[upper, 3] - polygon[lower, 3]) / width
             rows[size, 3] = (polygon[lower, 4] - polygon[upper, 4]) / width
-            rows[size, 4] = high
+            rows[size, 4] = offset
             tags[size, 0] = leaf
             tags[size, 1], tags[size, 2], tags[size, 3] = whole[slot, SIGN], whole[slot, BOUNCES], whole[slot, LEAF]
             size += 1

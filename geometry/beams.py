@@ -78,7 +78,13 @@ class Beams:
         return float(self.flux().sum())
 
 
-def beams_of(hollow_vertices: ArrayLike, *, tolerance: float = TOLERANCE, max_beams: int = MAX_BEAMS) -> Beams:
+def beams_of(
+    hollow_vertices: ArrayLike,
+    *,
+    tolerance: float = TOLERANCE,
+    max_beams: int = MAX_BEAMS,
+    mirror_symmetric: bool = False,
+) -> Beams:
     """Sort the rays into a polygonal hollow into beams that are reflected alike.
 
     The hollow is cut into triangles and carried along by unfolding; a beam is a convex polygon in the projective plane
@@ -92,6 +98,8 @@ def beams_of(hollow_vertices: ArrayLike, *, tolerance: float = TOLERANCE, max_be
         Stop when the unresolved share of the flux is no more than this.
     max_beams : int
         Stop when there are so many beams; cavities with narrow necks never resolve completely.
+    mirror_symmetric : bool
+        The hollow is its own mirror image: carry half of the rays, those with theta < pi/2, and mirror the result.
 
     Returns
     -------
@@ -124,8 +132,13 @@ def beams_of(hollow_vertices: ArrayLike, *, tolerance: float = TOLERANCE, max_be
     whole_number("max_beams", max_beams, 2)
     triangulation = triangulated(hollow_vertices)
     width = triangulation.width
-    corners, real, whole, used, rounding, _, status = split_beams(*triangulation.tables, tolerance, max_beams)
+    halves = 1 if mirror_symmetric else 2
+    corners, real, whole, used, rounding, _, status = split_beams(
+        *triangulation.tables, tolerance, max_beams * halves // 2, halves
+    )
     rows, tags = pieces_of(corners, real, whole, used, width)
+    if mirror_symmetric:
+        rows, tags, rounding = *_with_mirror_images(rows, tags), 2.0 * rounding
     out = tags[:, 3] == 1
     kept, rest = rows[out], rows[~out]
     unresolved = float(_flux(*rest[:, :4].T).sum())
@@ -153,6 +166,15 @@ def _flux(low: Floats, high: Floats, sine: Floats, cosine: Floats) -> Floats:
     """Half the integral of sine sin(theta) + cosine cos(theta), as products that do not cancel on short intervals."""
     middle, half = 0.5 * (low + high), np.sin(0.5 * (high - low))
     return np.asarray(half * (sine * np.sin(middle) + cosine * np.cos(middle)))
+
+
+def _with_mirror_images(rows: Floats, tags: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+    """The rows and tags of `pieces_of` with those of the mirror image: both angles replaced by pi minus them."""
+    low, high, sine, cosine, offset = rows.T
+    offset = np.where(tags[:, 1] > 0, -offset, 2.0 * np.pi - offset)
+    images, named = np.column_stack([np.pi - high, np.pi - low, sine, -cosine, offset]), tags.copy()
+    named[:, 0] += tags[tags[:, 3] == 1, 0].max(initial=-1) + 1
+    return np.concatenate([rows, images]), np.concatenate([tags, named])
 
 
 def _fixed(array: NDArray[Any]) -> NDArray[Any]:

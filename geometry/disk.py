@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, angles, finite_array, frozen, positive_number
 from ..errors import InputError
+from .kinetics import direction, foreshortening, frame_rows
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Disk:
     @property
     def foreshortening(self) -> float:
         """kappa = (1 + m/J)^(-1/2) < 1: how much the disk's rotation compresses a wall along x."""
-        return 1.0 / math.sqrt(1.0 + self.mass / self.inertia)
+        return float(foreshortening(self.mass, self.inertia))
 
     @property
     def frame(self) -> Floats:
@@ -61,10 +62,7 @@ class Disk:
 
         chi_perp = (1/m + 1/J)^(-1/2) (1/m, 0, 1/J), e2^ = m^(-1/2) (0, 1, 0), chi = (m + J)^(-1/2) (-1, 0, 1).
         """
-        m, J = self.mass, self.inertia
-        across = 1.0 / math.sqrt(1.0 / m + 1.0 / J)
-        along = 1.0 / math.sqrt(m + J)
-        return frozen([[across / m, 0.0, across / J], [0.0, 1.0 / math.sqrt(m), 0.0], [-along, 0.0, along]])
+        return frozen(frame_rows(self.mass, self.inertia))
 
     def inner(self, w: ArrayLike, w2: ArrayLike) -> Floats:
         """Return the kinetic-energy inner products of velocities of shape (..., 3), broadcast."""
@@ -148,8 +146,7 @@ class Disk:
             if isinstance(reason, InputError):
                 raise
             raise InputError(f"theta, psi, speed: expected shapes that broadcast ({reason})") from reason
-        planar = norms * np.sin(psi)
-        parts = np.stack([planar * np.cos(theta), planar * np.sin(theta), norms * np.cos(psi)], axis=-1)
+        parts = norms[..., np.newaxis] * np.stack(direction(theta, psi), axis=-1)
         # not a matrix product: each component keeps its own relative accuracy
         return np.asarray(np.sum(parts[..., :, np.newaxis] * self.frame, axis=-2))
 

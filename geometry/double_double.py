@@ -1,6 +1,6 @@
 """Compiled double-double arithmetic: a number is an unevaluated sum (high, low) of two doubles, about 31 digits.
 
-Only `refined_engine` imports this file, because it loads numba. The error-free transforms are those of Dekker (1971)
+Only compiled loops import this file, because it loads numba. The error-free transforms are those of Dekker (1971)
 and Knuth; sums and products follow Joldes, Muller & Popescu (2017), whose bounds on the relative error are 3 u^2 for
 the sum, 7 u^2 for the product and 15 u^2 for the quotient, u = 2^-53. No operation may be reassociated: never compile
 this with ``fastmath``.

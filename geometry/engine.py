@@ -7,10 +7,7 @@ The formulas are stable by themselves; there is no epsilon that decides which pi
 
 * The side of a ray on which a joint V lies is the sign of c = (V - p) x v. A segment is hit from its free side exactly
   if c goes from >= 0 at its start to <= 0 at its end. Neighbours share the number c, so that no ray slips between them.
-* A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0 with r measured from its first joint and n0 the unit normal
-  there, towards the free side; kappa > 0 is focusing. Its one front root is (B + sqrt(D)) / (kappa |v|^2), and
-  2 B / (kappa |v|^2) where the ray starts on the arc itself. An elliptic arc is the same in stretched coordinates.
-* A Bezier piece is hit where g(s) = (b(s) - p) x v falls through zero; the root at the ray's own start is divided out.
+* Arcs and Bezier pieces: see `arc_engine` and `bezier_engine`.
 * The hit point is put back on its piece, and the velocity is renormalised, once a bounce.
 """
 
@@ -21,18 +18,14 @@ import math
 import numpy as np
 from numba import njit
 
+from .arc_engine import arc_incidence, arc_reflect, arc_time, on_arc
+from .bezier_engine import bend_number, bezier_hit, bezier_value
+from .resolution import EPS, JOINT_ULPS
 from .skips import skip_crossings, skip_hops
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
 NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
-EPS = 2.0**-52
-# A joint that a ray meets, or a hit that a joint meets, within this share of the hollow's size is not resolved in
-# double precision: positions carry a few rounding errors of one ulp of the size each.
-JOINT_ULPS = 16.0
-# D = B^2 + 2 kappa |v|^2 F carries about eight rounding errors of B^2; below them hit and miss are not told apart.
-TANGENT_ULPS = 16.0
-ROOT_STEPS = 80
 # Flights followed one by one before a ray is given up: 20 to 100 ms. Hits in a run cost one flight together.
 MOST_STEPS = 1_000_000
 # An odd number without pattern, so that itineraries of the same pieces in another order differ.
@@ -40,195 +33,9 @@ HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 # Far beyond the numbers of the pieces.
 BEND_SHIFT = 40
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
-
-
-@_compile
-def arc_time(arc, own, px, py, vx, vy, stretch):
-    """Flight time to the front of one arc, or inf; second value: 1 where the ray is tangent within rounding."""
-    rx, ry = px - arc[0], stretch * (py - arc[1])
-    wy = stretch * vy
-    curvature = arc[4]
-    b = arc[2] * vx + arc[3] * wy - curvature * (rx * vx + ry * wy)
-    speed2 = vx * vx + wy * wy
-    if own:
-        if curvature <= 0.0 or b <= 0.0:
-            return np.inf, 0
-        return 2.0 * b / (curvature * speed2), 0
-    f = arc[2] * rx + arc[3] * ry - 0.5 * curvature * (rx * rx + ry * ry)
-    d = b * b + 2.0 * curvature * speed2 * f
-    tangent = 0
-    if curvature < 0.0 and b < 0.0 and abs(d) <= TANGENT_ULPS * EPS * b * b:
-        tangent = 1
-        d = 0.0
-    if d < 0.0:
-        return np.inf, 0
-    root = math.sqrt(d)
-    if b >= 0.0:
-        if curvature <= 0.0:
-            return np.inf, 0
-        return (b + root) / (curvature * speed2), tangent
-    return 2.0 * f / (root - b), tangent
-
-
-@_compile
-def on_arc(arc, qx, qy, slack):
-    """Whether the point q on the full circle, measured from the first joint, belongs to the arc."""
-    if arc[7] > 0.0:
-        # up to a half angle of pi/4 the position along the chord decides, on the arc's own side of the circle
-        along = qx * arc[5] + qy * arc[6]
-        nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
-        facing = ny * arc[5] - nx * arc[6]
-        return -slack <= along <= arc[7] + slack and facing > 0.0
-    # beyond it the side of the chord decides; the arc bulges away from its free side exactly if it is focusing
-    height = qy * arc[5] - qx * arc[6]
-    return height <= slack if arc[4] > 0.0 else height >= -slack
-
-
-@_compile
-def arc_reflect(arc, t, px, py, vx, vy, stretch):
-    """Position on the arc after the time t and the velocity reflected there."""
-    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
-    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
-    f = arc[2] * qx + arc[3] * qy - 0.5 * arc[4] * (qx * qx + qy * qy)
-    # one Newton step on F puts the point back on the arc
-    qx -= f * nx
-    qy -= f * ny
-    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
-    scale = 1.0 / math.sqrt(nx * nx + ny * ny)
-    nx *= scale
-    ny *= scale
-    px, py = arc[0] + qx, arc[1] + qy / stretch
-    w = 2.0 * (vx * nx + vy * ny)
-    return px, py, vx - w * nx, vy - w * ny
-
-
-@_compile
-def arc_incidence(arc, t, px, py, vx, vy, stretch):
-    """Sine of the angle between the velocity and the arc that it meets after the time t."""
-    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
-    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
-    return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)
-
-
-@_compile
-def bezier_value(a0, a1, a2, a3, s):
-    return ((a3 * s + a2) * s + a1) * s + a0
-
-
-@_compile
-def falling_root(a0, a1, a2, a3, low, high):
-    """The root of the cubic in [low, high], where it falls monotonically from >= 0 to <= 0; safeguarded Newton."""
-    s = 0.5 * (low + high)
-    for _ in range(ROOT_STEPS):
-        value = bezier_value(a0, a1, a2, a3, s)
-        if value > 0.0:
-            low = s
-        elif value < 0.0:
-            high = s
-        else:
-            return s
-        slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
-        step = s - value / slope if slope != 0.0 else 0.5 * (low + high)
-        if not low < step < high:
-            step = 0.5 * (low + high)
-        if abs(step - s) <= EPS * abs(step) or step == low or step == high:
-            return step
-        s = step
-    return s
-
-
-@_compile
-def bezier_hit(curve, own_s, px, py, vx, vy, slack):
-    """First front hit of one Bezier piece: flight time (inf if none) and parameter; ``own_s`` < 0: not on it."""
-    share_slack = JOINT_ULPS * EPS
-    # b(s) - p in the power basis; columns 0-7 hold x and y coefficients of 1, s, s^2, s^3
-    a0 = (curve[0] - px) * vy - (curve[1] - py) * vx
-    a1 = curve[2] * vy - curve[3] * vx
-    a2 = curve[4] * vy - curve[5] * vx
-    a3 = curve[6] * vy - curve[7] * vx
-    if own_s >= 0.0:
-        # divide out the ray's own start: g(s) = (s - own) (b2 sigma^2 + b1 sigma + b0), sigma = s - own
-        b0 = (3.0 * a3 * own_s + 2.0 * a2) * own_s + a1
-        b1 = 3.0 * a3 * own_s + a2
-        b2 = a3
-        best_t, best_s = np.inf, 0.0
-        disc = b1 * b1 - 4.0 * b2 * b0
-        if disc < 0.0:
-            return best_t, best_s
-        q = -0.5 * (b1 + math.copysign(math.sqrt(disc), b1))
-        for root in range(2):
-            bottom, top = (b2, q) if root == 0 else (q, b0)
-            if bottom == 0.0:
-                continue
-            s = own_s + top / bottom
-            if -share_slack <= s <= 1.0 + share_slack:
-                s = min(max(s, 0.0), 1.0)
-                slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
-                dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
-                dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
-                t = dx * vx + dy * vy
-                if slope <= 0.0 and 0.0 < t < best_t:
-                    best_t, best_s = t, s
-        return best_t, best_s
-    n = curve.shape[0]
-    # split [0, 1] at the critical points of g; it can fall through zero once on each part
-    c1, c2 = 2.0, 2.0
-    disc = a2 * a2 - 3.0 * a3 * a1
-    if disc > 0.0:
-        q = -(a2 + math.copysign(math.sqrt(disc), a2))
-        if a3 != 0.0:
-            c1 = q / (3.0 * a3)
-        if q != 0.0:
-            c2 = a1 / q
-        if c1 > c2:
-            c1, c2 = c2, c1
-    best_t, best_s = np.inf, 0.0
-    low = 0.0
-    value_low = a0
-    for part in range(3):
-        high = 1.0 if part == 2 else (c1 if part == 0 else c2)
-        if high <= low or high > 1.0:
-            if part < 2:
-                continue
-            high = 1.0
-        if high == 1.0:
-            # the joint itself, so that the next piece sees the same number
-            value_high = (curve[n - 4] - px) * vy - (curve[n - 3] - py) * vx
-        else:
-            value_high = bezier_value(a0, a1, a2, a3, high)
-        if value_low >= 0.0 >= value_high and value_low > value_high:
-            s = falling_root(a0, a1, a2, a3, low, high)
-            dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
-            dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
-            t = dx * vx + dy * vy
-            if -slack <= t < best_t:
-                best_t, best_s = max(t, 0.0), s
-        low, value_low = high, value_high
-    return best_t, best_s
-
-
-@_compile
-def bend_number(curve, s):
-    """Which part between its inflections the point s of a Bezier piece belongs to: 0, 1 or 2.
-
-    A ray that just misses a bump may hit the same piece behind it, and leaves elsewhere; only a part that bends to one
-    side has one front hit that moves continuously with the ray.
-    """
-    # the curvature has the sign of b' x b'', which is a quadratic in s for a cubic b
-    c0 = 2.0 * (curve[2] * curve[5] - curve[3] * curve[4])
-    c1 = 6.0 * (curve[2] * curve[7] - curve[3] * curve[6])
-    c2 = 6.0 * (curve[4] * curve[7] - curve[5] * curve[6])
-    disc = c1 * c1 - 4.0 * c2 * c0
-    if disc <= 0.0:
-        return 0
-    q = -0.5 * (c1 + math.copysign(math.sqrt(disc), c1))
-    number = 0
-    if q != 0.0 and 0.0 < c0 / q < s:
-        number += 1
-    if c2 != 0.0 and 0.0 < q / c2 < s:
-        number += 1
-    return number
+# The loop over rays takes in the loop over flights: passing some ten tables from one to the other would cost as much as
+# a bounce or two. Other callers go through a function of their own that calls `trace_ray` at one place.
+_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 @_compile
@@ -252,6 +59,17 @@ def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
     hx = joints[near, 0] + share * lines[j, 0]
     hy = joints[near, 1] + share * lines[j, 1]
     return (hx - px) * vx + (hy - py) * vy, share
+
+
+@_compile
+def near_end(piece, px, py, slack):
+    """Whether a hit is within rounding of a joint that is a corner; both tables keep the ends in their last columns."""
+    n = piece.shape[0]
+    x, y = px - piece[n - 6], py - piece[n - 5]
+    if piece[n - 2] > 0.0 and x * x + y * y <= slack * slack:
+        return True
+    x, y = px - piece[n - 4], py - piece[n - 3]
+    return piece[n - 1] > 0.0 and x * x + y * y <= slack * slack
 
 
 @_compile
@@ -360,9 +178,9 @@ def trace_ray(
         if beziers is not None:
             for k in range(bezier_low, bezier_high):
                 start_s = own_s if own_kind == BEZIER and own_index == k else -1.0
-                t, s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
+                t, s, touch = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
                 if t < time:
-                    time, kind, index, hit_s, tangent = t, BEZIER, k, s, 0
+                    time, kind, index, hit_s, tangent = t, BEZIER, k, s, touch
 
         # segments, by the signs of the joints: of all of them, or of those in the cells that the ray passes
         walking = False
@@ -502,15 +320,6 @@ def trace_ray(
         bounces += 1
         if path is not None:
             path[bounces, 0], path[bounces, 1] = px + shift, py
-
-
-@_compile
-def near_end(piece, px, py, slack):
-    """Whether a hit is within rounding of a joint that is a corner; both tables keep the ends in their last columns."""
-    n = piece.shape[0]
-    if piece[n - 2] > 0.0 and math.hypot(px - piece[n - 6], py - piece[n - 5]) <= slack:
-        return True
-    return piece[n - 1] > 0.0 and math.hypot(px - piece[n - 4], py - piece[n - 3]) <= slack
 
 
 @_compile

@@ -46,14 +46,14 @@ def grid_of(starts: Floats, ends: Floats, first: int, base: int) -> tuple[list[f
         side = sqrt(spread[0] * spread[1] / cells)
         columns, rows = max(1, ceil(spread[0] / side)), max(1, ceil(spread[1] / side))
         size = spread / np.array([columns, rows])
-        counts = np.zeros(columns * rows + 1, dtype=np.int64)
-        count_entries(starts, ends, low, size, columns, rows, counts)
+        counts, nothing = np.zeros(columns * rows + 1, dtype=np.int64), np.empty(0, dtype=np.int64)
+        list_entries(starts, ends, low, size, columns, rows, first, counts, nothing)
         if counts.sum() <= MOST_ENTRIES * len(starts) or cells <= 16.0:
             break
         cells *= 0.25
     offsets = np.cumsum(np.concatenate([[0], counts[:-1]]))
     entries = np.zeros(int(offsets[-1]), dtype=np.int64)
-    fill_entries(starts, ends, low, size, columns, rows, first, offsets[:-1].copy(), entries)
+    list_entries(starts, ends, low, size, columns, rows, first, offsets[:-1].copy(), entries)
     frame = [float(low[0]), float(low[1]), float(size[0]), float(size[1]), float(columns), float(rows), float(base)]
     return frame, np.concatenate([offsets + (base + len(offsets)), entries])
 
@@ -76,8 +76,11 @@ def cells_about(low, high, count):
 
 
 @njit(cache=True, nogil=True)
-def count_entries(starts, ends, low, size, columns, rows, counts):
-    """Count the lines in every cell."""
+def list_entries(starts, ends, low, size, columns, rows, first, places, entries):
+    """List the lines of every cell in ``entries``, from the cell's place on; move the place behind them.
+
+    With no entries the lines are only counted: places that begin at 0 become their numbers.
+    """
     for k in range(starts.shape[0]):
         ax, ay = (starts[k, 0] - low[0]) / size[0], (starts[k, 1] - low[1]) / size[1]
         bx, by = (ends[k, 0] - low[0]) / size[0], (ends[k, 1] - low[1]) / size[1]
@@ -86,19 +89,7 @@ def count_entries(starts, ends, low, size, columns, rows, counts):
         for row in range(bottom, top + 1):
             for column in range(left, right + 1):
                 if touches(ax, ay, bx, by, column, row):
-                    counts[row * columns + column] += 1
-
-
-@njit(cache=True, nogil=True)
-def fill_entries(starts, ends, low, size, columns, rows, first, places, entries):
-    """List the lines of every cell, from ``places`` on, which are moved."""
-    for k in range(starts.shape[0]):
-        ax, ay = (starts[k, 0] - low[0]) / size[0], (starts[k, 1] - low[1]) / size[1]
-        bx, by = (ends[k, 0] - low[0]) / size[0], (ends[k, 1] - low[1]) / size[1]
-        left, right = cells_about(min(ax, bx), max(ax, bx), columns)
-        bottom, top = cells_about(min(ay, by), max(ay, by), rows)
-        for row in range(bottom, top + 1):
-            for column in range(left, right + 1):
-                if touches(ax, ay, bx, by, column, row):
-                    entries[places[row * columns + column]] = first + k
-                    places[row * columns + column] += 1
+                    cell = row * columns + column
+                    if entries.size:
+                        entries[places[cell]] = first + k
+                    places[cell] += 1

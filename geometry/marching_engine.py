@@ -13,7 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
-from .beam_engine import FIRST_WALL, OPENING, PI_HIGH, PI_LOW, add_to, longer, reduced, taller
+from .beam_engine import FIRST_WALL, OPENING, longer, offset_of, reduced, taller, wall_lines
+from .double_double import add
 
 # Triangles that a ray may pass for every bounce that it is allowed.
 STEPS_A_BOUNCE = 64
@@ -25,12 +26,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_intervals, max_bounces):
     """Exact rows at many angles; returns first row of each angle, then per interval: end, offset, and sign, bounces."""
     width = x[x.shape[0] - 1]
-    wall_count = turn_high.shape[0]
-    walls = np.empty((wall_count, 3))
-    for e in range(wall_count):
-        walls[e, 0], walls[e, 1] = -math.sin(turn_high[e]), math.cos(turn_high[e])
-        k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
-        walls[e, 2] = walls[e, 0] * x[k] + walls[e, 1] * y[k]
+    walls = wall_lines(x, y, turn_high)
     first = np.zeros(theta.shape[0] + 1, np.int64)
     room = 64 + 8 * theta.shape[0]
     ends, offsets = np.empty(room), np.empty(room)
@@ -65,8 +61,8 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
                 else:
                     wall = FIRST_WALL - code
                     across = 2.0 * (m_x * walls[wall, 0] + m_y * walls[wall, 1])
-                    shift, shift_low = add_to(shift, shift_low, across * walls[wall, 2], 0.0)
-                    turn, rest = add_to(turn, rest, 2.0 * sign * turn_high[wall], 2.0 * sign * turn_low[wall])
+                    shift, shift_low = add((shift, shift_low), (across * walls[wall, 2], 0.0))
+                    turn, rest = add((turn, rest), (2.0 * sign * turn_high[wall], 2.0 * sign * turn_low[wall]))
                     turn, rest = reduced(turn, rest)
                     sign = -sign
                     bounces += 1
@@ -82,11 +78,7 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
             if used == room:
                 ends, offsets, tags = longer(ends), longer(offsets), taller(tags)
                 room *= 2
-            offset = 0.0
-            if out:
-                offset, rest = add_to(sign * PI_HIGH, sign * PI_LOW, -sign * turn, -sign * rest)
-                turns = np.rint((sign * theta[row] + offset - 0.5 * PI_HIGH) / (2.0 * PI_HIGH))
-                offset, rest = add_to(offset, rest, -2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW)
+            offset = offset_of(float(sign), turn, rest, theta[row]) if out else 0.0
             ends[used] = high / stop
             offsets[used] = offset
             tags[used, 0], tags[used, 1] = sign if out else 0, bounces

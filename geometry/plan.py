@@ -5,18 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..checks import Floats
+from .hollow_shape import distinct_hollows
 
 if TYPE_CHECKING:
     from .wall import Wall
-
-# Hollows are equal but for their place if their points agree to this share of the period: places are rounded once
-# each, and named walls compute them by some ten operations.
-PLACE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
-# Ends and three inner points tell pieces of one kind apart: circles need three points, ellipses and cubics five.
-SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 @dataclass(frozen=True)
@@ -41,8 +33,8 @@ class TracePlan:
     hollows_with_grid : int
         Hollows of so many lines that rays walk through the cells of a grid; in the others every piece is tested.
     distinct_hollows : int
-        Hollows that remain when those equal to another but for their place, to 64 rounding errors of the period, are
-        left out. The law of the wall is a mixture of theirs.
+        Hollows that remain when those equal to another but for their place and size, to 64 rounding errors, are left
+        out. The law of the wall is a mixture of theirs.
     mirror_symmetric : bool
         Whether the wall has a mirror axis: half of the angles then give the other half.
     wraps : bool
@@ -56,7 +48,7 @@ class TracePlan:
     (1, 0.5, 1, True)
     >>> plan = geo.mushrooms(0.3, 0.5, 2).plan()
     >>> plan.hollows, plan.distinct_hollows, plan.arcs_with_runs
-    (5, 2, 5)
+    (5, 1, 5)
     """
 
     primitives: tuple[str, ...]
@@ -92,18 +84,6 @@ def plan_of(wall: Wall) -> TracePlan:
         channels=parallel,
         wedges=0 if scene.pairs is None else len(scene.pairs) // 2 - parallel,
         hollows_with_grid=int((scene.hollows[:, 17] > 0.0).sum()),
-        distinct_hollows=_distinct(wall) if wall.closes else 1,
+        distinct_hollows=len(distinct_hollows(wall)) if wall.closes else 1,
         mirror_symmetric=wall.is_mirror_symmetric,
     )
-
-
-def _distinct(wall: Wall) -> int:
-    """Count the hollows that differ in more than their place."""
-    kinds: dict[tuple[str, ...], list[Floats]] = {}
-    for hollow in wall.hollows:
-        pieces = wall.pieces[hollow.first : hollow.last]
-        points = np.concatenate([piece.point(SAMPLES) for piece in pieces]) - np.array([hollow.left, 0.0])
-        shapes = kinds.setdefault(tuple(type(piece).__name__ for piece in pieces), [])
-        if not any(np.abs(points - shape).max() <= PLACE_TOLERANCE * wall.period for shape in shapes):
-            shapes.append(points)
-    return sum(map(len, kinds.values()))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import TYPE_CHECKING
@@ -13,14 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, finite_array, finite_number, number_between, whole_number
 from ..errors import InputError
+from .blocks import in_blocks
 
 if TYPE_CHECKING:
     from .wall import Wall
 
 # No limit in effect: rays are given up after 10^6 flights computed one by one (engine.MOST_STEPS), however many hits.
 MAX_COLLISIONS = 2**62
-# Rays in one block: large enough to hide the cost of handing a block to a thread, small enough to share evenly.
-BLOCK = 8192
 
 
 class Status(IntEnum):
@@ -85,8 +82,13 @@ class Trace:
         >>> geo.trace(geo.flat(), [0.2, 0.7], 1.0).counts()
         {'escaped': 2, 'corner': 0, 'grazing': 0, 'bounce_limit': 0}
         """
-        numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
-        return {status.name.lower(): int(numbers[status]) for status in Status}
+        return counts_by_name(self.status)
+
+
+def counts_by_name(status: NDArray[np.uint8]) -> dict[str, int]:
+    """Number of entries for every `Status`, by its name in lower case."""
+    numbers = np.bincount(np.ravel(status), minlength=len(Status))
+    return {outcome.name.lower(): int(numbers[outcome]) for outcome in Status}
 
 
 def trace(
@@ -147,7 +149,6 @@ def trace(
     _check_wall(wall)
     x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
-    workers = os.cpu_count() or 1 if threads is None else whole_number("threads", threads, 1)
     starts, incoming = np.ascontiguousarray(x_all).ravel(), np.ascontiguousarray(theta_all).ravel()
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
@@ -157,20 +158,13 @@ def trace(
     )  # fmt: skip
     period = scene.cell if scene.is_open else None
 
-    def run(first: int) -> None:
-        block = slice(first, first + BLOCK)
+    def run(block: slice) -> None:
         trace_rays(
             starts[block], incoming[block], *tables, period, scene.cell, max_collisions,
             out_x[block], out_theta[block], collisions[block], status[block],
         )  # fmt: skip
 
-    blocks = range(0, len(starts), BLOCK)
-    if workers == 1 or len(blocks) <= 1:
-        for first in blocks:
-            run(first)
-    else:
-        with ThreadPoolExecutor(min(workers, len(blocks))) as pool:
-            list(pool.map(run, blocks))
+    in_blocks(run, len(starts), threads)
     if np.any((status == Status.CORNER) | (status == Status.GRAZING)):
         from .refinement import retrace
 

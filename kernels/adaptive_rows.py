@@ -4,26 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, finite_number
 from ..errors import InputError
+from .hollow_rows import HollowRows
 from .law import AngleFunction
 
 if TYPE_CHECKING:
     from ..geometry import Wall
 
-# Collisions after which a ray counts as lost.
-MOST_COLLISIONS = 100_000
-# Pieces of a row that its neighbour starts from.
-MOST_SEEDS = 128
 # Pieces of a wall up to which a row takes no more than some milliseconds.
 MOST_PIECES = 64
-# Hollows are translates of each other if their tables agree to this share of their size.
-SAME_SHAPE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -123,103 +118,68 @@ class WallRows:
         self.degree = degree
         # the first of the Gauss rules on a piece that may be used
         self.least_level = least_level
-        self.edges = np.ascontiguousarray(edges, dtype=np.float64)
+        # a writable copy: for read-only arrays all would be compiled again
+        self.edges = np.array(edges, dtype=np.float64)
+        # angles of earlier calls whose rows are now known to have overlooked a piece; the owner may clear it
+        self.stale: set[float] = set()
 
     @cached_property
-    def _hollows(self) -> list[tuple[int, float]]:
-        """One hollow of each shape, and the share of the period that all of this shape take."""
-        scene = self.wall.scene
-        tables = (scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers)
-        shapes: list[tuple[list[Floats], int, float]] = []
-        for k, hollow in enumerate(scene.hollows):
-            share = float(hollow[1] - hollow[0]) / self.wall.period
-            shape = _shape(hollow, tables)
-            for n, (other, first, total) in enumerate(shapes):
-                if _alike(shape, other, float(hollow[2])):
-                    shapes[n] = (other, first, total + share)
-                    break
-            else:
-                shapes.append((shape, k, share))
-        return [(first, share) for _, first, share in shapes]
+    def _hollows(self) -> list[HollowRows]:
+        """The rows of one hollow of each shape."""
+        return [HollowRows(self.wall.scene, k, self.degree, self.edges, self.least_level) for k, _ in self._shapes]
+
+    @property
+    def _shares(self) -> list[float]:
+        return [share for _, share in self._shapes]
+
+    @cached_property
+    def _shapes(self) -> list[tuple[int, float]]:
+        """The number of one hollow of each shape, and the share of the period that all of this shape take."""
+        from ..geometry.hollow_shape import distinct_hollows
+
+        wall = self.wall
+        if not wall.closes:
+            return [(0, 1.0)]
+        shapes = [hollows for _, hollows in distinct_hollows(wall)]
+        return [
+            (wall.hollows.index(hollows[0]), sum(hollow.width for hollow in hollows) / wall.period)
+            for hollows in shapes
+        ]
 
     def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveRows:
         """Rows at checked angles."""
-        order = np.argsort(theta, kind="stable")
-        rows = len(theta)
-        incoming = np.ascontiguousarray(theta[order])
-        tolerances = np.ascontiguousarray(np.broadcast_to(tolerance, theta.shape)[order], dtype=np.float64)
-        owner, nodes, weights = [], [], []
-        error, lost, rays = np.zeros(rows), np.zeros(rows), 0
-        level = 1.0 - sum(share for _, share in self._hollows)
-        if level > 8.0 * np.finfo(np.float64).eps:
-            owner.append(np.arange(rows))
-            nodes.append(np.pi - incoming)
-            weights.append(np.full(rows, level))
-        for hollow, share in self._hollows:
-            found = self._march(incoming, hollow, tolerances)
-            owner.append(np.repeat(np.arange(rows), np.diff(found[2])))
-            nodes.append(found[0])
-            width = float(self.wall.scene.hollows[hollow, 1] - self.wall.scene.hollows[hollow, 0])
-            weights.append(share / width * found[1])
-            error += share / width * found[3]
-            lost += share / width * found[4]
-            rays += int(found[5].sum())
-        rank = order[np.concatenate(owner)]
-        sorting = np.argsort(rank, kind="stable")
-        starts = np.concatenate(([0], np.cumsum(np.bincount(rank, minlength=rows))))
-        back = np.empty(rows, dtype=np.int64)
-        back[order] = np.arange(rows)
+        incoming, place = np.unique(theta, return_inverse=True)
+        tolerances = np.full(len(incoming), np.inf)
+        np.minimum.at(tolerances, place, np.broadcast_to(tolerance, theta.shape))
+        before = sum(rows.rays for rows in self._hollows)
+        flat = 1.0 - sum(self._shares)
+        nodes: list[list[Floats]] = [[] for _ in incoming]
+        weights: list[list[Floats]] = [[] for _ in incoming]
+        error, lost = np.zeros(len(incoming)), np.zeros(len(incoming))
+        for rows, share in zip(self._hollows, self._shares, strict=True):
+            found, stale = rows.march(incoming, tolerances)
+            self.stale |= stale
+            scale = share / rows.width
+            for k, row in enumerate(found[angle] for angle in incoming.tolist()):
+                nodes[k].append(row.nodes)
+                weights[k].append(scale * row.widths)
+                error[k] += scale * row.error
+                lost[k] += scale * row.lost
+        if flat > 8.0 * np.finfo(np.float64).eps:
+            for k, angle in enumerate(incoming.tolist()):
+                nodes[k].append(np.array([np.pi - angle]))
+                weights[k].append(np.array([flat]))
         return AdaptiveRows(
             theta,
-            np.concatenate(nodes)[sorting],
-            np.concatenate(weights)[sorting],
-            starts,
-            error[back],
-            lost[back],
-            rays,
+            np.concatenate([part for k in place.tolist() for part in nodes[k]]),
+            np.concatenate([part for k in place.tolist() for part in weights[k]]),
+            np.cumsum([0, *(sum(map(len, nodes[k])) for k in place.tolist())]),
+            error[place],
+            lost[place],
+            sum(rows.rays for rows in self._hollows) - before,
         )
 
-    def _march(self, theta: Floats, hollow: int, tolerances: Floats) -> tuple[Any, ...]:
-        from ..geometry.itineraries import gauss_tables, march_rows
-
-        scene = self.wall.scene
-        # empty tables instead of absent ones, so that one compiled version serves all walls: compiling takes 20 s
-        tables = (
-            scene.joints,
-            np.zeros((len(scene.joints), 5)) if scene.lines is None else scene.lines,
-            *(
-                np.zeros((0, columns)) if table is None else table
-                for columns, table in ((19, scene.circles), (19, scene.ellipses), (14, scene.beziers))
-            ),
-        )
-        found: tuple[Any, ...] = march_rows(
-            theta, scene.hollows[hollow], tables, scene.cell if scene.is_open else None, MOST_COLLISIONS, self.edges,
-            self.degree, self.least_level, tolerances, gauss_tables(), MOST_SEEDS,
-        )  # fmt: skip
-        return found
-
-
-def _shape(hollow: Floats, tables: tuple[Floats | None, ...]) -> list[Floats]:
-    """The tables of one hollow, measured from its left end."""
-    joints, lines, circles, ellipses, beziers = tables
-    left = float(hollow[0])
-    parts = [hollow[[1, 2, 11, 12]] - [left, 0.0, 0.0, 0.0]]
-    low, high = int(hollow[3]), int(hollow[4])
-    assert joints is not None
-    parts.append(joints[low:high] - [left, 0.0, 0.0, 0.0])
-    if lines is not None:
-        parts.append(lines[low:high])
-    for column, table in ((5, circles), (7, ellipses), (9, beziers)):
-        if table is not None:
-            moved = table[int(hollow[column]) : int(hollow[column + 1])].copy()
-            moved[:, 0] -= left
-            moved[:, [-6, -4]] -= left
-            parts.append(moved)
-    return [np.asarray(part) for part in parts]
-
-
-def _alike(first: list[Floats], second: list[Floats], size: float) -> bool:
-    return all(
-        one.shape == other.shape and np.allclose(one, other, rtol=SAME_SHAPE, atol=SAME_SHAPE * size)
-        for one, other in zip(first, second, strict=True)
-    )
+    def critical_angles(self, low: float, high: float) -> Floats:
+        """Angles in (low, high), increasing, where pieces of rows are born or vanish: the most important ones known."""
+        found = [cut for rows in self._hollows for cut in rows.critical_angles(low, high)]
+        return np.unique([angle for angle, _ in found])

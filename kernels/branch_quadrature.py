@@ -48,7 +48,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_KINKS
     kinks, omitted = law.kinks(limit)
-    most = MOST_CHAINED_KINKS if _has_chain(law) else KINK_WORK // law.fan_out**2
+    most = MOST_CHAINED_KINKS if has_chain(law) else KINK_WORK // law.fan_out**2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 2 * limit <= most:
@@ -70,10 +70,10 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     return total, omitted * worst
 
 
-def _has_chain(law: object) -> bool:
+def has_chain(law: object) -> bool:
     if isinstance(law, Combination):
-        return any(_has_chain(term) for _, term in law.terms)
-    return isinstance(law, (Composition, Power)) or (isinstance(law, SpecularFrame) and _has_chain(law.law))
+        return any(has_chain(term) for _, term in law.terms)
+    return isinstance(law, (Composition, Power)) or (isinstance(law, SpecularFrame) and has_chain(law.law))
 
 
 def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -114,11 +115,45 @@ class CircularArcLaw(DrivenLaw):
         summed = np.add.reduceat(piece, starts, axis=0)
         return np.asarray(summed / total.reshape((-1,) + (1,) * (summed.ndim - 1)))
 
+    def row_masses(self, theta: Floats, edges: Floats) -> Floats:
+        """P(theta, (edges[j], edges[j + 1])) for increasing edges, shape (rays, cells): sums of integrals of a sine."""
+        ray, side, lower, upper, hits, rest, alone = self._row_pieces(theta)
+        lower = np.where(rest, lower, np.minimum(lower, upper))
+        found = np.zeros((theta.size, edges.size - 1))
+        step = max(1, 2**6 * CHUNK // edges.size)
+        for start in range(0, ray.size, step):
+            part = slice(start, start + step)
+            base = np.where(side[part] == 1, np.pi - theta[ray[part]], theta[ray[part]])
+            mirrored = np.where(side[part, None] == 1, np.pi - edges, edges)
+            # theta' falls with delta, so the part of the piece below an edge has delta above this
+            chord = (np.pi + base[:, None] - mirrored) / (2.0 * hits[part, None])
+            chord = np.where(rest[part, None], np.where(mirrored > np.pi - self.half_angle, -1.0, 4.0), chord)
+            high = np.maximum(upper[part], lower[part])[:, None]
+            below = SINE.mass(np.clip(chord, lower[part, None], high), high)
+            single = alone[part] & ~rest[part]
+            below[single] = chord[single] <= upper[part][single, None]
+            np.add.at(found, ray[part], np.abs(np.diff(below, axis=1)))
+        return np.asarray(found / found.sum(axis=1, keepdims=True))
+
     def _row_quadrature(self, theta: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]:
         """Gauss rules in delta between the changes of N, for every theta and both sides.
 
         Returns for each piece its ray and its side (1 where followed in the mirror), shape (pieces,), sorted by ray,
         and the outgoing angles there and their weights (not normalised), shape (pieces, NODES).
+        """
+        ray, side, lower, upper, hits, rest, alone = self._row_pieces(theta)
+        base = np.where(side == 1, np.pi - theta[ray], theta[ray])
+        chord, weight = (part.reshape(-1, NODES) for part in gauss_on_intervals(lower, np.maximum(upper, lower), NODES))
+        outgoing = np.pi + base[:, None] - 2.0 * hits[:, None] * chord
+        outgoing = np.where(rest[:, None], np.pi - self.half_angle, outgoing)
+        weight = weight * SINE.density(chord) + np.where(alone & ~rest, 1.0, 0.0)[:, None]
+        return ray, side, outgoing, weight
+
+    def _row_pieces(self, theta: Floats) -> tuple[Any, ...]:
+        """The intervals of delta on which N is constant, for every theta and both sides, sorted by ray.
+
+        Returns ray, side (1 where followed in the mirror), lower and upper end, N, whether the piece holds all the
+        rays with more hits, and whether its row has no width; each of shape (pieces,).
         """
         xi = self.half_angle
         base = np.stack([theta, np.pi - theta], axis=-1).reshape(-1)
@@ -138,7 +173,4 @@ class CircularArcLaw(DrivenLaw):
         rest = order == pieces[owner] - 1
         lower = np.where(rest, low[owner], np.maximum(low[owner], total[owner] / (2.0 * hits + 1.0)))
         upper = np.minimum(high[owner], total[owner] / (2.0 * hits - 1.0))
-        chord, weight = (part.reshape(-1, NODES) for part in gauss_on_intervals(lower, np.maximum(upper, lower), NODES))
-        outgoing = np.where(rest[:, None], np.pi - xi, np.pi + base[owner][:, None] - 2.0 * hits[:, None] * chord)
-        weight = weight * SINE.density(chord) + np.where(alone[owner] & ~rest, 1.0, 0.0)[:, None]
-        return owner // 2, owner % 2, outgoing, weight
+        return owner // 2, owner % 2, lower, upper, hits, rest, alone[owner]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Floats
+from ..geometry.kinetics import branch_block
 
 if TYPE_CHECKING:
     from ..geometry import Disk
@@ -48,12 +49,10 @@ def isometry_matrix(disk: Disk, sign: ArrayLike, offset: ArrayLike) -> Floats:
     momentum -m v1 + J omega, and is what Rudzis 2022, section 2.3.2 leaves out for triangular teeth.
     """
     sign, offset = np.broadcast_arrays(np.asarray(sign, dtype=np.float64), np.asarray(offset, dtype=np.float64))
-    cosine, sine = np.cos(offset), np.sin(offset)
     inner = np.zeros((*sign.shape, 3, 3))
-    # minus the incoming velocity has the angle theta, hence the signs; the chi component is kept
-    inner[..., 0, 0], inner[..., 0, 1] = -cosine, sign * sine
-    inner[..., 1, 0], inner[..., 1, 1] = -sine, -sign * cosine
-    inner[..., 2, 2] = 1.0
+    for row, entries in enumerate(branch_block(sign, np.cos(offset), np.sin(offset))):
+        for column, entry in enumerate(entries):
+            inner[..., row, column] = entry
     frame = np.asarray(disk.frame)
     metric = np.array([disk.mass, disk.mass, disk.inertia])
     return np.asarray(frame.T @ inner @ (frame * metric))

@@ -12,15 +12,18 @@ from ..errors import InputError
 from .algebra import lists_branches
 from .arc_quadrature import arc_matrix
 from .basis import Basis
+from .bins import Bins
 from .branch_quadrature import branch_matrix
 from .circular import CircularArcLaw
 from .composition import Composition, Power
 from .density import DensityLaw
+from .directions import Directions
 from .entry_quadrature import entry_matrix
 from .involution import InvolutionLaw
 from .isometry import table_of
 from .kernel_quadrature import action_is_affordable, action_matrix, density_matrix, map_matrix
 from .law import DrivenLaw, Law
+from .least_resistance import LeastResistanceLaw
 from .legendre import Legendre
 from .matrix import KernelMatrix
 from .matrix_algebra import frobenius_error
@@ -228,8 +231,12 @@ class _Maker:
         if isinstance(law, SpecularFrame):
             return self._flipped(law)
         how = "difference of the last two levels of quadrature"
-        if isinstance(law, DensityLaw):
+        if isinstance(law, DensityLaw) and not isinstance(self.basis, Directions):
+            # three smooth functions are integrated row by row below, on the law's own panels
             symmetric, error = density_matrix(law, self.basis, self.tolerance)
+        elif isinstance(law, LeastResistanceLaw) and isinstance(self.basis, Bins):
+            symmetric, error = self.basis.heights[:, None] * law.flux(self.basis) * self.basis.heights, 0.0
+            how = "masses of intervals, to rounding"
         elif isinstance(law, InvolutionLaw):
             symmetric, error = map_matrix(law.map, self.basis, self.tolerance)
         elif isinstance(law, CircularArcLaw):

@@ -130,6 +130,11 @@ class IsometryTable:
         return cls.of_pieces(1.0, 0.0, 0.0, np.pi, share, 0.0)
 
     @classmethod
+    def of_crevice(cls, share: float, height_to_width: float) -> IsometryTable:
+        """One rectangular crevice."""
+        return cls(*(np.empty(0),) * 6, crevices=(Crevice(share, height_to_width),))
+
+    @classmethod
     def joined(cls, tables: Iterable[IsometryTable]) -> IsometryTable:
         """The sum of tables whose shares sum to 1."""
         parts = list(tables)

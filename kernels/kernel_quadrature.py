@@ -109,7 +109,7 @@ def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order
     step = max(1, ROW_CHUNK // (SHARE_NODES[0] * edges.size))
     for start in range(0, angle.size, step):
         part = slice(start, start + step)
-        row, low, high, nodes = _row_intervals(law, edges, angle[part])
+        row, low, high, nodes = row_intervals(law, edges, angle[part])
         target = cell_index(basis, 0.5 * (low + high))
         for count in SHARE_NODES:
             chosen = nodes == count
@@ -121,7 +121,7 @@ def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order
     return basis.heights[:, None] * flux.reshape(basis.size, basis.size) * basis.heights
 
 
-def _row_intervals(
+def row_intervals(
     law: HasDensity, edges: Floats, theta: Floats
 ) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
     """Row, ends and number of Gauss nodes of the intervals into which cells and panels together cut (0, pi)."""
@@ -173,7 +173,7 @@ def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> F
 
 def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """<e_i, e_j o T> for a measure-preserving map T, whose jumps are found first; the error as for a density."""
-    jumps = _jumps(map_angle)
+    jumps = jumps_of_map(map_angle)
     edges = np.unique(np.concatenate((basis.edges, jumps)))
     return _until_settled(_map_levels(map_angle, basis, edges), tolerance)
 
@@ -210,7 +210,7 @@ def _crossings(map_angle: Callable[[Floats], Floats], basis: Basis, fine: Floats
     return _bisected(low, high, lambda middle: cell_index(basis, np.asarray(map_angle(middle))) == first)
 
 
-def _jumps(map_angle: Callable[[Floats], Floats]) -> Floats:
+def jumps_of_map(map_angle: Callable[[Floats], Floats]) -> Floats:
     """Where a measure-preserving map jumps or turns round: there the measure between two images changes."""
     probe = SINE.quantile((np.arange(JUMP_PROBES) + 0.5) / JUMP_PROBES)
     image = SINE.cdf(np.asarray(map_angle(probe), dtype=np.float64))

@@ -61,7 +61,8 @@ class KernelMatrix:
     requested_tolerance : float, optional
         The Frobenius error that was asked for.
     unresolved : float
-        Share of the sampled rays that the tracer flagged.
+        Share of the flux whose way through the wall is not known: beams that were not resolved, or traced rays that
+        did not escape.
     norm_bound : float
         Upper bound of the operator norm of the exact matrix: 1 for Markov kernels that keep the measure.
     raw_defect : SymmetryDefect, optional

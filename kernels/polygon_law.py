@@ -13,17 +13,17 @@ from numpy.typing import ArrayLike
 from ..checks import Floats, positive_number, whole_number
 from ..errors import InputError
 from ..estimates import Estimate
-from .isometry_table import Crevice, IsometryTable
+from .isometry_table import IsometryTable
 from .law import BranchLaw
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
     from ..geometry import Wall
     from ..geometry.beams import Beams
+    from ..geometry.hollow_shape import HollowShape
 
-# Hollows whose vertices agree to this share of their width are computed once; the same tolerance decides whether a
-# hollow is a rectangle or an isosceles triangle, whose law is known in closed form.
-SAME_SHAPE = 64.0 * np.finfo(np.float64).eps
+# A level share below this is the rounding of the hollows' widths.
+LEVEL_TOLERANCE = 64.0 * np.finfo(np.float64).eps
 BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
 # Angles looked at to tell how many branches there are: it is the cost of `apply`, and need not be exact.
 MOST_PROBES = 512
@@ -61,7 +61,8 @@ class PolygonLaw(BranchLaw):
     Notes
     -----
     The beams are computed on first use. Hollows of the same shape, also in another size or mirrored, are computed
-    once; rectangles and isosceles triangles have closed forms, so that a rectangle of any depth costs nothing.
+    once, and of those that are their own mirror images half; rectangles and isosceles triangles have closed forms, so
+    that a rectangle of any depth costs nothing.
 
     Examples
     --------
@@ -97,32 +98,33 @@ class PolygonLaw(BranchLaw):
 
     @cached_property
     def _table(self) -> IsometryTable:
+        from ..geometry.hollow_shape import distinct_hollows
+
         wall = self.wall
-        level = wall.period - math.fsum(hollow.width for hollow in wall.hollows)
-        parts = [IsometryTable.flat(level / wall.period)] if level > SAME_SHAPE * wall.period else []
-        known: list[tuple[Floats, IsometryTable]] = []
-        for hollow in wall.hollows:
-            width = hollow.width
-            chain = (wall.vertices[hollow.first : hollow.last + 1] - [hollow.left, 0.0]) / width
-            chain[-1, 0] = 1.0
-            parts.append(self._of_hollow(chain, known).scaled(width / wall.period))
+        level = 1.0 - math.fsum(hollow.width for hollow in wall.hollows) / wall.period
+        parts = [IsometryTable.flat(level)] if level > LEVEL_TOLERANCE else []
+        known: list[tuple[HollowShape, IsometryTable]] = []
+        for shape, hollows in distinct_hollows(wall):
+            image = shape.mirrored()
+            table = next((found.mirrored() for other, found in known if image.same_as(other)), None)
+            if table is None:
+                table = self._of_shape(shape, image.same_as(shape))
+                known.append((shape, table))
+            parts.append(table.scaled(math.fsum(hollow.width for hollow in hollows) / wall.period))
         return IsometryTable.joined(parts)
 
-    def _of_hollow(self, chain: Floats, known: list[tuple[Floats, IsometryTable]]) -> IsometryTable:
-        """The table of a hollow of width 1, looked up among those computed before."""
-        reflected = np.column_stack([1.0 - chain[::-1, 0], chain[::-1, 1]])
-        for other, found in known:
-            if _same(chain, other):
-                return found
-            if _same(reflected, other):
-                return found.mirrored()
-        table = _closed_form(chain)
-        if table is None:
-            from ..geometry.beams import beams_of
+    def _of_shape(self, shape: HollowShape, symmetric: bool) -> IsometryTable:
+        """The table of a hollow whose opening is the whole period."""
+        if shape.height_to_width is not None:
+            return IsometryTable.of_crevice(1.0, shape.height_to_width)
+        if shape.apex_angle is not None:
+            table = TriangularTeethLaw(shape.apex_angle).table()
+            if table is not None:
+                return table
+        from ..geometry.beams import beams_of
 
-            table = table_of_beams(beams_of(chain, tolerance=self.tolerance, max_beams=self.max_beams))
-        known.append((chain, table))
-        return table
+        beams = beams_of(shape.vertices, tolerance=self.tolerance, max_beams=self.max_beams, mirror_symmetric=symmetric)
+        return table_of_beams(beams)
 
     def table(self) -> IsometryTable:
         """All isometries with their probabilities."""
@@ -173,21 +175,3 @@ def table_of_beams(beams: Beams) -> IsometryTable:
             )
         )
     return IsometryTable.joined(parts)
-
-
-def _same(chain: Floats, other: Floats) -> bool:
-    size = SAME_SHAPE * max(1.0, float(np.abs(chain[:, 1]).max()))
-    return chain.shape == other.shape and bool(np.all(np.abs(chain - other) <= size))
-
-
-def _closed_form(chain: Floats) -> IsometryTable | None:
-    """The table of a rectangle or an isosceles triangle of width 1, or None."""
-    if len(chain) == 3 and abs(chain[1, 0] - 0.5) <= SAME_SHAPE:
-        return TriangularTeethLaw(2.0 * math.atan2(0.5, -chain[1, 1])).table()
-    if len(chain) == 4:
-        depth = -chain[1, 1]
-        tilt = max(abs(chain[1, 0]), abs(chain[2, 0] - 1.0), abs(chain[2, 1] / depth + 1.0))
-        if tilt <= SAME_SHAPE:
-            nothing = np.empty(0)
-            return IsometryTable(*(nothing,) * 6, crevices=(Crevice(1.0, float(depth)),))
-    return None

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, positive_number
-from .isometry_table import Crevice, IsometryTable
+from .isometry_table import IsometryTable
 from .law import BranchLaw, entry_points
 from .measure import SINE
 from .stable_angles import flipped
@@ -74,9 +74,7 @@ class RectangularTeethLaw(BranchLaw):
 
     def table(self) -> IsometryTable:
         """Half of it flat tops, half of it crevices."""
-        nothing = np.empty(0)
-        crevices = IsometryTable(*(nothing,) * 6, crevices=(Crevice(0.5, self.height_to_width),))
-        return IsometryTable.joined([IsometryTable.flat(0.5), crevices])
+        return IsometryTable.joined([IsometryTable.flat(0.5), IsometryTable.of_crevice(0.5, self.height_to_width)])
 
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left end of the flat top."""

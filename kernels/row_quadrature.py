@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,35 +10,14 @@ from numpy.typing import NDArray
 
 from ..checks import Floats
 from .adaptive_rows import WallRows
+from .angle_panels import NODES, AnglePanels
 from .basis import Basis
 from .legendre import Legendre
-from .measure import SINE
 from .products import cell_index
 from .reflection import is_mirror_symmetric, reflection_matrix
 
 if TYPE_CHECKING:
     from ..geometry import Wall
-
-# Kronrod's rule with 15 nodes and the Gauss rule with 7 among them (Piessens et al., QUADPACK, 1983).
-_NODES = (
-    0.991455371120812639206854697526329, 0.949107912342758524526189684047851,
-    0.864864423359769072789712788640926, 0.741531185599394439863864773280788,
-    0.586087235467691130294144691693, 0.405845151377397166906606412076961,
-    0.207784955007898467600689403773245, 0.0,
-)  # fmt: skip
-_KRONROD = (
-    0.022935322010529224963732008058970, 0.063092092629978553290700663189204,
-    0.104790010322250183839876322541518, 0.140653259715525918745189590510238,
-    0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
-    0.204432940075298892414161999234649, 0.209482141084727828012999174891714,
-)  # fmt: skip
-_GAUSS = (
-    0.0, 0.129484966168869693270611432679082, 0.0, 0.279705391489276667901467771423780,
-    0.0, 0.381830050505118944950369775488975, 0.0, 0.417959183673469387755102040816327,
-)  # fmt: skip
-NODES = np.array([-x for x in _NODES[:-1]] + list(_NODES[::-1]))
-KRONROD = np.array(list(_KRONROD[:-1]) + list(_KRONROD[::-1]))
-GAUSS = np.array(list(_GAUSS[:-1]) + list(_GAUSS[::-1]))
 
 # Rays after which the matrix is handed over as it is, with the error that it has: some seconds.
 MOST_RAYS = 10_000_000
@@ -53,6 +32,9 @@ VALUES_AT_ONCE = 2_000_000
 # The rows together may spend this share of the tolerance.
 ROW_SHARE = 0.1
 SMALLEST_ROW_TOLERANCE = 1e-14
+# Tolerances are approached in stages by this ratio, from one that is no coarser than this: where no more than a coarse
+# result can be had, its rows are coarse as well.
+STAGE_RATIO, COARSEST_STAGE = 1e-2, 0.1
 # The rows of a narrow panel may be coarser: the panel may spend this share of what all rows together may.
 FAIR_SHARE = 0.02
 COARSEST_ROW = 1e-4
@@ -64,8 +46,12 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
+# Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
+LEAST_CUT = 1e-7
 # Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error.
-FEWEST_FUNCTIONS = 3
+FEWEST_FUNCTIONS = 4
+# Rounds in which rows are done again that have overlooked a piece.
+MOST_MENDINGS = 8
 
 
 def is_affordable(wall: Wall, basis: Basis) -> bool:
@@ -83,50 +69,25 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     return bool(wall.closes) and not overhangs and predicted <= MOST_RAYS
 
 
-@dataclass
-class _Panels:
-    """Panels in the incoming angle with their integrals and errors."""
-
-    low: Floats
-    high: Floats
-    value: list[Floats]
-    difference: Floats
-    error: Floats
-    row_error: Floats
-
-    def kept(self, mask: NDArray[np.bool_]) -> _Panels:
-        return _Panels(
-            self.low[mask],
-            self.high[mask],
-            [value for value, keep in zip(self.value, mask, strict=True) if keep],
-            self.difference[mask],
-            self.error[mask],
-            self.row_error[mask],
-        )
-
-    def joined(self, other: _Panels) -> _Panels:
-        return _Panels(
-            np.concatenate((self.low, other.low)),
-            np.concatenate((self.high, other.high)),
-            self.value + other.value,
-            np.concatenate((self.difference, other.difference)),
-            np.concatenate((self.error, other.error)),
-            np.concatenate((self.row_error, other.row_error)),
-        )
-
-
 def row_matrix(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
-    of that difference scaled by what halving the panel showed where they are smooth; plus the errors of the rows;
+    of that difference scaled by what dividing the panel showed where they are smooth; plus the errors of the rows;
     plus ASYMMETRY_FACTOR times the asymmetry of the result, which other errors than these would show.
     """
     small = isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS
     inner = Legendre(FEWEST_FUNCTIONS) if small else basis
     matrix, error, rays = _Integrator(wall, inner, tolerance, most_rays).run()
-    error += ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), error, rays
+
+
+def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS) -> tuple[Floats, float]:
+    """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
+    integrator = _Integrator(wall, basis, tolerance, most_rays)
+    _, error, _ = integrator.run()
+    edges = np.union1d(integrator.panels.low, integrator.panels.high)
+    return np.union1d(edges, np.pi - edges) if integrator.halved else edges, error
 
 
 class _Integrator:
@@ -150,31 +111,65 @@ class _Integrator:
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
         self.rows = WallRows(wall, degree, inside, least)
-        self.row_tolerance = max(ROW_SHARE * self.tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
-
-    def run(self) -> tuple[Floats, float, int]:
-        edges = self.basis.edges
+        edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
-        goal = 0.5 * self.tolerance if self.halved else self.tolerance
-        panels = self._panels(edges[:-1], edges[1:])
+        self.stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
+        self.row_tolerance = ROW_SHARE * self.tolerance / STAGE_RATIO**self.stages / self.scale
+        self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
+        self._add_panels(edges[:-1], edges[1:])
+
+    def run(self) -> tuple[Floats, float, int]:
+        """Divide panels until the error is small enough, or no rays are left: first for coarser tolerances."""
+        for stage in range(self.stages, -1, -1):
+            error = self._meet(self._begin(stage))
+            if self.rays >= self.most_rays:
+                break
+        return self._state()[0], error, self.rays
+
+    def _begin(self, stage: int) -> float:
+        """The tolerance of a stage; rows whose error is too large for it are done again."""
+        tolerance = self.tolerance / STAGE_RATIO**stage
+        self.row_tolerance = max(ROW_SHARE * tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
+        coarse = self.panels.row_errors(self.basis) > 2.0 * ROW_SHARE * tolerance * np.maximum(
+            self.panels.mass, FAIR_SHARE
+        )
+        self._fill(self.panels, np.broadcast_to(coarse[:, None], self.panels.angle.shape))
+        self._mend()
+        return tolerance
+
+    def _meet(self, tolerance: float) -> float:
+        """Divide panels until the error is below the tolerance, or no rays are left; returns the error."""
+        goal = tolerance
         while True:
-            total = float(np.sum(panels.error) + np.sum(panels.row_error))
-            if total <= goal or self.rays >= self.most_rays:
-                break
-            chosen = self._worth_halving(panels, goal)
+            _, known, hidden = self._state()
+            if known + hidden <= tolerance or self.rays >= self.most_rays:
+                return known + hidden
+            # errors that only the asymmetry shows lie in panels whose rules agree by chance
+            goal = min(goal, max(tolerance - hidden, 0.25 * known))
+            chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
             if not chosen.any():
-                break
-            panels = panels.kept(~chosen).joined(self._halves(panels.kept(chosen)))
-        matrix = np.sum(np.array(panels.value), axis=0) if isinstance(panels.value[0], np.ndarray) else panels.value[0]
+                return known + hidden
+            self._divide(chosen)
+
+    def _state(self) -> tuple[Floats, float, float]:
+        """The matrix, the error that its panels and rows are known to have, and what its asymmetry adds."""
+        matrix = np.zeros((self.basis.size, self.basis.size))
+        step = max(1, VALUES_AT_ONCE // self.basis.size**2)
+        for first in range(0, len(self.panels.low), step):
+            matrix += (
+                self.panels.kept(np.arange(first, min(first + step, len(self.panels.low)))).values(self.basis).sum(0)
+            )
+        known = float(np.sum(self.panels.error) + np.sum(self.panels.row_errors(self.basis)))
         if self.halved:
             flip = reflection_matrix(self.basis)
-            matrix, total = matrix + flip @ matrix @ flip.T, 2.0 * total
-        return matrix, total, self.rays
+            matrix, known = matrix + flip @ matrix @ flip.T, 2.0 * known
+        return matrix, known, ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
 
-    def _worth_halving(self, panels: _Panels, goal: float) -> NDArray[np.bool_]:
+    def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:
         """The worst panels: those beyond which the others together have less than a part of the goal."""
-        able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.row_error)
+        panels = self.panels
+        able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.row_errors(self.basis))
         order = np.argsort(panels.error)
         cumulative = np.cumsum(panels.error[order])
         chosen = np.zeros(len(order), dtype=np.bool_)
@@ -187,50 +182,62 @@ class _Integrator:
         worst[order[max(0, len(order) - most) :]] = True
         return np.asarray(chosen & worst)
 
-    def _halves(self, parents: _Panels) -> _Panels:
-        middle = 0.5 * (parents.low + parents.high)
-        count = len(middle)
-        halves = self._panels(np.append(parents.low, middle), np.append(middle, parents.high))
-        for k in range(count):
-            pair = [k, k + count]
-            actual = float(np.linalg.norm(halves.value[k] + halves.value[k + count] - parents.value[k]))
-            before = parents.difference[k]
-            for half in pair:
-                if halves.difference[half] < SMOOTH_SHRINKING * before:
-                    ratio = min(1.0, max(RATIO_MARGIN * actual / before, LEAST_RATIO))
-                    halves.error[half] = ratio * halves.difference[half]
-        return halves
+    def _divide(self, chosen: NDArray[np.bool_]) -> None:
+        parents = self.panels.kept(chosen)
+        before, whole = parents.differences(self.basis), parents.values(self.basis)
+        cuts = [self._cuts(low, high) for low, high in zip(parents.low.tolist(), parents.high.tolist(), strict=True)]
+        parts = [
+            np.concatenate(([low], cut, [high])) for low, cut, high in zip(parents.low, cuts, parents.high, strict=True)
+        ]
+        owner = np.repeat(np.arange(len(parts)), [len(part) - 1 for part in parts])
+        self.panels = self.panels.kept(~chosen)
+        self._add_panels(np.concatenate([p[:-1] for p in parts]), np.concatenate([p[1:] for p in parts]))
+        children = self.panels.kept(np.arange(-len(owner), 0))
+        after, value = children.differences(self.basis), children.values(self.basis)
+        total = np.zeros_like(whole)
+        np.add.at(total, owner, value)
+        actual = np.linalg.norm(total - whole, axis=(1, 2))
+        ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
+        smooth = after < SMOOTH_SHRINKING * before[owner]
+        self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, after)
 
-    def _panels(self, low: Floats, high: Floats) -> _Panels:
-        """Integrals over new panels, several at a time."""
-        step = max(1, ROWS_AT_ONCE // len(NODES))
-        found = None
-        for first in range(0, len(low), step):
-            part = self._few_panels(low[first : first + step], high[first : first + step])
-            found = part if found is None else found.joined(part)
-        assert found is not None
-        return found
+    def _cuts(self, low: float, high: float) -> Floats:
+        """Where a panel is divided: at critical angles, in its middle if none is known inside it."""
+        margin = LEAST_CUT * (high - low)
+        cuts = self.rows.critical_angles(low + margin, high - margin)
+        cuts = cuts[np.concatenate(([True], np.diff(cuts) > margin))[: len(cuts)]]
+        return cuts if len(cuts) else np.array([0.5 * (low + high)])
 
-    def _few_panels(self, low: Floats, high: Floats) -> _Panels:
-        half = 0.5 * (high - low)
-        angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
-        flat = angle.ravel()
-        share = FAIR_SHARE / np.maximum(SINE.mass(low, high), np.finfo(np.float64).tiny)
+    def _add_panels(self, low: Floats, high: Floats) -> None:
+        """Append panels, with their rows."""
+        fresh = AnglePanels.between(low, high, self.basis.size)
+        self._fill(fresh, np.ones(fresh.angle.shape, dtype=np.bool_))
+        self.panels = self.panels.joined(fresh)
+        self._mend()
+
+    def _mend(self) -> None:
+        """Do rows again that turned out to have overlooked a piece."""
+        for _ in range(MOST_MENDINGS):
+            stale = np.isin(self.panels.angle, list(self.rows.stale))
+            self.rows.stale.clear()
+            if not stale.any():
+                break
+            self._fill(self.panels, stale)
+
+    def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
+        """Compute the rows at these nodes, and the panels' differences of the rules as their errors."""
+        share = FAIR_SHARE / np.maximum(panels.mass, np.finfo(np.float64).tiny)
         tolerance = np.minimum(self.row_tolerance * np.maximum(1.0, share), COARSEST_ROW)
-        rows = self.rows(flat, np.repeat(tolerance, len(NODES)))
-        self.rays += rows.rays
-        self.row_count += len(flat)
-        shape = (len(low), len(NODES), self.basis.size)
-        image = self._images(rows.nodes, rows.weights, rows.starts).reshape(shape)
-        here = self.basis.evaluate(flat).reshape(shape)
-        density = half[:, None] * SINE.density(angle)
-        weight = density * KRONROD
-        value = np.einsum("pk,pki,pkj->pij", weight, here, image, optimize=True)
-        gauss = density * (KRONROD - GAUSS)
-        difference = np.linalg.norm(np.einsum("pk,pki,pkj->pij", gauss, here, image, optimize=True), axis=(1, 2))
-        size = np.linalg.norm(here, axis=2)
-        row_error = self.scale * np.sum(weight * size * (rows.error + 2.0 * rows.lost).reshape(angle.shape), axis=1)
-        return _Panels(low, high, list(value), difference, difference.copy(), row_error)
+        panel, node = np.nonzero(mask)
+        for first in range(0, len(panel), ROWS_AT_ONCE):
+            few = slice(first, first + ROWS_AT_ONCE)
+            rows = self.rows(panels.angle[panel[few], node[few]], tolerance[panel[few]])
+            self.rays += rows.rays
+            self.row_count += len(rows.theta)
+            panels.image[panel[few], node[few]] = self._images(rows.nodes, rows.weights, rows.starts)
+            panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)
+        touched = np.unique(panel)
+        panels.error[touched] = panels.kept(touched).differences(self.basis)
 
     def _images(self, nodes: Floats, weights: Floats, starts: NDArray[np.int64]) -> Floats:
         """The means of all functions of the basis, shape (rows, size)."""

@@ -28,9 +28,10 @@ if TYPE_CHECKING:
     from ..geometry.curve import Curve
     from ..geometry.hollow import Hollow
 
-# A hollow is symmetric, vertical or level to rounding if coordinates agree to this share of its size: named walls
-# place them by a handful of operations. A wall this close to a closed form has that law to rounding as well.
-SHAPE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
+# Widths add up to the period, and an arc is a semicircle, to this share: sums and angles of a handful of operations.
+ROUNDED = 64.0 * np.finfo(np.float64).eps
+# The hollows with closed forms have at most this many pieces.
+MOST_PIECES_KNOWN = 3
 # Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
 # error in total variation; above this it would show in a kernel estimated from a million rays.
 LOST_TOLERANCE = 1e-4
@@ -154,7 +155,6 @@ class WallLaw(DrivenLaw):
         """That of the exact law, or None."""
         return None if self.exact_law is None else table_of(self.exact_law)
 
-    # `_apply` stays that of a traced law: its absence from this class tells `discretise` that it is a coarse rule.
     def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
         return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
 
@@ -179,18 +179,16 @@ def _closed_form(wall: Wall) -> Law | None:
     terms: dict[Law, float] = {}
     level = wall.period - math.fsum(hollow.width for hollow in wall.hollows)
     for hollow in wall.hollows:
-        pieces = wall.pieces[hollow.first : hollow.last]
-        law = _triangle(hollow, pieces) or _arc(hollow, pieces) or _rectangle(hollow, pieces)
+        law = _of_hollow(wall, hollow)
         if law is None:
             return None
         width = hollow.width
         if isinstance(law, RectangularTeethLaw):
-            # That law has a flat top as wide as its crevice.
             level, width = level - width, 2.0 * width
         terms[law] = terms.get(law, 0.0) + width
-    if level < -SHAPE_TOLERANCE * wall.period:
+    if level < -ROUNDED * wall.period:
         return None
-    if level > SHAPE_TOLERANCE * wall.period:
+    if level > ROUNDED * wall.period:
         terms[specular()] = level
     if len(terms) == 1:
         return next(iter(terms))
@@ -198,35 +196,27 @@ def _closed_form(wall: Wall) -> Law | None:
     return Combination(tuple((width / total, law) for law, width in terms.items()))
 
 
-def _triangle(hollow: Hollow, pieces: tuple[Curve, ...]) -> Law | None:
-    from ..geometry import Segment
+def _of_hollow(wall: Wall, hollow: Hollow) -> Law | None:
+    """The closed form of one hollow; that of a rectangle has a flat top as wide as its crevice besides."""
+    from ..geometry.hollow_shape import HollowShape
 
-    if len(pieces) != 2 or not all(isinstance(piece, Segment) for piece in pieces):
+    pieces = wall.pieces[hollow.first : hollow.last]
+    if len(pieces) > MOST_PIECES_KNOWN:
         return None
-    x, y = pieces[0].end
-    if abs(0.5 * (hollow.left + hollow.right) - x) > SHAPE_TOLERANCE * hollow.width:
-        return None
-    return TriangularTeethLaw(2.0 * math.atan2(0.5 * hollow.width, -y))
+    shape = HollowShape.of(wall, hollow)
+    if shape.apex_angle is not None:
+        return TriangularTeethLaw(shape.apex_angle)
+    if shape.height_to_width is not None:
+        return RectangularTeethLaw(shape.height_to_width)
+    return _arc(pieces)
 
 
-def _rectangle(hollow: Hollow, pieces: tuple[Curve, ...]) -> Law | None:
-    from ..geometry import Segment
-
-    if len(pieces) != 3 or not all(isinstance(piece, Segment) for piece in pieces):
-        return None
-    (left, depth), (right, other) = pieces[0].end, pieces[1].end
-    tilt = max(abs(left - hollow.left), abs(right - hollow.right)) / hollow.width
-    if max(tilt, abs(depth - other) / abs(depth)) > SHAPE_TOLERANCE:
-        return None
-    return RectangularTeethLaw(-depth / hollow.width)
-
-
-def _arc(hollow: Hollow, pieces: tuple[Curve, ...]) -> Law | None:
+def _arc(pieces: tuple[Curve, ...]) -> Law | None:
     from ..geometry import Arc
 
     arc = pieces[0]
     if len(pieces) != 1 or not isinstance(arc, Arc) or not arc.is_circular or arc.direction < 0:
         return None
-    if arc.half_span > 0.5 * np.pi * (1.0 + SHAPE_TOLERANCE):
+    if arc.half_span > 0.5 * np.pi * (1.0 + ROUNDED):
         return None
     return CircularArcLaw(min(arc.half_span, 0.5 * np.pi))

@@ -14,12 +14,19 @@ if TYPE_CHECKING:
     from .diffusion import Diffusivity, diffusivity
     from .eigenvalues import Spectrum, SpectrumErrors, spectrum
     from .enclosure import Enclosure, Enclosures, enclosures
+    from .error_and_time import work_precision
     from .essential import EssentialEdge, essential_edge
+    from .fitted_order import FittedOrder, fit_order
     from .gap import SpectralGap, gaps_in_both_conventions, spectral_gap
     from .laplacian import LaplacianComparison, laplacian_comparison, mean_squared_slope
     from .leading import LeadingEigenvalues, leading_eigenvalues
+    from .machine import Machine
+    from .reference_value import ReferenceValue
     from .relaxation import MixingTime, mixing_time
     from .sampling import bootstrap_intervals
+    from .work_problem import WorkMethod, WorkProblem
+    from .work_report import MethodFacts, WorkReport
+    from .work_row import WorkRow
 
 _HOMES = {
     "Conductance": "cheeger",
@@ -28,25 +35,35 @@ _HOMES = {
     "Enclosures": "enclosure",
     "EssentialEdge": "essential",
     "ExitTimes": "channel",
+    "FittedOrder": "fitted_order",
     "LaplacianComparison": "laplacian",
     "LeadingEigenvalues": "leading",
+    "Machine": "machine",
+    "MethodFacts": "work_report",
     "MixingTime": "relaxation",
+    "ReferenceValue": "reference_value",
     "SpectralGap": "gap",
     "Spectrum": "eigenvalues",
     "SpectrumErrors": "eigenvalues",
+    "WorkMethod": "work_problem",
+    "WorkProblem": "work_problem",
+    "WorkReport": "work_report",
+    "WorkRow": "work_row",
     "bootstrap_intervals": "sampling",
     "conductance": "cheeger",
     "diffusivity": "diffusion",
     "enclosures": "enclosure",
     "essential_edge": "essential",
     "exit_times": "channel",
-    "laplacian_comparison": "laplacian",
+    "fit_order": "fitted_order",
     "gaps_in_both_conventions": "gap",
+    "laplacian_comparison": "laplacian",
     "leading_eigenvalues": "leading",
     "mean_squared_slope": "laplacian",
     "mixing_time": "relaxation",
     "spectral_gap": "gap",
     "spectrum": "eigenvalues",
+    "work_precision": "error_and_time",
 }
 
 __all__ = [
@@ -56,18 +73,27 @@ __all__ = [
     "Enclosures",
     "EssentialEdge",
     "ExitTimes",
+    "FittedOrder",
     "LaplacianComparison",
     "LeadingEigenvalues",
+    "Machine",
+    "MethodFacts",
     "MixingTime",
+    "ReferenceValue",
     "SpectralGap",
     "Spectrum",
     "SpectrumErrors",
+    "WorkMethod",
+    "WorkProblem",
+    "WorkReport",
+    "WorkRow",
     "bootstrap_intervals",
     "conductance",
     "diffusivity",
     "enclosures",
     "essential_edge",
     "exit_times",
+    "fit_order",
     "gaps_in_both_conventions",
     "laplacian_comparison",
     "leading_eigenvalues",
@@ -75,6 +101,7 @@ __all__ = [
     "mixing_time",
     "spectral_gap",
     "spectrum",
+    "work_precision",
 ]
 
 

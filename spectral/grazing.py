@@ -10,7 +10,7 @@ import numpy as np
 
 from ..checks import Floats
 from ..kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
-from ..kernels.row_quadrature import GAUSS, KRONROD, NODES
+from ..kernels.angle_panels import GAUSS, KRONROD, NODES
 from ..kernels.sampling import responder
 
 # Grazing angles, down to where the outgoing angle, good to some 1e-15, still has seven digits.

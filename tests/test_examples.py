@@ -23,7 +23,17 @@ def load(name):
 
 
 def test_every_example_has_a_test():
-    tested = {"gallery", "maxwell_or_rough", "measured_profile", "no_slip_or_smooth", "published_gap"}
+    tested = {
+        "disk_in_a_strip",
+        "gallery",
+        "least_resistance",
+        "maxwell_or_rough",
+        "measured_profile",
+        "no_slip_or_smooth",
+        "published_gap",
+        "true_disk",
+        "true_disk_pictures",
+    }
     assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
 
 
@@ -68,6 +78,14 @@ def test_a_rough_wall_mixes_with_maxwells_law_as_theory_says():
     assert found["rough wall, twice"] == pytest.approx(1 - (1 - rough) ** 2, abs=1e-10)
 
 
+def test_the_least_resistance_is_bracketed_and_no_triangle_is_as_good_as_retroreflection(tmp_path):
+    found = load("least_resistance").main(points=3, picture=tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").stat().st_size > 10_000
+    assert 0.0 < found["least, upper bound"] - found["least, lower bound"] < 1e-5
+    assert found["least, upper bound"] < found["involution near the least"] < 0.98785
+    assert np.sqrt(2) < found["best triangle"] < found["greatest"] == 1.5
+
+
 def test_the_gallery_draws_what_its_page_shows(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(EXAMPLES)
     gallery = load("gallery")
@@ -75,11 +93,13 @@ def test_the_gallery_draws_what_its_page_shows(tmp_path, monkeypatch):
     # the studies are tested for themselves; here only what becomes of them
     monkeypatch.setattr(gallery, "study_wall", lambda *_, **__: quick)
     monkeypatch.setattr(gallery.measured_profile, "main", lambda **_: quick)
+    monkeypatch.setattr(gallery.least_resistance, "main", lambda picture: picture.touch())
     assert list(gallery.main(tmp_path / "gallery")) == ["focusing-arcs", "measured-profile"]
     sys.modules.pop("measured_profile", None)
+    sys.modules.pop("least_resistance", None)
     drawn = {path.name for path in (tmp_path / "gallery").iterdir()}
     named = {f"{study}-{name}" for study in ("focusing-arcs", "measured-profile") for name in PICTURES}
-    assert drawn == {"walls.png", *named}
+    assert drawn == {"walls.png", "least-resistance.png", *named}
     page = EXAMPLES.parent / "gallery.md"
     committed = EXAMPLES.parent / "gallery"
     assert {path.name for path in committed.iterdir()} == drawn

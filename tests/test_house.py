@@ -17,7 +17,7 @@ import asperity
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"numba", "sympy", "ot", "matplotlib", "shapely", "dask", "distributed"}
-PAGES = ["README.md", "docs/quickstart.md", "docs/errors.md"]
+PAGES = ["README.md", "docs/quickstart.md", "docs/verifying.md", "docs/errors.md", "docs/theory/configurations.md"]
 
 
 def run_python(*arguments: str) -> str:

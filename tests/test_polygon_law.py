@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -15,6 +14,7 @@ from asperity.errors import InputError
 from asperity.kernels.branch_quadrature import branch_matrix
 from asperity.kernels.isometry import isometries, table_of
 from asperity.kernels.isometry_table import IsometryTable
+from traced_pairs import chi_square_p
 
 EPS = float(np.finfo(np.float64).eps)
 SKEW = [(0, 0), (0.3, -0.5), (1, 0)]
@@ -127,22 +127,10 @@ def test_matrices_of_polygons_are_markov_and_reversible(name: str, basis: ker.Ba
 
 
 @pytest.mark.parametrize("name", WALLS)
-def test_traced_rays_follow_the_exact_law(name: str, rays: int = 200_000, cells: int = 12) -> None:
+def test_traced_rays_follow_the_exact_law(name: str) -> None:
     wall = geo.Wall.from_vertices(WALLS[name])
-    rng = np.random.default_rng(3)
-    basis = ker.Bins(cells)
-    x, theta = rng.uniform(0.0, wall.period, rays), ker.SINE.sample(rays, rng)
-    traced = geo.trace(wall, x, theta)
-    assert traced.escaped.all()
-    pairs = np.bincount(basis.index(theta) * cells + basis.index(traced.theta), minlength=cells * cells)
-    expected = rays * ker.discretise(ker.PolygonLaw(wall), basis).flux.ravel()
-    assert pairs[expected < 1e-9 * rays].sum() == 0
-    rare = expected < 10.0
-    counts = np.append(pairs[~rare], pairs[rare].sum())
-    means = np.append(expected[~rare], expected[rare].sum())
-    counts, means = counts[means > 1e-6], means[means > 1e-6]
-    statistic = float(np.sum((counts - means) ** 2 / means))
-    assert 1e-4 < chi2.sf(statistic, counts.size - 1) < 1.0 - 1e-4
+    p_value = chi_square_p(wall, ker.PolygonLaw(wall), 200_000, 12, np.random.default_rng(3))
+    assert 1e-4 < p_value < 1.0 - 1e-4
 
 
 def test_different_hollows_add_up_by_their_widths_and_equal_ones_are_computed_once(

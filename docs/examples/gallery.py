@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import least_resistance
 import measured_profile
 
 from asperity import geometry as geo
@@ -13,9 +14,10 @@ from asperity.study_picture import draw_gallery
 
 
 def main(folder: Path, tolerance: float = 1e-3) -> dict[str, Study]:
-    """Write the named walls, the study of focusing arcs and that of the measured profile; returns the studies."""
+    """Write the named walls, the least resistance, and two studies, which are returned."""
     folder.mkdir(parents=True, exist_ok=True)
     draw_gallery(folder / "walls.png", overwrite=True)
+    least_resistance.main(picture=folder / "least-resistance.png")
     studies = {
         "focusing-arcs": study_wall(geo.focusing_arcs(1.2), "focusing-arcs", tolerance=tolerance),
         "measured-profile": measured_profile.main(tolerance=tolerance),

@@ -20,6 +20,7 @@ from .estimates import Estimate
 
 if TYPE_CHECKING:
     from . import geometry, kernels, spectral
+    from .verification import Verdict, verify
 
 __version__ = "0.1.0"
 
@@ -29,21 +30,27 @@ __all__ = [
     "Estimate",
     "FileExistsRefusal",
     "InputError",
+    "Verdict",
     "WallError",
     "__version__",
     "geometry",
     "kernels",
     "spectral",
+    "verify",
 ]
 
 _ROOMS = ("geometry", "kernels", "spectral")
+# these two load numpy
+_VERIFICATION = ("Verdict", "verify")
 
 
 def __getattr__(name: str) -> Any:
     if name in _ROOMS:
         return import_module(f".{name}", __name__)
+    if name in _VERIFICATION:
+        return getattr(import_module(".verification", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_ROOMS})
+    return sorted({*globals(), *_ROOMS, *_VERIFICATION})

@@ -137,3 +137,64 @@ def walls(out: Path | None, force: bool) -> None:
         click.echo(f"{entry.name:20s} {entry.summary}" + (f" [{parameters}]" if parameters else ""))
     if out is not None:
         click.echo(f"wrote {out}")
+
+
+@main.command()
+@click.argument("ids", nargs=-1, metavar="[ID]...")
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON list of rows.")
+@click.option("--latex", "as_latex", is_flag=True, help="Print the formulas in LaTeX; no check is run.")
+def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
+    """Check the ledger: every formula of the paper, each against the status that it has here.
+
+    ID is the id of a row (S2.01) or its beginning (S2); without one all rows are checked. Exit code 1 if a row is not
+    as stated.
+
+    \b
+    Examples:
+      asperity verify
+      asperity verify S2.01 S1.3
+      asperity verify S2 --json
+    """
+    import json
+
+    from tqdm import tqdm
+
+    from .ledger import findings, selected
+    from .ledger_text import finding_as_dict, latex_of, table_of
+
+    chosen = selected(ids)
+    if as_latex:
+        click.echo(latex_of(chosen))
+        return
+    found = list(tqdm(findings(chosen), "verify", len(chosen), delay=2, disable=None, leave=False, unit="row"))
+    click.echo(json.dumps([finding_as_dict(one) for one in found], indent=2) if as_json else table_of(found))
+    if any(one.as_stated is False for one in found):
+        sys.exit(1)
+
+
+@main.command()
+@click.argument("problem", nargs=-1)
+@click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")
+@click.option("--extremes", is_flag=True, help="The stability report instead: stiff and extreme cases.")
+@click.option("--savings", is_flag=True, help="Instead: what each scene leaves out, and what that saves.")
+@click.option("--out", default="bench", show_default=True, type=click.Path(path_type=Path), help="Folder for results.")
+@click.option("--force", is_flag=True, help="Measure again what the folder holds; by default a run goes on.")
+@click.option(
+    "--compare",
+    type=click.Path(path_type=Path, exists=True, dir_okay=False),
+    help="Compare with the bench.json of an earlier run; exit code 1 if something became slower or less exact.",
+)
+def bench(
+    problem: tuple[str, ...], quick: bool, extremes: bool, savings: bool, out: Path, force: bool, compare: Path | None
+) -> None:
+    """Error against run time on the standard set, or on PROBLEMs of it: SCENE, QUANTITY or SCENE/QUANTITY.
+
+    \b
+    Examples:
+      asperity bench --quick
+      asperity bench focusing-arc/moment lambda2 --out my-bench
+      asperity bench --extremes
+    """
+    from .bench.commands import run_bench
+
+    sys.exit(run_bench(problem, quick=quick, extremes=extremes, savings=savings, out=out, force=force, compare=compare))

@@ -1,0 +1,31 @@
+"""Blocks of independent work on threads: compiled loops that release the lock."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from ..checks import whole_number
+
+# Rays in one block: large enough to hide the cost of handing a block to a thread, small enough to share evenly.
+BLOCK = 8192
+
+
+def in_blocks(run: Callable[[slice], None], count: int, threads: int | None, block: int = BLOCK) -> None:
+    """Call ``run`` with slices that cover ``range(count)``, on ``threads`` threads, by default one a processor.
+
+    Examples
+    --------
+    >>> in_blocks(print, 5, threads=1, block=3)
+    slice(0, 3, None)
+    slice(3, 5, None)
+    """
+    workers = os.cpu_count() or 1 if threads is None else whole_number("threads", threads, 1)
+    blocks = [slice(first, min(first + block, count)) for first in range(0, count, block)]
+    if workers == 1 or len(blocks) <= 1:
+        for part in blocks:
+            run(part)
+    else:
+        with ThreadPoolExecutor(min(workers, len(blocks))) as pool:
+            list(pool.map(run, blocks))

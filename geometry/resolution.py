@@ -1,0 +1,11 @@
+"""What the planar tracer resolves in double precision, as shares in units of the rounding error."""
+
+from __future__ import annotations
+
+EPS = 2.0**-52
+# A joint that a ray meets, or a hit that a joint meets, within this share of the hollow's size is not resolved in
+# double precision: positions carry a few rounding errors of one ulp of the size each.
+JOINT_ULPS = 16.0
+# D = B^2 + 2 kappa |v|^2 F carries about eight rounding errors of B^2, and so does g of a Bezier piece at its extrema;
+# below them hit and miss are not told apart.
+TANGENT_ULPS = 16.0

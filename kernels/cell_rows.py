@@ -1,0 +1,61 @@
+"""Kernel matrices as kernels between points: the middle angles of their cells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ..checks import Floats
+from ..errors import InputError
+from ..estimates import ErrorKind
+from .matrix import KernelMatrix
+from .row_transport import grid_wasserstein
+
+# From two arrays of probabilities, shape (..., n, n), to their distances, shape (...).
+RowsDistance = Callable[[Floats, Floats], Floats]
+
+
+def stochastic_rows(matrix: KernelMatrix) -> Floats:
+    """The rows of a matrix on cells, divided by their sums."""
+    if not matrix.basis.is_partition:
+        raise InputError(
+            f"matrix: expected one on Bins, got one in {matrix.basis!r}; discretise on Bins, or use kind='pseudometric'"
+        )
+    array = matrix.array
+    return np.asarray(array / array.sum(axis=1, keepdims=True))
+
+
+def cell_middles(edges: Floats) -> Floats:
+    """The middle angles of the cells between edges."""
+    return np.asarray(0.5 * (edges[1:] + edges[:-1]))
+
+
+def distance_of_rows(matrix: KernelMatrix, order: float, sup: bool) -> RowsDistance:
+    """The row-wise W_p, averaged or at most, of kernels on the cells of a matrix."""
+    points, weights = cell_middles(matrix.basis.edges), matrix.weights
+
+    def between(one: Floats, other: Floats) -> Floats:
+        one, other = np.broadcast_arrays(one, other)
+        rows = grid_wasserstein(one, other, points, order)
+        return np.asarray(rows.max(axis=-1) if sup else (rows**order @ weights) ** (1.0 / order))
+
+    return between
+
+
+def check_comparable(first: KernelMatrix, second: KernelMatrix) -> None:
+    """Raise an InputError unless both are on the same cells and in the same frame."""
+    for matrix in (first, second):
+        stochastic_rows(matrix)
+    if first.basis != second.basis:
+        raise InputError(f"the matrices have different bins, {first.basis!r} and {second.basis!r}; discretise again")
+    if first.frame != second.frame:
+        raise InputError(
+            f"the matrices are in different conventions, {first.frame!r} and {second.frame!r}; use "
+            "in_specular_frame() on both or on neither"
+        )
+
+
+def joint_kind(first: KernelMatrix, second: KernelMatrix) -> ErrorKind:
+    """Whether what is computed from both has a bound for its error, or an estimate."""
+    return "bound" if first.error.kind == second.error.kind == "bound" else "estimate"

@@ -1,0 +1,1 @@
+"""The entries of the ledger on kernels: reflection laws, collision laws and their matrices."""

@@ -1,0 +1,204 @@
+"""Sections 2.3 and 5.1: collision laws on velocities, and how the wall that a disk feels decides them."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ...geometry import Disk, Wall, rectangular_teeth, trace, triangular_teeth
+from ...geometry.kinetics import contact_normal, foreshortening
+from ...verification import Formula, Verdict, agreement, erratum, every, verified, verify
+from ...verification.entry import Code
+
+# Rounding of a dozen reflections.
+TRACED = 1e-10
+MOST_BOUNCES = 1000
+
+
+def explicit_matrices(m: Any, J: Any) -> list[list[list[Any]]]:
+    """A_smooth and A_no-slip, entry by entry."""
+    total = m + J
+    no_slip = [[(m - J) / total, 0, -2 * J / total], [0, -1, 0], [-2 * m / total, 0, (J - m) / total]]
+    return [[[1, 0, 0], [0, -1, 0], [0, 0, 1]], no_slip]
+
+
+@verified(
+    id="S2.19",
+    section="2.3.1",
+    equation="2.25",
+    statement="The matrices of smooth and no-slip collisions are those of specular reflection and retroreflection.",
+    printed=Formula(
+        r"A_{\text{smooth}} = \mathrm{diag}(1, -1, 1), \quad A_{\text{no-slip}} = \frac1{m + J} \begin{pmatrix}"
+        r" m - J & 0 & -2J \\ 0 & -m - J & 0 \\ -2m & 0 & J - m \end{pmatrix}",
+        explicit_matrices,
+    ),
+    perturbed=lambda m, J: explicit_matrices(J, m),
+    reason="They take −w(θ, ψ) to w(θ′, π − ψ) with θ′ = π − θ and θ′ = θ. The library's matrices, made from the "
+    "branches of the law, are the same.",
+)
+def matrices_of_the_two_laws(matrices: Code) -> Verdict:
+    import sympy as sp
+
+    from ...geometry import symbolic as sym
+
+    smooth, no_slip = (sp.Matrix(rows) for rows in matrices(sym.m, sym.J))
+
+    def outgoing(theta: Any) -> Any:
+        return sym.G.subs({sym.theta: theta, sym.psi: sp.pi - sym.psi}, simultaneous=True)
+
+    return every(
+        verify(smooth * -sym.G, outgoing(sp.pi - sym.theta)),
+        verify(no_slip * -sym.G, outgoing(sym.theta)),
+        verify([smooth, no_slip], [sym.smooth, sym.no_slip]),
+    )
+
+
+@verified(
+    id="S2.20",
+    section="2.3.1",
+    statement="Both matrices are involutions and isometries that conserve the rolling momentum and reverse v₂.",
+    printed=Formula(
+        r"A^2 = I, \quad A^{\mathsf T} M A = M, \quad \langle Aw, \tilde\chi\rangle = \langle w, \tilde\chi\rangle",
+        explicit_matrices,
+    ),
+    perturbed=lambda m, J: explicit_matrices(2 * m, J),
+    reason="Each is checked for all m and J. The no-slip matrix also reverses the slip v₁ + ω.",
+)
+def properties_of_the_two_matrices(matrices: Code) -> Verdict:
+    import sympy as sp
+
+    from ...geometry import symbolic as sym
+
+    both = [sp.Matrix(rows) for rows in matrices(sym.m, sym.J)]
+    slip = sp.Matrix([[1, 0, 1]])
+    rolling = sp.Matrix([[-1, 0, 1]]) * sym.metric
+    return every(
+        *(verify(A * A, sp.eye(3)) for A in both),
+        *(verify(A.T * sym.metric * A, sym.metric) for A in both),
+        *(verify(rolling * A, rolling) for A in both),
+        *(verify(A.row(1), sp.Matrix([[0, -1, 0]])) for A in both),
+        verify(slip * both[1], -slip),
+    )
+
+
+@erratum(
+    id="S2.24",
+    section="2.3.4",
+    statement="The wall Ŵ for which the disk feels the wall W: which way it is stretched.",
+    printed=Formula(
+        r"\hat W = \{(x_1, x_2) : (x_1, (1 + m/J)^{-1/2} x_2) \in W\}", lambda x1, x2, factor: (x1, factor * x2)
+    ),
+    corrected=Formula(
+        r"\hat W = \{(x_1, x_2) : ((1 + m/J)^{-1/2} x_1, x_2) \in W\}, \text{ or up to scale }"
+        r" (x_1, (1 + m/J)^{1/2} x_2) \in W",
+        lambda x1, x2, factor: (x1, x2 / factor),
+    ),
+    reason="The disk sees the wall compressed along x, so it must be stretched along x, or flattened. The printed one "
+    "is deepened, and the disk feels it deeper still.",
+)
+def wall_that_is_felt_as_given(point: Code) -> Verdict:
+    import sympy as sp
+
+    from ...geometry import symbolic as sym
+
+    x1, x2 = sp.symbols("x1 x2", real=True)
+    factor = foreshortening(sym.m, sym.J, sp)
+    felt1, felt2 = factor * x1, x2
+    given1, given2 = point(x1, x2, factor)
+    # up to scale: the two points lie on one line through the origin
+    return verify(felt1 * given2, felt2 * given1)
+
+
+@verified(
+    id="S2.25",
+    section="2.3.4",
+    statement="The smooth and the no-slip law are symmetric with respect to Λ² and keep the rolling direction's share.",
+    printed=Formula(
+        r"(\theta, \psi) \mapsto (\pi - \theta, \pi - \psi), \quad (\theta, \psi) \mapsto (\theta, \pi - \psi)",
+        lambda theta, psi, xp: [(xp.pi - theta, xp.pi - psi), (theta, xp.pi - psi)],
+    ),
+    perturbed=lambda theta, psi, xp: [(xp.pi / 2 - theta, xp.pi - psi), (theta, xp.pi - psi)],
+    reason="Both maps are involutions under which the density sin θ sin²ψ is invariant. cos ψ changes its sign because "
+    "the velocity is reversed.",
+)
+def symmetry_of_the_two_laws(maps: Code) -> Verdict:
+    import sympy as sp
+
+    from ...geometry import symbolic as sym
+
+    def check(index: int) -> Verdict:
+        theta, psi = maps(sym.theta, sym.psi, sp)[index]
+        again = maps(theta, psi, sp)[index]
+        density = sym.lambda2.subs({sym.theta: theta, sym.psi: psi}, simultaneous=True)
+        return every(
+            verify(again, (sym.theta, sym.psi)), verify(density, sym.lambda2), verify(sp.cos(psi), -sp.cos(sym.psi))
+        )
+
+    return every(check(0), check(1))
+
+
+def next_side(vertices: Any, point: Any, along: Any, last: int) -> tuple[float, int]:
+    """When a particle in the plane of a polygonal wall next hits a side, and which; -1 is the line y = 0."""
+    time, side = (-point[1] / along[1], -1) if along[1] > 0 and last >= 0 else (math.inf, -1)
+    for index, (start, end) in enumerate(pairwise(vertices)):
+        edge, offset = end - start, start - point
+        cross = along[0] * edge[1] - along[1] * edge[0]
+        if index == last or cross == 0:
+            continue
+        when = (offset[0] * edge[1] - offset[1] * edge[0]) / cross
+        share = (offset[0] * along[1] - offset[1] * along[0]) / cross
+        if 0 <= when < time and 0 <= share <= 1:
+            time, side = when, index
+    return time, side
+
+
+def bounce_on_the_cylinder(disk: Disk, wall: Wall, place: Any, velocity: Any) -> Any:
+    """The outgoing velocity of a disk on the cylinder over a polygonal wall, by reflections in three dimensions.
+
+    The free configurations are those with (x1 + alpha, x2) outside the wall; at a side with unit normal k the velocity
+    is reflected at n = `contact_normal` in the kinetic-energy metric. Not a number after too many bounces.
+    """
+    vertices, last = wall.vertices, -1
+    position, velocity = np.array(place, dtype=float), np.array(velocity, dtype=float)
+    for _ in range(MOST_BOUNCES):
+        point = np.array([position[0] + position[2], position[1]])
+        along = np.array([velocity[0] + velocity[2], velocity[1]])
+        time, last = next_side(vertices, point, along, last)
+        if last < 0:
+            return velocity
+        position = position + time * velocity
+        edge = vertices[last + 1] - vertices[last]
+        normal = np.array(contact_normal(disk.mass, disk.inertia, (-edge[1], edge[0]) / np.hypot(*edge), 0.0))
+        velocity = velocity - 2 * disk.inner(velocity, normal) * normal
+    return np.full(3, np.nan)
+
+
+@verified(
+    id="S2.28",
+    section="5.1, 1.3.7",
+    equation="3.10 and the law of rough collisions",
+    statement="On the cylinder a collision is reflection by the foreshortened wall, and free along χ.",
+    printed=Formula(
+        r"K_{\mathrm{cyl}}(\theta, \psi) = (P^{\tilde\Sigma}(\theta), \pi - \psi)",
+        lambda wall, disk: wall.foreshorten(disk),
+    ),
+    perturbed=lambda wall, disk: wall.unforeshorten(disk),
+    reason="Simulated in three dimensions with the kinetic-energy normal, the disk leaves as the particle of the "
+    "foreshortened wall does. With the inverse exponent the angles differ.",
+    kind="numeric",
+)
+def decoupling_on_the_cylinder(felt: Code) -> Verdict:
+    rng = np.random.default_rng(5)
+    found, expected = [], []
+    for _ in range(60):
+        disk = Disk(*np.exp(rng.uniform(-1.0, 1.0, 2)))
+        wall = triangular_teeth(rng.uniform(0.6, 2.5)) if rng.random() < 0.5 else rectangular_teeth(rng.uniform(0.3, 2))
+        x, theta, psi = rng.random(), rng.uniform(0.3, np.pi - 0.3), rng.uniform(0.3, np.pi - 0.3)
+        alpha = rng.uniform(-1.0, 1.0)
+        velocity = bounce_on_the_cylinder(disk, wall, (x - alpha, 0.0, alpha), -disk.from_angles(theta, psi))
+        found.append([float(angle) for angle in disk.to_angles(velocity)])
+        expected.append([float(trace(felt(wall, disk), x, theta).theta), np.pi - psi])
+    return agreement(found, expected, TRACED)

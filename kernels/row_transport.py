@@ -1,0 +1,127 @@
+"""Wasserstein distances between probability measures on an interval, for many pairs at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..checks import Floats
+
+# Ends of a piece that agree to this share are integrated by the value in the middle: the divided difference below
+# would lose the other digits, and the neglected term is of the order of the square.
+EQUAL_ENDS = 1e-5
+# A step of a cumulative distribution smaller than this is none.
+SMALLEST_STEP = 1e-300
+# Numbers at a time: they stay in the cache, which makes it three times faster.
+CHUNK = 2**15
+
+
+@dataclass(frozen=True)
+class Distributions:
+    """Cumulative distribution functions as polygons, one a row: jumps are vertical sides, densities slanted ones.
+
+    Parameters
+    ----------
+    position, level : arrays, shape (rows, corners)
+        Corners (x, F(x)), both non-decreasing along a row; F ends at 1.
+    """
+
+    position: Floats
+    level: Floats
+
+    @classmethod
+    def of_atoms(cls, position: Floats, probability: Floats) -> Distributions:
+        """Sums of point masses; both arrays of shape (rows, atoms), in any order."""
+        order = np.argsort(position, axis=1, kind="stable")
+        above = np.cumsum(np.take_along_axis(probability, order, axis=1), axis=1)
+        above /= above[:, -1:]
+        below = np.concatenate((np.zeros_like(above[:, :1]), above[:, :-1]), axis=1)
+        level = np.stack((below, above), axis=-1).reshape(len(above), -1)
+        return cls(np.repeat(np.take_along_axis(position, order, axis=1), 2, axis=1), level)
+
+    @classmethod
+    def of_parts(cls, edges: Floats, cumulative: Floats, position: Floats, probability: Floats) -> Distributions:
+        """A continuous part, linear between edges, shape (rows, edges), plus point masses, shape (rows, atoms)."""
+        if position.shape[1] == 0:
+            corners = np.broadcast_to(edges, cumulative.shape)
+            return cls(corners, cumulative / cumulative[:, -1:])
+        rows, count = cumulative.shape
+        cell = np.clip(np.searchsorted(edges, position, side="right") - 1, 0, count - 2)
+        share = (position - edges[cell]) / (edges[cell + 1] - edges[cell])
+        low = np.take_along_axis(cumulative, cell, axis=1)
+        at_atom = low + share * (np.take_along_axis(cumulative, cell + 1, axis=1) - low)
+        # every atom is two corners with the same place: before the jump and after it
+        corner = np.concatenate((np.broadcast_to(edges, (rows, count)), position, position), axis=1)
+        base = np.concatenate((cumulative, at_atom, at_atom), axis=1)
+        jump = np.concatenate((np.zeros((rows, count + position.shape[1])), probability), axis=1)
+        order = np.argsort(corner, axis=1, kind="stable")
+        level = np.take_along_axis(base, order, axis=1) + np.cumsum(np.take_along_axis(jump, order, axis=1), axis=1)
+        level = np.maximum.accumulate(level, axis=1)
+        return cls(np.take_along_axis(corner, order, axis=1), level / level[:, -1:])
+
+    def quantile(self, share: Floats) -> Floats:
+        """The inverse function at ``share``, shape (rows, any)."""
+        rows, corners = self.level.shape
+        # one search in all rows at once: row i occupies the values from 2 i to 2 i + 1
+        shift = 2.0 * np.arange(rows)[:, None]
+        place = np.searchsorted((self.level + shift).ravel(), (share + shift).ravel(), side="left").reshape(share.shape)
+        right = np.clip(place - corners * np.arange(rows)[:, None], 1, corners - 1)
+        low, high = (np.take_along_axis(self.level, right - back, axis=1) for back in (1, 0))
+        left_end, right_end = (np.take_along_axis(self.position, right - back, axis=1) for back in (1, 0))
+        part = np.clip((share - low) / np.maximum(high - low, SMALLEST_STEP), 0.0, 1.0)
+        return np.asarray(left_end + part * (right_end - left_end))
+
+
+def wasserstein(first: Distributions, second: Distributions, order: float = 1.0) -> Floats:
+    r"""W_p between corresponding rows, exactly, shape (rows,).
+
+    W_p^p is the integral over t in (0, 1) of the p-th power of the difference of the two quantile functions. Between
+    two neighbouring levels of either function the difference is linear in t, and its power is integrated in closed
+    form.
+
+    Examples
+    --------
+    >>> one = Distributions.of_atoms(np.array([[0.0, 1.0]]), np.array([[0.5, 0.5]]))
+    >>> other = Distributions.of_atoms(np.array([[0.5]]), np.array([[1.0]]))
+    >>> wasserstein(one, other, 2.0).tolist()
+    [0.5]
+    """
+    levels = np.sort(np.concatenate((first.level, second.level), axis=1), axis=1)
+    width = np.diff(levels, axis=1)
+    quarter, three = levels[:, :-1] + 0.25 * width, levels[:, :-1] + 0.75 * width
+    early = first.quantile(quarter) - second.quantile(quarter)
+    late = first.quantile(three) - second.quantile(three)
+    start, end = 1.5 * early - 0.5 * late, 1.5 * late - 0.5 * early
+    power = np.sum(width * _mean_power(start, end, order), axis=1)
+    return np.asarray(power ** (1.0 / order))
+
+
+def _mean_power(start: Floats, end: Floats, order: float) -> Floats:
+    """The mean of the p-th power of the modulus of a linear function between two values."""
+    rise = end - start
+    flat = np.abs(rise) <= EQUAL_ENDS * np.maximum(np.abs(start), np.abs(end))
+    middle = np.abs(0.5 * (start + end)) ** order
+    primitive = [np.sign(value) * np.abs(value) ** (order + 1.0) / (order + 1.0) for value in (start, end)]
+    return np.where(flat, middle, (primitive[1] - primitive[0]) / np.where(flat, 1.0, rise))
+
+
+def grid_wasserstein(first: Floats, second: Floats, points: Floats, order: float = 1.0) -> Floats:
+    """W_p between corresponding rows of probabilities of the same increasing points, shape ``first.shape[:-1]``.
+
+    For p = 1 it is the integral of the difference of the distribution functions: one sum, no sorting.
+    """
+    shape = first.shape[:-1]
+    flat = [np.reshape(array, (-1, points.size)) for array in (first, second)]
+    if order != 1.0:
+        position = np.broadcast_to(points, flat[0].shape)
+        one, other = (Distributions.of_atoms(position, array) for array in flat)
+        return wasserstein(one, other, order).reshape(shape)
+    gap, found = np.diff(points), np.empty(len(flat[0]))
+    step = max(1, CHUNK // points.size)
+    for start in range(0, found.size, step):
+        part = slice(start, start + step)
+        difference = flat[0][part] - flat[1][part]
+        np.cumsum(difference, axis=1, out=difference)
+        found[part] = np.abs(difference, out=difference)[:, :-1] @ gap
+    return found.reshape(shape)

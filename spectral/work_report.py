@@ -1,0 +1,202 @@
+"""Error against run time of several methods: rows, orders, the front, and how well the library chose."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from .fitted_order import FittedOrder, fit_order
+from .machine import Machine
+from .reference_value import ROUNDED
+from .work_problem import WorkMethod, WorkProblem
+from .work_row import WorkRow
+from .work_table import table_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMAT = 1
+# An error within so many errors of its reference measures the reference.
+ABOVE_REFERENCE = 3.0
+
+
+@dataclass(frozen=True)
+class MethodFacts:
+    """What a report says of a method besides its rows.
+
+    Attributes
+    ----------
+    declared_order : float or None
+    is_random : bool
+    reference : str
+        Where the reference that it is measured against comes from.
+    floor : float
+        Error of that reference, or rounding; errors below it are not told apart.
+    """
+
+    declared_order: float | None
+    is_random: bool
+    reference: str
+    floor: float
+
+
+@dataclass(frozen=True)
+class WorkReport:
+    """What `work_precision` measured.
+
+    Attributes
+    ----------
+    problem : str
+    norms : tuple of str
+        The first one decides on orders, the front and the choice.
+    auto : str
+        Name of the method in which the library chooses.
+    methods : mapping of str to MethodFacts
+    machine : Machine
+    rows : tuple of WorkRow
+
+    Examples
+    --------
+    >>> from asperity import spectral as spec
+    >>> problem = spec.WorkProblem("one third", spec.ReferenceValue(1 / 3, 0.0, "by hand"))
+    >>> decimals = spec.WorkMethod("decimals", lambda n: round(1 / 3, n))
+    >>> report = spec.work_precision(problem, [decimals], [1, 2, 3], repeats=1)
+    >>> [f"{row.errors['absolute']:.1e}" for row in report.rows]
+    ['3.3e-02', '3.3e-03', '3.3e-04']
+    """
+
+    problem: str
+    norms: tuple[str, ...]
+    auto: str
+    methods: Mapping[str, MethodFacts]
+    machine: Machine
+    rows: tuple[WorkRow, ...] = ()
+
+    @classmethod
+    def of(cls, problem: WorkProblem, methods: Sequence[WorkMethod], machine: Machine) -> WorkReport:
+        """A report without rows."""
+        facts = {}
+        for method in methods:
+            reference = problem.reference_for(method.name)
+            size = float(np.max(np.abs(reference.value), initial=0.0))
+            floor = max(reference.error, ROUNDED * size, ROUNDED * np.finfo(np.float64).tiny)
+            facts[method.name] = MethodFacts(method.order, method.is_random, reference.source, floor)
+        return cls(problem.name, tuple(problem.norms), problem.auto, MappingProxyType(facts), machine)
+
+    def with_row(self, row: WorkRow) -> WorkReport:
+        """The report with one row more."""
+        return replace(self, rows=(*self.rows, row))
+
+    def continued(self, earlier: WorkReport) -> WorkReport:
+        """This report with the rows of an earlier one; an InputError if these are not of the same problem."""
+        if (earlier.problem, earlier.norms) != (self.problem, self.norms):
+            raise InputError(f"path: expected rows of {self.problem!r}, got {earlier.problem!r}; name another file")
+        if not earlier.machine.is_comparable_with(self.machine):
+            raise InputError(f"path: its times are of {earlier.machine}, not of {self.machine}; name another file")
+        return replace(self, methods=MappingProxyType({**earlier.methods, **self.methods}), rows=earlier.rows)
+
+    def error(self, row: WorkRow) -> float:
+        """Error of a row that is done, in the first norm."""
+        return row.errors[self.norms[0]]
+
+    def order(self, method: str) -> FittedOrder | None:
+        """The order in the budget, fitted to errors well above the reference's; None for fewer than three of them."""
+        least = ABOVE_REFERENCE * self.methods[method].floor
+        rows = [row for row in self._done(method) if self.error(row) > least]
+        return fit_order([row.budget for row in rows], [self.error(row) for row in rows]) if rows else None
+
+    def front(self) -> tuple[WorkRow, ...]:
+        """The rows that no other one beats in both error and least time, fastest first."""
+        found: list[WorkRow] = []
+        for row in sorted(self._done(), key=lambda row: (row.least, self.error(row))):
+            if not found or self._level(row) < self._level(found[-1]):
+                found.append(row)
+        return tuple(found)
+
+    def choice(self) -> float | None:
+        """Time of the method that chooses over that of the best other one at equal error, the worst of its rows.
+
+        Between the rows of a method its time is interpolated in the logarithms. An error that its reference cannot
+        tell from zero counts as what the method reports, if that is less. None without rows of both kinds.
+        """
+        ratios = []
+        for row in self._done(self.auto):
+            times = [
+                time
+                for name in self.methods
+                if name != self.auto and (time := self._time_to(name, self._claim(row))) is not None
+            ]
+            if times:
+                ratios.append(row.least / min(times))
+        return max(ratios, default=None)
+
+    def table(self) -> str:
+        """A Markdown table, with the reference, the orders, the choice and the machine below it."""
+        return table_of(self)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw errors against least times, both logarithmic."""
+        from .work_picture import draw_work
+
+        return draw_work(self, ax)
+
+    def to_json(self) -> str:
+        """Everything, as JSON without NaN or infinity."""
+        data = {
+            "format": FORMAT,
+            "problem": self.problem,
+            "norms": list(self.norms),
+            "auto": self.auto,
+            "methods": {name: dict(facts.__dict__) for name, facts in self.methods.items()},
+            "machine": self.machine.as_dict(),
+            "rows": [row.as_dict() for row in self.rows],
+        }
+        return json.dumps(data, indent=1, allow_nan=False)
+
+    @classmethod
+    def of_json(cls, text: str) -> WorkReport:
+        """The report that `to_json` gave; an InputError for any other text."""
+        try:
+            data: dict[str, Any] = json.loads(text)
+            if data["format"] != FORMAT:
+                raise InputError(f"JSON: expected format {FORMAT} of a report, got {data['format']!r}")
+            methods = {name: MethodFacts(**facts) for name, facts in data["methods"].items()}
+            rows = tuple(WorkRow.of_dict(row) for row in data["rows"])
+            machine = Machine.of_dict(data["machine"])
+            return cls(data["problem"], tuple(data["norms"]), data["auto"], MappingProxyType(methods), machine, rows)
+        except (ValueError, KeyError, TypeError) as reason:
+            raise InputError(f"JSON: expected what WorkReport.to_json() gives: {reason!r}") from reason
+
+    def _done(self, method: str | None = None) -> list[WorkRow]:
+        return [row for row in self.rows if row.is_done and method in (None, row.method)]
+
+    def _level(self, row: WorkRow) -> float:
+        """The row's error, not below what can be told from zero."""
+        return max(self.error(row), self.methods[row.method].floor)
+
+    def _claim(self, row: WorkRow) -> float:
+        """The row's error; the reported one where the reference cannot tell."""
+        floor = self.methods[row.method].floor
+        if self.error(row) > ABOVE_REFERENCE * floor or row.reported is None:
+            return self._level(row)
+        # no claim is better than rounding
+        return max(min(row.reported, self._level(row)), min(floor, ROUNDED))
+
+    def _time_to(self, method: str, error: float) -> float | None:
+        """The time after which a method has an error, or None if it has not."""
+        best: list[tuple[float, float]] = []
+        for row in sorted(self._done(method), key=lambda row: row.least):
+            if not best or self._claim(row) < best[-1][1]:
+                best.append((row.least, self._claim(row)))
+        if not best or best[-1][1] > error:
+            return None
+        if best[0][1] <= error:
+            return best[0][0]
+        times, errors = np.log(np.array(best)).T
+        return float(np.exp(np.interp(-np.log(error), -errors, times)))

@@ -1,0 +1,125 @@
+"""One run of the benchmark: reports of problems, extreme cases and savings, and the files that hold them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import FileExistsRefusal, InputError
+from ..spectral import WorkReport
+from .standard_set import file_stem
+
+FORMAT = 1
+SUMMARY, TABLES, DATA = "summary.md", "tables.md", "bench.json"
+# The library's choice is called good within this factor of the best method's time at equal error.
+GOOD_CHOICE = 2.0
+
+
+@dataclass(frozen=True)
+class BenchRun:
+    """Reports on problems, in the order in which they were run.
+
+    Attributes
+    ----------
+    reports : tuple of WorkReport
+    """
+
+    reports: tuple[WorkReport, ...]
+
+    def summary(self) -> str:
+        """One line a problem: what the library chose, how far it got, how far its time is from the best."""
+        lines = [
+            "| problem | chosen | error | reported | seconds | times the best at equal error | front |",
+            "|---|---|---|---|---|---|---|",
+        ]
+        lines += [_line(report) for report in self.reports]
+        choices = [choice for report in self.reports if (choice := report.choice()) is not None]
+        good = sum(choice <= GOOD_CHOICE for choice in choices)
+        lines += [
+            "",
+            f"The choice is within a factor {GOOD_CHOICE:g} of the best on {good} of {len(choices)} problems.",
+        ]
+        agree, differ, unsure = self.orders()
+        lines.append(
+            f"Declared orders: {len(agree)} agree within 0.15, {len(differ)} differ, {len(unsure)} are not resolved "
+            "(their 95 % interval is wider)."
+        )
+        lines += [f"- differs: {line}" for line in differ]
+        if self.reports:
+            lines.append(f"Machine: {self.reports[0].machine}.")
+        return "\n".join(lines)
+
+    def orders(self) -> tuple[list[str], list[str], list[str]]:
+        """Declared orders that the fits agree with, that they contradict, and that they do not resolve."""
+        groups: tuple[list[str], list[str], list[str]] = ([], [], [])
+        for report in self.reports:
+            for name, facts in report.methods.items():
+                fitted = report.order(name)
+                if facts.declared_order is None or fitted is None:
+                    continue
+                verdict = fitted.verdict(facts.declared_order)
+                line = f"{report.problem}, {name}: {fitted}, declared {facts.declared_order:g}"
+                groups[("agrees", "differs", "not resolved").index(verdict)].append(line)
+        return groups
+
+    def tables(self) -> str:
+        """All rows of all problems."""
+        return "\n\n".join(f"## {report.problem}\n\n{report.table()}" for report in self.reports)
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write summary, tables, data, and a picture a problem; returns what was written."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.figure import Figure
+
+        written = [folder / SUMMARY, folder / TABLES, folder / DATA]
+        for path, text in zip(written, (self.summary(), self.tables(), self.to_json()), strict=True):
+            path.write_text(text + "\n", encoding="utf-8")
+        for report in self.reports:
+            if any(row.is_done for row in report.rows):
+                ax = report.plot()
+                assert isinstance(ax.figure, Figure)
+                FigureCanvasAgg(ax.figure)
+                written.append(folder / f"{file_stem(report.problem)}.png")
+                ax.figure.savefig(written[-1], dpi=110)
+        return written
+
+    def to_json(self) -> str:
+        """All reports."""
+        data = {"format": FORMAT, "reports": [json.loads(report.to_json()) for report in self.reports]}
+        return json.dumps(data, indent=1, allow_nan=False)
+
+    @classmethod
+    def of_json(cls, text: str) -> BenchRun:
+        """The run that `to_json` gave; an InputError for any other text."""
+        try:
+            data = json.loads(text)
+            return cls(tuple(WorkReport.of_json(json.dumps(report)) for report in data["reports"]))
+        except (ValueError, KeyError, TypeError) as reason:
+            raise InputError(f"JSON: expected what BenchRun.to_json() gives: {reason!r}") from reason
+
+
+def fresh_folder(folder: Path, force: bool) -> None:
+    """Make the folder; with ``force`` remove the rows of an earlier run, so that all are measured again."""
+    if folder.exists() and not folder.is_dir():
+        raise FileExistsRefusal(f"--out: {folder} is a file; name a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    if force:
+        for path in folder.glob("*.json"):
+            path.unlink()
+
+
+def _line(report: WorkReport) -> str:
+    rows = [row for row in report.rows if row.method == report.auto and row.is_done]
+    front = ", ".join(dict.fromkeys(row.method for row in report.front()))
+    if not rows:
+        states = ", ".join(dict.fromkeys(row.status for row in report.rows if row.method == report.auto))
+        return f"| {report.problem} | {states or 'not run'} | - | - | - | - | {front} |"
+    best = min(rows, key=report.error)
+    choice = report.choice()
+    reported = "-" if best.reported is None else f"{best.reported:.1e}"
+    ratio = "-" if choice is None else f"{choice:.2g}"
+    return (
+        f"| {report.problem} | {best.note} | {report.error(best):.1e} | {reported} | {best.least:.2g} | {ratio} "
+        f"| {front} |"
+    )

@@ -1,0 +1,61 @@
+"""One line of the stability report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+ExtremeVerdict = Literal["met", "degraded as reported", "refused", "not met", "timed out"]
+
+
+@dataclass(frozen=True)
+class ExtremeRow:
+    """What became of one extreme case.
+
+    Attributes
+    ----------
+    case : str
+    reference : str
+        What the error is measured against.
+    error, allowed : float
+        Largest error, and what it may be; in ``unit``.
+    unit : str
+        "eps x condition" for rays: rounding errors times the derivative of the exact map and the number of hits.
+    reported : float
+        What the library itself says its error is, in the same unit; 0 if it makes no claim.
+    counts : mapping of str to int
+        Rays by status; empty where none is traced.
+    note : str
+    seconds : float
+    ended : str
+        "", or why there is no error: "refused", "timed out", "failed".
+
+    Examples
+    --------
+    >>> ExtremeRow("gap of 1e-12", "g", 1e-16, 1e-15).verdict, ExtremeRow("gap", "g", 1e-3, 1e-15, reported=0.1).verdict
+    ('met', 'degraded as reported')
+    """
+
+    case: str
+    reference: str
+    error: float = 0.0
+    allowed: float = 0.0
+    unit: str = ""
+    reported: float = 0.0
+    counts: Mapping[str, int] = field(default_factory=dict)
+    note: str = ""
+    seconds: float = 0.0
+    ended: str = ""
+
+    @property
+    def verdict(self) -> ExtremeVerdict:
+        """Whether the case meets what it may be off by, says that it does not, is refused, or is simply wrong."""
+        if self.ended == "timed out":
+            return "timed out"
+        if self.ended:
+            return "refused" if self.ended == "refused" else "not met"
+        if not self.error <= max(self.allowed, self.reported):
+            return "not met"
+        flagged = sum(number for status, number in self.counts.items() if status != "escaped")
+        return "degraded as reported" if self.error > self.allowed or flagged else "met"

@@ -1,0 +1,27 @@
+"""How a formula is verified: identities by proof, numbers by measurement, and the entry that holds both.
+
+Names are imported when they are first used; sympy and mpmath only when an identity is asked about.
+"""
+
+from __future__ import annotations
+
+from .entry import Entry, Finding, Formula, by_reading, convention, erratum, verified
+from .identity import verify
+from .measurement import agreement, holds, no_excess
+from .verdict import Verdict, every
+
+__all__ = [
+    "Entry",
+    "Finding",
+    "Formula",
+    "Verdict",
+    "agreement",
+    "by_reading",
+    "convention",
+    "erratum",
+    "every",
+    "holds",
+    "no_excess",
+    "verified",
+    "verify",
+]

@@ -1,0 +1,262 @@
+"""The normal form in which an expression that is zero becomes the polynomial 0.
+
+Every symbol is replaced by parameters that run over its interval and over nothing else, so that signs are known: an
+angle in (0, pi) by 2 arctan t with t > 0, which makes its sines rational; an angle without bounds, or where signs do
+not matter, by a pair (c, s) with c^2 + s^2 = 1; a number in (a, b) by (a + b t)/(1 + t). Roots become symbols with a
+relation, after factors of known sign have been drawn out. What remains is a polynomial in quantities that are taken for
+independent: if it is 0, so is the expression, at every point of the domain. The converse fails where they are not.
+
+Imported only by functions, because it imports sympy.
+"""
+
+from __future__ import annotations
+
+from math import comb, lcm
+from typing import Any
+
+import sympy as sp
+
+from .domain import Domain
+
+_BY_SINES = {
+    sp.tan: lambda x: sp.sin(x) / sp.cos(x),
+    sp.cot: lambda x: sp.cos(x) / sp.sin(x),
+    sp.sec: lambda x: 1 / sp.cos(x),
+    sp.csc: lambda x: 1 / sp.sin(x),
+    sp.sinh: lambda x: (sp.exp(x) - sp.exp(-x)) / 2,
+    sp.cosh: lambda x: (sp.exp(x) + sp.exp(-x)) / 2,
+    sp.tanh: lambda x: (sp.exp(2 * x) - 1) / (sp.exp(2 * x) + 1),
+}
+
+
+def vanishes(expression: Any, parameters: Parameters) -> bool:
+    """Whether the normal form is 0, which proves that the expression is: on open intervals, and where it is continuous
+    at their ends too."""
+    e = parameters.normal(expression)
+    # functions without a normal form of their own: equal ones have become one expression
+    e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function) if f.func is not sp.Abs})
+    roots: dict[Any, tuple[Any, int]] = {}
+    e = _without_roots(e, roots)
+    e = sp.together(e).as_numer_denom()[0]
+    # from the outermost root to the innermost, for a root's radicand may hold others
+    for root, (radicand, index) in reversed(roots.items()):
+        e = _reduced(e, root, index, radicand)
+    for cosine, sine in parameters.circles.values():
+        e = _reduced(e, sine, 2, 1 - cosine**2)
+    return bool(sp.expand(e) == 0)
+
+
+class Parameters:
+    """What stands for the symbols of a domain; filled as expressions are met, so that all of them share it.
+
+    Without ``half_angles`` every angle is a pair (c, s): less is known then, but polynomials stay short.
+    """
+
+    def __init__(self, domain: Domain, half_angles: bool) -> None:
+        self._domain = domain
+        self._half_angles = half_angles
+        self._numbers: dict[Any, Any] = {}
+        self._opaque: dict[Any, Any] = {}
+        self._angles: dict[Any, tuple[Any, Any]] = {}
+        self._exponentials: dict[Any, Any] = {}
+        self._divisors: dict[Any, int] = {}
+        self.circles: dict[Any, tuple[Any, Any]] = {}
+
+    def normal(self, e: Any) -> Any:
+        """The expression in the parameters, roots and absolute values drawn apart into factors of known sign."""
+        for function, by_sines in _BY_SINES.items():
+            e = e.replace(function, by_sines)
+        e = e.replace(lambda p: p.func is sp.exp and p.has(sp.I), lambda p: sp.expand(p, complex=True))
+        arguments = {f.args[0] for f in e.atoms(sp.sin, sp.cos, sp.exp)}
+        changed = False
+        for argument in arguments:
+            for share, unit in _terms(argument):
+                divisor = lcm(self._divisors.get(unit, 1), int(share.q))
+                changed |= divisor != self._divisors.get(unit, 1)
+                self._divisors[unit] = divisor
+        if changed:
+            # the unit angle is smaller now: what stood for the old one is no longer used
+            self._angles.clear()
+            self._exponentials.clear()
+            self.circles.clear()
+        return self._rebuilt(e)
+
+    def factored(self, e: Any) -> Any:
+        """The normal form as a product, whose sign sympy knows if it knows that of every factor."""
+        return sp.factor(sp.together(self.normal(e)))
+
+    def _rebuilt(self, e: Any) -> Any:
+        if e.is_Symbol:
+            if e not in self._numbers:
+                self._numbers[e] = _running(self._domain.intervals.get(e, (-sp.oo, sp.oo)), e)
+            return self._numbers[e]
+        if e.func in (sp.sin, sp.cos):
+            sine, cosine = self._sine_and_cosine(e.args[0])
+            return sine if e.func is sp.sin else cosine
+        if e.func is sp.exp:
+            return sp.Mul(
+                *(self._exponential(unit) ** (share * self._divisors[unit]) for share, unit in _terms(e.args[0]))
+            )
+        if not e.args:
+            return e
+        if not _is_arithmetic(e):
+            # equal to what is written alike
+            return self._opaque.setdefault(e, sp.Dummy("o"))
+        parts = [self._rebuilt(part) for part in e.args]
+        if e.is_Pow and parts[1].is_Rational and not parts[1].is_Integer:
+            return _power(parts[0], parts[1])
+        if e.func is sp.Abs:
+            return sp.Mul(*(_absolute(factor) ** times for factor, times in _factors(parts[0])))
+        if e.func is sp.log:
+            return _logarithm(parts[0])
+        if e.is_Function:
+            return e.func(*(sp.factor(part) for part in parts))
+        return e.func(*parts)
+
+    def _sine_and_cosine(self, argument: Any) -> tuple[Any, Any]:
+        terms = _terms(argument)
+        turn = sum(share for share, unit in terms if unit is sp.pi)
+        sine, cosine = sp.sin(sp.pi * turn), sp.cos(sp.pi * turn)
+        for share, unit in terms:
+            if unit is sp.pi:
+                continue
+            one = self._multiple(int(share * self._divisors[unit]), *self._unit_circle(unit))
+            sine, cosine = sine * one[1] + cosine * one[0], cosine * one[1] - sine * one[0]
+        return sine, cosine
+
+    @staticmethod
+    def _multiple(times: int, sine: Any, cosine: Any) -> tuple[Any, Any]:
+        """Sine and cosine of a multiple, by the binomial formula."""
+        n = abs(times)
+        if n == 1:
+            return times * sine, cosine
+        terms = [comb(n, k) * (-1) ** (k // 2) * cosine ** (n - k) * sine**k for k in range(n + 1)]
+        return (1 if times > 0 else -1) * sp.Add(*terms[1::2]), sp.Add(*terms[::2])
+
+    def _unit_circle(self, unit: Any) -> tuple[Any, Any]:
+        """Sine and cosine of ``unit`` divided by its divisor."""
+        if unit not in self._angles:
+            low, high = self._domain.intervals.get(unit, (-sp.oo, sp.oo))
+            low, high = low / self._divisors[unit], high / self._divisors[unit]
+            low, high = _plain_end(low, sp.floor), _plain_end(high, sp.ceiling)
+            if self._half_angles and bool(low >= -sp.pi) and bool(high <= sp.pi):
+                ends = (sp.tan(low / 2) if low != -sp.pi else -sp.oo, sp.tan(high / 2) if high != sp.pi else sp.oo)
+                t = _running(ends, unit)
+                self._angles[unit] = 2 * t / (1 + t**2), (1 - t**2) / (1 + t**2)
+            else:
+                cosine, sine = sp.Dummy("c", real=True), sp.Dummy("s", real=True)
+                self.circles[unit] = cosine, sine
+                self._angles[unit] = sine, cosine
+        return self._angles[unit]
+
+    def _exponential(self, unit: Any) -> Any:
+        return self._exponentials.setdefault(unit, sp.Dummy("E", positive=True))
+
+
+def _is_arithmetic(e: Any) -> bool:
+    """Whether it is an operation or a function of numbers; cases, integrals, sums and the like are not."""
+    return bool(e.is_Add or e.is_Mul or e.is_Pow or e.is_Function) and all(isinstance(part, sp.Expr) for part in e.args)
+
+
+def _terms(argument: Any) -> list[tuple[Any, Any]]:
+    """An argument as a sum of rational multiples of units."""
+    return [term.as_coeff_Mul(rational=True) for term in sp.Add.make_args(sp.expand(argument))]
+
+
+def _plain_end(end: Any, outward: Any) -> Any:
+    """The end of an interval of angles, or a multiple of pi/2 beyond it if its half has no plain tangent.
+
+    What holds on the wider interval holds on the given one.
+    """
+    quarters = 2 * end / sp.pi
+    return end if end.is_infinite or quarters.is_Integer else outward(quarters) * sp.pi / 2
+
+
+def _running(interval: tuple[Any, Any], symbol: Any) -> Any:
+    """An expression in one new symbol that takes exactly the values of an open interval."""
+    low, high = interval
+    name = str(symbol)
+    if low == -sp.oo and high == sp.oo:
+        return sp.Dummy(name, real=True, integer=symbol.is_integer, zero=symbol.is_zero)
+    if low == 0 and high == sp.oo:
+        return sp.Dummy(name, positive=True, integer=symbol.is_integer)
+    t = sp.Dummy(name, positive=True)
+    if high == sp.oo:
+        return low + t
+    if low == -sp.oo:
+        return high - t
+    return (low + high * t) / (1 + t)
+
+
+def _factors(e: Any) -> list[tuple[Any, Any]]:
+    """Factors and their exponents, those of known sign apart; numbers as powers of primes."""
+    found: list[tuple[Any, Any]] = []
+    for factor in sp.Mul.make_args(sp.factor(sp.together(e))):
+        base, times = factor.as_base_exp()
+        if base.is_Rational and base != 0 and times.is_Integer:
+            found += [(sp.Integer(p), k * times) for p, k in sp.factorint(abs(base.p)).items() if p != 1]
+            found += [(sp.Integer(p), -k * times) for p, k in sp.factorint(base.q).items() if p != 1]
+            if base < 0:
+                found.append((sp.Integer(-1), times))
+        else:
+            found.append((base, times))
+    return found
+
+
+def _absolute(factor: Any) -> Any:
+    if factor.is_nonnegative:
+        return factor
+    return -factor if factor.is_nonpositive else sp.Abs(sp.expand(factor))
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    """base ** exponent for a base that is not negative, without the factors whose root is known."""
+    outside, inside = sp.Integer(1), sp.Integer(1)
+    for factor, times in _factors(base):
+        if factor.is_nonnegative:
+            outside *= factor ** (times * exponent)
+        elif times.is_Integer and times % 2 == 0 and exponent.q == 2:
+            outside *= _absolute(factor) ** (times * exponent)
+        elif factor.is_nonpositive:
+            outside *= (-factor) ** (times * exponent)
+            inside *= (-1) ** times
+        else:
+            inside *= factor**times
+    return outside * (sp.expand(inside) if inside.is_polynomial() else inside) ** exponent
+
+
+def _logarithm(e: Any) -> Any:
+    factors = _factors(e)
+    if all(factor.is_positive for factor, _ in factors):
+        return sp.Add(*(times * sp.log(sp.expand(factor)) for factor, times in factors))
+    return sp.log(sp.factor(e))
+
+
+def _without_roots(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
+    """Replace every root by a symbol; ``roots`` receives the radicands, inner roots first."""
+    if not e.args:
+        return e
+    if e.func is sp.Abs:
+        return _root(_without_roots(e.args[0], roots) ** 2, 2, roots)
+    if e.is_Pow and e.exp.is_Rational and not e.exp.is_Integer:
+        return _root(_without_roots(e.base, roots), int(e.exp.q), roots) ** e.exp.p
+    return e.func(*(_without_roots(part, roots) for part in e.args))
+
+
+def _root(radicand: Any, index: int, roots: dict[Any, tuple[Any, int]]) -> Any:
+    for symbol, known in roots.items():
+        if known == (radicand, index):
+            return symbol
+    symbol = sp.Dummy("r")
+    roots[symbol] = radicand, index
+    return symbol
+
+
+def _reduced(e: Any, symbol: Any, index: int, power: Any) -> Any:
+    """The numerator of e after symbol^index = power."""
+    if not e.has(symbol):
+        return e
+    total = sp.Integer(0)
+    for (times,), coefficient in sp.Poly(e, symbol).terms():
+        total += coefficient * symbol ** (times % index) * power ** (times // index)
+    return sp.together(total).as_numer_denom()[0]

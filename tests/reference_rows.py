@@ -1,0 +1,432 @@
+"""Reference rows and first moments of the random curved walls, by a second method: ``python tests/reference_rows.py``.
+
+Nothing here is the library's but the walls and their curves, and the angles at which the moments are cut. The tracer is
+that of a textbook: arcs by the quadratic about their centre, Bezier pieces by bisection of a polynomial between its
+critical points, no orientation, no run skipped. Rows are sampled densely, changes of the pieces hit are bisected to
+rounding, and between them tanh-sinh rules take over. The first moment <u, P u>/<u, u> is integrated over rows by Gauss
+rules between cuts; where pieces are too many for that, rays at a stratified sample of (x, u) are averaged. What is
+written comes with an error: from coarser rules or from the spread, and for moments from the flux E[cos Theta'] = 0.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from asperity.geometry import Arc, Bezier, Segment
+from asperity.kernels import Legendre
+from asperity.kernels.row_quadrature import panel_edges
+from random_curved_walls import COUNT, random_curved_wall
+
+FILE = Path(__file__).with_suffix(".json")
+ANGLES = (0.21, 0.83, 1.37, 1.96, 2.77)
+MOST_HITS = 5000
+# Samples of a row that stands for itself, and of one of many under a moment.
+ROW_SAMPLES, MOMENT_SAMPLES = 16384, 512
+# Rays that the library may spend on finding cuts; where its error is then above the limit, rays are averaged instead.
+CUT_RAYS, CUT_TOLERANCE, ROUGH = 800_000, 1e-5, 1e-3
+# Sides of the grid of strata, and the number of replicates; in a row, of shifted midpoint sums.
+STRATA, REPLICATES, MIDPOINTS = 500, 8, 1 << 16
+# Walks along a row, each with the places at which the one before met a piece that it had not seen.
+ATTEMPTS = 3
+# Pieces of a row at most.
+MOST_PIECES = 6000
+# tanh-sinh: step of the coarsest rule, number of halvings, largest argument.
+FIRST_STEP, LEVELS, REACH = 0.5, 5, 3.6
+# Halvings before Newton's method is tried.
+HALVINGS = 8
+compiled = njit(cache=True, error_model="numpy")
+
+
+def table_of(wall):
+    """A row a piece: kind, then what defines it; Bezier pieces are cut where they change the side they bend to."""
+    rows = []
+    for piece in wall.pieces:
+        if isinstance(piece, Segment):
+            if piece.start[1] == 0.0 == piece.end[1]:
+                continue
+            rows.append([0.0, *piece.start, *piece.end, 0.0, 0.0, 0.0, 0.0])
+        elif isinstance(piece, Arc):
+            low, high = sorted((piece.start_angle, piece.end_angle))
+            rows.append([1.0, *piece.center, *piece.semi_axes, 0.5 * (low + high), 0.5 * (high - low), 0.0, 0.0])
+        else:
+            assert isinstance(piece, Bezier)
+            control = np.array(piece.control_points)
+            if len(control) == 3:
+                control = np.array(
+                    [control[0], (control[0] + 2 * control[1]) / 3, (2 * control[1] + control[2]) / 3, control[2]]
+                )
+            rest, before = Bezier(control.tolist()), 0.0
+            for s in inflections(control):
+                first, rest = rest.split((s - before) / (1.0 - before))
+                before = s
+                rows.append([2.0, *np.array(first.control_points).ravel()])
+            rows.append([2.0, *np.array(rest.control_points).ravel()])
+    return np.array(rows)
+
+
+def inflections(control):
+    """Parameters in (0, 1) where b' x b'' changes its sign, found on a fine grid and by bisection."""
+    d = 3.0 * np.diff(control, axis=0)
+    e = 2.0 * np.diff(d, axis=0)
+
+    def bend(s):
+        v = (1 - s) ** 2 * d[0] + 2 * s * (1 - s) * d[1] + s * s * d[2]
+        a = (1 - s) * e[0] + s * e[1]
+        return v[0] * a[1] - v[1] * a[0]
+
+    grid, found = np.linspace(0.0, 1.0, 2001), []
+    for low, high in pairwise(grid):
+        if bend(low) * bend(high) < 0.0:
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if bend(low) * bend(middle) > 0.0 else (low, middle)
+            found.append(low)
+    return found
+
+
+@compiled
+def cubic(c0, c1, c2, c3, s):
+    return (1 - s) ** 3 * c0 + 3 * s * (1 - s) ** 2 * c1 + 3 * s * s * (1 - s) * c2 + s**3 * c3
+
+
+@compiled
+def bezier_time(row, own, px, py, vx, vy):
+    """First hit of a Bezier piece: time and parameter; the root nearest to ``own`` is the ray's start."""
+    g0 = (row[1] - px) * vy - (row[2] - py) * vx
+    g1 = (row[3] - px) * vy - (row[4] - py) * vx
+    g2 = (row[5] - px) * vy - (row[6] - py) * vx
+    g3 = (row[7] - px) * vy - (row[8] - py) * vx
+    # derivative/3 = d0 (1-s)^2 + 2 d1 s(1-s) + d2 s^2
+    d0, d1, d2 = g1 - g0, g2 - g1, g3 - g2
+    a, b, c = d0 - 2 * d1 + d2, 2 * (d1 - d0), d0
+    cuts = np.array([0.0, 1.0, 1.0, 1.0])
+    disc = b * b - 4 * a * c
+    if disc > 0.0:
+        q = -0.5 * (b + math.copysign(math.sqrt(disc), b))
+        r0 = q / a if a != 0.0 else 2.0
+        r1 = c / q if q != 0.0 else 2.0
+        cuts[1] = r0 if 0.0 < r0 < 1.0 else 1.0
+        cuts[2] = r1 if 0.0 < r1 < 1.0 else 1.0
+        cuts.sort()
+    roots, count = np.empty(3), 0
+    for part in range(3):
+        low, high = cuts[part], cuts[part + 1]
+        flow, fhigh = cubic(g0, g1, g2, g3, low), cubic(g0, g1, g2, g3, high)
+        if low == high or flow * fhigh > 0.0:
+            continue
+        for step in range(70):
+            middle = 0.5 * (low + high)
+            if step == HALVINGS:
+                # Newton from here; where it does not settle inside, halving goes on
+                new, settled = middle, False
+                for _ in range(8):
+                    slope = 3.0 * ((a * new + b) * new + c)
+                    if slope == 0.0 or not low <= new <= high:
+                        break
+                    move = cubic(g0, g1, g2, g3, new) / slope
+                    new -= move
+                    settled = abs(move) < 1e-16
+                    if settled:
+                        break
+                if settled and low <= new <= high:
+                    low = high = new
+                    break
+            if high - low <= 1e-16:
+                break
+            value = cubic(g0, g1, g2, g3, middle)
+            if (value > 0.0) == (flow > 0.0):
+                low = middle
+            else:
+                high = middle
+        roots[count] = 0.5 * (low + high)
+        count += 1
+    skip = -1
+    if own >= 0.0:
+        least = 1e-6
+        for k in range(count):
+            if abs(roots[k] - own) < least:
+                least, skip = abs(roots[k] - own), k
+    best, best_s = np.inf, 0.0
+    for k in range(count):
+        if k != skip:
+            s = roots[k]
+            t = (cubic(row[1], row[3], row[5], row[7], s) - px) * vx + (
+                cubic(row[2], row[4], row[6], row[8], s) - py
+            ) * vy
+            if 1e-13 < t < best:
+                best, best_s = t, s
+    return best, best_s
+
+
+@compiled
+def arc_time(row, own, px, py, vx, vy):
+    """First hit of an arc, in coordinates in which it is part of the unit circle."""
+    qx, qy, wx, wy = (px - row[1]) / row[3], (py - row[2]) / row[4], vx / row[3], vy / row[4]
+    a, b, c = wx * wx + wy * wy, qx * wx + qy * wy, qx * qx + qy * qy - 1.0
+    if own:
+        c = 0.0
+    disc = b * b - a * c
+    if disc <= 0.0:
+        return np.inf
+    root = math.sqrt(disc)
+    # the two roots without cancellation
+    q = -(b + math.copysign(root, b))
+    first, second = q / a, c / q
+    if own:
+        # one root is the start
+        first, second = -2.0 * b / a, np.inf
+    best = np.inf
+    for t in (first, second):
+        if 1e-13 < t < best:
+            turn = math.atan2(qy + t * wy, qx + t * wx) - row[5]
+            turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+            if abs(turn) <= row[6] + 1e-15:
+                best = t
+    return best
+
+
+@compiled
+def follow(table, x, theta):
+    """Outgoing angle and a hash of the pieces hit; 0 for a ray that is lost."""
+    px, py, vx, vy = x, 0.0, -math.cos(theta), -math.sin(theta)
+    own, own_s, label = -1, -1.0, np.uint64(1)
+    for _ in range(MOST_HITS):
+        time, piece, place = np.inf, -1, 0.0
+        for k in range(table.shape[0]):
+            row = table[k]
+            t, s = np.inf, 0.0
+            if row[0] == 0.0:
+                if k != own:
+                    ex, ey = row[3] - row[1], row[4] - row[2]
+                    det = ex * vy - ey * vx
+                    if det != 0.0:
+                        rx, ry = row[1] - px, row[2] - py
+                        share = (vx * ry - vy * rx) / det
+                        if -1e-15 <= share <= 1.0 + 1e-15:
+                            t = (ex * ry - ey * rx) / det
+            elif row[0] == 1.0:
+                t = arc_time(row, k == own, px, py, vx, vy)
+            else:
+                t, s = bezier_time(row, own_s if k == own else -1.0, px, py, vx, vy)
+            if 1e-13 < t < time:
+                time, piece, place = t, k, s
+        if vy > 0.0 and own >= 0 and -py / vy <= time:
+            return math.atan2(vy, vx), label
+        if piece < 0:
+            return theta, np.uint64(0)
+        row = table[piece]
+        px, py = px + time * vx, py + time * vy
+        if row[0] == 0.0:
+            nx, ny = row[2] - row[4], row[3] - row[1]
+        elif row[0] == 1.0:
+            nx, ny = (px - row[1]) / row[3] ** 2, (py - row[2]) / row[4] ** 2
+        else:
+            s = place
+            px, py = cubic(row[1], row[3], row[5], row[7], s), cubic(row[2], row[4], row[6], row[8], s)
+            nx = -((1 - s) ** 2 * (row[4] - row[2]) + 2 * s * (1 - s) * (row[6] - row[4]) + s * s * (row[8] - row[6]))
+            ny = (1 - s) ** 2 * (row[3] - row[1]) + 2 * s * (1 - s) * (row[5] - row[3]) + s * s * (row[7] - row[5])
+        twice = 2.0 * (vx * nx + vy * ny) / (nx * nx + ny * ny)
+        vx, vy = vx - twice * nx, vy - twice * ny
+        size = math.hypot(vx, vy)
+        vx, vy = vx / size, vy / size
+        own, own_s = piece, place
+        label = label * np.uint64(6364136223846793005) + np.uint64(2 * piece + 3)
+    return theta, np.uint64(0)
+
+
+@compiled
+def row_integral(table, theta, low, high, samples, exactness):
+    """The integral of cos theta' over the entry points, and the error: what narrow gaps and the last rules leave open.
+
+    Gaps are halved until they matter less than the exactness, as far as their ends show, and rules have to agree to it.
+    """
+    width = high - low
+    ladder = np.empty(samples + 80)
+    for n in range(samples):
+        ladder[n] = low + width * (n + (0.1 + n * 0.7548776662466927 + theta * 977.0) % 1.0) / samples
+    for n in range(40):
+        ladder[samples + 2 * n] = low + width * 0.4 ** (n + 3)
+        ladder[samples + 2 * n + 1] = high - width * 0.4 ** (n + 3)
+    for _ in range(ATTEMPTS):
+        ladder.sort()
+        total, error, strange = walk(table, theta, ladder, exactness)
+        if strange.shape[0] == 0:
+            break
+        ladder = np.concatenate((ladder, strange))
+    return total, error + 2.0 * (ladder[0] - low) + 2.0 * (high - ladder[-1])
+
+
+@compiled
+def walk(table, theta, ladder, exactness):
+    """The integral from the first to the last place of the ladder, its error, and places in pieces of other labels."""
+    xs, outs, labels = np.empty(200), np.empty(200), np.empty(200, np.uint64)
+    strange = [0.0 for _ in range(0)]
+    last = ladder[0]
+    last_out, last_label = follow(table, last, theta)
+    start, total, error, gaps, pieces = last, 0.0, 0.0, 0.0, 0
+    for k in range(1, ladder.shape[0]):
+        # the places still to be reached, the nearest one on top: the middle of a gap goes on top of its far end
+        xs[0] = ladder[k]
+        outs[0], labels[0] = follow(table, xs[0], theta)
+        count = 1
+        while count > 0:
+            x, out, label = xs[count - 1], outs[count - 1], labels[count - 1]
+            gap = x - last
+            matter = gap * (abs(math.cos(out) - math.cos(last_out)) + math.sqrt(gap))
+            if label == last_label:
+                last, last_out = x, out
+                count -= 1
+            elif matter > exactness and gap > 4e-16 and pieces < MOST_PIECES:
+                xs[count] = 0.5 * (last + x)
+                outs[count], labels[count] = follow(table, xs[count], theta)
+                count += 1
+            else:
+                value, miss, other = piece_integral(table, theta, start, last, last_label, exactness)
+                if not math.isnan(other):
+                    strange.append(other)
+                total += value + 0.5 * (math.cos(last_out) + math.cos(out)) * gap
+                error += miss
+                gaps += matter * matter
+                pieces += 1
+                start, last, last_out, last_label = x, x, out, label
+                count -= 1
+    value, miss, other = piece_integral(table, theta, start, last, last_label, exactness)
+    if not math.isnan(other):
+        strange.append(other)
+    # where in its gap a change lies is by chance
+    return total + value, error + miss + 3.0 * math.sqrt(gaps), np.array(strange)
+
+
+@compiled
+def piece_integral(table, theta, low, high, label, exactness):
+    """tanh-sinh over a piece, finer until two rules agree, the error, and a place of another label (nan: none).
+
+    What such rays weigh counts as error.
+    """
+    half = 0.5 * (high - low)
+    old, step, total, strange, miss, other = 0.0, FIRST_STEP, 0.0, 0.0, 2.0 * half, np.nan
+    if half <= 0.0:
+        return 0.0, 0.0, np.nan
+    for level in range(LEVELS + 1):
+        total, strange = 0.5 * total, 0.5 * strange
+        number = int(REACH / step)
+        for n in range(-number, number + 1):
+            if level > 0 and n % 2 == 0:
+                continue
+            u = 0.5 * math.pi * math.sinh(n * step)
+            weight = step * half * 0.5 * math.pi * math.cosh(n * step) / math.cosh(u) ** 2
+            # the distance to the nearer end, without cancellation
+            distance = 2.0 * half / (1.0 + math.exp(2.0 * abs(u)))
+            x = low + distance if u < 0.0 else high - distance
+            out, here = follow(table, x, theta)
+            total += weight * math.cos(out)
+            if here != label and distance > 1e-13:
+                strange += weight
+                other = x if half > exactness**0.5 else other
+        if level > 0:
+            miss = abs(total - old)
+            if level > 1 and miss <= exactness:
+                break
+        old = total
+        step *= 0.5
+    return total, miss + 2.0 * strange, other
+
+
+def opening(wall):
+    """Ends of the only hollow."""
+    (hollow,) = wall.hollows
+    return hollow.left, hollow.right
+
+
+def row_of(wall, theta):
+    """E[cos Theta' | theta] and its error."""
+    table, (left, right) = table_of(wall), opening(wall)
+    value, error = row_integral(table, theta, left, right, ROW_SAMPLES, 1e-14)
+    if error > ROUGH:
+        shifts = np.random.default_rng(7).random(REPLICATES)
+        sums = [midpoint_sum(table, theta, left, right, shift) for shift in shifts]
+        value, error = np.mean(sums), 3.0 * np.std(sums, ddof=1) / math.sqrt(REPLICATES)
+    flat = wall.period - (right - left)
+    return float(value - flat * math.cos(theta)) / wall.period, float(error) / wall.period
+
+
+@compiled
+def midpoint_sum(table, theta, left, right, shift):
+    total = 0.0
+    for n in range(MIDPOINTS):
+        total += math.cos(follow(table, left + (right - left) * (n + shift) / MIDPOINTS, theta)[0])
+    return total * (right - left) / MIDPOINTS
+
+
+FINE, COARSE = np.polynomial.legendre.leggauss(12), np.polynomial.legendre.leggauss(8)
+
+
+def moment_of(wall):
+    """<u, P u>/<u, u> and its error: flat tops, which reflect u to -u, in closed form."""
+    table, (left, right) = table_of(wall), opening(wall)
+    edges, missed = panel_edges(wall, Legendre(2), CUT_TOLERANCE, CUT_RAYS)
+    share, flat = (right - left) / wall.period, 1.0 - (right - left) / wall.period
+    if missed > ROUGH:
+        rng = np.random.default_rng(11)
+        means = [stratified_mean(table, left, right, rng.random((STRATA, STRATA, 2))) for _ in range(REPLICATES)]
+        # int u^2 du/2 = 1/3
+        return 3.0 * share * float(np.mean(means)) - flat, 9.0 * share * float(np.std(means, ddof=1)) / math.sqrt(
+            REPLICATES
+        )
+    moment, flux, error = 0.0, 0.0, 0.0
+    for low, high in pairwise(edges):
+        fine, coarse = (panel(table, left, right, low, high, rule) for rule in (FINE, COARSE))
+        moment, flux, error = moment + fine[0], flux + fine[1], error + fine[2] + abs(fine[0] - coarse[0])
+    scale = 3.0 / wall.period
+    return scale * moment - flat, scale * (error + 2.0 * abs(flux))
+
+
+def panel(table, left, right, low, high, rule):
+    """Integrals of cos theta E[cos Theta'] and of E[cos Theta'] for sin(theta)/2 d theta, and the rows' error."""
+    s, weight = 0.5 * (1.0 + rule[0]), 0.5 * rule[1]
+    angle = low + (high - low) * s * s * (3.0 - 2.0 * s)
+    weight = (high - low) * 6.0 * s * (1.0 - s) * weight * 0.5 * np.sin(angle)
+    rows = np.array([row_integral(table, theta, left, right, MOMENT_SAMPLES, 1e-8) for theta in angle])
+    return (weight * np.cos(angle)) @ rows[:, 0], weight @ rows[:, 0], weight @ rows[:, 1]
+
+
+@compiled
+def stratified_mean(table, left, right, random):
+    """Mean of u u' with one ray in every cell of a grid in (x, u)."""
+    n, total = random.shape[0], 0.0
+    for i in range(n):
+        for j in range(n):
+            x, u = left + (right - left) * (i + random[i, j, 0]) / n, -1.0 + 2.0 * (j + random[i, j, 1]) / n
+            total += u * math.cos(follow(table, x, math.acos(u))[0])
+    return total / n**2
+
+
+def main() -> None:
+    """Compute and write all references."""
+    found = []
+    for kind in range(COUNT):
+        wall = random_curved_wall(kind)
+        rows = [row_of(wall, theta) for theta in ANGLES]
+        moment = moment_of(wall)
+        found.append(
+            {
+                "kind": kind,
+                "angles": list(ANGLES),
+                "rows": [value.hex() for value, _ in rows],
+                "row_errors": [error for _, error in rows],
+                "moment": float(moment[0]).hex(),
+                "moment_error": float(moment[1]),
+            }
+        )
+        FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        print(kind, [f"{v:.12f}+-{e:.0e}" for v, e in rows], f"{moment[0]:.10f} +- {moment[1]:.1e}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

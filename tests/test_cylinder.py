@@ -1,0 +1,82 @@
+"""The straightened collision: it decouples, and the true disk shadows it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity.errors import InputError
+from asperity.geometry.satellites import Satellites
+from test_rigid import WALLS, states
+
+RATIOS = (0.1, 1.0, 2.0, 10.0)
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize("name", [name for name in WALLS if name != "islands"])
+def test_the_cylinder_is_the_foreshortened_billiard_times_a_free_motion(name, ratio):
+    disk, wall, scale = geo.Disk(ratio, 1.0), WALLS[name], 1e-3
+    position, velocity = states(wall, scale, 400, disk=disk)
+    out = geo.collide_cylinder(disk, wall, scale, position, velocity)
+    theta, psi = disk.to_angles(-velocity)
+    outgoing, rolled = disk.to_angles(out.velocity)
+    ray = geo.trace(wall.foreshorten(disk), position.sum(axis=1) / scale, theta)
+    both = out.escaped & ray.escaped
+    assert both.mean() > 0.99
+    np.testing.assert_allclose(outgoing[both], ray.theta[both], atol=1e-11)
+    np.testing.assert_allclose(out.position.sum(axis=1)[both] / scale, ray.x[both], atol=1e-10)
+    np.testing.assert_array_equal(out.contacts[both], ray.collisions[both])
+    np.testing.assert_allclose(rolled, np.pi - psi, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_the_rolling_momentum_is_conserved_to_rounding_and_its_coordinate_moves_freely(name):
+    disk, scale = geo.Disk(1.0, 0.4), 1e-2
+    position, velocity = states(WALLS[name], scale, 500, disk=disk)
+    out = geo.collide_cylinder(disk, WALLS[name], scale, position, velocity)
+    momentum = disk.rolling_momentum(velocity)
+    np.testing.assert_allclose(disk.rolling_momentum(out.velocity), momentum, atol=2e-16 * (4 + out.contacts.max()))
+    step = np.insert(out.position - position, 1, 0.0, axis=1)
+    np.testing.assert_allclose(disk.rolling_momentum(step), out.time * momentum, atol=1e-13)
+    # a flat top turns the disk round at height 0
+    assert np.all(out.time >= 0.0) and np.mean(out.time > 0.0) >= 0.25
+
+
+def test_the_flight_time_is_the_length_of_the_foreshortened_ray():
+    disk, wall = geo.Disk(1.0, 0.4), WALLS["focusing"]
+    position, velocity = states(wall, 1.0, 20, disk=disk, spacing=np.pi / 2)
+    out = geo.collide_cylinder(disk, wall, 1.0, position, velocity)
+    theta, psi = disk.to_angles(-velocity)
+    for row in range(20):
+        ray = geo.trajectory(wall.foreshorten(disk), float(position[row].sum()), float(theta[row]))
+        length = np.hypot(*np.diff(ray, axis=0).T).sum()
+        # lengths in the kinetic metric: kappa m^(1/2) times those of the foreshortened wall of the same period
+        speed = np.sin(psi[row]) / (disk.foreshortening * np.sqrt(disk.mass))
+        assert out.time[row] == pytest.approx(length / speed, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["triangular", "focusing"])
+def test_the_modified_law_is_shadowed_by_the_true_disk_with_order_one_in_the_spacing(name):
+    disk, wall = geo.Disk(1.0, 0.6), WALLS[name]
+    scales = np.array([1e-4, 1e-5, 1e-6, 1e-7])
+    spacings, errors, strays = [], [], []
+    for scale in scales:
+        spacing = Satellites.around(scale, scale * wall.depth).spacing
+        position, velocity = states(wall, scale, 2000, disk=disk)
+        true = geo.collide(disk, wall, scale, position, velocity)
+        shadow = geo.collide_modified(disk, wall, scale, position, velocity, spacing)
+        error = np.abs(true.velocity - shadow.velocity).max(axis=1)
+        spacings.append(spacing)
+        errors.append(np.median(error))
+        strays.append(np.mean(error > 0.1))
+    slope = np.polyfit(np.log(spacings), np.log(errors), 1)[0]
+    assert abs(slope - 1.0) < 0.1
+    assert strays[-1] < 0.5 * strays[0] and strays[-1] < 0.02
+
+
+def test_bad_input_is_refused():
+    with pytest.raises(InputError, match="v2 < 0"):
+        geo.collide_cylinder(geo.Disk(), WALLS["triangular"], 0.1, [[0, 0]], [[0, 1, 0]])
+    with pytest.raises(InputError, match="whole number"):
+        geo.collide_modified(geo.Disk(), WALLS["triangular"], 0.1, [[0, 0]], [[0, -1, 0]], 1.0)

@@ -1,0 +1,285 @@
+"""Distances between laws and between matrices, their errors, and the test of difference."""
+
+from __future__ import annotations
+
+import numpy as np
+import ot
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.polynomial.chebyshev import cheb2poly
+from numpy.polynomial.legendre import poly2leg
+from scipy.stats import binomtest, wasserstein_distance
+
+from asperity import InputError
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.estimates import Estimate
+from asperity.kernels import joint_distance
+from asperity.kernels.adaptive_rows import WallRows
+from asperity.kernels.moment_distance import flux_means
+from asperity.kernels.row_transport import Distributions, grid_wasserstein, wasserstein
+
+KINDS = ("rows", "sup", "joint", "pseudometric")
+
+
+def random_matrix(rng, n=6, spread=0.4):
+    rows = rng.dirichlet(np.full(n, spread), n)
+    basis = ker.Bins(n)
+    return ker.KernelMatrix(rows, basis, Estimate(0.0, 0.0, "bound", "given"))
+
+
+def empirical(law, pairs, bins, rng):
+    theta = ker.SINE.sample(pairs, rng)
+    return ker.estimate(theta, law.sample(theta, rng), ker.Bins(bins))
+
+
+# ---- the row-wise engine against others --------------------------------------------------------------------------
+@pytest.mark.parametrize("order", [1.0, 2.0, 3.5])
+def test_every_row_agrees_with_scipy_and_pot(order):
+    rng = np.random.default_rng(1)
+    points = np.sort(rng.random(40)) * np.pi
+    one, other = rng.dirichlet(np.full(40, 0.3), 30), rng.dirichlet(np.full(40, 0.3), 30)
+    found = grid_wasserstein(one, other, points, order)
+    pot = [ot.wasserstein_1d(points, points, a, b, p=order) ** (1 / order) for a, b in zip(one, other, strict=True)]
+    np.testing.assert_allclose(found, pot, rtol=0, atol=1e-13)
+    if order == 1.0:
+        scipy = [wasserstein_distance(points, points, a, b) for a, b in zip(one, other, strict=True)]
+        np.testing.assert_allclose(found, scipy, rtol=0, atol=1e-13)
+
+
+def test_atoms_in_any_order_and_place_agree_with_pot():
+    rng = np.random.default_rng(2)
+    x, y = rng.random((20, 7)), rng.random((20, 4))
+    a, b = rng.dirichlet(np.ones(7), 20), rng.dirichlet(np.ones(4), 20)
+    found = wasserstein(Distributions.of_atoms(x, a), Distributions.of_atoms(y, b), 2.0)
+    pot = [ot.wasserstein_1d(*row, p=2) ** 0.5 for row in zip(x, y, a, b, strict=True)]
+    np.testing.assert_allclose(found, pot, rtol=0, atol=1e-13)
+
+
+def test_densities_with_atoms_are_moved_exactly():
+    # half of the mass uniform on (0, 1), half at 3/4, to a point at 0: the mean, and the mean square
+    edges = np.linspace(0.0, 1.0, 5)
+    mixed = Distributions.of_parts(edges, 0.5 * edges[None, :], np.array([[0.75]]), np.array([[0.5]]))
+    point = Distributions.of_atoms(np.zeros((1, 1)), np.ones((1, 1)))
+    assert wasserstein(mixed, point)[0] == pytest.approx(0.25 + 0.375, abs=1e-14)
+    assert wasserstein(mixed, point, 2.0)[0] == pytest.approx(np.sqrt(1 / 6 + 0.5 * 0.5625), abs=1e-14)
+
+
+# ---- metrics -----------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("kind", KINDS)
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), order=st.sampled_from([1.0, 2.0]))
+def test_distances_are_metrics_on_random_kernels(kind, seed, order):
+    rng = np.random.default_rng(seed)
+    first, second, third = (random_matrix(rng) for _ in range(3))
+    between = {pair: float(ker.distance(*pair, order, kind)) for pair in [(first, second), (second, third)]}
+    direct = float(ker.distance(first, third, order, kind))
+    assert float(ker.distance(first, first, order, kind)) == pytest.approx(0.0, abs=1e-7)
+    assert float(ker.distance(third, first, order, kind)) == pytest.approx(direct, abs=1e-7)
+    assert direct <= sum(between.values()) + 1e-7
+    assert min(between.values()) > 1e-6
+
+
+def test_the_joint_distance_is_no_larger_than_that_of_rows_and_these_no_larger_than_the_supremum():
+    rng = np.random.default_rng(5)
+    for _ in range(5):
+        pair = random_matrix(rng, 8), random_matrix(rng, 8)
+        joint, rows, sup = (float(ker.distance(*pair, 2, kind)) for kind in ("joint", "rows", "sup"))
+        assert joint <= rows + 1e-12 <= sup + 2e-12
+
+
+# ---- closed forms ------------------------------------------------------------------------------------------------
+def mean_turn(order):
+    """(int |pi - 2 theta|^p sin(theta)/2 d theta)^(1/p)."""
+    return {1: np.pi - 2, 2: np.sqrt(np.pi**2 - 8)}[order]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_specular_and_retroreflection_are_as_far_apart_as_their_angles(order):
+    found = ker.distance(ker.specular(), ker.retroreflection(), order)
+    assert abs(found.value - mean_turn(order)) <= found.error < 1e-10
+
+
+@pytest.mark.parametrize("kind, share", [("rows", np.pi / 4), ("sup", np.pi / 2)])
+def test_laws_of_maxwell_differ_by_what_the_diffuse_share_moves(kind, share):
+    # W_1(point at x, sin/2) = pi/2 - sin(x), with the mean pi/4 and the supremum pi/2
+    found = ker.distance(ker.maxwell(0.2), ker.maxwell(0.7), kind=kind)
+    assert abs(found.value - 0.5 * share) <= found.error < 1e-4
+
+
+def test_a_supremum_at_grazing_is_within_the_error():
+    # a ray that crosses a crevice an odd number of times comes back, from theta = 0 instead of to pi
+    found = ker.distance(ker.RectangularTeethLaw(0.5), ker.specular(), kind="sup")
+    assert 0.0 < np.pi / 2 - found.value <= found.error < 0.01
+
+
+def test_the_diffuse_shift_between_laws_of_a_density_is_found_with_its_error():
+    # p(theta, .) = (1 + c cos(theta')) sin(theta')/2: the distribution functions differ by c sin^2/4, W_1 = c pi/8
+    def tilted(c):
+        return ker.DensityLaw(lambda theta, out: 0.5 * np.sin(out) * (1.0 + c * np.cos(out)) + 0.0 * theta)
+
+    for tolerance in (1e-3, 1e-6):
+        found = ker.distance(tilted(0.3), tilted(0.1), tolerance=tolerance)
+        assert abs(found.value - 0.2 * np.pi / 8) <= found.error <= tolerance
+
+
+def test_henyey_greenstein_laws_obey_the_bounds_by_their_means():
+    # |E cos - E' cos| <= W_1 since cos is Lipschitz; the mean over theta of |g - h| |cos theta| is |g - h|/2
+    found = ker.distance(ker.henyey_greenstein(0.5), ker.henyey_greenstein(0.4))
+    assert found.value >= 0.05
+    # W_1 is convex in the law and HG(g) tends to specular and retroreflection
+    near = ker.distance(ker.henyey_greenstein(0.999), ker.henyey_greenstein(-0.999), tolerance=1e-2)
+    assert near.value == pytest.approx(np.pi - 2, abs=0.02)
+
+
+def test_the_pseudometric_is_its_series():
+    def mean_cosine(j):
+        return 1.0 / (1.0 - j * j) if j % 2 == 0 else 0.0
+
+    total = 0.0
+    for k in range(60):
+        for m in range(1, 60, 2):
+            total += 2.0 ** (-k - m - 2) * abs(mean_cosine(k - m) + mean_cosine(k + m))
+    for tolerance in (1e-2, 1e-6, 1e-12):
+        found = ker.distance(ker.specular(), ker.retroreflection(), kind="pseudometric", tolerance=tolerance)
+        assert abs(found.value - total) <= found.error
+        assert found.error <= max(1.2 * tolerance, 1e-11) and found.kind == "bound"
+
+
+def test_the_pseudometric_of_henyey_greenstein_laws_is_a_sum_over_their_eigenvalues():
+    # cos(k theta) = T_k(u) in Legendre polynomials, whose squares have the mean 1/(2 l + 1); eigenvalues g^l
+    last = 40
+    coefficients = np.zeros((last + 1, last + 1))
+    for k in range(last + 1):
+        found = cheb2poly(np.eye(last + 1)[k])
+        coefficients[k, : found.size] = poly2leg(found)[: last + 1]
+    degree = np.arange(last + 1)
+    eigenvalues = (0.5**degree - 0.3**degree) / (2 * degree + 1)
+    weight = 0.5 ** (degree + 1)
+    exact = weight @ np.abs((coefficients * eigenvalues) @ coefficients.T) @ weight
+    found = ker.distance(ker.henyey_greenstein(0.5), ker.henyey_greenstein(0.3), kind="pseudometric", tolerance=1e-8)
+    assert abs(found.value - exact) <= found.error < 2e-8
+
+
+def test_the_slots_of_the_test_functions_are_incoming_and_outgoing():
+    # ledger S6.07: G nu(K x X) = nu(K) whatever G is, also for a law that does not keep nu
+    rows = np.array([[0.9, 0.1], [0.8, 0.2]])
+    matrix = ker.KernelMatrix(rows, ker.Bins(2), Estimate(0.0, 0.0, "bound", "given"))
+    means = flux_means(matrix, 4)
+    invariant = [1.0, 0.0, -1.0 / 3.0, 0.0, -1.0 / 15.0]
+    np.testing.assert_allclose(means[:, 0], invariant, atol=1e-14)
+    # 0.85 of the mass leaves for theta' < pi/2, where cos has the mean 1/2
+    assert means[0, 1] == pytest.approx(0.7 * 0.5, abs=1e-14)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_error_between_laws_holds_against_a_finer_level(order):
+    pair = ker.TriangularTeethLaw(0.7), ker.TriangularTeethLaw(0.8)
+    coarse, fine = (ker.distance(*pair, order, tolerance=tolerance) for tolerance in (1e-2, 2e-5))
+    assert fine.error < coarse.error
+    assert abs(coarse.value - fine.value) <= coarse.error + fine.error
+
+
+def test_rows_of_arcs_in_closed_form_are_those_that_are_traced():
+    theta, edges = np.array([0.02, 0.4, 0.9, 1.5, 2.9]), np.linspace(0.0, np.pi, 33)
+    traced = WallRows(geo.focusing_arcs(0.9), 0, edges[1:-1])(theta, 1e-10)
+    for k, masses in enumerate(ker.CircularArcLaw(0.9).row_masses(theta, edges)):
+        part = slice(traced.starts[k], traced.starts[k + 1])
+        counted = np.histogram(traced.nodes[part], edges, weights=traced.weights[part])[0]
+        # the traced rows are asked for 1e-10, an estimate that grazing rows miss
+        np.testing.assert_allclose(masses, counted, rtol=0, atol=1e-7)
+
+
+# ---- joint distances ---------------------------------------------------------------------------------------------
+def test_the_joint_distance_of_small_matrices_is_the_linear_programme(monkeypatch):
+    from scipy.optimize import linprog
+
+    rng = np.random.default_rng(7)
+    one, other = random_matrix(rng, 3), random_matrix(rng, 3)
+    middle = 0.5 * (one.basis.edges[1:] + one.basis.edges[:-1])
+    points = np.array([(a, b) for a in middle for b in middle])
+    cost = np.hypot(*(points[:, None] - points).transpose(2, 0, 1))
+    sums = np.vstack([np.kron(np.eye(9), np.ones(9)), np.kron(np.ones(9), np.eye(9))])
+    exact = linprog(cost.ravel(), A_eq=sums, b_eq=np.concatenate([one.flux.ravel(), other.flux.ravel()])).fun
+    found = ker.distance(one, other, kind="joint")
+    assert found.value == pytest.approx(exact, abs=1e-10) and found.kind == "bound"
+
+
+def test_diagonal_and_antidiagonal_are_as_far_apart_as_their_second_moments():
+    # (s, s) and (t, -t) are at the squared distance 2 s^2 + 2 t^2, whatever the coupling
+    found = ker.distance(ker.specular(), ker.retroreflection(), 2, "joint")
+    assert abs(found.value - np.sqrt(np.pi**2 - 8)) <= found.error < 0.01
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_beyond_the_guard_the_error_still_holds(monkeypatch, order):
+    pair = [ker.discretise(ker.henyey_greenstein(g), ker.Bins(16)) for g in (0.4, 0.8)]
+    exact = ker.distance(*pair, order, "joint")
+    monkeypatch.setattr(joint_distance, "MOST_PAIRS", 2**10)
+    merged = ker.distance(*pair, order, "joint")
+    assert "bracketed" in merged.method or "within" in merged.method
+    assert 0.0 < abs(merged.value - exact.value) <= merged.error
+
+
+# ---- samples -----------------------------------------------------------------------------------------------------
+def test_the_error_of_empirical_distances_holds():
+    law, other = ker.maxwell(0.3), ker.maxwell(0.6)
+    exact = float(ker.distance(*(ker.discretise(each, ker.Bins(16)) for each in (law, other))))
+    outside = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        found = ker.distance(empirical(law, 4000, 16, rng), empirical(other, 3000, 16, rng))
+        outside += abs(found.value - exact) > found.error
+    assert outside == 0
+
+
+def test_the_noise_floor_is_the_mean_distance_of_equal_laws():
+    law = ker.maxwell(0.3)
+    floors, values = [], []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        found = ker.distance(empirical(law, 2000, 12, rng), empirical(law, 1000, 12, rng))
+        floors.append(found.noise_floor)
+        values.append(found.value)
+    standard_error = np.std(values) / np.sqrt(len(values))
+    # the pooled law has less mass in cells that nobody visited, so that the floor is a few per cent low
+    assert abs(np.mean(floors) / np.mean(values) - 1.0) < 0.05 + 4 * standard_error / np.mean(values)
+
+
+@pytest.mark.parametrize("samples", ["two", "one"])
+def test_false_alarms_of_the_difference_test_come_at_the_nominal_rate(samples):
+    # 200 of the runs here; the benchmark makes all 2,000
+    law, alarms, runs = ker.maxwell(0.4), 0, 200
+    exact = ker.discretise(law, ker.Bins(6))
+    for seed in range(runs):
+        rng = np.random.default_rng(seed)
+        first = empirical(law, 300, 6, rng)
+        second = empirical(law, 200, 6, rng) if samples == "two" else exact
+        alarms += ker.difference_test(first, second, permutations=99, rng=rng).differs(0.05)
+    assert binomtest(alarms, runs, 0.05, alternative="greater").pvalue > 1e-3
+    assert alarms > 0
+
+
+def test_different_laws_are_told_apart():
+    rng = np.random.default_rng(0)
+    first, second = empirical(ker.maxwell(0.4), 3000, 8, rng), empirical(ker.maxwell(0.5), 3000, 8, rng)
+    found = ker.difference_test(first, second, permutations=199, rng=rng)
+    assert found.p_value == pytest.approx(1 / 200) and found.statistic > 1.5 * found.noise_floor
+
+
+# ---- refusals ----------------------------------------------------------------------------------------------------
+def test_what_cannot_be_compared_is_refused():
+    law, matrix = ker.specular(), ker.discretise(ker.specular(), ker.Bins(4))
+    with pytest.raises(InputError, match="same frame"):
+        ker.distance(law, law.in_specular_frame())
+    with pytest.raises(InputError, match="different bins"):
+        ker.distance(matrix, ker.discretise(law, ker.Bins(8)))
+    with pytest.raises(InputError, match="kind"):
+        ker.distance(law, law, kind="nearby")
+    with pytest.raises(InputError, match="at least 1"):
+        ker.distance(law, law, order=0.5)
+    with pytest.raises(InputError, match="on Bins"):
+        ker.distance(ker.discretise(law, ker.Legendre(4)), matrix)
+    with pytest.raises(InputError, match="counts"):
+        ker.difference_test(matrix, matrix)
