@@ -25,7 +25,8 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="put the tables into docs/benchmarks.md")
     arguments = parser.parse_args()
     tables = [
-        _throughput_table(arguments.rays), _laws_table(), _runs_table(), speed_table(), metastable_table(), _start_table(),
+        _throughput_table(arguments.rays), _laws_table(), _runs_table(), speed_table(), metastable_table(),
+        _start_table(),
     ]  # fmt: skip
     text = "\n".join([_machine(), *(line for table in tables for line in ("", *table))])
     print(text)
