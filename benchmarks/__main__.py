@@ -8,6 +8,7 @@ import platform
 from pathlib import Path
 
 from .laws import measure_laws
+from .metastable import metastable_table
 from .rigid import speed_table
 from .runs import measure_runs
 from .start import measure_start
@@ -23,7 +24,10 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=RAYS, help="rays on every wall")
     parser.add_argument("--write", action="store_true", help="put the tables into docs/benchmarks.md")
     arguments = parser.parse_args()
-    tables = [_throughput_table(arguments.rays), _laws_table(), _runs_table(), speed_table(), _start_table()]
+    tables = [
+        _throughput_table(arguments.rays), _laws_table(), _runs_table(), speed_table(), metastable_table(),
+        _start_table(),
+    ]  # fmt: skip
     text = "\n".join([_machine(), *(line for table in tables for line in ("", *table))])
     print(text)
     if arguments.write:

@@ -106,7 +106,7 @@ def _deeptime(matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
     return eigenvalues(matrix, k=WELLS), "none"
 
 
-def rows() -> list[str]:
+def metastable_table() -> list[str]:
     """The table in Markdown."""
     found = ["| solver | states | seconds | of 30 gaps wrong | what it says |", "|---|---|---|---|---|"]
     for row in measure_metastable():
@@ -117,4 +117,4 @@ def rows() -> list[str]:
 
 
 if __name__ == "__main__":
-    print("\n".join(rows()))
+    print("\n".join(metastable_table()))

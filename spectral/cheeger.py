@@ -23,8 +23,8 @@ class Conductance:
     ----------
     value : float
         Flux from the set to its complement over the measure of the smaller of both.
-    cells : array of bool, shape (n,)
-        The set.
+    cells : array of shape (n,)
+        1 for the bins of the set, 0 for the others.
     gap_above : float
         The gap is at most this, flux / (measure times measure of the complement): of the matrix, and of the law behind
         it, whose Rayleigh quotient of the same set is the same number. Of a sampled matrix only to its sampling error.

@@ -10,13 +10,14 @@ import numpy as np
 from ..checks import positive_number
 from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind, Estimate
-from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, discretise
+from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
 from ..kernels.algebra import made_of_isometries
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge, essential_edge
 from .ideal_parts import ideal_spectrum
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
+from .relaxation import largest_modulus
 from .separation import lambertian_share
 
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
@@ -108,6 +109,8 @@ def spectral_gap(
             "Use law @ law.adjoint() if that is what you mean",
             np.inf,
         )
+    if isinstance(law, Power) and law.exponent > 1 and law.law.reversible and not made_of_isometries(law):
+        return _of_power(law, tolerance, rng or np.random.default_rng(0))
     return _by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng or np.random.default_rng(0)))
 
 
@@ -178,6 +181,23 @@ def _by_theorem(law: Law) -> SpectralGap | None:
 
 def _stated(law: Law, value: float, error: float, verdict: Verdict, *evidence: str) -> SpectralGap:
     return SpectralGap(value, error, "bound", "structure of the law", verdict, evidence, law.frame)
+
+
+def _of_power(law: Power, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+    """The spectrum of P^n consists of the n-th powers of that of P: an even power turns its lower end up."""
+    exponent = law.exponent
+    base = spectral_gap(law.law, tolerance / exponent, rng)
+    top, error, kind = 1.0 - base.value, base.error, base.kind
+    evidence = [f"P: {base}", *base.evidence]
+    if exponent % 2 == 0:
+        modulus = largest_modulus(law.law)
+        if modulus.value > top:
+            top, error, kind = modulus.value, modulus.error, modulus.kind
+            evidence.append(f"the largest modulus off the constants is {modulus.value:.10g} +- {modulus.error:.2g}")
+    value = 1.0 - top**exponent
+    slope = exponent * min(top + error, 1.0) ** (exponent - 1)
+    method = f"power {exponent} of the spectrum of P; {base.method}"
+    return SpectralGap(value, slope * error, kind, method, base.verdict, tuple(evidence), law.frame)
 
 
 def _of_finite_rank(law: MatrixLaw) -> SpectralGap:

@@ -123,7 +123,7 @@ def test_the_semicircle_turns_grazing_flights_round():
 )
 def test_exit_times_agree_with_the_spectral_formula(law, arrangement):
     lengths = 10.0 * 2.0 ** np.arange(0, 4.5, 0.5)
-    simulated = spec.exit_times(law, lengths, 1500, np.random.default_rng(5), arrangement=arrangement).eta()
+    simulated = spec.exit_times(law, lengths, 1000, np.random.default_rng(5), arrangement=arrangement).eta()
     found = spec.diffusivity(law, arrangement=arrangement)
     assert abs(float(simulated) - found.eta) <= simulated.error + found.eta_error
     assert simulated.error < 0.75 * found.eta

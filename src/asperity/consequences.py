@@ -13,7 +13,7 @@ from .spectral import diffusivity, mean_squared_slope
 if TYPE_CHECKING:
     from .geometry import Wall
     from .kernels import Law
-    from .spectral import Diffusivity, SpectralGap
+    from .spectral import Diffusivity, SpectralGap, Spectrum
 
 
 @dataclass(frozen=True)
@@ -80,9 +80,11 @@ class Consequences:
         return lines
 
 
-def consequences_of(wall: Wall, law: Law, gap: SpectralGap | None, specular_gap: SpectralGap | None) -> Consequences:
+def consequences_of(
+    wall: Wall, law: Law, gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None
+) -> Consequences:
     """Derive what follows; a diffusivity that is infinite or out of reach is None, with the reason."""
-    slem = _slem(gap, specular_gap)
+    slem = _slem(gap, specular_gap, found)
     diffusion, refusal = None, ""
     try:
         diffusion = diffusivity(law)
@@ -91,11 +93,18 @@ def consequences_of(wall: Wall, law: Law, gap: SpectralGap | None, specular_gap:
     return Consequences(slem, None if slem is None else _relaxation(slem), diffusion, mean_squared_slope(wall), refusal)
 
 
-def _slem(gap: SpectralGap | None, specular_gap: SpectralGap | None) -> Estimate | None:
-    """For mirror-symmetric laws: odd eigenvalues change sign, so that the larger of both suprema is the modulus."""
-    if gap is None or specular_gap is None:
+def _slem(gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None) -> Estimate | None:
+    """The gaps see the upper end of the spectrum, and in the other convention minus the odd functions' lower end.
+
+    The lower end on even functions is that of the spectrum that was computed.
+    """
+    if gap is None or specular_gap is None or found is None:
         return None
     nearer = gap if gap.value <= specular_gap.value else specular_gap
+    lowest = int(found.values.argmin())
+    if -found.values[lowest] > 1.0 - nearer.value + nearer.error:
+        error = float(found.errors.total()[lowest])
+        return Estimate(-float(found.values[lowest]), error, "estimate", f"least eigenvalue in {found.basis!r}")
     return Estimate(1.0 - nearer.value, nearer.error, nearer.kind, f"gap in the {nearer.convention} convention")
 
 

@@ -231,7 +231,7 @@ def study_wall(
         progress.update()
         collision_gap = gap_of(collision.law, "collision_gap")
         progress.update()
-        consequences = consequences_of(wall, law, gap, specular_gap)
+        consequences = consequences_of(wall, law, gap, specular_gap, found)
     return Study(
         name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, collision, collision_matrix,
         collision_gap, MappingProxyType(_conservation(collision, rng)), MappingProxyType(refusals),
