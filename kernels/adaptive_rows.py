@@ -92,7 +92,9 @@ def adaptive_rows(
     For fixed theta the map from the entry point to theta' is analytic between changes of the itinerary. The changes
     are found by bisection; between them Gauss rules take over. Near cusps and grazing there are infinitely many: what
     is left undecided is counted in the error. The error is an estimate: a piece narrower than the distance of the
-    samples can be overlooked.
+    samples can be overlooked, unless a row next to it in theta has seen it. Held against references of a second method
+    (tests/reference_rows.py), 4 of 720 rows of 24 walls were further off than reported; in the median the report was
+    11 times the true error.
 
     Examples
     --------

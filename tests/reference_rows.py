@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -408,24 +409,29 @@ def stratified_mean(table, left, right, random):
 
 
 def main() -> None:
-    """Compute and write all references."""
-    found = []
-    for kind in range(COUNT):
-        wall = random_curved_wall(kind)
-        rows = [row_of(wall, theta) for theta in ANGLES]
-        moment = moment_of(wall)
-        found.append(
-            {
-                "kind": kind,
-                "angles": list(ANGLES),
-                "rows": [value.hex() for value, _ in rows],
-                "row_errors": [error for _, error in rows],
-                "moment": float(moment[0]).hex(),
-                "moment_error": float(moment[1]),
-            }
-        )
-        FILE.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-        print(kind, [f"{v:.12f}+-{e:.0e}" for v, e in rows], f"{moment[0]:.10f} +- {moment[1]:.1e}", flush=True)
+    """Compute and write the references of the walls whose numbers are given, or of all: rows first, then moments."""
+    kinds = [int(word) for word in sys.argv[1:]] or list(range(COUNT))
+    found = {entry["kind"]: entry for entry in json.loads(FILE.read_text(encoding="utf-8"))} if FILE.exists() else {}
+    for kind in kinds:
+        rows = [row_of(random_curved_wall(kind), theta) for theta in ANGLES]
+        found[kind] = {
+            "kind": kind,
+            "angles": list(ANGLES),
+            "rows": [value.hex() for value, _ in rows],
+            "row_errors": [error for _, error in rows],
+        }
+        _write(found)
+        print(kind, [f"{value:.12f}+-{error:.0e}" for value, error in rows], flush=True)
+    for kind in kinds:
+        moment, error = moment_of(random_curved_wall(kind))
+        found[kind] |= {"moment": float(moment).hex(), "moment_error": float(error)}
+        _write(found)
+        print(kind, f"{moment:.10f} +- {error:.1e}", flush=True)
+
+
+def _write(found):
+    text = json.dumps([found[kind] for kind in sorted(found)], indent=1)
+    FILE.write_text(text + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

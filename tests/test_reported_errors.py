@@ -1,0 +1,32 @@
+"""Reported errors of adaptive rows and matrices, against the references that tests/reference_rows.py wrote."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from benchmarks.errors import outcomes, references
+
+from random_curved_walls import COUNT
+
+# On these two walls a row has thousands of pieces; the benchmark takes them.
+CHAOTIC = (6, 13)
+OTHERS = [kind for kind in range(COUNT) if kind not in CHAOTIC]
+
+
+def test_the_references_are_those_of_all_walls() -> None:
+    assert [entry["kind"] for entry in references()] == list(range(COUNT))
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+def test_errors_of_rows_hold_and_are_not_vacuous(tolerance: float) -> None:
+    found = list(outcomes(OTHERS, [tolerance], most_rays=0, moments=False))
+    # one in a hundred may exceed what was reported
+    assert sum(not outcome.held for outcome in found) <= len(found) // 100
+    assert np.median([outcome.reported / max(outcome.true, 1e-16) for outcome in found if outcome.is_told]) < 100.0
+
+
+@pytest.mark.parametrize("kind", [0, 3, 9, 11])
+def test_errors_of_first_moments_hold(kind: int) -> None:
+    found = [outcome for outcome in outcomes([kind], [1e-3, 1e-5], most_rays=500_000) if outcome.what == "moment"]
+    assert all(outcome.held for outcome in found)
+    assert found[1].reported < 1e-4
