@@ -159,7 +159,7 @@ def test_a_run_is_written_and_read_again(tmp_path):
     names = {path.name for path in run.save(tmp_path)}
     assert names == {"summary.md", "tables.md", "bench.json", "teeth-law.png"}
     assert BenchRun.of_json((tmp_path / "bench.json").read_text()) == run
-    assert "1 of 1 problems" in run.summary() and "1.3" in run.summary()
+    assert "1 of the 1 problems" in run.summary() and "| 1.3 |" in run.summary()
     json.loads(run.to_json(), parse_constant=lambda word: pytest.fail(word))
 
 
