@@ -13,7 +13,7 @@ MARKERS = "osv^D<>Ph*X"
 
 
 def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
-    """Draw every method's errors (see `WorkReport.level`) over its least times, the front in grey, the chosen in black."""
+    """Draw the errors (see `WorkReport.level`) over the least times, the front in grey and the chosen one in black."""
     if ax is None:
         from matplotlib.figure import Figure
 

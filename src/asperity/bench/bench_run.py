@@ -34,11 +34,15 @@ class BenchRun:
             "|---|---|---|---|---|---|---|",
         ]
         lines += [_line(report) for report in self.reports]
-        choices = [choice for report in self.reports if (choice := report.choice()) is not None]
+        chosen = [report for report in self.reports if any(row.is_done for row in _chosen(report))]
+        choices = [choice for report in chosen if (choice := report.choice()) is not None]
         good = sum(choice <= GOOD_CHOICE for choice in choices)
         lines += [
             "",
-            f"The choice is within a factor {GOOD_CHOICE:g} of the best on {good} of {len(choices)} problems.",
+            f"The choice is within a factor {GOOD_CHOICE:g} of the best on {good} of the {len(choices)} problems where "
+            f"another method gets as far; on {len(chosen) - len(choices)} none does; on "
+            f"{len(self.reports) - len(chosen)} it was not done in time.",
+            "",
         ]
         agree, differ, unsure = self.orders()
         lines.append(
