@@ -49,7 +49,7 @@ format: $(DEV) ## rewrite the sources as `make check` wants them
 	$(PY) -m ruff check --fix .
 
 clean: ## remove what the other targets wrote, except .venv
-	rm -rf build dist study bench docs/_build docs/api/generated src/asperity.egg-info
+	rm -rf build dist study bench-results docs/_build docs/api/generated src/asperity.egg-info
 	rm -rf .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -path ./$(VENV) -prune -o -name __pycache__ -prune -exec rm -rf {} +
 

@@ -32,7 +32,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="short ladders and small cases")
     parser.add_argument("--peers", action="store_true", help="install the peers beside the rows and measure them too")
     parser.add_argument("--write", action="store_true", help="put the tables and pictures into docs/")
-    parser.add_argument("--out", type=Path, default=Path("bench"), help="folder of the rows and pictures")
+    parser.add_argument("--out", type=Path, default=Path("bench-results"), help="folder of the rows and pictures")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     speed = _speed(RAYS // 16 if options.quick else RAYS)

@@ -54,7 +54,9 @@ def test_the_standard_set_has_a_wall_of_every_kind():
 def test_random_walls_are_walls_and_the_same_for_ever():
     walls = [random_wall(number) for number in range(RANDOM_WALLS)]
     assert [wall.is_polygonal for wall in walls[::2]] == [True] * (RANDOM_WALLS // 2)
-    assert not any(wall.is_polygonal for wall in walls[1::2]) or len({w.arc_length for w in walls}) == RANDOM_WALLS
+    # a curved piece may be drawn as a segment, but hardly all of a wall's
+    assert sum(wall.is_polygonal for wall in walls[1::2]) <= 2
+    assert len({wall.arc_length for wall in walls}) == RANDOM_WALLS
     assert np.array_equal(random_wall(7).vertices, walls[7].vertices)
     assert len(scenes()) == 8 + RANDOM_WALLS
 
