@@ -38,8 +38,8 @@ docs: $(DEV) ## build the documentation into docs/_build/html, warnings are erro
 	$(PY) -m sphinx -b html -W --keep-going -q -d docs/_build/doctrees docs docs/_build/html
 	@echo "documentation: docs/_build/html/index.html"
 
-bench: $(RUN) ## measure the tracer's throughput
-	$(PY) -m benchmarks
+bench: $(RUN) ## measure everything and write docs/benchmarks.md and docs/stability.md, up to 40 minutes
+	$(PY) -m benchmarks --peers --write
 
 build: $(DEV) ## build the sdist and the wheel into dist/
 	$(PY) -m build
@@ -49,7 +49,7 @@ format: $(DEV) ## rewrite the sources as `make check` wants them
 	$(PY) -m ruff check --fix .
 
 clean: ## remove what the other targets wrote, except .venv
-	rm -rf build dist study docs/_build docs/api/generated docs/generated src/asperity.egg-info
+	rm -rf build dist study bench-results docs/_build docs/api/generated docs/generated src/asperity.egg-info
 	rm -rf .mypy_cache .pytest_cache .ruff_cache .hypothesis
 	find . -path ./$(VENV) -prune -o -name __pycache__ -prune -exec rm -rf {} +
 

@@ -1,1 +1,1 @@
-"""Measurements of speed, as ratios within one run: ``python -m benchmarks``."""
+"""What developers measure besides ``asperity bench``: speed, goals, peers; ``python -m benchmarks`` runs all."""

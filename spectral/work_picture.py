@@ -13,12 +13,12 @@ MARKERS = "osv^D<>Ph*X"
 
 
 def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
-    """Draw every method's errors over its least times, the front as a grey line and the chosen one in black."""
+    """Draw the errors (see `WorkReport.level`) over the least times, the front in grey and the chosen one in black."""
     if ax is None:
         from matplotlib.figure import Figure
 
         ax = Figure(figsize=(6.0, 4.5), layout="constrained").add_subplot()
-    front = [(row.least, max(report.error(row), report.methods[row.method].floor)) for row in report.front()]
+    front = [(row.least, report.level(row)) for row in report.front()]
     if len(front) > 1:
         ax.plot(*zip(*front, strict=True), color="0.8", linewidth=6.0, solid_capstyle="round", zorder=0)
     floors = {facts.floor for facts in report.methods.values()}
@@ -28,11 +28,15 @@ def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
             continue
         chosen = name == report.auto
         ax.plot(
-            [row.least for row in rows], [max(report.error(row), report.methods[name].floor) for row in rows],
+            [row.least for row in rows], [report.level(row) for row in rows],
             marker=MARKERS[number % len(MARKERS)], markersize=8.0 if chosen else 5.0, linewidth=1.2,
             color="black" if chosen else f"C{number}", fillstyle="none" if chosen else "full", label=name,
         )  # fmt: skip
     ax.axhline(max(floors), color="0.5", linestyle=":", linewidth=1.0, label="reference known to")
     ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel=f"{report.norms[0]} error", title=report.problem)
+    from matplotlib.ticker import NullFormatter
+
+    # within a decade matplotlib labels the minor ticks, too, and they overlap
+    ax.xaxis.set_minor_formatter(NullFormatter())
     ax.legend(fontsize="small")
     return ax

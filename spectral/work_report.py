@@ -105,6 +105,17 @@ class WorkReport:
         """Error of a row that is done, in the first norm."""
         return row.errors[self.norms[0]]
 
+    def level(self, row: WorkRow) -> float:
+        """The row's error; where its reference cannot tell it from zero, what the method reports if that is less.
+
+        Never below rounding.
+        """
+        floor = self.methods[row.method].floor
+        error = max(self.error(row), floor)
+        if error > ABOVE_REFERENCE * floor or row.reported is None:
+            return error
+        return max(min(row.reported, error), min(floor, ROUNDED))
+
     def order(self, method: str) -> FittedOrder | None:
         """The order in the budget, fitted to errors well above the reference's; None for fewer than three of them."""
         least = ABOVE_REFERENCE * self.methods[method].floor
@@ -112,25 +123,25 @@ class WorkReport:
         return fit_order([row.budget for row in rows], [self.error(row) for row in rows]) if rows else None
 
     def front(self) -> tuple[WorkRow, ...]:
-        """The rows that no other one beats in both error and least time, fastest first."""
+        """The rows that no other one beats in both error (see `level`) and least time, fastest first."""
         found: list[WorkRow] = []
         for row in sorted(self._done(), key=lambda row: (row.least, self.error(row))):
-            if not found or self._level(row) < self._level(found[-1]):
+            if not found or self.level(row) < self.level(found[-1]):
                 found.append(row)
         return tuple(found)
 
     def choice(self) -> float | None:
         """Time of the method that chooses over that of the best other one at equal error, the worst of its rows.
 
-        Between the rows of a method its time is interpolated in the logarithms. An error that its reference cannot
-        tell from zero counts as what the method reports, if that is less. None without rows of both kinds.
+        Between the rows of a method its time is interpolated in the logarithms. Errors are those of
+        `level`. None without rows of both kinds.
         """
         ratios = []
         for row in self._done(self.auto):
             times = [
                 time
                 for name in self.methods
-                if name != self.auto and (time := self._time_to(name, self._claim(row))) is not None
+                if name != self.auto and (time := self._time_to(name, self.level(row))) is not None
             ]
             if times:
                 ratios.append(row.least / min(times))
@@ -176,24 +187,12 @@ class WorkReport:
     def _done(self, method: str | None = None) -> list[WorkRow]:
         return [row for row in self.rows if row.is_done and method in (None, row.method)]
 
-    def _level(self, row: WorkRow) -> float:
-        """The row's error, not below what can be told from zero."""
-        return max(self.error(row), self.methods[row.method].floor)
-
-    def _claim(self, row: WorkRow) -> float:
-        """The row's error; the reported one where the reference cannot tell."""
-        floor = self.methods[row.method].floor
-        if self.error(row) > ABOVE_REFERENCE * floor or row.reported is None:
-            return self._level(row)
-        # no claim is better than rounding
-        return max(min(row.reported, self._level(row)), min(floor, ROUNDED))
-
     def _time_to(self, method: str, error: float) -> float | None:
         """The time after which a method has an error, or None if it has not."""
         best: list[tuple[float, float]] = []
         for row in sorted(self._done(method), key=lambda row: row.least):
-            if not best or self._claim(row) < best[-1][1]:
-                best.append((row.least, self._claim(row)))
+            if not best or self.level(row) < best[-1][1]:
+                best.append((row.least, self.level(row)))
         if not best or best[-1][1] > error:
             return None
         if best[0][1] <= error:

@@ -54,7 +54,9 @@ def test_the_standard_set_has_a_wall_of_every_kind():
 def test_random_walls_are_walls_and_the_same_for_ever():
     walls = [random_wall(number) for number in range(RANDOM_WALLS)]
     assert [wall.is_polygonal for wall in walls[::2]] == [True] * (RANDOM_WALLS // 2)
-    assert not any(wall.is_polygonal for wall in walls[1::2]) or len({w.arc_length for w in walls}) == RANDOM_WALLS
+    # a curved piece may be drawn as a segment, but hardly all of a wall's
+    assert sum(wall.is_polygonal for wall in walls[1::2]) <= 2
+    assert len({wall.arc_length for wall in walls}) == RANDOM_WALLS
     assert np.array_equal(random_wall(7).vertices, walls[7].vertices)
     assert len(scenes()) == 8 + RANDOM_WALLS
 
@@ -159,7 +161,7 @@ def test_a_run_is_written_and_read_again(tmp_path):
     names = {path.name for path in run.save(tmp_path)}
     assert names == {"summary.md", "tables.md", "bench.json", "teeth-law.png"}
     assert BenchRun.of_json((tmp_path / "bench.json").read_text()) == run
-    assert "1 of 1 problems" in run.summary() and "1.3" in run.summary()
+    assert "1 of the 1 problems" in run.summary() and "| 1.3 |" in run.summary()
     json.loads(run.to_json(), parse_constant=lambda word: pytest.fail(word))
 
 

@@ -101,7 +101,17 @@ def distributions(tmp_path_factory):
     pytest.importorskip("build")
     copy = tmp_path_factory.mktemp("tree") / "asperity"
     ignore = shutil.ignore_patterns(
-        ".git", ".venv", "__pycache__", ".*_cache", ".hypothesis", "*.egg-info", "build", "dist", "study", "_build"
+        ".git",
+        ".venv",
+        "__pycache__",
+        ".*_cache",
+        ".hypothesis",
+        "*.egg-info",
+        "build",
+        "dist",
+        "study",
+        "bench-results",
+        "_build",
     )
     shutil.copytree(ROOT, copy, symlinks=True, ignore=ignore)
     done = subprocess.run(

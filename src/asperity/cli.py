@@ -177,7 +177,9 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
 @click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")
 @click.option("--extremes", is_flag=True, help="The stability report instead: stiff and extreme cases.")
 @click.option("--savings", is_flag=True, help="Instead: what each scene leaves out, and what that saves.")
-@click.option("--out", default="bench", show_default=True, type=click.Path(path_type=Path), help="Folder for results.")
+@click.option(
+    "--out", default="bench-results", show_default=True, type=click.Path(path_type=Path), help="Folder for results."
+)
 @click.option("--force", is_flag=True, help="Measure again what the folder holds; by default a run goes on.")
 @click.option(
     "--compare",

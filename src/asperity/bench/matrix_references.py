@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 # matrix, its error, where it comes from, which methods share its code
 MatrixReference = tuple[KernelMatrix, float, str, tuple[str, ...]]
 # Rays of the sampled reference, and the tolerances of adaptive rows.
-QUICK_RAYS, RAYS = 2**20, 2**25
+QUICK_RAYS, RAYS = 2**19, 2**23
 QUICK_TOLERANCE, TOLERANCE = 1e-2, 1e-6
-QUICK_BEAMS, MANY_BEAMS = 20_000, 400_000
+QUICK_BEAMS, MANY_BEAMS = 5_000, 100_000
 SEED = 1648
 
 

@@ -16,7 +16,9 @@ from ..checks import Floats
 from ..errors import InputError
 
 if TYPE_CHECKING:
-    from ..geometry import Wall
+    from ..geometry import Curve, Wall
+
+Point = tuple[float, float]
 
 METRES_PER_DEGREE = 111_200.0
 TRANSECT_ROW, EXAGGERATION = 170, 3.0
@@ -115,7 +117,7 @@ def random_wall(number: int) -> Wall:
     raise InputError(f"number: no wall after {ATTEMPTS} attempts for {number!r}; choose another")
 
 
-def _piece(start: tuple[float, float], end: tuple[float, float], curved: bool, rng: np.random.Generator):  # type: ignore[no-untyped-def]
+def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> Curve:
     from ..geometry import Arc, Bezier, Segment
 
     kind = int(rng.integers(0, 3)) if curved else 0
@@ -131,7 +133,8 @@ def _piece(start: tuple[float, float], end: tuple[float, float], curved: bool, r
         radius = (0.25 * chord**2 + height**2) / (2.0 * height)
         center = 0.5 * (first + last) + side * (height - radius) / chord * normal
         begin, finish = (float(np.arctan2(*(point - center)[::-1])) for point in (first, last))
-        finish += 2.0 * pi * ((finish < begin) - (finish > begin)) * (side * (finish - begin) < 0.0)
+        if side * (finish - begin) < 0.0:
+            finish += side * 2.0 * pi
         return Arc(tuple(center), radius, begin, finish).pinned(start, end)
     bends = rng.uniform(-0.35, 0.35, 2)
     control = [tuple(first + (k + 1) / 3 * along + bends[k] * normal) for k in range(2)]

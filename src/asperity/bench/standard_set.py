@@ -44,8 +44,8 @@ class Effort:
     reference_seconds: float
 
 
-QUICK = Effort(True, 5, 0.3, 2.0, 10.0)
-FULL = Effort(False, 8, 3.0, 20.0, 90.0)
+QUICK = Effort(True, 5, 0.2, 1.5, 10.0)
+FULL = Effort(False, 5, 1.0, 10.0, 60.0)
 # Of the random walls every quantity that has a reference by itself; the others are of the standard set alone.
 RANDOM_QUANTITIES = ("law", "moment")
 

@@ -1,0 +1,123 @@
+"""The numbers to reach, beside what this run reached."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+
+from .laws import LawTime
+from .runs import RunTime
+from .throughput import Throughput
+
+ARC_LAMBDA2 = 0.3670253152
+LARGE_BINS = 4096
+TRUE_DISKS = 2**16
+# Million bounces a second that the four walls of `throughput` should reach on one thread, in their order.
+BOUNCE_GOALS = (50.0, 35.0, 20.0, 5.0)
+
+
+@dataclass(frozen=True)
+class Goal:
+    """One goal: what, how much, and what was reached; ``is_met`` is None where a part of it was not measured."""
+
+    what: str
+    goal: str
+    reached: str
+    is_met: bool | None
+
+
+def all_goals(
+    throughput: Sequence[Throughput], laws: Sequence[LawTime], runs: Sequence[RunTime], start: dict[str, float]
+) -> list[Goal]:
+    """The table of goals, from measurements already made and some more."""
+    goals = [
+        Goal(
+            f"bounces, {row.wall}", f"{goal:g} M/s, two threads 1.8 times",
+            f"{row.one_thread / 1e6:.1f} M/s, {row.two_threads / row.one_thread:.2f} times",
+            row.one_thread >= 1e6 * goal and row.two_threads >= 1.8 * row.one_thread,
+        )
+        for row, goal in zip(throughput, BOUNCE_GOALS, strict=True)
+    ]  # fmt: skip
+    wanted = {
+        "triangular teeth, first moment": (1e-14, 0.01),
+        "triangular teeth, Bins(512)": (1e-13, 0.1),
+        "triangular teeth, Legendre(64)": (1e-13, 0.1),
+        "polygon of 16 vertices, whole law": (1e-12, 0.5),
+        "focusing arc, first moment": (1e-10, 1.0),
+    }
+    by_name = {row.what: row for row in laws}
+    for what, (error, seconds) in wanted.items():
+        row = by_name[what]
+        found = row.reported if np.isnan(row.error) else row.error
+        goals.append(_in_time(what, found, row.seconds, error, seconds))
+    goals += [_eigenvalue(1e-6, 0.5), _eigenvalue(1e-9, 5.0)]
+    goals += [
+        Goal(f"run of hits: {row.what}", "below 1 us", f"{1e6 * row.seconds:.2f} us for {row.hits:.1e} hits",
+             row.seconds < 1e-6)
+        for row in runs
+    ]  # fmt: skip
+    goals.append(_large_matrix())
+    if hasattr(geo, "collide"):
+        goals.append(_true_disk())
+    for what, limit in (("import asperity", 0.3), ("first trace, warm cache", 1.5)):
+        goals.append(Goal(what, f"{limit:g} s", f"{start[what]:.2f} s", start[what] < limit))
+    return goals
+
+
+def goal_table(goals: Sequence[Goal]) -> list[str]:
+    """Markdown lines."""
+    word = {True: "yes", False: "**no**", None: "-"}
+    rows = [f"| {goal.what} | {goal.goal} | {goal.reached} | {word[goal.is_met]} |" for goal in goals]
+    return ["| what | reach | reached | met |", "|---|---|---|---|", *rows]
+
+
+def _in_time(what: str, error: float, seconds: float, goal: float, limit: float) -> Goal:
+    return Goal(
+        what, f"{goal:.0e} in {limit:g} s", f"{error:.1e} in {seconds:.3g} s", error <= goal and seconds <= limit
+    )
+
+
+def _eigenvalue(tolerance: float, limit: float) -> Goal:
+    law = ker.WallLaw(geo.focusing_arcs(1.2))
+    found, seconds = _timed(lambda: spec.spectral_gap(law, tolerance))
+    error = abs(1.0 - found.value - ARC_LAMBDA2)
+    goal = _in_time("focusing arc, lambda_2 with an error that holds", error, seconds, tolerance, limit)
+    holds = error <= found.error <= tolerance
+    return Goal(goal.what, goal.goal, f"{goal.reached}, reported {found.error:.1e}", bool(goal.is_met and holds))
+
+
+def _large_matrix() -> Goal:
+    matrix = ker.discretise(ker.maxwell(0.5), ker.Bins(LARGE_BINS))
+    _, alone = _timed(lambda: np.linalg.eigvalsh(matrix.symmetric))
+    _, seconds = _timed(lambda: spec.spectrum(matrix, k=2))
+    ratio = seconds / alone
+    return Goal(
+        f"gap of {LARGE_BINS} bins with its proof", "0.15 of eigvalsh", f"{ratio:.2f} of eigvalsh", ratio <= 0.15
+    )
+
+
+def _true_disk() -> Goal:
+    from asperity.bench.quantities import DISK, sampled_velocities
+
+    rng = np.random.default_rng(0)
+    wall, scale = geo.triangular_teeth(0.7), 1e-3
+    velocity = -sampled_velocities(TRUE_DISKS, rng)
+    position = np.column_stack([scale * rng.random(TRUE_DISKS), 2.0 * np.pi * rng.random(TRUE_DISKS)])
+    collide = lambda: geo.collide(DISK, wall, scale, position, velocity, threads=1)  # type: ignore[attr-defined]  # noqa: E731
+    collide()
+    _, seconds = _timed(collide)
+    rate = TRUE_DISKS / seconds
+    return Goal("true disk", "2 M collisions/s", f"{rate / 1e6:.2f} M collisions/s", rate >= 2e6)
+
+
+def _timed(job: Callable[[], object]):  # type: ignore[no-untyped-def]
+    start = time.perf_counter()
+    result = job()
+    return result, time.perf_counter() - start
