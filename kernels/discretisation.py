@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ..checks import Floats, finite_number, generator, whole_number
-from ..errors import InputError
+from ..errors import AccuracyError, InputError
 from .algebra import lists_branches
 from .arc_quadrature import arc_matrix
 from .basis import Basis
@@ -78,7 +78,8 @@ def discretise(
         is that difference. ``"qmc"``: rays from 8 independently scrambled Sobol sequences; the error is from their
         spread. ``"monte-carlo"``: independent rays; the error is from the variance of the counts. ``"auto"`` takes
         the first of these that the law has, except that quadrature in the entry point comes after ``"qmc"`` where it
-        is slow: for traced walls of many pieces, by a prediction of its cost, and for driven laws without a wall.
+        is slow: for traced walls of many pieces, by a prediction of its cost, and for driven laws without a wall. Where
+        it falls short of the tolerance on a traced wall, rays are sampled too, and the more exact matrix is returned.
         ``KernelMatrix.method`` says what was used.
     tolerance : float
         Wanted Frobenius error of ``symmetric``. If it is not met the matrix says so: in its ``error`` and its repr.
@@ -169,7 +170,21 @@ class _Maker:
                 methods = self.methods(law, isometries=False)
         if isinstance(law, Combination) and methods[0] != "exact":
             return self._sum(law, "auto")
+        if isinstance(law, WallLaw) and methods[:2] == ("quadrature", "qmc"):
+            return self._by_rows_or_rays(law)
         return self._made_by(law, methods[0])
+
+    def _by_rows_or_rays(self, law: WallLaw) -> KernelMatrix:
+        """Adaptive rows, or rays where rows fall short of the tolerance and rays are more exact."""
+        rows = self._quadrature(law)
+        if float(rows.error) <= self.tolerance:
+            return rows
+        try:
+            rays = self._sampled(law, "qmc")
+        except AccuracyError:
+            # too many rays do not escape; the rows have counted theirs in their error
+            return rows
+        return min(rows, rays, key=lambda matrix: float(matrix.error))
 
     def methods(self, law: Law, isometries: bool = True) -> tuple[Method, ...]:
         """The methods that a law has, the best first; ``"monte-carlo"``, which all have, last."""
@@ -243,7 +258,8 @@ class _Maker:
             symmetric, error = arc_matrix(law.half_angle, self.basis)
             how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
         elif isinstance(law, WallLaw):
-            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, self.most_rays)
+            patient = self.most_rays == MOST_RAYS
+            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, self.most_rays, patient=patient)
             how = (
                 f"adaptive rows and panels, {rays} rays, predicted cheaper than sampling: Gauss against Kronrod, "
                 "plus undecided entry points and twice the asymmetry"

@@ -46,6 +46,10 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
+# Rays before the progress of the error is judged: rays of rows cost up to twenty times those of a sample of a million.
+FEWEST_TO_JUDGE = 200_000
+# The order in the number of rays that is taken for granted before it is seen: that of a kink in every panel.
+PRESUMED_ORDER = 2.0
 # Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
 LEAST_CUT = 1e-7
 # Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error.
@@ -69,8 +73,12 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     return bool(wall.closes) and not overhangs and predicted <= MOST_RAYS
 
 
-def row_matrix(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS) -> tuple[Floats, float, int]:
+def row_matrix(
+    wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS, *, patient: bool = True
+) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
+
+    Who is not patient stops as soon as the errors so far speak against meeting the tolerance with so many rays.
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
     of that difference scaled by what dividing the panel showed where they are smooth; plus the errors of the rows;
@@ -78,13 +86,13 @@ def row_matrix(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST
     """
     small = isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS
     inner = Legendre(FEWEST_FUNCTIONS) if small else basis
-    matrix, error, rays = _Integrator(wall, inner, tolerance, most_rays).run()
+    matrix, error, rays = _Integrator(wall, inner, tolerance, most_rays, patient).run()
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), error, rays
 
 
 def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS) -> tuple[Floats, float]:
     """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
-    integrator = _Integrator(wall, basis, tolerance, most_rays)
+    integrator = _Integrator(wall, basis, tolerance, most_rays, patient=True)
     _, error, _ = integrator.run()
     edges = np.union1d(integrator.panels.low, integrator.panels.high)
     return np.union1d(edges, np.pi - edges) if integrator.halved else edges, error
@@ -93,11 +101,12 @@ def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOS
 class _Integrator:
     """One matrix in the making."""
 
-    def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_rays: int) -> None:
+    def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_rays: int, patient: bool) -> None:
         self.basis = basis
         self.tolerance = max(tolerance, 8.0 * np.finfo(np.float64).eps * basis.size)
-        self.most_rays = most_rays
+        self.most_rays, self.patient = most_rays, patient
         self.rays, self.row_count = 0, 0
+        self.progress: list[tuple[int, float]] = []
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
         if isinstance(basis, Legendre):
@@ -123,7 +132,7 @@ class _Integrator:
         """Divide panels until the error is small enough, or no rays are left: first for coarser tolerances."""
         for stage in range(self.stages, -1, -1):
             error = self._meet(self._begin(stage))
-            if self.rays >= self.most_rays:
+            if self.rays >= self.most_rays or self._is_hopeless():
                 break
         return self._state()[0], error, self.rays
 
@@ -143,7 +152,8 @@ class _Integrator:
         goal = tolerance
         while True:
             _, known, hidden = self._state()
-            if known + hidden <= tolerance or self.rays >= self.most_rays:
+            self.progress.append((self.rays, known + hidden))
+            if known + hidden <= tolerance or self.rays >= self.most_rays or self._is_hopeless():
                 return known + hidden
             # errors that only the asymmetry shows lie in panels whose rules agree by chance
             goal = min(goal, max(tolerance - hidden, 0.25 * known))
@@ -151,6 +161,17 @@ class _Integrator:
             if not chosen.any():
                 return known + hidden
             self._divide(chosen)
+
+    def _is_hopeless(self) -> bool:
+        """Whether the error, going on as it fell while the rays grew fourfold, would take more rays than there are."""
+        rays, error = self.progress[-1]
+        if self.patient or rays < FEWEST_TO_JUDGE or error <= self.tolerance:
+            return False
+        before, coarse = next(step for step in self.progress if step[0] >= rays // 4)
+        rate = PRESUMED_ORDER
+        if before < rays:
+            rate = math.log(coarse / error) / math.log(rays / before) if coarse > error else 0.0
+        return rate <= 0.0 or rays * (error / self.tolerance) ** (1.0 / rate) > self.most_rays
 
     def _state(self) -> tuple[Floats, float, float]:
         """The matrix, the error that its panels and rows are known to have, and what its asymmetry adds."""

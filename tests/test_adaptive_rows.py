@@ -76,3 +76,14 @@ def test_discretise_takes_adaptive_rows_for_a_curved_wall_of_few_pieces() -> Non
     assert found.method == "quadrature" and found.tolerance_met
     assert "adaptive rows" in found.error.method
     assert float(np.linalg.norm(found.symmetric - found.symmetric.T)) <= float(found.error)
+
+
+def test_rays_are_taken_where_rows_fall_short_of_the_tolerance_and_know_less():
+    law = ker.WallLaw(random_curved_wall(0))
+    chosen, rows, rays = (
+        ker.discretise(law, ker.Legendre(4), method=method, tolerance=tolerance)
+        for method, tolerance in (("auto", 1e-6), ("auto", 1e-2), ("qmc", 1e-6))
+    )
+    assert rows.method == "quadrature" and float(rows.error) <= 1e-2
+    assert chosen.method == "qmc" and float(chosen.error) == float(rays.error)
+    assert np.linalg.norm(rows.symmetric - rays.symmetric) <= float(rows.error) + float(rays.error)
