@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from .symmetry import Defect, SymmetryDefect
     from .tensor import TensorBasis
     from .triangular import TriangularTeethLaw
-    from .two_mirrors import TwoMirrorHollow, two_mirrors
+    from .two_mirror_hollow import TwoMirrorHollow, two_mirrors
     from .wall_convergence import Convergence, ConvergenceStep, study_convergence
     from .wall_law import WallLaw
     from .weighted_sum import Combination, mixture
@@ -91,7 +91,7 @@ _HOMES = {
     "SymmetryDefect": "symmetry",
     "TensorBasis": "tensor",
     "TriangularTeethLaw": "triangular",
-    "TwoMirrorHollow": "two_mirrors",
+    "TwoMirrorHollow": "two_mirror_hollow",
     "WallLaw": "wall_law",
     "air_resistance": "functional",
     "best_hollow": "hollow_search",
@@ -114,7 +114,7 @@ _HOMES = {
     "smooth_matrix": "collision_matrices",
     "specular": "ideal",
     "study_convergence": "wall_convergence",
-    "two_mirrors": "two_mirrors",
+    "two_mirrors": "two_mirror_hollow",
 }
 
 __all__ = [

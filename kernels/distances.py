@@ -13,7 +13,7 @@ from .discretisation import discretise
 from .joint_distance import joint_law_distance, joint_matrix_distance
 from .law import Law
 from .matrix import KernelMatrix
-from .moment_distance import moment_distance
+from .pseudometric import moment_distance
 from .resampling import noise_floor
 from .row_distance import law_distance, matrix_distance
 

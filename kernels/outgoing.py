@@ -8,7 +8,6 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import InputError
-from .adaptive_rows import WallRows, is_few
 from .bins import Bins
 from .circular import CircularArcLaw
 from .composition import Composition, Power
@@ -23,6 +22,7 @@ from .row_transport import Distributions
 from .specular_frame import SpecularFrame
 from .stable_angles import kept_inside
 from .wall_law import WallLaw
+from .wall_rows import WallRows, is_few
 from .weighted_sum import Combination
 
 # Error of a row's distribution function at the edges.

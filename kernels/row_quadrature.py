@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
-from .adaptive_rows import WallRows
 from .angle_panels import NODES, AnglePanels
 from .basis import Basis
 from .legendre import Legendre
 from .products import cell_index
 from .reflection import is_mirror_symmetric, reflection_matrix
+from .wall_rows import WallRows
 
 if TYPE_CHECKING:
     from ..geometry import Wall

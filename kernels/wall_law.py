@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles
 from ..errors import AccuracyError, InputError
-from .adaptive_rows import adaptive_rows, is_few
 from .circular import CircularArcLaw
 from .ideal import specular
 from .isometry import table_of
@@ -21,6 +20,7 @@ from .law import AngleFunction, DrivenLaw, Law, entry_points
 from .polygon_law import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .triangular import TriangularTeethLaw
+from .wall_rows import adaptive_rows, is_few
 from .weighted_sum import Combination
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.adaptive_rows import adaptive_rows
 from asperity.kernels.row_quadrature import row_matrix
+from asperity.kernels.wall_rows import adaptive_rows
 from plain_tracer import trace_plainly
 from random_curved_walls import random_curved_wall
 

@@ -16,9 +16,9 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
 from asperity.kernels import joint_distance
-from asperity.kernels.adaptive_rows import WallRows
-from asperity.kernels.moment_distance import flux_means
+from asperity.kernels.pseudometric import flux_means
 from asperity.kernels.row_transport import Distributions, grid_wasserstein, wasserstein
+from asperity.kernels.wall_rows import WallRows
 
 KINDS = ("rows", "sup", "joint", "pseudometric")
 

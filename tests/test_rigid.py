@@ -169,7 +169,7 @@ def test_the_default_spacing_is_the_least_divisor_that_is_allowed(scale):
     [
         ({"spacing": 0.3}, "whole number"),
         ({"spacing": 2 * math.pi / 500}, "at most two satellites"),
-        ({"scale": 3.0}, "much smaller than the disk"),
+        ({"scale": 3.0}, "make the scale smaller"),
         ({"scale": 0.0}, "greater than 0"),
         ({"velocity": [[0.0, 1.0, 0.0]]}, "v2 < 0"),
         ({"velocity": [[0.0, -1.0]]}, r"shape \(n, 3\)"),

@@ -131,7 +131,7 @@ def prepare(scene: str) -> None:
     """What a new process loads before anything is timed: the wall, and the compiled loops for it."""
     from ..geometry import trace
     from ..kernels import Legendre, WallLaw, discretise
-    from ..kernels.adaptive_rows import adaptive_rows
+    from ..kernels.wall_rows import adaptive_rows
 
     wall = wall_of(scene)
     trace(wall, [0.3, 0.6], [1.0, 2.0])
