@@ -37,7 +37,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("bench-results"), help="folder of the rows and pictures")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    speed = _speed(RAYS // 16 if options.quick else RAYS)
+    flags = [f"--{name}" for name in ("quick", "peers", "write") if getattr(options, name)]
+    command = f"Measured by `{' '.join(['python -m benchmarks', *flags])}`."
+    speed = [command, "", *_speed(RAYS // 16 if options.quick else RAYS)]
     _say("the standard set")
     standard = _run(problem_names(), options.quick, options.out / "standard")
     _say("random walls")
@@ -54,7 +56,7 @@ def main() -> None:
         sections.append(["## Peers", "", peer_table(options.out / "peers")])
     text = "\n\n".join("\n".join(section) for section in sections)
     _say("extreme cases")
-    stability = f"{run_extremes(options.quick).table()}\n\nMachine: {Machine.here()}."
+    stability = f"{command}\n\n{run_extremes(options.quick).table()}\n\nMachine: {Machine.here()}."
     print(text, stability, sep="\n\n")
     if options.write:
         write_between_marks(BENCHMARKS, text)

@@ -46,9 +46,9 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# Rays before the progress of the error is judged: rays of rows cost up to twenty times those of a sample of a million.
-FEWEST_TO_JUDGE = 200_000
-# The order in the number of rays that is taken for granted before it is seen: that of a kink in every panel.
+# Rows of a wall that takes more than this share of the rays for a first look have pieces without number.
+FIRST_SHARE = 0.05
+# The order in the number of rays that they are trusted to have.
 PRESUMED_ORDER = 2.0
 # Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
 LEAST_CUT = 1e-7
@@ -78,7 +78,7 @@ def row_matrix(
 ) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
-    Who is not patient stops as soon as the errors so far speak against meeting the tolerance with so many rays.
+    Who is not patient stops where the first rows already speak against meeting the tolerance with so many rays.
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
     of that difference scaled by what dividing the panel showed where they are smooth; plus the errors of the rows;
@@ -163,15 +163,15 @@ class _Integrator:
             self._divide(chosen)
 
     def _is_hopeless(self) -> bool:
-        """Whether the error, going on as it fell while the rays grew fourfold, would take more rays than there are."""
-        rays, error = self.progress[-1]
-        if self.patient or rays < FEWEST_TO_JUDGE or error <= self.tolerance:
+        """Whether the first rows alone took a good part of the rays, and left more than the others can make good.
+
+        Later progress is no guide: errors fall by jumps, when the last of the pieces that matter are seen.
+        """
+        if self.patient or len(self.progress) != 1:
             return False
-        before, coarse = next(step for step in self.progress if step[0] >= rays // 4)
-        rate = PRESUMED_ORDER
-        if before < rays:
-            rate = math.log(coarse / error) / math.log(rays / before) if coarse > error else 0.0
-        return rate <= 0.0 or rays * (error / self.tolerance) ** (1.0 / rate) > self.most_rays
+        rays, error = self.progress[0]
+        needed = rays * max(error / self.tolerance, 1.0) ** (1.0 / PRESUMED_ORDER)
+        return rays > FIRST_SHARE * self.most_rays and needed > self.most_rays
 
     def _state(self) -> tuple[Floats, float, float]:
         """The matrix, the error that its panels and rows are known to have, and what its asymmetry adds."""

@@ -29,13 +29,15 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
 
 def coarser_grids(matrix: KernelMatrix, levels: int) -> list[Floats]:
     """Eigenvalues off the constants (ascending) on successively coarser bases, as many as the basis has."""
+    from scipy.sparse import csr_array
+
     found: list[Floats] = []
     basis, array = matrix.basis, 0.5 * (matrix.symmetric + matrix.symmetric.T)
     for _ in range(levels):
         coarser = basis.coarsened()
         if coarser is None:
             break
-        basis, embedding = coarser
+        basis, embedding = coarser[0], csr_array(coarser[1])
         array = np.asarray(embedding @ array @ embedding.T)
         found.append(off_constants(array, np.asarray(basis.constant))[0])
     return found

@@ -221,11 +221,13 @@ def _solved(matrix: KernelMatrix, array: Floats, constant: Floats) -> tuple[Floa
     split = halves(matrix)
     if split is None:
         return *off_constants(array, constant), []
-    even, odd = split
-    values, vectors = off_constants(even.T @ array @ even, even.T @ constant)
     from scipy.linalg import eigh
+    from scipy.sparse import csr_array
 
-    odd_values, odd_vectors = eigh(odd.T @ array @ odd) if odd.size else (np.empty(0), np.empty((0, 0)))
+    # one or two entries a row
+    even, odd = map(csr_array, split)
+    values, vectors = off_constants(np.asarray(even.T @ array @ even), np.asarray(even.T @ constant))
+    odd_values, odd_vectors = eigh(np.asarray(odd.T @ array @ odd)) if odd.shape[1] else (np.empty(0), np.empty((0, 0)))
     everything = np.concatenate([values, odd_values])
     order = np.argsort(everything, kind="stable")
     names: list[Parity] = ["even" if place < len(values) else "odd" for place in order]
