@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.bench.timing import least_time
 from asperity.geometry.beams import beams_of
 from asperity.kernels.polygon_law import table_of_beams
 from asperity.kernels.row_quadrature import row_matrix
@@ -21,8 +20,6 @@ REPEATS = 3
 TRIANGULAR_MOMENT = 0.134541971359171
 ARC_MOMENT = 0.327558333378
 RAYS = 2**18
-
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -52,14 +49,14 @@ def measure_laws(repeats: int = REPEATS) -> list[LawTime]:
 
 def _moment(what: str, wall: geo.Wall, exact: float, repeats: int) -> LawTime:
     """By the method that the library chooses."""
-    matrix, seconds = _timed(lambda: ker.discretise(ker.WallLaw(wall), ker.Legendre(2)), repeats)
+    matrix, seconds = least_time(lambda: ker.discretise(ker.WallLaw(wall), ker.Legendre(2)), repeats)
     error = abs(float(matrix.symmetric[1, 1]) - exact)
     return LawTime(what, error, matrix.error.value, seconds, _monte_carlo(wall) / seconds**0.5)
 
 
 def _rows(wall: geo.Wall, tolerance: float, repeats: int) -> LawTime:
     """By adaptive rows, as if the arc had no quadrature of its own."""
-    (matrix, reported, _), seconds = _timed(lambda: row_matrix(wall, ker.Legendre(2), tolerance), repeats)
+    (matrix, reported, _), seconds = least_time(lambda: row_matrix(wall, ker.Legendre(2), tolerance), repeats)
     error = abs(float(matrix[1, 1]) - ARC_MOMENT)
     what = f"focusing arc by adaptive rows, first moment to {tolerance:g}"
     return LawTime(what, error, reported, seconds, _monte_carlo(wall) / seconds**0.5)
@@ -67,7 +64,7 @@ def _rows(wall: geo.Wall, tolerance: float, repeats: int) -> LawTime:
 
 def _against(what: str, law: ker.Law, basis: ker.Basis, wall: geo.Wall, repeats: int) -> LawTime:
     """The closed form's matrix against the one from the beams of the same hollow."""
-    matrix, seconds = _timed(lambda: ker.discretise(law, basis), repeats)
+    matrix, seconds = least_time(lambda: ker.discretise(law, basis), repeats)
     beams, _ = table_matrix(table_of_beams(beams_of(wall.vertices)), basis)
     error = float(np.linalg.norm(matrix.symmetric - beams))
     return LawTime(what, error, matrix.error.value, seconds, float("nan"))
@@ -85,7 +82,7 @@ def _polygon(repeats: int) -> LawTime:
         law.branches(1.0)
         return law
 
-    law, seconds = _timed(whole, repeats)
+    law, seconds = least_time(whole, repeats)
     return LawTime("polygon of 16 vertices, whole law", float("nan"), float(law.unresolved), seconds, float("nan"))
 
 
@@ -98,12 +95,3 @@ def _monte_carlo(wall: geo.Wall) -> float:
     values = 3.0 * -u * np.cos(traced.theta)
     seconds = time.perf_counter() - start
     return float(values.std() * (seconds / RAYS) ** 0.5)
-
-
-def _timed(job: Callable[[], Result], repeats: int) -> tuple[Result, float]:
-    result, best = job(), np.inf
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = job()
-        best = min(best, time.perf_counter() - start)
-    return result, best

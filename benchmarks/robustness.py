@@ -17,13 +17,12 @@ from tests.precise_tracer import trace_precisely
 
 from asperity import geometry as geo
 from asperity.geometry.double_double import EPS_DOUBLE_DOUBLE
+from asperity.geometry.refined_engine import LOST, UNSETTLED
 from asperity.geometry.refinement import RefinedTrace, refined_trace
 
 Floats = NDArray[np.float64]
 EPS = 2.0**-52
-# The twin's status of a ray that met nothing, and of one that even 31 digits leave open: hundreds of hits along an arc.
-LOST, UNSETTLED = 4, 5
-# The tracer's error on such a ray is that of hundreds of bounces with a derivative of some 10^6.
+# The tracer's error on a ray that its twin leaves open: hundreds of bounces with a derivative of some 10^6.
 OPEN_ERROR = 1e-6
 RAYS = 1_000_000
 # Rays that are traced in 50 digits besides those in dispute, on all walls together.

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from asperity import geometry as geo
+from asperity.bench.timing import least_time
 
 RAYS, REPEATS = 2**14, 5
 LIMIT = 2**62
@@ -37,11 +37,8 @@ def measure_runs(rays: int = RAYS, repeats: int = REPEATS) -> list[RunTime]:
     rows = []
     for what, (wall, (low, high), (first, last)) in CASES.items():
         x, theta = low + (high - low) * rng.random(rays), first + (last - first) * rng.random(rays)
-        traced = geo.trace(wall, x, theta, max_collisions=LIMIT, threads=1)
-        best = np.inf
-        for _ in range(repeats):
-            start = time.perf_counter()
-            geo.trace(wall, x, theta, max_collisions=LIMIT, threads=1)
-            best = min(best, time.perf_counter() - start)
+        traced, best = least_time(
+            lambda wall=wall, x=x, theta=theta: geo.trace(wall, x, theta, max_collisions=LIMIT, threads=1), repeats
+        )
         rows.append(RunTime(what, float(traced.collisions.mean()), best / rays, float(traced.escaped.mean())))
     return rows

@@ -6,22 +6,18 @@ of the difference test in 2,000 runs.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
 from asperity import kernels as ker
+from asperity.bench.timing import least_time
 from asperity.kernels.row_transport import grid_wasserstein
 
 REPEATS = 5
 ALARM_RUNS, ALARM_PAIRS, ALARM_BINS, LEVEL = 2000, 300, 6, 0.05
 # tests/precise_least_resistance.py
 LEAST = 0.987823750351585515600495963
-
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -46,8 +42,8 @@ def measure_rows(bins: int = 512, repeats: int = REPEATS) -> RowTimes:
     rng = np.random.default_rng(0)
     points = np.sort(rng.random(bins)) * np.pi
     one, other = (rng.dirichlet(np.full(bins, 0.3), bins) for _ in range(2))
-    ours, seconds = _timed(lambda: grid_wasserstein(one, other, points), repeats)
-    pot, pot_seconds = _timed(
+    ours, seconds = least_time(lambda: grid_wasserstein(one, other, points), repeats)
+    pot, pot_seconds = least_time(
         lambda: [float(ot.wasserstein_1d(points, points, *pair)) for pair in zip(one, other, strict=True)], repeats
     )
     return RowTimes(bins, seconds, pot_seconds, float(np.abs(ours - pot).max()))
@@ -58,7 +54,7 @@ def measure_joint(sizes: tuple[int, ...] = (16, 32, 48, 64, 128)) -> list[tuple[
     rows = []
     for size in sizes:
         pair = [ker.discretise(ker.henyey_greenstein(g), ker.Bins(size)) for g in (0.5, 0.7)]
-        rows.append((size, *_timed(lambda pair=pair: ker.distance(*pair, kind="joint"), 1)))
+        rows.append((size, *least_time(lambda pair=pair: ker.distance(*pair, kind="joint"), 1)))
     return rows
 
 
@@ -66,7 +62,7 @@ def measure_extremes(sizes: tuple[int, ...] = (256, 1024, 4096)) -> list[tuple[i
     """Cells, distance of the bounds of the least resistance from its value, and seconds."""
     rows = []
     for size in sizes:
-        found, seconds = _timed(lambda size=size: ker.extremal_resistance(size), 1)
+        found, seconds = least_time(lambda size=size: ker.extremal_resistance(size), 1)
         rows.append((size, LEAST - found.lower, found.upper - LEAST, seconds))
     return rows
 
@@ -82,15 +78,6 @@ def count_false_alarms(runs: int = ALARM_RUNS) -> int:
             pair.append(ker.estimate(theta, law.sample(theta, rng), ker.Bins(ALARM_BINS)))
         alarms += ker.difference_test(*pair, permutations=99, rng=rng).differs(LEVEL)
     return alarms
-
-
-def _timed(job: Callable[[], Result], repeats: int) -> tuple[Result, float]:
-    best, result = np.inf, job()
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = job()
-        best = min(best, time.perf_counter() - start)
-    return result, best
 
 
 def main() -> None:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, positive_number, whole_number
+from . import rolling
 from .blocks import in_blocks
 from .charts import RollingCharts
 from .disk import Disk
 from .rigid import check_kinds, checked_states, rigid_tables, rounding_of_places, shares
-from .tracing import MAX_COLLISIONS, Status, counts_by_name
+from .tracing import MAX_COLLISIONS, Outcomes
 from .wall import Wall
 
 # Newton's method on a convex function halves its error at worst, and squares it soon.
@@ -20,7 +21,7 @@ LANDING_STEPS = 80
 
 
 @dataclass(frozen=True)
-class CylinderCollision:
+class CylinderCollision(Outcomes):
     """What became of the disks, the first axis of every array running over them.
 
     Attributes
@@ -41,15 +42,6 @@ class CylinderCollision:
     time: Floats
     contacts: NDArray[np.int64]
     status: NDArray[np.uint8]
-
-    @property
-    def escaped(self) -> NDArray[np.bool_]:
-        """Mask of the disks that came back to height 0."""
-        return np.asarray(self.status == Status.ESCAPED)
-
-    def counts(self) -> dict[str, int]:
-        """Number of disks by the name of their status; every name is there."""
-        return counts_by_name(self.status)
 
 
 def collide_cylinder(
@@ -173,7 +165,7 @@ def _landing(charts: RollingCharts, alpha: Floats, velocity: Floats) -> Floats:
     half = 0.5 * charts.spacing
     for _ in range(LANDING_STEPS):
         bar = charts.residual(alpha + omega * time)
-        height = v2 * time + 2.0 * np.sin(0.5 * bar) ** 2
+        height = v2 * time + rolling.rise(bar)
         slope = v2 + omega * np.sin(bar)
         with np.errstate(divide="ignore", invalid="ignore"):
             takeover = np.where(omega == 0.0, np.inf, (half - np.sign(omega) * bar) / np.abs(omega))

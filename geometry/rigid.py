@@ -15,7 +15,7 @@ from .bezier import Bezier
 from .blocks import in_blocks
 from .disk import Disk
 from .satellites import Satellites
-from .tracing import MAX_COLLISIONS, Status, counts_by_name
+from .tracing import MAX_COLLISIONS, Outcomes
 from .wall import Wall
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ SLACK = 16.0 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
-class RigidCollision:
+class RigidCollision(Outcomes):
     """What became of the disks, the first axis of every array running over them.
 
     Attributes
@@ -55,15 +55,6 @@ class RigidCollision:
     contacts: NDArray[np.int64]
     two_satellites: NDArray[np.bool_]
     status: NDArray[np.uint8]
-
-    @property
-    def escaped(self) -> NDArray[np.bool_]:
-        """Mask of the disks that came back to x2 = 0."""
-        return np.asarray(self.status == Status.ESCAPED)
-
-    def counts(self) -> dict[str, int]:
-        """Number of disks by the name of their status; every name is there."""
-        return counts_by_name(self.status)
 
 
 def collide(

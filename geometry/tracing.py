@@ -34,8 +34,31 @@ class Status(IntEnum):
     BOUNCE_LIMIT = 3
 
 
+class Outcomes:
+    """What a result with an array ``status`` says of it: of rays, or of disks."""
+
+    status: NDArray[np.uint8]
+
+    @property
+    def escaped(self) -> NDArray[np.bool_]:
+        """Mask of the rays that left through y = 0, or of the disks that came back to it."""
+        return np.asarray(self.status == Status.ESCAPED)
+
+    def counts(self) -> dict[str, int]:
+        """Number of entries for every `Status`, by its name in lower case.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.trace(geo.flat(), [0.2, 0.7], 1.0).counts()
+        {'escaped': 2, 'corner': 0, 'grazing': 0, 'bounce_limit': 0}
+        """
+        numbers = np.bincount(np.ravel(self.status), minlength=len(Status))
+        return {outcome.name.lower(): int(numbers[outcome]) for outcome in Status}
+
+
 @dataclass(frozen=True)
-class Trace:
+class Trace(Outcomes):
     """What became of the rays, each array in the broadcast shape of ``x`` and ``theta``.
 
     Attributes
@@ -57,11 +80,6 @@ class Trace:
     status: NDArray[np.uint8]
 
     @property
-    def escaped(self) -> NDArray[np.bool_]:
-        """Mask of the rays that left through y = 0."""
-        return np.asarray(self.status == Status.ESCAPED)
-
-    @property
     def flagged(self) -> NDArray[np.bool_]:
         """Mask of the rays that double precision does not settle: those that met a corner or grazed a piece.
 
@@ -72,23 +90,6 @@ class Trace:
         [False, True]
         """
         return np.asarray((self.status == Status.CORNER) | (self.status == Status.GRAZING))
-
-    def counts(self) -> dict[str, int]:
-        """Number of rays by the name of their status; every name is there.
-
-        Examples
-        --------
-        >>> from asperity import geometry as geo
-        >>> geo.trace(geo.flat(), [0.2, 0.7], 1.0).counts()
-        {'escaped': 2, 'corner': 0, 'grazing': 0, 'bounce_limit': 0}
-        """
-        return counts_by_name(self.status)
-
-
-def counts_by_name(status: NDArray[np.uint8]) -> dict[str, int]:
-    """Number of entries for every `Status`, by its name in lower case."""
-    numbers = np.bincount(np.ravel(status), minlength=len(Status))
-    return {outcome.name.lower(): int(numbers[outcome]) for outcome in Status}
 
 
 def trace(

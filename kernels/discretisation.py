@@ -130,8 +130,7 @@ def discretise(
     source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
-    most_rays = MOST_RAYS if method == "quadrature" else QUICK_RAYS
-    maker = _Maker(basis, tolerance, number, source, symmetrise, most_rays)
+    maker = _Maker(basis, tolerance, number, source, symmetrise, patient=method == "quadrature")
     return replace(
         maker.make(law, method),
         law=repr(law),
@@ -152,7 +151,7 @@ class _Maker:
     samples: int
     rng: np.random.Generator
     symmetrise: bool
-    most_rays: int
+    patient: bool
 
     def make(self, law: Law, method: Method) -> KernelMatrix:
         """The matrix of a law; the facts of the whole law are put in by `discretise`."""
@@ -258,8 +257,8 @@ class _Maker:
             symmetric, error = arc_matrix(law.half_angle, self.basis)
             how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
         elif isinstance(law, WallLaw):
-            patient = self.most_rays == MOST_RAYS
-            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, self.most_rays, patient=patient)
+            most_rays = MOST_RAYS if self.patient else QUICK_RAYS
+            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, most_rays, patient=self.patient)
             how = (
                 f"adaptive rows and panels, {rays} rays, predicted cheaper than sampling: Gauss against Kronrod, "
                 "plus undecided entry points and twice the asymmetry"

@@ -222,10 +222,8 @@ def _solved(matrix: KernelMatrix, array: Floats, constant: Floats) -> tuple[Floa
     if split is None:
         return *off_constants(array, constant), []
     from scipy.linalg import eigh
-    from scipy.sparse import csr_array
 
-    # one or two entries a row
-    even, odd = map(csr_array, split)
+    even, odd = split
     values, vectors = off_constants(np.asarray(even.T @ array @ even), np.asarray(even.T @ constant))
     odd_values, odd_vectors = eigh(np.asarray(odd.T @ array @ odd)) if odd.shape[1] else (np.empty(0), np.empty((0, 0)))
     everything = np.concatenate([values, odd_values])

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..checks import Floats
 from ..kernels.reflection import is_mirror_symmetric, reflection_matrix
 
 if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
     from ..kernels import Basis, KernelMatrix
 
 Parity = Literal["even", "odd", "none"]
@@ -18,8 +20,8 @@ Parity = Literal["even", "odd", "none"]
 ENTRY = 0.5
 
 
-def halves(matrix: KernelMatrix) -> tuple[Floats, Floats] | None:
-    """Orthonormal even and odd functions, shapes (n, even) and (n, odd), of a mirror-symmetric law's basis.
+def halves(matrix: KernelMatrix) -> tuple[csr_array[Any], csr_array[Any]] | None:
+    """Orthonormal even and odd functions, sparse of shapes (n, even) and (n, odd), of a mirror-symmetric law's basis.
 
     None where the law is not known to be symmetric, or the basis is not.
 
@@ -34,24 +36,23 @@ def halves(matrix: KernelMatrix) -> tuple[Floats, Floats] | None:
     return _halves(matrix.basis)
 
 
-def _halves(basis: Basis) -> tuple[Floats, Floats] | None:
+def _halves(basis: Basis) -> tuple[csr_array[Any], csr_array[Any]] | None:
     flip = reflection_matrix(basis)
     image = np.argmax(np.abs(flip), axis=1)
     here = np.arange(basis.size)
     sign = flip[here, image]
     if np.any(np.abs(sign) < ENTRY) or np.any(image[image] != here):
         return None
-    fixed, pairs = image == here, image > here
-    even: list[Floats] = []
-    odd: list[Floats] = []
-    for chosen, target in ((fixed & (sign > 0.0), even), (fixed & (sign < 0.0), odd)):
-        part = np.zeros((basis.size, int(chosen.sum())))
-        part[here[chosen], np.arange(part.shape[1])] = 1.0
-        target.append(part)
-    for factor, target in ((1.0, even), (-1.0, odd)):
-        part = np.zeros((basis.size, int(pairs.sum())))
-        column = np.arange(part.shape[1])
-        part[here[pairs], column] = np.sqrt(0.5)
-        part[image[pairs], column] = factor * np.sqrt(0.5) * np.sign(sign[pairs])
-        target.append(part)
-    return np.concatenate(even, axis=1), np.concatenate(odd, axis=1)
+    from scipy.sparse import csr_array
+
+    def columns(alone: NDArray[np.bool_], factor: float) -> csr_array[Any]:
+        """The functions of one parity: each that is its own image, and the sums of each other one with its image."""
+        single, first = here[alone], here[image > here]
+        weight = np.full(len(first), np.sqrt(0.5))
+        rows = np.concatenate([single, first, image[first]])
+        pair = len(single) + np.arange(len(first))
+        entries = np.concatenate([np.ones(len(single)), weight, factor * weight * np.sign(sign[first])])
+        where = np.concatenate([np.arange(len(single)), pair, pair])
+        return csr_array((entries, (rows, where)), shape=(basis.size, len(single) + len(first)))
+
+    return columns((image == here) & (sign > 0.0), 1.0), columns((image == here) & (sign < 0.0), -1.0)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +13,7 @@ from ..geometry.scene import Scene
 from ..kernels import Legendre, WallLaw, discretise
 from ..kernels.row_quadrature import row_matrix
 from .scenes import standard_names, wall_of
+from .timing import least_time
 
 if TYPE_CHECKING:
     from ..geometry import Wall
@@ -142,8 +141,8 @@ def _traced(name: str, what: str, wall: Wall, other: Scene, rays: int, repeats: 
     x = hollow[:, 0] + (hollow[:, 1] - hollow[:, 0]) * rng.random(rays)
     theta = np.arccos(1.0 - 2.0 * rng.random(rays))
     plain = SceneWithout(wall, other)
-    with_it, seconds = _timed(lambda: trace(wall, x, theta, threads=1), repeats)
-    without, longer = _timed(lambda: trace(plain, x, theta, threads=1), repeats)  # type: ignore[arg-type]
+    with_it, seconds = least_time(lambda: trace(wall, x, theta, threads=1), repeats)
+    without, longer = least_time(lambda: trace(plain, x, theta, threads=1), repeats)  # type: ignore[arg-type]
     difference = largest_difference(with_it, without)
     return Saving(name, what, seconds, longer, difference, difference <= ROUNDED)
 
@@ -167,8 +166,8 @@ def largest_difference(first: Trace, second: Trace) -> float:
 def _tracing(name: str, wall: Wall, rays: int, repeats: int) -> Saving:
     """The law's matrix without tracing, against the same from as many rays."""
     law, basis = WallLaw(wall), Legendre(2)
-    exact, seconds = _timed(lambda: discretise(WallLaw(wall), basis), repeats)
-    sampled, longer = _timed(
+    exact, seconds = least_time(lambda: discretise(WallLaw(wall), basis), repeats)
+    sampled, longer = least_time(
         lambda: discretise(law, basis, "qmc", samples=rays, rng=np.random.default_rng(SEED)), repeats
     )
     distance = float(np.linalg.norm(exact.symmetric - sampled.symmetric))
@@ -179,8 +178,8 @@ def _tracing(name: str, wall: Wall, rays: int, repeats: int) -> Saving:
 def _half(name: str, wall: Wall, repeats: int) -> Saving:
     """Adaptive rows of half of the angles, against those of all."""
     whole = WithoutMirror(wall)
-    halved, seconds = _timed(lambda: row_matrix(wall, Legendre(2), ROW_TOLERANCE), repeats)
-    full, longer = _timed(lambda: row_matrix(whole, Legendre(2), ROW_TOLERANCE), repeats)  # type: ignore[arg-type]
+    halved, seconds = least_time(lambda: row_matrix(wall, Legendre(2), ROW_TOLERANCE), repeats)
+    full, longer = least_time(lambda: row_matrix(whole, Legendre(2), ROW_TOLERANCE), repeats)  # type: ignore[arg-type]
     score = float(np.linalg.norm(halved[0] - full[0])) / (halved[1] + full[1])
     return Saving(name, "half of the angles, by symmetry", seconds, longer, score, score <= 1.0)
 
@@ -208,12 +207,3 @@ def plan_words(wall: Wall) -> str:
         f"left out; runs on {plan.arcs_with_runs} arcs, in {plan.channels} channels, {plan.wedges} wedges; "
         f"{plan.hollows_with_grid} grids{half}"
     )
-
-
-def _timed(job: Callable[[], object], repeats: int):  # type: ignore[no-untyped-def]
-    result, best = job(), np.inf
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = job()
-        best = min(best, time.perf_counter() - start)
-    return result, best
