@@ -14,6 +14,8 @@ Three sizes accompany a ray.
 * Its width: half an ulp of the incoming angle. An angle stands for the angles that round to it; a ray meets a corner
   exactly if one of them does. (No ray of rational data but a vertical one meets a corner in the strict sense, since
   the tangent of an algebraic angle is transcendental.)
+
+Long runs between two vertical sides that face each other are counted by a division; no other run is left out.
 """
 
 from __future__ import annotations
@@ -50,6 +52,8 @@ WIDTH_MARGIN = 1.0 + 2.0**-20
 LARGEST_ERROR = 2.0**-50
 ROOT_STEPS = 200
 ARC_COLUMNS = 22
+# Shorter runs are followed hit by hit, so that they check those of `skips`; of a longer one the last hits are.
+LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -301,13 +305,36 @@ def bezier_place(curve, s):
 
 
 @_compile
+def crossings(joints, lines, pairs, index, other, py, vx, vy, most):
+    """Hits, an even number, between a vertical side and one that faces it; the way along y, and the flight time."""
+    way, flight = (0.0, 0.0), 0.0
+    if joints[index, 0] != joints[index + 1, 0] or joints[other, 0] != joints[other + 1, 0]:
+        return 0, way, flight
+    for row in range(int(lines[index, 5]), int(lines[index, 6])):
+        if pairs[row, 0] == other:
+            gap = two_sum(joints[other, 0], -joints[index, 0])
+            time = divide(gap, vx)
+            step = multiply(time, vy)
+            low, high = min(pairs[row, 2], pairs[row, 4]), max(pairs[row, 2], pairs[row, 4])
+            room = high - py[0] if step[0] > 0.0 else py[0] - low
+            count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
+            if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
+                hits = 2 * np.int64(0.5 * count)
+                # beyond 2^53 there is no such double, and no double-double knows the ray's place
+                return hits, multiply((float(hits), 0.0), step), float(hits) * time[0]
+    return 0, way, flight
+
+
+@_compile
 def earlier(t, time):
     """Whether t < time, which may be (inf, 0): differences of infinities are not numbers."""
     return t[0] < np.inf and (time[0] == np.inf or subtract(t, time)[0] < 0.0)
 
 
 @_compile
-def refined_ray(place, theta, hollow, joints, lines, arcs, first_ellipse, beziers, is_open, cell, limit):
+def refined_ray(
+    place, theta, hollow, joints, lines, pairs, arcs, first_ellipse, beziers, is_open, cell, limit, most_flights
+):  # fmt: skip
     """Follow one ray; returns x and angle (double-doubles), bounces, status, amplification and rounding error.
 
     ``place`` is a double-double in the hollow, and ``arcs`` holds the circles, then the ellipses, of `refined_arcs`.
@@ -425,7 +452,7 @@ def refined_ray(place, theta, hollow, joints, lines, arcs, first_ellipse, bezier
             x = add(qx, two_product(float(wraps), right - left))
             norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
             return x, direction_angle(vx, vy), bounces, ESCAPED, norm, local
-        if bounces >= limit or steps >= 2 * limit + 2:
+        if bounces >= limit or steps >= most_flights:
             return px, (0.0, 0.0), bounces, BOUNCE_LIMIT, norm, local
         if kind == SIDE:
             py = qy
@@ -445,6 +472,14 @@ def refined_ray(place, theta, hollow, joints, lines, arcs, first_ellipse, bezier
             a1 -= power * j1
             a2 -= power * j2
             bounces += 1
+            if kind == LINE and own_kind == LINE:
+                hits, way, flight = crossings(joints, lines, pairs, index, own_index, py, vx, vy, limit - bounces)
+                bounces += hits
+                py = add(py, way)
+                flight /= scale
+                j1 += flight * a1
+                j2 += flight * a2
+                step_j += flight * step_a
         norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
         spread += norm
         own_kind, own_index, own_s = kind, index, hit_s if kind == BEZIER else (-1.0, 0.0)
@@ -452,7 +487,7 @@ def refined_ray(place, theta, hollow, joints, lines, arcs, first_ellipse, bezier
 
 @_compile
 def refined_rays(
-    x, theta, hollows, joints, lines, arcs, first_ellipse, beziers, is_open, cell, limit,
+    x, theta, hollows, joints, lines, pairs, arcs, first_ellipse, beziers, is_open, cell, limit, most_flights,
     out_x, out_theta, bounces, status, amplification, rounding,
 ):  # fmt: skip
     """Trace rays; fills the output arrays, ``out_x`` and ``out_theta`` (n, 2) with double-doubles."""
@@ -486,8 +521,9 @@ def refined_rays(
                 out_theta[i, 0], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
         end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
-            place, theta[i], hollows[h], joints, lines, arcs, first_ellipse, beziers, is_open, cell, limit
-        )
+            place, theta[i], hollows[h], joints, lines, pairs, arcs, first_ellipse, beziers, is_open, cell, limit,
+            most_flights,
+        )  # fmt: skip
         end = add(base, end)
         out_x[i, 0], out_x[i, 1] = end
         out_theta[i, 0], out_theta[i, 1] = angle

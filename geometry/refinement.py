@@ -13,9 +13,9 @@ from ..checks import Floats
 if TYPE_CHECKING:
     from .scene import Scene
 
-# Double-double steps cost about twenty times a double one, and runs are not skipped: a flagged ray that needs more
-# collisions than these keeps its flag.
-REFINED_COLLISIONS = 20_000
+# Double-double steps cost about twenty times a double one: a flagged ray that needs more flights than these keeps its
+# flag. Runs between vertical sides are one flight, runs along arcs and in wedges are not.
+REFINED_FLIGHTS = 40_000
 _SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
 
 
@@ -45,7 +45,7 @@ class RefinedTrace:
     rounding: Floats
 
 
-def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = REFINED_COLLISIONS) -> RefinedTrace:
+def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 2**62) -> RefinedTrace:
     """Trace rays (two arrays of one dimension) in double-double arithmetic, whatever double precision makes of them."""
     from .refined_engine import refined_arcs, refined_rays
 
@@ -58,8 +58,8 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     )  # fmt: skip
     refined_rays(
         np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64),
-        scene.hollows, scene.joints, _rows(scene.lines, 5), arcs, len(circles), _rows(scene.beziers, 14),
-        scene.is_open, scene.cell, max_collisions,
+        scene.hollows, scene.joints, _rows(scene.lines, 7), _rows(scene.pairs, 10), arcs, len(circles), _rows(scene.beziers, 14),
+        scene.is_open, scene.cell, max_collisions, REFINED_FLIGHTS,
         result.x, result.theta, result.collisions, result.status, result.amplification, result.rounding,
     )  # fmt: skip
     return result
@@ -86,16 +86,16 @@ def retrace(
     x, theta : array of float, shape (n,)
         The incoming rays.
     max_collisions : int
-        The limit that was asked for; no ray is followed for more than ``REFINED_COLLISIONS``.
+        The limit that was asked for; no ray is followed for more than ``REFINED_FLIGHTS``.
     out_x, out_theta, collisions, status : arrays of shape (n,)
         What double precision made of them.
     """
     flagged = np.flatnonzero((status == _CORNER) | (status == _GRAZING))
     if len(flagged) == 0:
         return
-    refined = refined_trace(scene, x[flagged], theta[flagged], min(max_collisions, REFINED_COLLISIONS))
+    refined = refined_trace(scene, x[flagged], theta[flagged], max_collisions)
     # a ray that is still inside after as many collisions as were asked for is settled, too
-    limited = (refined.status == _BOUNCE_LIMIT) & (max_collisions <= REFINED_COLLISIONS)
+    limited = (refined.status == _BOUNCE_LIMIT) & (refined.collisions >= max_collisions)
     collisions[flagged[limited]], status[flagged[limited]] = refined.collisions[limited], _BOUNCE_LIMIT
     settled = refined.status == _SETTLED
     rays = flagged[settled]

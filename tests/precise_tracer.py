@@ -98,7 +98,7 @@ def _bezier_hits(c, p, v):
 
 
 def _crossings(sides, p, v):
-    """How many whole crossings, an even number, a ray leaving one of two vertical sides makes, and their way along y."""
+    """Whole crossings, an even number, that a ray leaving one of two vertical sides makes, and the way of each."""
     low = max(min(a[1], b[1]) for a, b in sides)
     high = min(max(a[1], b[1]) for a, b in sides)
     step = abs((sides[0][0][0] - sides[1][0][0]) / v[0]) * v[1]
@@ -168,6 +168,9 @@ def trace_precisely(scene, x, theta, limit=2000):
                     (h for h in hits if h[0] > NEAR * scene.cell), default=(mp.inf, None, None), key=lambda h: h[0]
                 )
                 leave = -p[1] / v[1] if v[1] > 0 else mp.inf
+                # a plate of no thickness lies as high as the opening beside it
+                if leave < mp.inf and not (scene.is_open or left <= p[0] + leave * v[0] <= right):
+                    leave = mp.inf
                 side = ((right if v[0] > 0 else left) - p[0]) / v[0] if scene.is_open and v[0] != 0 else mp.inf
                 if min(leave, t) <= side:
                     break

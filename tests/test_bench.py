@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench import exact_rays, quantities, routes, scene_savings
+from asperity.bench import quantities, routes, scene_savings
 from asperity.bench.bench_run import BenchRun
 from asperity.bench.child_process import ChildCrashed, ChildProcess, OutOfTime
 from asperity.bench.comparison import compare_runs
-from asperity.bench.extreme_report import case_names, run_case, run_extremes
+from asperity.bench.extreme_report import run_extremes
 from asperity.bench.extreme_row import ExtremeRow
 from asperity.bench.matrix_references import matrix_references
 from asperity.bench.scenes import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
@@ -193,36 +192,13 @@ def test_a_row_that_is_less_exact_or_gone_is_worse():
 # extreme cases
 
 
-SLOW_CASES = ("Koch 8", "r = 10000", "r = 1e+08", "stem/cap 1e-08", "matrix of", "angle 0.0001")
-
-
-@pytest.mark.parametrize("name", [name for name in case_names(True) if not any(slow in name for slow in SLOW_CASES)])
-def test_an_extreme_case_is_met_or_says_that_it_is_not(name):
-    row = run_case(name, quick=True)
-    assert row.verdict in ("met", "degraded as reported"), row
-    if not row.counts:
-        assert row.verdict == "met"
-
-
-@pytest.mark.parametrize(
-    ("exact", "wall", "other"),
-    [
-        (exact_rays.tooth(0.7), geo.triangular_teeth(0.7), geo.triangular_teeth(0.70001)),
-        (exact_rays.crevice(2.0), geo.rectangular_teeth(2.0), geo.rectangular_teeth(2.3)),
-        (exact_rays.arc(1.2), geo.focusing_arcs(1.2), geo.focusing_arcs(1.20001)),
-    ],
-)
-def test_the_check_of_rays_can_fail(exact, wall, other):
-    from asperity.bench.extreme_rays import _closed
-
-    assert _closed("right", lambda: wall, exact, 50).verdict == "met"
-    assert _closed("wrong", lambda: other, exact, 50).verdict == "not met"
-
-
 def test_verdicts_tell_apart_what_is_said_and_what_is_not():
     assert ExtremeRow("a", "b", 1.0, 2.0).verdict == "met"
     assert ExtremeRow("a", "b", 3.0, 2.0, reported=4.0).verdict == "degraded as reported"
     assert ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}).verdict == "degraded as reported"
+    # a flag that is the exact answer is as good as an escape
+    aimed = ExtremeRow("a", "b", 1.0, 2.0, counts={"escaped": 9, "corner": 1}, flagged_rightly=1)
+    assert aimed.verdict == "met"
     assert ExtremeRow("a", "b", 3.0, 2.0).verdict == "not met"
     assert ExtremeRow("a", "b", float("nan"), 2.0).verdict == "not met"
     assert ExtremeRow("a", "b", ended="refused").verdict == "refused"

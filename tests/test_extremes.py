@@ -132,3 +132,24 @@ def test_deep_channels_follow_the_law_of_rectangular_teeth(theta, height_to_widt
         share = np.mean(np.abs(traced.theta - angle) <= 64 * np.finfo(float).eps)
         # equidistant rays resolve the two intervals of each branch to one ray an end
         assert share == pytest.approx(weight, abs=unsure)
+
+
+def test_flags_in_deep_channels_are_settled_where_half_an_ulp_of_the_angle_meets_no_corner():
+    # some 10^13 crossings down to the bottom; the place there is known to a hundredth of the width
+    depth, width = 5e3, 0.5
+    rng = np.random.default_rng(7)
+    theta, place = 10.0 ** rng.uniform(-9.4, -8.8, RAYS), rng.random(RAYS)
+    traced = geo.trace(geo.rectangular_teeth(1e4), 0.5 + width * place, theta)
+    ends = []
+    with mp.workdps(50):
+        for x, angle in zip(place.tolist(), theta.tolist(), strict=True):
+            half_ulp = mp.mpf(float(np.spacing(angle))) / 2
+            ways = [x - depth / width * mp.cot(mp.mpf(angle) + sign * half_ulp) for sign in (-1, 1)]
+            ends.append([{int(mp.floor(way)) for way in ways}, {int(mp.floor(2 * way - x)) for way in ways}])
+    for ray, (bottom, out) in enumerate(ends):
+        meets_corner = len(bottom) > 1 or len(out) > 1
+        if traced.escaped[ray]:
+            assert traced.theta[ray] == (theta[ray] if min(out) % 2 else math.pi - theta[ray]) or meets_corner
+        else:
+            assert traced.status[ray] == geo.Status.CORNER and meets_corner
+    assert 0 < np.sum(~traced.escaped) < RAYS / 10

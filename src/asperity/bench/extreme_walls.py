@@ -31,9 +31,7 @@ def extreme_walls() -> dict[str, Callable[[], geo.Wall]]:
     walls |= {f"triangular teeth, angle {angle:.10g}": partial(geo.triangular_teeth, angle) for angle in TOOTH_ANGLES}
     walls |= {f"rectangular teeth, r = {ratio:g}": partial(geo.rectangular_teeth, ratio) for ratio in TOOTH_RATIOS}
     walls |= {f"arcs, half angle {half:.10g}": partial(geo.focusing_arcs, half) for half in ARC_ANGLES}
-    walls |= {
-        f"mushrooms of stem aspect 0, stem/cap {stem:g}": partial(geo.mushrooms, stem, 0.0) for stem in STEMS
-    }
+    walls |= {f"mushrooms of stem aspect 0, stem/cap {stem:g}": partial(geo.mushrooms, stem, 0.0) for stem in STEMS}
     walls |= {
         "mushrooms, stem/cap 0.3": _mushrooms,
         "cusp between dispersing bumps": partial(geo.dispersing_arcs, 2.0),
