@@ -58,7 +58,8 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     )  # fmt: skip
     refined_rays(
         np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64),
-        scene.hollows, scene.joints, _rows(scene.lines, 7), _rows(scene.pairs, 10), arcs, len(circles), _rows(scene.beziers, 14),
+        scene.hollows, scene.joints, _rows(scene.lines, 7), _rows(scene.pairs, 10), arcs, len(circles),
+        _rows(scene.beziers, 14),
         scene.is_open, scene.cell, max_collisions, REFINED_FLIGHTS,
         result.x, result.theta, result.collisions, result.status, result.amplification, result.rounding,
     )  # fmt: skip

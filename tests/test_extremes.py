@@ -149,7 +149,8 @@ def test_flags_in_deep_channels_are_settled_where_half_an_ulp_of_the_angle_meets
     for ray, (bottom, out) in enumerate(ends):
         meets_corner = len(bottom) > 1 or len(out) > 1
         if traced.escaped[ray]:
-            assert traced.theta[ray] == (theta[ray] if min(out) % 2 else math.pi - theta[ray]) or meets_corner
+            exact = theta[ray] if min(out) % 2 else math.pi - theta[ray]
+            assert abs(traced.theta[ray] - exact) <= 2.0 * np.spacing(exact) or meets_corner
         else:
             assert traced.status[ray] == geo.Status.CORNER and meets_corner
     assert 0 < np.sum(~traced.escaped) < RAYS / 10
