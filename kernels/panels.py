@@ -132,6 +132,14 @@ class Panels(Basis):
         panel = self._cells.index(angle)
         return panel, np.einsum("...k,...ki->...i", self._local_legendre(angle, panel), self._coefficients[panel])
 
+    def of_legendre(self, moments: Floats) -> Floats:
+        """Integrals of the functions, shape (..., size), from those of the panels' Legendre polynomials.
+
+        ``moments`` has shape (..., panels, degree + 1).
+        """
+        turned = np.matmul(np.moveaxis(moments, -2, 0), self._coefficients)
+        return np.moveaxis(turned, 0, -2).reshape((*moments.shape[:-2], self.size))
+
     def evaluate(self, angle: ArrayLike) -> Floats:
         angle = np.asarray(angle, dtype=np.float64)
         panel, local = self.local(angle)
