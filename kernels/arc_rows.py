@@ -23,13 +23,13 @@ SINE_NODES = 2
 CHUNK = 2**17
 
 
-def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats) -> Floats:
-    r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (rows, functions).
+def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
+    r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (rows, functions), and the rows' errors.
 
     The outgoing angle is linear in the angle delta of the chord, of density sin(delta): on each piece between two
     edges the functions are polynomials in delta, and a Gauss rule is exact but for the sine.
     """
-    pieces = law.pieces(theta)
+    pieces = law.pieces(theta, most_hits)
     ray, rest, alone = pieces.ray, pieces.rest, pieces.alone & ~pieces.rest
     base = np.where(pieces.mirrored, np.pi - theta[ray], theta[ray])
     # theta' = offset + slope delta
@@ -56,9 +56,11 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats) -> Floats:
     low, high = panels.edges[panel], panels.edges[panel + 1]
     local = np.polynomial.legendre.legvander((2.0 * angle[single] - low - high) / (high - low), panels.degree)
     np.add.at(gathered, (slice(None), ray[single] * (len(panels.edges) - 1) + panel), (share[:, None] * local).T)
-    total = np.bincount(ray, weights=np.where(alone, 1.0, SINE.mass(lower, upper)), minlength=theta.size)
+    mass = np.where(alone, 1.0, SINE.mass(lower, upper))
+    total = np.bincount(ray, weights=mass, minlength=theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
-    return panels.of_legendre(moments.transpose(1, 2, 0))
+    left = np.bincount(ray, weights=np.where(rest, mass, 0.0), minlength=theta.size)
+    return panels.of_legendre(moments.transpose(1, 2, 0)), left / total * law.half_angle / most_hits**2
 
 
 def _add_moments(
@@ -67,7 +69,7 @@ def _add_moments(
     """Add the integrals of L_k(scale delta + shift) over (near, far), k = 0 ... degree, to the columns ``cell``."""
     full = degree // 2 + 1 + SINE_NODES
     short = np.abs(scale) * (far - near) <= 2.0 * SHORT_SHARE
-    for chosen, nodes in ((short, -(-full // 2)), (~short, full)):
+    for chosen, nodes in ((short, full // 2 + 1), (~short, full)):
         if not chosen.any():
             continue
         delta, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(near[chosen], far[chosen], nodes))

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from .arc_means import ArcMeans
 from .arc_rows import arc_images
 from .basis import Basis
-from .circular import CircularArcLaw
+from .circular import CircularArcLaw, followed_hits
 from .ideal import LambertianLaw
 from .law import Law
 from .legendre import Legendre
@@ -31,6 +32,17 @@ PANEL_LEVEL = 2
 # From angles and the wanted errors of the means of functions of sup norm 1: the images, shape (rows, size), and the
 # errors, shape (rows,); nan where nothing is known of them.
 BasisRows = Callable[[Floats, float], tuple[Floats, Floats]]
+
+
+def integrates_panels(law: Law) -> bool:
+    """Whether the rows of a law against functions on panels have errors that are known: others go through `apply`."""
+    if isinstance(law, Combination):
+        return all(integrates_panels(term) for _, term in law.terms)
+    if isinstance(law, SpecularFrame):
+        return law.mirror_symmetric is True and integrates_panels(law.law)
+    if isinstance(law, WallLaw):
+        return is_few(law.wall) if law.exact_law is None else integrates_panels(law.exact_law)
+    return isinstance(law, (CircularArcLaw, LambertianLaw))
 
 
 @singledispatch
@@ -54,19 +66,12 @@ def _(law: LambertianLaw, basis: Basis) -> BasisRows:
 def _(law: CircularArcLaw, basis: Basis) -> BasisRows:
     if not isinstance(basis, Panels):
         return basis_rows.dispatch(Law)(law, basis)
-    return lambda theta, tolerance: (arc_images(law, basis, theta), np.zeros(theta.size))
+    return lambda theta, tolerance: arc_images(law, basis, theta, followed_hits(tolerance))
 
 
 @basis_rows.register
 def _(law: Combination, basis: Basis) -> BasisRows:
-    terms = [(weight, basis_rows(term, basis)) for weight, term in law.terms_checked()]
-
-    def rows(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        found = [(weight, term(theta, tolerance)) for weight, term in terms]
-        images = sum((weight * image for weight, (image, _) in found), start=np.zeros((theta.size, basis.size)))
-        return images, np.asarray(sum(abs(weight) * error for weight, (_, error) in found))
-
-    return rows
+    return _weighted([(weight, basis_rows(term, basis)) for weight, term in law.terms_checked()])
 
 
 @basis_rows.register
@@ -97,6 +102,55 @@ def _(law: WallLaw, basis: Basis) -> BasisRows:
     def rows(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         found = march(theta, tolerance)
         return means_of_basis(basis, found.nodes, found.weights, found.starts), found.error + 2.0 * found.lost
+
+    return rows
+
+
+@singledispatch
+def function_rows(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+    """As `basis_rows` for the functions with the coefficients ``vectors``, shape (n, k)."""
+    rows = basis_rows(law, basis)
+
+    def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        step = max(1, VALUES_AT_ONCE // basis.size)
+        parts = [rows(theta[start : start + step], tolerance) for start in range(0, theta.size, step)]
+        return np.concatenate([images @ vectors for images, _ in parts]), np.concatenate([error for _, error in parts])
+
+    return means
+
+
+@function_rows.register
+def _(law: CircularArcLaw, basis: Basis, vectors: Floats) -> BasisRows:
+    if not isinstance(basis, Panels):
+        return function_rows.dispatch(Law)(law, basis, vectors)
+    means = ArcMeans(law, basis, vectors)
+    return lambda theta, tolerance: means(theta, followed_hits(tolerance))
+
+
+@function_rows.register
+def _(law: Combination, basis: Basis, vectors: Floats) -> BasisRows:
+    return _weighted([(weight, function_rows(term, basis, vectors)) for weight, term in law.terms_checked()])
+
+
+@function_rows.register
+def _(law: SpecularFrame, basis: Basis, vectors: Floats) -> BasisRows:
+    if not is_mirror_symmetric(basis):
+        return function_rows.dispatch(Law)(law, basis, vectors)
+    return function_rows(law.law, basis, reflection_matrix(basis) @ vectors)
+
+
+@function_rows.register
+def _(law: WallLaw, basis: Basis, vectors: Floats) -> BasisRows:
+    if law.exact_law is not None:
+        return function_rows(law.exact_law, basis, vectors)
+    return function_rows.dispatch(Law)(law, basis, vectors)
+
+
+def _weighted(terms: list[tuple[float, BasisRows]]) -> BasisRows:
+    def rows(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        found = [(weight, *term(theta, tolerance)) for weight, term in terms]
+        images = sum((weight * image for weight, image, _ in found[1:]), start=found[0][0] * found[0][1])
+        return images, np.asarray(sum(abs(weight) * error for weight, _, error in found))
 
     return rows
 

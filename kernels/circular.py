@@ -163,7 +163,7 @@ class CircularArcLaw(DrivenLaw):
         weight = weight * SINE.density(chord) + np.where(alone & ~rest, 1.0, 0.0)[:, None]
         return ray, mirrored, outgoing, weight
 
-    def pieces(self, theta: Floats) -> ArcPieces:
+    def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
         """The intervals of delta on which N is constant, for every theta and both sides, sorted by ray."""
         xi = self.half_angle
         base = np.stack([theta, np.pi - theta], axis=-1).reshape(-1)
@@ -173,7 +173,7 @@ class CircularArcLaw(DrivenLaw):
         alone = (np.abs(high - low) <= 0.0) & (base <= 0.5 * np.pi)
         fewest = np.maximum(np.ceil((total - high) / (2.0 * high)), 1.0)
         with np.errstate(divide="ignore"):
-            most = np.minimum(np.ceil((total - low) / (2.0 * low)), MOST_HITS)
+            most = np.minimum(np.ceil((total - low) / (2.0 * low)), most_hits)
         most = np.maximum(most, fewest)
         pieces = np.where((high > low) | alone, most - fewest + 2.0, 0.0).astype(np.intp)
         owner = np.repeat(np.arange(base.size), pieces)
@@ -184,3 +184,8 @@ class CircularArcLaw(DrivenLaw):
         lower = np.where(rest, low[owner], np.maximum(low[owner], total[owner] / (2.0 * hits + 1.0)))
         upper = np.minimum(high[owner], total[owner] / (2.0 * hits - 1.0))
         return ArcPieces(owner // 2, owner % 2 == 1, lower, upper, hits, rest, alone[owner])
+
+
+def followed_hits(tolerance: float) -> int:
+    """How many hits are followed for means of smooth functions to a tolerance: see MOST_HITS."""
+    return int(np.clip(np.ceil((4.0 * tolerance) ** -0.25), 8, MOST_HITS))

@@ -14,6 +14,7 @@ from ..kernels import Law, Legendre, Panels
 from ..kernels.angle_panels import KRONROD, NODES
 from ..kernels.basis_rows import BasisRows, basis_rows
 from ..kernels.measure import SINE
+from ..kernels.products import one_blas_thread
 
 # Degree on each panel: Kronrod's rule is then still exact for products of two functions.
 DEGREE = 6
@@ -74,7 +75,8 @@ def adapted_trials(law: Law, k: int, tolerance: float, extra: int = 2) -> Trials
     goal = np.sqrt(tolerance)
     while True:
         level = _Level(law, edges, mirrored, ROW_SHARE * goal)
-        values, vectors, parity = level.leading(k + extra, SETTLED * goal)
+        with one_blas_thread():
+            values, vectors, parity = level.leading(k + extra, SETTLED * goal)
         squares = level.squared_residuals(values, vectors, parity)
         goal = np.sqrt(tolerance * _room(values, k))
         joint = float(np.sqrt(squares[:, :k].sum()))

@@ -13,6 +13,7 @@ from ..checks import Floats, whole_number
 from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind
 from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
+from ..kernels.basis_rows import integrates_panels
 from ..kernels.measure import SINE
 from .adapted_panels import adapted_trials
 from .deflation import off_constants
@@ -158,7 +159,7 @@ def enclosures(
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     if law.reversible is False:
         raise AccuracyError(f"{law!r} is not reversible: its spectrum need not be real", np.inf)
-    if basis is None and not isinstance(law, (MatrixLaw, DensityLaw)):
+    if basis is None and integrates_panels(law):
         trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
         found = residuals(
             law, trials.basis, trials.vectors, trials.values, MOST_ADAPTED_ROWS,

@@ -9,7 +9,7 @@ import numpy as np
 from ..checks import Floats
 from ..kernels import Basis, DensityLaw, Law, Legendre, Panels
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
-from ..kernels.basis_rows import basis_rows
+from ..kernels.basis_rows import function_rows
 from ..kernels.density import GAUSS_NODES
 from ..kernels.kernel_quadrature import GRAZING_EDGES
 from ..kernels.law import AngleFunction
@@ -76,7 +76,7 @@ def residuals(
     """
     if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
         return _smooth_residuals(law, basis, vectors, values)
-    function = _TrialFunctions(law, basis, vectors, np.sqrt(quotient_error))
+    function = _TrialFunctions(law, basis, vectors, quotient_error)
     low, high = _first_panels(basis)
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
@@ -91,7 +91,10 @@ def residuals(
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
         wanted = np.stack(
-            [np.maximum(SHARE * square + 4.0 * EPS, quotient_error), SHARE * square + (8.0 * EPS) ** 2]
+            [
+                np.maximum(SHARE * square + 4.0 * EPS, quotient_error),
+                np.maximum(SHARE * square + (8.0 * EPS) ** 2, SHARE * quotient_error),
+            ]
         )
         share = (error / wanted).max(axis=(1, 2))
         affordable = max(most_rows - rows, 0) // (2 * len(NODES))
@@ -138,7 +141,7 @@ class _TrialFunctions:
     def __init__(self, law: Law, basis: Basis, vectors: Floats, row_tolerance: float) -> None:
         self.basis, self.vectors, self.law = basis, vectors, law
         self.row_tolerance = row_tolerance or ROW_TOLERANCE
-        self.rows = basis_rows(law, basis) if isinstance(basis, Panels) else None
+        self.rows = function_rows(law, basis, vectors) if isinstance(basis, Panels) else None
 
     def __call__(self, theta: Floats) -> Floats:
         """Their values, shape (angles, k)."""
@@ -146,16 +149,11 @@ class _TrialFunctions:
 
     def images(self, theta: Floats) -> tuple[Floats, Floats]:
         """The values of P v, shape (angles, k), and their errors."""
-        starts = range(0, theta.size, CHUNK_ROWS)
-        chunks = [theta[start : start + CHUNK_ROWS] for start in starts]
-        if self.rows is None:
-            found = np.concatenate([images(self.law, self, chunk, self.basis) for chunk in chunks])
-            return found, np.zeros(theta.size)
-        parts = [self.rows(chunk, self.row_tolerance) for chunk in chunks]
-        return (
-            np.concatenate([image @ self.vectors for image, _ in parts]),
-            np.nan_to_num(np.concatenate([error for _, error in parts])),
-        )
+        if self.rows is not None:
+            found, errors = self.rows(theta, self.row_tolerance)
+            return found, np.nan_to_num(errors)
+        chunks = [theta[start : start + CHUNK_ROWS] for start in range(0, theta.size, CHUNK_ROWS)]
+        return np.concatenate([images(self.law, self, chunk, self.basis) for chunk in chunks]), np.zeros(theta.size)
 
 
 def _integrals(
