@@ -3,7 +3,9 @@
 The wall is the one that the scene's tables define: joints are doubles, a circular arc is the one through both of its
 joints that subtends the double in its table (ellipses are circles in stretched coordinates), a Bezier piece has the
 coefficients of its table but the highest, which takes it to its end joint. Arcs are found by the quadratic about their
-centre and the angle there, segments by a 2x2 system, Bezier pieces by the roots of a polynomial.
+centre and the angle there, segments by a 2x2 system, Bezier pieces by the roots of a polynomial. Flights between two
+vertical sides with nothing between them, and hops along one circular arc with nothing under it, are counted by one
+division instead of one by one.
 """
 
 from __future__ import annotations
@@ -11,18 +13,24 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import mpmath as mp
+import numpy as np
 
 DIGITS = 50
 # Guard digits, and the distance below which a hit is the ray's own start: 50 digits lie between the two.
 GUARD, NEAR = 25, mp.mpf(10) ** -40
+# Of more lines than so many only those are looked at that doubles, off by this share of the cell, do not rule out.
+MANY_LINES, DOUBLE_ERROR = 64, 1e-9
+# Crossings between two sides, or hops along an arc, that are worth a division.
+FEW = 4
 
 
 class PreciseRay(NamedTuple):
-    """Place and angle at the way out, or None, and the number of bounces."""
+    """Place and angle at the way out, or None, the number of bounces, and the pieces hit or the crossings left out."""
 
     x: mp.mpf | None
     theta: mp.mpf | None
     bounces: int
+    itinerary: tuple[tuple[str, int], ...] = ()
 
 
 def _line_hits(a, b, p, v):
@@ -89,8 +97,48 @@ def _bezier_hits(c, p, v):
                 yield (x - p[0]) * v[0] + (y - p[1]) * v[1], (-ty, tx)
 
 
+def _crossings(sides, p, v):
+    """How many whole crossings, an even number, a ray leaving one of two vertical sides makes, and their way along y."""
+    low = max(min(a[1], b[1]) for a, b in sides)
+    high = min(max(a[1], b[1]) for a, b in sides)
+    step = abs((sides[0][0][0] - sides[1][0][0]) / v[0]) * v[1]
+    if not low < p[1] < high or step == 0:
+        return 0, step
+    number = int(((low if step < 0 else high) - p[1]) / step) - 1
+    return max(0, number - number % 2), step
+
+
+def _hops(arc, p, v):
+    """How many whole hops a ray that leaves a focusing circular arc makes along it, and the angle of each."""
+    center, _, focusing, middle, half, stretch = arc
+    r = (p[0] - center[0], p[1] - center[1])
+    along, inward = r[0] * v[1] - r[1] * v[0], -(r[0] * v[0] + r[1] * v[1])
+    turn = 2 * mp.atan2(inward, along)
+    turn = turn if turn <= mp.pi else turn - 2 * mp.pi
+    if not focusing or stretch != 1 or turn == 0:
+        return 0, turn
+    place = mp.atan2(r[1], r[0]) - middle
+    place -= 2 * mp.pi * mp.nint(place / (2 * mp.pi))
+    return max(0, int((half - place if turn > 0 else half + place) / abs(turn)) - 1), turn
+
+
+def _turned(vector, angle):
+    c, s = mp.cos(angle), mp.sin(angle)
+    return c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]
+
+
+def _faces(sides, joints):
+    """Whether two lines are vertical and no joint lies between the parts of them that face each other."""
+    (a, b), (c, d) = sides
+    if a[0] != b[0] or c[0] != d[0] or a[0] == c[0]:
+        return False
+    left, right = sorted((a[0], c[0]))
+    low, high = max(min(a[1], b[1]), min(c[1], d[1])), min(max(a[1], b[1]), max(c[1], d[1]))
+    return not any(left < x < right and low < y < high for x, y in joints[:, :2])
+
+
 def trace_precisely(scene, x, theta, limit=2000):
-    """Follow one ray whose place and angle are exact doubles through the wall that the tables define."""
+    """Follow one ray whose place and angle are numbers through the wall that the tables define."""
     with mp.workdps(DIGITS + GUARD):
         base = mp.floor(mp.mpf(x) / mp.mpf(scene.cell)) * mp.mpf(scene.cell)
         p = (mp.mpf(x) - base, mp.mpf(0))
@@ -100,9 +148,8 @@ def trace_precisely(scene, x, theta, limit=2000):
             return PreciseRay(mp.mpf(x), mp.pi - mp.mpf(theta), 1)
         hollow = inside[0]
         left, right = mp.mpf(hollow[0]), mp.mpf(hollow[1])
-        joints = [(mp.mpf(a), mp.mpf(b)) for a, b in scene.joints[:, :2]]
-        rows = range(int(hollow[3]), int(hollow[4]) - 1)
-        lines = [(joints[j], joints[j + 1]) for j in rows if scene.joints[j, 3] > 0]
+        starts = np.arange(int(hollow[3]), int(hollow[4]) - 1)
+        starts = starts[scene.joints[starts, 3] > 0]
         arcs = [
             _arc(row)
             for table, k in ((scene.circles, 5), (scene.ellipses, 7))
@@ -110,13 +157,15 @@ def trace_precisely(scene, x, theta, limit=2000):
             for row in table[int(hollow[k]) : int(hollow[k + 1])]
         ]
         curves = [] if scene.beziers is None else [_bezier(r) for r in scene.beziers[int(hollow[9]) : int(hollow[10])]]
-        for bounces in range(limit + 1):
+        bounces, itinerary = 0, []
+        while bounces <= limit:
             while True:
-                hits = [h for a, b in lines for h in _line_hits(a, b, p, v)]
-                hits += [h for arc in arcs for h in _arc_hits(arc, p, v)]
-                hits += [h for curve in curves for h in _bezier_hits(curve, p, v)]
-                t, normal = min(
-                    (h for h in hits if h[0] > NEAR * scene.cell), default=(mp.inf, None), key=lambda h: h[0]
+                near = starts if len(starts) <= MANY_LINES else _candidates(scene, starts, p, v)
+                hits = [(*h, ("line", int(j))) for j in near for h in _line_hits(*_line(scene, j), p, v)]
+                hits += [(*h, ("arc", k)) for k, arc in enumerate(arcs) for h in _arc_hits(arc, p, v)]
+                hits += [(*h, ("curve", k)) for k, curve in enumerate(curves) for h in _bezier_hits(curve, p, v)]
+                t, normal, piece = min(
+                    (h for h in hits if h[0] > NEAR * scene.cell), default=(mp.inf, None, None), key=lambda h: h[0]
                 )
                 leave = -p[1] / v[1] if v[1] > 0 else mp.inf
                 side = ((right if v[0] > 0 else left) - p[0]) / v[0] if scene.is_open and v[0] != 0 else mp.inf
@@ -127,12 +176,41 @@ def trace_precisely(scene, x, theta, limit=2000):
                 base += step
                 p = (left if v[0] > 0 else right, p[1] + side * v[1])
             if leave < mp.inf and leave <= t:
-                return PreciseRay(base + p[0] + leave * v[0], mp.atan2(v[1], v[0]), bounces)
+                return PreciseRay(base + p[0] + leave * v[0], mp.atan2(v[1], v[0]), bounces, tuple(itinerary))
             if normal is None:
-                return PreciseRay(None, None, bounces)
+                return PreciseRay(None, None, bounces, tuple(itinerary))
             p = (p[0] + t * v[0], p[1] + t * v[1])
             size = mp.sqrt(normal[0] ** 2 + normal[1] ** 2)
             n = (normal[0] / size, normal[1] / size)
             w = 2 * (v[0] * n[0] + v[1] * n[1])
             v = (v[0] - w * n[0], v[1] - w * n[1])
+            bounces, before = bounces + 1, itinerary[-1] if itinerary else ("", -1)
+            itinerary.append(piece)
+            if not scene.is_open and before[0] == piece[0] == "line" and before != piece:
+                sides = _line(scene, before[1]), _line(scene, piece[1])
+                number, step = _crossings(sides, p, v) if _faces(sides, scene.joints) else (0, 0)
+                if FEW <= number <= limit - bounces:
+                    p = (p[0], p[1] + number * step)
+                    bounces += number
+                    itinerary.append(("crossings", number))
+            if before == piece and piece[0] == "arc":
+                center = arcs[piece[1]][0]
+                number, turn = _hops(arcs[piece[1]], p, v)
+                if FEW <= number <= limit - bounces:
+                    r = _turned((p[0] - center[0], p[1] - center[1]), number * turn)
+                    p, v = (center[0] + r[0], center[1] + r[1]), _turned(v, number * turn)
+                    bounces += number
+                    itinerary.append(("hops", number))
         return PreciseRay(None, None, limit)
+
+
+def _line(scene, j):
+    """The ends of the line that starts at joint j."""
+    return tuple((mp.mpf(x), mp.mpf(y)) for x, y in scene.joints[j : j + 2, :2])
+
+
+def _candidates(scene, starts, p, v):
+    """Those of many lines that a ray may meet, by doubles and with room for their rounding."""
+    sides = (scene.joints[:, 0] - float(p[0])) * float(v[1]) - (scene.joints[:, 1] - float(p[1])) * float(v[0])
+    room = DOUBLE_ERROR * scene.cell
+    return starts[(sides[starts] >= -room) & (sides[starts + 1] <= room)]

@@ -90,7 +90,7 @@ def _cases(quick: bool) -> dict[str, Callable[[], ExtremeRow]]:
     from .extreme_rays import ray_cases
 
     rays = QUICK_SIZE if quick else SIZE
-    return {**ray_cases(rays), **law_cases(rays, QUICK_BINS if quick else MOST_BINS)}
+    return {**ray_cases(), **law_cases(rays, QUICK_BINS if quick else MOST_BINS)}
 
 
 def _load() -> None:
