@@ -20,8 +20,8 @@ help: ## list the targets
 study: $(RUN) ## study a wall and draw it into study/ (WALL=NAME or NAME:parameter=value for another)
 	$(VENV)/bin/asperity study $(WALL) --out study --force
 
-test: $(DEV) ## run the tests
-	$(PY) -m pytest
+test: $(DEV) ## run the tests, on every core
+	$(PY) -m pytest --numprocesses auto --dist worksteal
 
 check: format-check lint types docs test ## everything a change must pass
 

@@ -10,6 +10,10 @@ collect_ignore = ["kernels", "geometry", "spectral"]
 # Pictures are drawn to files; no test may open a window.
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+# The tests share out the cores themselves; a linear algebra with threads of its own would only get in their way.
+for library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
 # A first call may compile for seconds, which says nothing about the law under test.
 settings.register_profile("asperity", deadline=None, print_blob=True)
 settings.load_profile("asperity")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from asperity import geometry as geo
+from asperity.bench.timing import least_time
 from asperity.geometry.satellites import Satellites
 
 COLLISIONS, REPEATS = 2**18, 5
@@ -73,13 +73,14 @@ def measure_rigid(collisions: int = COLLISIONS, repeats: int = REPEATS) -> list[
     for what, wall in TIMED.items():
         x, theta = rng.random(collisions), np.arccos(1 - 2 * rng.random(collisions))
         bounces = int(geo.trace(wall, x, theta).collisions.sum())
-        planar = bounces / _least(lambda wall=wall, x=x, theta=theta: geo.trace(wall, x, theta, threads=1), repeats)
+        _, seconds = least_time(lambda wall=wall, x=x, theta=theta: geo.trace(wall, x, theta, threads=1), repeats)
+        planar = bounces / seconds
         for scale in (1e-2, 1e-4, 1e-6):
             position, velocity = random_states(wall, scale, collisions, rng)
             arguments = (DISK, wall, scale, position, velocity)
             contacts = float(geo.collide(*arguments).contacts.mean())
             one, two = (
-                collisions / _least(lambda a=arguments, k=threads: geo.collide(*a, threads=k), repeats)
+                collisions / least_time(lambda a=arguments, k=threads: geo.collide(*a, threads=k), repeats)[1]
                 for threads in (1, 2)
             )
             rows.append(Speed(what, scale, contacts, one, two, planar))
@@ -113,15 +114,6 @@ def check_involution(states: int = STATES) -> list[InvolutionCheck]:
             figures = float(np.median(error)), float(error[settled].max()), int(missed.sum()), energy
             rows.append(InvolutionCheck(what, scale, n, lost, *figures))
     return rows
-
-
-def _least(job: object, repeats: int) -> float:
-    best = np.inf
-    for _ in range(repeats):
-        start = time.perf_counter()
-        job()  # type: ignore[operator]
-        best = min(best, time.perf_counter() - start)
-    return float(best)
 
 
 def speed_table() -> list[str]:

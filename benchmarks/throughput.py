@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
 from asperity import geometry as geo
+from asperity.bench.timing import least_time
 
 RAYS = 2**20
 REPEATS = 5
@@ -33,7 +32,6 @@ class Throughput:
     bounces_per_ray: float
     one_thread: float
     two_threads: float
-    spread: float
     flop_limit: float
 
 
@@ -46,23 +44,14 @@ def measure_throughput(rays: int = RAYS, repeats: int = REPEATS) -> list[Through
     for name, wall in WALLS.items():
         traced = geo.trace(wall, x, theta)
         bounces = int(traced.collisions.sum())
-        one = _times(lambda wall=wall: geo.trace(wall, x, theta, threads=1), repeats)
-        two = _times(lambda wall=wall: geo.trace(wall, x, theta, threads=2), repeats)
+        _, one = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=1), repeats)
+        _, two = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=2), repeats)
         lines = sum(isinstance(piece, geo.Segment) for piece in wall.pieces)
         flops = BOUNCE_FLOPS + LINE_FLOPS * lines + ARC_FLOPS * (len(wall.pieces) - lines)
         rows.append(
-            Throughput(name, bounces / rays, bounces / one[0], bounces / two[0], one[-1] / one[0], peak / flops)
+            Throughput(name, bounces / rays, bounces / one, bounces / two, peak / flops)
         )
     return rows
-
-
-def _times(job: Callable[[], object], repeats: int) -> list[float]:
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        job()
-        times.append(time.perf_counter() - start)
-    return sorted(times)
 
 
 @njit(fastmath=True)
@@ -76,5 +65,5 @@ def _peak_flops(rounds: int = 200_000) -> float:
     """Multiply-adds a second of one core on an array that stays in the first-level cache, times two."""
     values = np.ones(512)
     _multiply_add(values, 1)
-    best = min(_times(lambda: _multiply_add(values, rounds), 3))
+    _, best = least_time(lambda: _multiply_add(values, rounds), 3)
     return 2.0 * rounds * len(values) / best

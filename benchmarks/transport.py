@@ -15,6 +15,8 @@ from asperity.bench.timing import least_time
 from asperity.kernels.row_transport import grid_wasserstein
 
 REPEATS = 5
+# Sizes that the page shows.
+PAGE_JOINT, PAGE_CELLS = (32, 64), (256, 1024)
 ALARM_RUNS, ALARM_PAIRS, ALARM_BINS, LEVEL = 2000, 300, 6, 0.05
 # tests/precise_least_resistance.py
 LEAST = 0.987823750351585515600495963
@@ -78,6 +80,20 @@ def count_false_alarms(runs: int = ALARM_RUNS) -> int:
             pair.append(ker.estimate(theta, law.sample(theta, rng), ker.Bins(ALARM_BINS)))
         alarms += ker.difference_test(*pair, permutations=99, rng=rng).differs(LEVEL)
     return alarms
+
+
+def transport_table() -> list[str]:
+    """What it takes to compare laws by transport, as a table; the false alarms, which take minutes, are not in it."""
+    rows = measure_rows()
+    lines = ["| transport | result | seconds | compared with |", "|---|---|---|---|"]
+    ratio = f"a loop over POT: {rows.pot_seconds:.2g} s, {rows.ratio:.0f} times; same to {rows.difference:.0e}"
+    lines.append(f"| distances of {rows.bins} rows | exact | {rows.seconds:.2g} | {ratio} |")
+    for size, found, seconds in measure_joint(PAGE_JOINT):
+        lines.append(f"| joint distance on {size} bins | {found.value:.6f} +- {found.error:.1e} | {seconds:.2g} | - |")
+    for size, below, above, seconds in measure_extremes(PAGE_CELLS):
+        value = f"bounds -{below:.1e}, +{above:.1e}"
+        lines.append(f"| least resistance on {size} cells | {value} | {seconds:.2g} | its closed form |")
+    return lines
 
 
 def main() -> None:

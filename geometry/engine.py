@@ -20,6 +20,7 @@ from numba import njit
 
 from .arc_engine import arc_incidence, arc_reflect, arc_time, on_arc
 from .bezier_engine import bend_number, bezier_hit, bezier_value
+from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
 from .resolution import EPS, JOINT_ULPS
 from .skips import skip_crossings, skip_hops
 
@@ -331,24 +332,12 @@ def trace_rays(
     for i in range(x.shape[0]):
         base = math.floor(x[i] / cell) * cell
         place = x[i] - base
-        # the last hollow whose left end is not beyond the place
-        low, high = 0, hollows.shape[0]
-        while low < high:
-            middle = (low + high) // 2
-            if hollows[middle, 0] <= place:
-                low = middle + 1
-            else:
-                high = middle
-        h = low - 1
-        if h < 0 or place >= hollows[h, 1] or (place == hollows[h, 0] and hollows[h, 11] > 0.0):
-            # a flat top, or an edge of it; the edges between two hollows are corners
-            out_x[i], out_theta[i], bounces[i] = x[i], math.pi - theta[i], 1
-            status[i] = ESCAPED
-            edge = h >= 0 and (
-                (place == hollows[h, 0] and hollows[h, 11] > 1.0) or (place == hollows[h, 1] and hollows[h, 12] > 1.0)
-            )
-            if edge:
-                out_theta[i], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
+        h = opening_at(place, hollows)
+        if h == FLAT_TOP:
+            out_x[i], out_theta[i], bounces[i], status[i] = x[i], math.pi - theta[i], 1, ESCAPED
+            continue
+        if h == TOP_CORNER:
+            out_x[i], out_theta[i], bounces[i], status[i] = x[i], theta[i] - math.pi, 0, CORNER
             continue
         place, vx, vy, bounces[i], status[i] = trace_ray(
             place,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from .closed_forms import NONE
 from .hollow_shape import distinct_hollows
 
 if TYPE_CHECKING:
@@ -30,6 +31,10 @@ class TracePlan:
     channels, wedges : int
         Pairs of lines, parallel or not, that face each other with nothing in between: there, too, a run of hits is
         computed in one step. Wedges of more than 0.3 radians have no long runs and are not among them.
+    closed_forms : int
+        Hollows of two lines or of one circular arc whose rays are followed by a formula from the opening to the exit:
+        fans (lines that meet at more than 0.3 radians, their apex below the opening) and bowls (half angles from 0.05
+        to pi/2). Rays within 1e-9 of a corner are followed flight by flight there, too.
     hollows_with_grid : int
         Hollows of so many lines that rays walk through the cells of a grid; in the others every piece is tested.
     distinct_hollows : int
@@ -49,6 +54,8 @@ class TracePlan:
     >>> plan = geo.mushrooms(0.3, 0.5, 2).plan()
     >>> plan.hollows, plan.distinct_hollows, plan.arcs_with_runs
     (5, 1, 5)
+    >>> geo.triangular_teeth(0.7).plan().closed_forms
+    1
     """
 
     primitives: tuple[str, ...]
@@ -60,6 +67,7 @@ class TracePlan:
     wraps: bool
     channels: int
     wedges: int
+    closed_forms: int
     hollows_with_grid: int
     distinct_hollows: int
     mirror_symmetric: bool
@@ -83,6 +91,7 @@ def plan_of(wall: Wall) -> TracePlan:
         wraps=scene.is_open,
         channels=parallel,
         wedges=0 if scene.pairs is None else len(scene.pairs) // 2 - parallel,
+        closed_forms=0 if scene.closed is None else int((scene.closed[:, 0] != NONE).sum()),
         hollows_with_grid=int((scene.hollows[:, 17] > 0.0).sum()),
         distinct_hollows=len(distinct_hollows(wall)) if wall.closes else 1,
         mirror_symmetric=wall.is_mirror_symmetric,

@@ -14,6 +14,7 @@ unit normal there (2), curvature, chord direction (2), chord length (0 beyond a 
 below which a run of hops is skipped (0 never), span, stretch, both joints (4), corner flags (2); all in coordinates
 whose y is multiplied by the stretch, but for the joints.
 ``beziers``: coefficients of 1, s, s^2, s^3 (x and y each), both joints (4), corner flags (2).
+``closed``: a row for each hollow, see `closed_forms`.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from numpy.typing import NDArray
 from ..checks import Floats
 from .arc import Arc
 from .bezier import Bezier
+from .closed_forms import NONE, closed_row, closed_table
 from .facing import facing_pairs
 from .segment import Segment
 
@@ -65,6 +67,7 @@ class Scene:
     grid: NDArray[np.int64] | None
     cell: float
     is_open: bool
+    closed: Floats | None = None
 
     @property
     def primitives(self) -> tuple[str, ...]:
@@ -132,9 +135,11 @@ class _Tables:
         self.beziers: list[list[float]] = []
         self.pairs: list[list[float]] = []
         self.grids: list[NDArray[np.int64]] = []
+        self.closed: list[list[float]] = []
 
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[int, int]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
+        is_closed = len(chains) == 1 and edges != (0, 0)
         chains = [chain.without_long_arcs() for chain in chains]
         before = self._sizes()
         for chain in chains:
@@ -150,6 +155,7 @@ class _Tables:
         if inside or edges != (0, 0):
             self._mark_pairs(before[0], chains, size)
         self._add_grid(before[0])
+        self.closed.append(closed_row(chains[0].pieces, chains[0].places, size) if is_closed else [NONE])
 
     def _sizes(self) -> tuple[int, int, int, int]:
         return len(self.joints), len(self.circles), len(self.ellipses), len(self.beziers)
@@ -242,6 +248,7 @@ class _Tables:
             grid=np.concatenate(self.grids) if self.grids else None,
             cell=cell,
             is_open=is_open,
+            closed=closed_table(self.closed),
         )
 
 

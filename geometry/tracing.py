@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,7 @@ from ..errors import InputError
 from .blocks import in_blocks
 
 if TYPE_CHECKING:
+    from .scene import Scene
     from .wall import Wall
 
 # No limit in effect: rays are given up after 10^6 flights computed one by one (engine.MOST_STEPS), however many hits.
@@ -145,8 +147,6 @@ def trace(
     >>> print(f"{ray.x:.12f} {ray.theta / pi:.12f} {ray.collisions}")
     0.750000000000 0.250000000000 2
     """
-    from .engine import trace_rays
-
     _check_wall(wall)
     x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
@@ -154,16 +154,10 @@ def trace(
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
     scene = wall.scene
-    tables = (
-        scene.hollows, scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers, scene.pairs, scene.grid,
-    )  # fmt: skip
-    period = scene.cell if scene.is_open else None
+    trace_block = _block_tracer(scene, max_collisions)
 
     def run(block: slice) -> None:
-        trace_rays(
-            starts[block], incoming[block], *tables, period, scene.cell, max_collisions,
-            out_x[block], out_theta[block], collisions[block], status[block],
-        )  # fmt: skip
+        trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], status[block])
 
     in_blocks(run, len(starts), threads)
     if np.any((status == Status.CORNER) | (status == Status.GRAZING)):
@@ -175,6 +169,31 @@ def trace(
     for array in results:
         array.setflags(write=False)
     return Trace(*results)
+
+
+def _block_tracer(scene: Scene, max_collisions: int) -> Callable[..., None]:
+    """A function of x, theta and the four arrays to fill: closed forms where the scene has some, else the loop."""
+
+    def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
+        from .engine import trace_rays
+
+        trace_rays(
+            x, theta, scene.hollows, scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers,
+            scene.pairs, scene.grid, scene.cell if scene.is_open else None, scene.cell, max_collisions, *results,
+        )  # fmt: skip
+
+    def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
+        from .closed_engine import UNDECIDED, trace_closed
+
+        trace_closed(x, theta, scene.hollows, scene.closed, scene.cell, max_collisions, *results)
+        rest = np.flatnonzero(results[-1] == UNDECIDED)
+        if len(rest):
+            followed = tuple(np.empty(len(rest), result.dtype) for result in results)
+            follow(x[rest], theta[rest], *followed)
+            for result, part in zip(results, followed, strict=True):
+                result[rest] = part
+
+    return follow if scene.closed is None else close
 
 
 def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_000) -> Floats:

@@ -12,6 +12,7 @@ from .basis import Basis
 from .measure import gauss_on_intervals
 from .panels import Panels
 from .products import add_blocks, cell_index
+from .ragged import ragged
 from .reflection import is_mirror_symmetric, reflection_matrix
 from .stable_angles import flipped, kept_inside
 
@@ -81,7 +82,7 @@ def _strips(half_angle: float, edges: Floats) -> _Strips:
         ends = slope * whole.low + offset, slope * whole.high + offset
         first = np.searchsorted(edges, np.minimum(*ends), side="right")
         number = np.maximum(np.searchsorted(edges, np.maximum(*ends), side="left") - first, 0)
-        owner, place = _ragged(number)
+        owner, place = ragged(number)
         with np.errstate(divide="ignore", invalid="ignore"):
             met = (edges[first[owner] + place] - offset[owner]) / slope[owner]
         inside = (met > whole.low[owner]) & (met < whole.high[owner])
@@ -167,7 +168,7 @@ def _add_rows(
     first = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * upper, side="right")
     last = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * lower, side="left")
     number = np.maximum(last - first, 0) + 1
-    row, place = _ragged(number)
+    row, place = ragged(number)
     above = np.clip(last[row] - place, 0, edges.size - 1)
     cut = (np.pi + theta[row] - edges[above]) / (2.0 * strips.hits[row])
     low = np.where(place == 0, lower[row], np.clip(cut, lower[row], upper[row]))
@@ -217,9 +218,3 @@ def _add_rest(total: Floats, basis: Basis, half_angle: float, rest: float, mirro
     centre = np.outer(incoming[middle], outgoing[middle])
     total += rest * centre
     return abs(rest) * max(float(np.linalg.norm(np.outer(e, f) - centre)) for e in incoming for f in outgoing)
-
-
-def _ragged(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """For counts (2, 0, 3): owners (0, 0, 2, 2, 2) and places (0, 1, 0, 1, 2)."""
-    owner = np.repeat(np.arange(number.size), number)
-    return owner, np.arange(owner.size) - np.repeat(np.cumsum(number) - number, number)

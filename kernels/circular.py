@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +20,20 @@ MOST_HITS = 500
 NODES = 16
 # Evaluations of the function held in memory at a time.
 CHUNK = 2**14
+
+
+class ArcPieces(NamedTuple):
+    """Pieces of rows, each of shape (pieces,): the number of the row; whether it is followed in the mirror; the ends of
+    delta; N; whether the piece holds all the rays with more hits; whether its row has no width.
+    """
+
+    ray: NDArray[np.intp]
+    mirrored: NDArray[np.bool_]
+    lower: Floats
+    upper: Floats
+    hits: Floats
+    rest: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -106,8 +120,8 @@ class CircularArcLaw(DrivenLaw):
         return total.reshape(theta.shape + total.shape[1:])
 
     def _apply_chunk(self, function: AngleFunction, theta: Floats) -> Floats:
-        ray, side, outgoing, weight = self._row_quadrature(theta)
-        angle = kept_inside(np.where(side[:, None] == 1, np.pi - outgoing, outgoing))
+        ray, mirrored, outgoing, weight = self._row_quadrature(theta)
+        angle = kept_inside(np.where(mirrored[:, None], np.pi - outgoing, outgoing))
         value = np.asarray(function(angle), dtype=np.float64)
         piece = np.einsum("ij,ij...->i...", weight, value)
         total = np.bincount(ray, weights=weight.sum(axis=1), minlength=theta.size)
@@ -117,14 +131,14 @@ class CircularArcLaw(DrivenLaw):
 
     def row_masses(self, theta: Floats, edges: Floats) -> Floats:
         """P(theta, (edges[j], edges[j + 1])) for increasing edges, shape (rays, cells): sums of integrals of a sine."""
-        ray, side, lower, upper, hits, rest, alone = self._row_pieces(theta)
+        ray, mirror, lower, upper, hits, rest, alone = self.pieces(theta)
         lower = np.where(rest, lower, np.minimum(lower, upper))
         found = np.zeros((theta.size, edges.size - 1))
         step = max(1, 2**6 * CHUNK // edges.size)
         for start in range(0, ray.size, step):
             part = slice(start, start + step)
-            base = np.where(side[part] == 1, np.pi - theta[ray[part]], theta[ray[part]])
-            mirrored = np.where(side[part, None] == 1, np.pi - edges, edges)
+            base = np.where(mirror[part], np.pi - theta[ray[part]], theta[ray[part]])
+            mirrored = np.where(mirror[part, None], np.pi - edges, edges)
             # theta' falls with delta, so the part of the piece below an edge has delta above this
             chord = (np.pi + base[:, None] - mirrored) / (2.0 * hits[part, None])
             chord = np.where(rest[part, None], np.where(mirrored > np.pi - self.half_angle, -1.0, 4.0), chord)
@@ -135,26 +149,22 @@ class CircularArcLaw(DrivenLaw):
             np.add.at(found, ray[part], np.abs(np.diff(below, axis=1)))
         return np.asarray(found / found.sum(axis=1, keepdims=True))
 
-    def _row_quadrature(self, theta: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, Floats]:
+    def _row_quadrature(self, theta: Floats) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
         """Gauss rules in delta between the changes of N, for every theta and both sides.
 
-        Returns for each piece its ray and its side (1 where followed in the mirror), shape (pieces,), sorted by ray,
+        Returns for each piece its ray and whether it is followed in the mirror, shape (pieces,), sorted by ray,
         and the outgoing angles there and their weights (not normalised), shape (pieces, NODES).
         """
-        ray, side, lower, upper, hits, rest, alone = self._row_pieces(theta)
-        base = np.where(side == 1, np.pi - theta[ray], theta[ray])
+        ray, mirrored, lower, upper, hits, rest, alone = self.pieces(theta)
+        base = np.where(mirrored, np.pi - theta[ray], theta[ray])
         chord, weight = (part.reshape(-1, NODES) for part in gauss_on_intervals(lower, np.maximum(upper, lower), NODES))
         outgoing = np.pi + base[:, None] - 2.0 * hits[:, None] * chord
         outgoing = np.where(rest[:, None], np.pi - self.half_angle, outgoing)
         weight = weight * SINE.density(chord) + np.where(alone & ~rest, 1.0, 0.0)[:, None]
-        return ray, side, outgoing, weight
+        return ray, mirrored, outgoing, weight
 
-    def _row_pieces(self, theta: Floats) -> tuple[Any, ...]:
-        """The intervals of delta on which N is constant, for every theta and both sides, sorted by ray.
-
-        Returns ray, side (1 where followed in the mirror), lower and upper end, N, whether the piece holds all the
-        rays with more hits, and whether its row has no width; each of shape (pieces,).
-        """
+    def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
+        """The intervals of delta on which N is constant, for every theta and both sides, sorted by ray."""
         xi = self.half_angle
         base = np.stack([theta, np.pi - theta], axis=-1).reshape(-1)
         total = xi + base
@@ -163,7 +173,7 @@ class CircularArcLaw(DrivenLaw):
         alone = (np.abs(high - low) <= 0.0) & (base <= 0.5 * np.pi)
         fewest = np.maximum(np.ceil((total - high) / (2.0 * high)), 1.0)
         with np.errstate(divide="ignore"):
-            most = np.minimum(np.ceil((total - low) / (2.0 * low)), MOST_HITS)
+            most = np.minimum(np.ceil((total - low) / (2.0 * low)), most_hits)
         most = np.maximum(most, fewest)
         pieces = np.where((high > low) | alone, most - fewest + 2.0, 0.0).astype(np.intp)
         owner = np.repeat(np.arange(base.size), pieces)
@@ -173,4 +183,9 @@ class CircularArcLaw(DrivenLaw):
         rest = order == pieces[owner] - 1
         lower = np.where(rest, low[owner], np.maximum(low[owner], total[owner] / (2.0 * hits + 1.0)))
         upper = np.minimum(high[owner], total[owner] / (2.0 * hits - 1.0))
-        return owner // 2, owner % 2, lower, upper, hits, rest, alone[owner]
+        return ArcPieces(owner // 2, owner % 2 == 1, lower, upper, hits, rest, alone[owner])
+
+
+def followed_hits(tolerance: float) -> int:
+    """How many hits are followed for means of smooth functions to a tolerance: see MOST_HITS."""
+    return int(np.clip(np.ceil((4.0 * tolerance) ** -0.25), 8, MOST_HITS))

@@ -132,6 +132,18 @@ class Panels(Basis):
         panel = self._cells.index(angle)
         return panel, np.einsum("...k,...ki->...i", self._local_legendre(angle, panel), self._coefficients[panel])
 
+    def of_legendre(self, moments: Floats) -> Floats:
+        """Integrals of the functions, shape (..., size), from those of the panels' Legendre polynomials.
+
+        ``moments`` has shape (..., panels, degree + 1).
+        """
+        turned = np.matmul(np.moveaxis(moments, -2, 0), self._coefficients)
+        return np.moveaxis(turned, 0, -2).reshape((*moments.shape[:-2], self.size))
+
+    def legendre_series(self, vectors: Floats) -> Floats:
+        """Coefficients in the panels' Legendre polynomials, shape (panels, degree + 1, k), from ``vectors`` (size, k)."""
+        return np.asarray(np.matmul(self._coefficients, vectors.reshape(-1, self.degree + 1, vectors.shape[1])))
+
     def evaluate(self, angle: ArrayLike) -> Floats:
         angle = np.asarray(angle, dtype=np.float64)
         panel, local = self.local(angle)

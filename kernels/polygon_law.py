@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ..geometry.beams import Beams
     from ..geometry.hollow_shape import HollowShape
 
-# A level share below this is the rounding of the hollows' widths.
-LEVEL_TOLERANCE = 64.0 * np.finfo(np.float64).eps
 BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
 # Angles looked at to tell how many branches there are: it is the cost of `apply`, and need not be exact.
 MOST_PROBES = 512
@@ -101,8 +99,7 @@ class PolygonLaw(BranchLaw):
         from ..geometry.hollow_shape import distinct_hollows
 
         wall = self.wall
-        level = 1.0 - math.fsum(hollow.width for hollow in wall.hollows) / wall.period
-        parts = [IsometryTable.flat(level)] if level > LEVEL_TOLERANCE else []
+        parts = [IsometryTable.flat(wall.flat_top / wall.period)]
         known: list[tuple[HollowShape, IsometryTable]] = []
         for shape, hollows in distinct_hollows(wall):
             image = shape.mirrored()

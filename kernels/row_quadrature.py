@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ..checks import Floats
 from .angle_panels import NODES, AnglePanels
 from .basis import Basis
+from .basis_rows import VALUES_AT_ONCE, means_of_basis
 from .legendre import Legendre
-from .products import cell_index
 from .reflection import is_mirror_symmetric, reflection_matrix
 from .wall_rows import WallRows
 
@@ -26,9 +26,8 @@ ROWS_A_PIECE, RAYS_A_CHANGE = 100, 100
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
 # part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
 ASYMMETRY_FACTOR = 2.0
-# Rows at a time, so that their nodes fit into memory, and outgoing angles times functions at a time.
+# Rows at a time, so that their nodes fit into memory.
 ROWS_AT_ONCE = 1500
-VALUES_AT_ONCE = 2_000_000
 # The rows together may spend this share of the tolerance.
 ROW_SHARE = 0.1
 SMALLEST_ROW_TOLERANCE = 1e-14
@@ -255,26 +254,9 @@ class _Integrator:
             rows = self.rows(panels.angle[panel[few], node[few]], tolerance[panel[few]])
             self.rays += rows.rays
             self.row_count += len(rows.theta)
-            panels.image[panel[few], node[few]] = self._images(rows.nodes, rows.weights, rows.starts)
+            panels.image[panel[few], node[few]] = means_of_basis(
+                self.basis, rows.nodes, rows.weights, rows.starts
+            )
             panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)
         touched = np.unique(panel)
         panels.error[touched] = panels.kept(touched).differences(self.basis)
-
-    def _images(self, nodes: Floats, weights: Floats, starts: NDArray[np.int64]) -> Floats:
-        """The means of all functions of the basis, shape (rows, size)."""
-        rows, size = len(starts) - 1, self.basis.size
-        if self.basis.is_partition:
-            owner = np.repeat(np.arange(rows), np.diff(starts))
-            cell = owner * size + cell_index(self.basis, nodes)
-            mass = np.bincount(cell, weights=weights, minlength=rows * size).reshape(rows, size)
-            return np.asarray(mass * self.basis.evaluate(0.5 * (self.basis.edges[1:] + self.basis.edges[:-1])).max(0))
-        found = np.empty((rows, size))
-        most = max(1, VALUES_AT_ONCE // size)
-        first = 0
-        while first < rows:
-            last = max(first + 1, int(np.searchsorted(starts, starts[first] + most, side="right")) - 1)
-            part = slice(starts[first], starts[last])
-            values = self.basis.evaluate(nodes[part]) * weights[part, None]
-            found[first:last] = np.add.reduceat(values, starts[first:last] - starts[first], axis=0)
-            first = last
-        return found

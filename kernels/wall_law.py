@@ -38,8 +38,8 @@ LOST_TOLERANCE = 1e-4
 # Polygonal walls are resolved into beams where that takes about a second (a few microseconds a beam, the table
 # included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
 MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 512, 100_000, 1e-6
-# Walls of more pieces are tried with a tenth of the beams first.
-FEW_PIECES = 32
+# Walls of more pieces are tried with a tenth of the beams first; where what that leaves is rounding, it does.
+FEW_PIECES, RESOLVED = 32, 1e-11
 # `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 
@@ -124,6 +124,8 @@ class WallLaw(DrivenLaw):
             probe = PolygonLaw(wall, max_beams=MOST_BEAMS // 10)
             if float(probe.unresolved) > 100.0 * EXACT_ENOUGH:
                 return None
+            if float(probe.unresolved) <= RESOLVED:
+                return probe
         law = PolygonLaw(wall, max_beams=MOST_BEAMS)
         return law if float(law.unresolved) <= EXACT_ENOUGH else None
 
@@ -184,7 +186,7 @@ def _closed_form(wall: Wall) -> Law | None:
     if not wall.closes:
         return None
     terms: dict[Law, float] = {}
-    level = wall.period - math.fsum(hollow.width for hollow in wall.hollows)
+    level = wall.flat_top
     for hollow in wall.hollows:
         law = _of_hollow(wall, hollow)
         if law is None:

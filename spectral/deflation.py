@@ -1,15 +1,18 @@
-"""Splitting the constant function off a Markov operator, and the eigenvalues of the rest."""
+"""Symmetric matrices compressed to a subspace, above all to the complement of the constant function."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..checks import Floats
 
 if TYPE_CHECKING:
-    from ..kernels import KernelMatrix
+    from scipy.sparse import csr_array
+
+# Two tiles of this many rows and columns stay in the cache.
+TILE = 256
 
 
 def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
@@ -27,19 +30,24 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
     return np.asarray(values), _reflect(reflector, vectors)
 
 
-def coarser_grids(matrix: KernelMatrix, levels: int) -> list[Floats]:
-    """Eigenvalues off the constants (ascending) on successively coarser bases, as many as the basis has."""
-    from scipy.sparse import csr_array
+def compressed(array: Floats, embedding: csr_array[Any]) -> Floats:
+    """The symmetric half of E A E^T for a sparse E of shape (m, n): the form of A on the rows of E."""
+    rows = embedding @ array
+    found = np.empty((len(rows), len(rows)))
+    for start in range(0, len(rows), TILE):
+        # a product with a transpose in one piece would read memory across the rows
+        found[:, start : start + TILE] = embedding @ np.ascontiguousarray(rows[start : start + TILE].T)
+    return symmetric_half(found)
 
-    found: list[Floats] = []
-    basis, array = matrix.basis, 0.5 * (matrix.symmetric + matrix.symmetric.T)
-    for _ in range(levels):
-        coarser = basis.coarsened()
-        if coarser is None:
-            break
-        basis, embedding = coarser[0], csr_array(coarser[1])
-        array = np.asarray(embedding @ array @ embedding.T)
-        found.append(off_constants(array, np.asarray(basis.constant))[0])
+
+def symmetric_half(array: Floats) -> Floats:
+    """(A + A^T)/2, tile by tile, so that memory is read along the rows."""
+    found = np.empty_like(array)
+    for row in range(0, len(array), TILE):
+        for column in range(0, row + 1, TILE):
+            here, there = slice(row, row + TILE), slice(column, column + TILE)
+            found[here, there] = 0.5 * (array[here, there] + array[there, here].T)
+            found[there, here] = found[here, there].T
     return found
 
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
-from .deflation import coarser_grids, off_constants
-from .parity import Parity, halves
+from .parity import Parity, outermost_by_parity
 from .sampling import NORMAL_95, sampling_errors, sampling_quantile
+from .two_grids import two_grid_changes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +25,6 @@ REVERSIBLE_Z = 5.0
 # An unsampled matrix is called reversible below this relative antisymmetry, a thousand times the rounding errors of
 # its entries; otherwise its own reported error decides.
 REVERSIBLE_ROUNDING = 1e-12
-# With order 2, the lowest of the bases, the change by the last doubling is this share of the one before.
-EARLIER_SHARE = 0.25
 
 
 @dataclass(frozen=True)
@@ -36,7 +34,8 @@ class SpectrumErrors:
     Attributes
     ----------
     algebraic : array
-        Bound: the norm of S v - lambda v plus the eigensolver's rounding. Some eigenvalue of the matrix is this near.
+        Bound, to rounding: the value is this near the eigenvalue of its rank in the matrix (``Spectrum.completeness``),
+        and the norm of S v - lambda v is below it.
     discretisation : array
         Change of the eigenvalue from the basis of half the size, or a quarter of the change before that, whichever
         is larger (``inf`` where there is no coarser basis), plus the Frobenius error of a matrix that was not sampled.
@@ -84,6 +83,8 @@ class Spectrum:
     parity : tuple of {"even", "odd", "none"}
         Of every eigenfunction under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric. In
         the other convention the odd eigenvalues have the opposite sign.
+    completeness : str
+        What proves that no eigenvalue of the matrix has a larger modulus off the constants and is not listed.
     """
 
     values: Floats
@@ -98,6 +99,7 @@ class Spectrum:
     method: str
     matrix_error: float = 0.0
     parity: tuple[Parity, ...] = ()
+    completeness: str = ""
 
     @property
     def intervals(self) -> Floats:
@@ -164,8 +166,9 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
 
     Notes
     -----
-    The constant function is split off exactly; the rest is solved by LAPACK's complete symmetric solver, which misses
-    no eigenvalue of the matrix. Cost: O(n^3).
+    The constant function is split off exactly, and even from odd functions where the law is mirror-symmetric. Small
+    matrices are solved by LAPACK's complete symmetric solver; of large ones Lanczos finds what is asked for, and
+    Cholesky factorisations prove that nothing was missed (`asperity.spectral.extremes`). Cost: O(n^3).
 
     Examples
     --------
@@ -180,28 +183,30 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), **discretisation), k)
     matrix = matrix_of(kernel, **discretisation)
     check_reversible(matrix)
-    array = 0.5 * (matrix.symmetric + matrix.symmetric.T)
     constant = np.asarray(matrix.basis.constant)
-    rest, rest_vectors, parity = _solved(matrix, array, constant)
-    chosen = np.sort(np.argsort(-np.abs(rest), kind="stable")[: k - 1])[::-1]
-    values = np.concatenate([[constant @ array @ constant], rest[chosen]])
-    vectors = np.column_stack([constant, rest_vectors[:, chosen]])
-    residuals = np.linalg.norm(array @ vectors - vectors * values, axis=0)
-    changes = _two_grids(matrix, rest)
-    errors = _errors(matrix, values, vectors, residuals, np.concatenate([[0.0], changes[chosen]]))
+    rest, names = outermost_by_parity(matrix, constant, max(k - 1, 1))
+    chosen = np.sort(np.argsort(-np.abs(rest.values), kind="stable")[: k - 1])
+    listed = np.column_stack([constant, rest.vectors])
+    images = 0.5 * (matrix.symmetric @ listed + (listed.T @ matrix.symmetric).T)
+    own = np.concatenate([[constant @ images[:, 0]], rest.values])
+    residuals = np.linalg.norm(images - listed * own, axis=0)
+    changes, proved = np.append(0.0, two_grid_changes(matrix, rest)), np.append(0.0, rest.errors)
+
+    def errors_of(places: NDArray[np.intp]) -> SpectrumErrors:
+        return _errors(matrix, own[places], listed[:, places], np.maximum(residuals, proved)[places], changes[places])
+
     # without a second function the gap is 1 by convention, and nothing is known of it
     unknown = frozen([np.inf])
     gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(unknown, unknown, unknown)
-    if len(rest):
-        top = rest_vectors[:, -1:]
-        residual = np.linalg.norm(array @ top - rest[-1] * top, axis=0)
-        gap_errors = _errors(matrix, rest[-1:], top, residual, changes[-1:])
-        gap, slem = float(1.0 - rest[-1]), float(max(abs(rest[-1]), abs(rest[0])))
+    if len(rest.values):
+        gap_errors = errors_of(np.array([1]))
+        gap, slem = float(1.0 - rest.values[0]), float(np.abs(rest.values).max())
+    places = np.append(0, 1 + chosen)
     return Spectrum(
-        values=frozen(values),
-        vectors=frozen(vectors),
-        residuals=frozen(residuals),
-        errors=errors,
+        values=frozen(own[places]),
+        vectors=frozen(listed[:, places]),
+        residuals=frozen(residuals[places]),
+        errors=errors_of(places),
         gap=gap,
         gap_errors=gap_errors,
         slem=slem,
@@ -209,27 +214,9 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         basis=matrix.basis,
         method=matrix.method,
         matrix_error=0.0 if matrix.samples else float(matrix.error),
-        parity=("even" if parity else "none", *(parity[i] if parity else "none" for i in chosen)),
+        parity=("none" if "none" in names or not names else "even", *(names[i] for i in chosen)),
+        completeness=rest.method,
     )
-
-
-def _solved(matrix: KernelMatrix, array: Floats, constant: Floats) -> tuple[Floats, Floats, list[Parity]]:
-    """Eigenvalues off the constants, ascending, with vectors and, for mirror-symmetric laws, parities.
-
-    Even and odd functions do not mix there, and two matrices of half the size take a quarter of the work.
-    """
-    split = halves(matrix)
-    if split is None:
-        return *off_constants(array, constant), []
-    from scipy.linalg import eigh
-
-    even, odd = split
-    values, vectors = off_constants(np.asarray(even.T @ array @ even), np.asarray(even.T @ constant))
-    odd_values, odd_vectors = eigh(np.asarray(odd.T @ array @ odd)) if odd.shape[1] else (np.empty(0), np.empty((0, 0)))
-    everything = np.concatenate([values, odd_values])
-    order = np.argsort(everything, kind="stable")
-    names: list[Parity] = ["even" if place < len(values) else "odd" for place in order]
-    return everything[order], np.concatenate([even @ vectors, odd @ odd_vectors], axis=1)[:, order], names
 
 
 def _errors(
@@ -262,6 +249,8 @@ def check_reversible(matrix: KernelMatrix) -> None:
 
     The matrix of a law that is reversible by theorem is taken so, unless it was sampled and the counts speak against.
     """
+    if matrix.reversible and matrix.raw_defect is None:
+        return
     defect = matrix.symmetry_defect()
     if defect.z_score is not None:
         refused = defect.z_score > REVERSIBLE_Z
@@ -269,44 +258,13 @@ def check_reversible(matrix: KernelMatrix) -> None:
         # an antisymmetric part of the size of the matrix's own error is no evidence
         scale = float(np.linalg.norm(matrix.symmetric)) or 1.0
         allowed = REVERSIBLE_ROUNDING + 2.0 * float(matrix.error) / scale
-        refused = not matrix.reversible and float(defect) > allowed
+        refused = float(defect) > allowed
     if refused:
         raise AccuracyError(
             f"the kernel is not symmetric with respect to sin(theta) d theta: {defect}; its spectrum need not be real. "
             "Use (P + P.adjoint()) / 2 or P @ P.adjoint() if one of these is what you mean, or sample it better",
             float(defect),
         )
-
-
-def _two_grids(matrix: KernelMatrix, rest: Floats) -> Floats:
-    """Change of every eigenvalue from the coarser basis, counted from the nearer end of the spectrum.
-
-    A step of parity can leave an eigenvalue unchanged by accident; so a share of the change before counts too.
-    """
-    grids = coarser_grids(matrix, levels=2)
-    if not grids:
-        return np.full(len(rest), np.inf)
-    change = _changes(rest, grids[0])
-    if len(grids) == 1:
-        return change
-    earlier = _changes(grids[0], grids[1])
-    place, inside = _counterparts(rest, grids[0])
-    before = np.where(inside, earlier[place], np.inf)
-    return np.where(np.isfinite(before), np.maximum(change, EARLIER_SHARE * before), change)
-
-
-def _changes(fine: Floats, coarse: Floats) -> Floats:
-    if len(coarse) == 0:
-        return np.full(len(fine), np.inf)
-    place, inside = _counterparts(fine, coarse)
-    return np.where(inside, np.abs(fine - coarse[place]), np.inf)
-
-
-def _counterparts(fine: Floats, coarse: Floats) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Places in the ascending ``coarse`` of the eigenvalues ``fine``: from the top if positive, else from below."""
-    from_bottom = np.arange(len(fine))
-    place = np.where(fine >= 0.0, len(coarse) - len(fine) + from_bottom, from_bottom)
-    return np.clip(place, 0, max(len(coarse) - 1, 0)), (place >= 0) & (place < len(coarse))
 
 
 def _both_signs(half: Spectrum, k: int) -> Spectrum:

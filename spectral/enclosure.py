@@ -13,7 +13,9 @@ from ..checks import Floats, whole_number
 from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind
 from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
+from ..kernels.basis_rows import integrates_panels
 from ..kernels.measure import SINE
+from .adapted_panels import adapted_trials
 from .deflation import off_constants
 from .eigenvalues import check_reversible
 from .separation import Separation, rest_of_spectrum
@@ -24,6 +26,9 @@ Label = Literal["indexed", "contains-spectrum"]
 # Trial functions beyond those asked for: the first ones of them show what comes next.
 LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
+# The squared residuals of adapted trial functions, and the errors of their quotients, may take this share of an
+# enclosure each; so many rows may be spent on the quotients.
+TRIAL_SHARE, MOST_ADAPTED_ROWS = 0.3, 20_000
 # Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
 QUOTIENT_ROUNDING = 4.0 * EPS
 
@@ -154,10 +159,21 @@ def enclosures(
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     if law.reversible is False:
         raise AccuracyError(f"{law!r} is not reversible: its spectrum need not be real", np.inf)
-    if basis is None:
-        basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
-    values, vectors, next_value = _trial(law, basis, k, tolerance)
-    found = residuals(law, basis, vectors, values)
+    if basis is None and integrates_panels(law):
+        trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
+        found = residuals(
+            law, trials.basis, trials.vectors, trials.values, MOST_ADAPTED_ROWS,
+            mirrored=trials.mirrored, quotient_error=TRIAL_SHARE * tolerance,
+        )  # fmt: skip
+        after = residuals(
+            law, trials.basis, trials.following, trials.following_values, 0, mirrored=trials.mirrored
+        )
+        basis, values, next_value = trials.basis, trials.values, _reach(after)
+    else:
+        if basis is None:
+            basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
+        values, vectors, next_value = _trial(law, basis, k, tolerance)
+        found = residuals(law, basis, vectors, values)
     order = np.argsort(-np.abs(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.rows} rows"
@@ -198,7 +214,12 @@ def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Fl
     if not following.size:
         return values, vectors, 0.0
     after = residuals(law, basis, inner[:, following], rest[following], most_rows=0)
-    return values, vectors, float(np.max(np.abs(after.quotients) + after.norms))
+    return values, vectors, _reach(after)
+
+
+def _reach(after: Residuals) -> float:
+    """Up to what modulus the intervals of these functions reach."""
+    return float(np.max(np.abs(after.quotients) + after.norms))
 
 
 def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:

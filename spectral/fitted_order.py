@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import finite_array
+from ..checks import Floats, finite_array
 from ..errors import InputError
 
 # Fits need this many points to have a confidence interval.
@@ -28,7 +28,7 @@ class FittedOrder:
     ----------
     order : float
     low, high : float
-        Ends of its 95 % confidence interval by Student's t.
+        Ends of its 95 % confidence interval; see `fit_order`.
     points : int
         Number of measurements that the fit rests on.
     """
@@ -58,22 +58,65 @@ class FittedOrder:
         return f"{self.order:.2f} [{self.low:.2f}, {self.high:.2f}]"
 
 
-def fit_order(size: ArrayLike, error: ArrayLike) -> FittedOrder | None:
+def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = None) -> FittedOrder | None:
     """Least squares of log(error) on log(size); None for fewer than three different sizes.
+
+    Parameters
+    ----------
+    size, error : array_like, shape (points,)
+        Positive.
+    repeats : array_like, shape (points,), optional
+        Of random methods: over how many independent repeats each error is a root mean square.
+
+    Returns
+    -------
+    FittedOrder or None
+        Without ``repeats`` the interval is Student's, from the scatter about the line: errors of a deterministic
+        method are exact, but do not lie on a line. With them every error has a spread of its own: n times its square
+        is as a chi-square with n degrees of freedom if the errors are Gaussian numbers, so that the variance of its
+        logarithm is trigamma(n/2)/4. The points are weighted by that, and the interval is Gaussian; where the scatter
+        about the line is larger than the spreads explain, it is widened by Birge's ratio. Errors of arrays scatter
+        less, so that their interval is too wide rather than too narrow.
 
     Examples
     --------
     >>> fit = fit_order([1, 2, 4, 8], [1, 1 / 4, 1 / 16, 1 / 64])
     >>> round(fit.order, 12), fit.points
     (2.0, 4)
+    >>> few = fit_order([1, 4, 16], [1, 0.5, 0.25], repeats=[5, 5, 5])
+    >>> round(few.order, 12), round(few.high - few.low, 2)
+    (0.5, 0.7)
     """
     sizes, errors = finite_array("size", size), finite_array("error", error)
     if sizes.shape != errors.shape or np.any(sizes <= 0.0) or np.any(errors <= 0.0):
         raise InputError(f"size, error: expected positive numbers of one shape, got {size!r}, {error!r}")
+    number = None if repeats is None else finite_array("repeats", repeats)
+    if number is not None and (number.shape != sizes.shape or np.any(number < 1.0)):
+        raise InputError(f"repeats: expected a number of at least 1 for each of {sizes.size} sizes, got {repeats!r}")
     if len(np.unique(sizes)) < FEWEST_POINTS:
         return None
+    slope, half = _by_scatter(sizes, errors) if number is None else _by_spread(sizes, errors, number)
+    return FittedOrder(-slope, -slope - half, -slope + half, len(sizes))
+
+
+def _by_scatter(sizes: Floats, errors: Floats) -> tuple[float, float]:
+    """Slope and half the width of its interval, by Student's t."""
     from scipy.stats import linregress, t
 
     fit = linregress(np.log(sizes), np.log(errors))
-    half = float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(sizes) - 2) * fit.stderr)
-    return FittedOrder(-float(fit.slope), -float(fit.slope) - half, -float(fit.slope) + half, len(sizes))
+    return float(fit.slope), float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(sizes) - 2) * fit.stderr)
+
+
+def _by_spread(sizes: Floats, errors: Floats, repeats: Floats) -> tuple[float, float]:
+    """Slope and half the width of its interval, from the spreads of root mean squares over repeats."""
+    from scipy.special import polygamma
+    from scipy.stats import norm
+
+    weight = 4.0 / polygamma(1, 0.5 * repeats)
+    x, y = np.log(sizes), np.log(errors)
+    x = x - np.average(x, weights=weight)
+    precision = float(weight @ x**2)
+    slope = float(weight @ (x * y)) / precision
+    rest = y - np.average(y, weights=weight) - slope * x
+    birge = float(np.sqrt(weight @ rest**2 / (len(x) - 2)))
+    return slope, float(norm.ppf(0.5 + 0.5 * CONFIDENCE)) * max(birge, 1.0) / precision**0.5

@@ -12,11 +12,12 @@ from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind, Estimate
 from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
 from ..kernels.algebra import made_of_isometries
+from ..kernels.basis_rows import integrates_panels
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge, essential_edge
 from .ideal_parts import ideal_spectrum
-from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
+from .refinement import EIGENVALUES, NEGLIGIBLE, Refinement, SharedMatrices, refined
 from .relaxation import largest_modulus
 from .separation import lambertian_share
 
@@ -214,7 +215,7 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     if edge.low >= 1.0 - tolerance:
         # nothing fits between the edge and 1 that the tolerance could tell
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    if isinstance(law, DensityLaw):
+    if isinstance(law, DensityLaw) or (edge.high <= NEGLIGIBLE and integrates_panels(law)):
         enclosed = _by_enclosure(law, tolerance)
         if enclosed is not None:
             return enclosed
@@ -251,7 +252,7 @@ def _at_edge(law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Sp
 def _by_enclosure(law: Law, tolerance: float) -> SpectralGap | None:
     """The gap from an indexed enclosure, where the separation of the spectrum is known."""
     for number in (ENCLOSED, 2 * ENCLOSED):
-        found = enclosures(law, number)
+        found = enclosures(law, number, tolerance=tolerance)
         listed = [item for item in found if item.label == "indexed" and item.index]
         if not listed:
             continue

@@ -9,6 +9,7 @@ import numpy as np
 from ..checks import Floats
 from ..kernels import Basis, DensityLaw, Law, Legendre, Panels
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
+from ..kernels.basis_rows import function_rows
 from ..kernels.density import GAUSS_NODES
 from ..kernels.kernel_quadrature import GRAZING_EDGES
 from ..kernels.law import AngleFunction
@@ -17,7 +18,11 @@ from ..kernels.measure import SINE, gauss_on_intervals
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
 SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
 # Functions of the basis times outgoing angles held at a time.
-CHUNK_ROWS = 128
+CHUNK_ROWS = 256
+# Halves of (0, pi) overlap by no more.
+HALF_ROUNDING = 1e-12
+# Errors of rows of which nothing is asked.
+ROW_TOLERANCE = 1e-8
 # A Gauss rule with n nodes on a panel of width h follows cos(l theta) to rounding for l h up to about this times n.
 NODES_PER_DEGREE = 1.2
 # Nodes beyond those that the basis asks for, of the two rules that are compared.
@@ -52,26 +57,45 @@ class Residuals:
         return float(np.linalg.norm(self.norms))
 
 
-def residuals(law: Law, basis: Basis, vectors: Floats, values: Floats, most_rows: int = MOST_ROWS) -> Residuals:
+def residuals(
+    law: Law,
+    basis: Basis,
+    vectors: Floats,
+    values: Floats,
+    most_rows: int = MOST_ROWS,
+    *,
+    mirrored: bool = False,
+    quotient_error: float = 0.0,
+) -> Residuals:
     """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
 
     ``values``, shape (k,), are the eigenvalues that they are thought to have. ||P v - rho v||^2 is integrated as it
     stands: as <P v, P v> - rho^2 it would lose half of its digits. Panels in the incoming angle are halved where Gauss
-    and Kronrod differ most; their difference counts as error.
+    and Kronrod differ most; their difference counts as error. ``mirrored`` says that each function is even or odd, and
+    the law mirror-symmetric; an error of a quotient below ``quotient_error`` is good enough.
     """
     if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
         return _smooth_residuals(law, basis, vectors, values)
+    function = _TrialFunctions(law, basis, vectors, quotient_error)
     low, high = _first_panels(basis)
+    if mirrored:
+        inside = low < 0.5 * np.pi - HALF_ROUNDING
+        low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
     kept, total, error = np.zeros((2, 0)), np.zeros((0, 2, len(values))), np.zeros((0, 2, len(values)))
     rows = 0
     while low.size:
-        fresh, doubt = _integrals(law, basis, vectors, values, low, high)
+        fresh, doubt = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
         rows += low.size * len(NODES)
         kept = np.concatenate([kept, [low, high]], axis=1)
         total, error = np.concatenate([total, fresh]), np.concatenate([error, doubt])
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
-        wanted = np.stack([SHARE * square + 4.0 * EPS, SHARE * square + (8.0 * EPS) ** 2])
+        wanted = np.stack(
+            [
+                np.maximum(SHARE * square + 4.0 * EPS, quotient_error),
+                np.maximum(SHARE * square + (8.0 * EPS) ** 2, SHARE * quotient_error),
+            ]
+        )
         share = (error / wanted).max(axis=(1, 2))
         affordable = max(most_rows - rows, 0) // (2 * len(NODES))
         worst = np.argsort(-share)[:affordable]
@@ -111,27 +135,48 @@ def _first_panels(basis: Basis) -> tuple[Floats, Floats]:
     return edges[:-1], edges[1:]
 
 
+class _TrialFunctions:
+    """Trial functions and what the law makes of them."""
+
+    def __init__(self, law: Law, basis: Basis, vectors: Floats, row_tolerance: float) -> None:
+        self.basis, self.vectors, self.law = basis, vectors, law
+        self.row_tolerance = row_tolerance or ROW_TOLERANCE
+        self.rows = function_rows(law, basis, vectors) if isinstance(basis, Panels) else None
+
+    def __call__(self, theta: Floats) -> Floats:
+        """Their values, shape (angles, k)."""
+        return expansion(self.basis, self.vectors, theta)
+
+    def images(self, theta: Floats) -> tuple[Floats, Floats]:
+        """The values of P v, shape (angles, k), and their errors."""
+        if self.rows is not None:
+            found, errors = self.rows(theta, self.row_tolerance)
+            return found, np.nan_to_num(errors)
+        chunks = [theta[start : start + CHUNK_ROWS] for start in range(0, theta.size, CHUNK_ROWS)]
+        return np.concatenate([images(self.law, self, chunk, self.basis) for chunk in chunks]), np.zeros(theta.size)
+
+
 def _integrals(
-    law: Law, basis: Basis, vectors: Floats, values: Floats, low: Floats, high: Floats
+    function: _TrialFunctions, values: Floats, low: Floats, high: Floats, copies: float
 ) -> tuple[Floats, Floats]:
-    """Integrals of v (P v - rho v) and of its square over each panel, with the differences of the two rules."""
+    """Integrals of v (P v - rho v) and of its square over each panel, with the differences of the two rules.
+
+    An error e of a row adds e v to the first and 2 e (P v - rho v) + e^2 to the second.
+    """
     half = 0.5 * (high - low)
     angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
     flat = angle.ravel()
-
-    def trial(theta: Floats) -> Floats:
-        return expansion(basis, vectors, theta)
-
-    starts = range(0, flat.size, CHUNK_ROWS)
-    image = np.concatenate([images(law, trial, flat[start : start + CHUNK_ROWS], basis) for start in starts])
-    here = trial(flat)
-    rest = image - here * values
+    image, row_error = function.images(flat)
+    here = function(flat)
+    rest, doubt = image - here * values, row_error[:, None]
     shape = (*angle.shape, len(values))
     parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
-    density = half[:, None] * SINE.density(angle)
+    doubts = np.stack([(np.abs(here) * doubt).reshape(shape), ((2.0 * np.abs(rest) + doubt) * doubt).reshape(shape)], 2)
+    density = copies * half[:, None] * SINE.density(angle)
     return (
         np.einsum("pq,pqjk->pjk", density * KRONROD, parts),
-        np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts)),
+        np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts))
+        + np.einsum("pq,pqjk->pjk", density * KRONROD, doubts),
     )
 
 

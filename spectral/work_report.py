@@ -120,7 +120,10 @@ class WorkReport:
         """The order in the budget, fitted to errors well above the reference's; None for fewer than three of them."""
         least = ABOVE_REFERENCE * self.methods[method].floor
         rows = [row for row in self._done(method) if self.error(row) > least]
-        return fit_order([row.budget for row in rows], [self.error(row) for row in rows]) if rows else None
+        if not rows:
+            return None
+        repeats = [len(row.seconds) for row in rows] if self.methods[method].is_random else None
+        return fit_order([row.budget for row in rows], [self.error(row) for row in rows], repeats)
 
     def front(self) -> tuple[WorkRow, ...]:
         """The rows that no other one beats in both error (see `level`) and least time, fastest first."""

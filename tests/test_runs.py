@@ -28,7 +28,7 @@ def step_by_step(wall):
     if circles is not None:
         circles = circles.copy()
         circles[:, 10] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, pairs=None, circles=circles)
+    plain.__dict__["scene"] = replace(plain.scene, pairs=None, circles=circles, closed=None)
     return plain
 
 

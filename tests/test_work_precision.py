@@ -78,6 +78,22 @@ def test_the_confidence_interval_covers_the_slope_as_often_as_it_says():
     assert abs(covered - 380) <= 4 * 4.4
 
 
+def test_the_interval_of_root_mean_squares_covers_the_slope_as_often_as_it_says():
+    rng = np.random.default_rng(1)
+    size = 4.0 ** np.arange(3)
+    repeats = np.array([16, 16, 4])
+    covered, by_scatter = 0, 0
+    for _ in range(1000):
+        error = size**-0.5 * np.sqrt([np.mean(rng.standard_normal(n) ** 2) for n in repeats])
+        fit = spec.fit_order(size, error, repeats)
+        covered += fit.low <= 0.5 <= fit.high
+        by_scatter += fit.high - fit.low < 0.2
+    # 950 expected, standard deviation 6.9; widening where the scatter is large adds some, so only few are too many
+    assert 950 - 4 * 6.9 <= covered <= 1000
+    # three points that happen to lie on a line must not look certain
+    assert by_scatter == 0
+
+
 def test_errors_below_the_reference_take_no_part_in_the_order():
     known = spec.WorkProblem("shifted", spec.ReferenceValue(EXACT + 1e-5, 1e-5, "a rough value"))
     report = spec.work_precision(known, [DECLARED["trapezoid"]], [4, 8, 16, 32, 1024, 2048], repeats=1)
@@ -216,6 +232,8 @@ def test_a_kernel_matrix_brings_its_reported_error():
         lambda: spec.WorkProblem("none", ()),
         lambda: spec.WorkRow("a", 1, "finished"),
         lambda: spec.fit_order([1, 2, 3], [1, 0, 1]),
+        lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1]),
+        lambda: spec.fit_order([1, 2, 3], [1, 1, 1], [1, 1, 0]),
         lambda: spec.work_precision(problem(), [], [1]),
         lambda: spec.work_precision(problem(), [DECLARED["trapezoid"]], {"simpson": [1]}),
         lambda: spec.work_precision(problem(), [DECLARED["trapezoid"]] * 2, [1]),

@@ -34,24 +34,37 @@ class BenchRun:
             "|---|---|---|---|---|---|---|",
         ]
         lines += [_line(report) for report in self.reports]
-        chosen = [report for report in self.reports if any(row.is_done for row in _chosen(report))]
-        choices = [choice for report in chosen if (choice := report.choice()) is not None]
-        good = sum(choice <= GOOD_CHOICE for choice in choices)
-        lines += [
-            "",
-            f"The choice is within a factor {GOOD_CHOICE:g} of the best on {good} of the {len(choices)} problems where "
-            f"another method gets as far; on {len(chosen) - len(choices)} none does; on "
-            f"{len(self.reports) - len(chosen)} it was not done in time.",
-            "",
-        ]
+        lines += ["", *self._choices(), ""]
         agree, differ, unsure = self.orders()
         lines.append(
             f"Declared orders: {len(agree)} agree within 0.15, {len(differ)} differ, {len(unsure)} are not resolved "
             "(their 95 % interval holds the declared one, but is wide)."
         )
-        lines += [f"- differs: {line}" for line in differ]
+        lines += ["", *(f"- differs: {line}" for line in differ), ""] if differ else [""]
         if self.reports:
             lines.append(f"Machine: {self.reports[0].machine}.")
+        return "\n".join(lines)
+
+    def _choices(self) -> list[str]:
+        """How good the library's choices are, in words, and which are not."""
+        choosing = [report for report in self.reports if report.auto in report.methods]
+        done = [report for report in choosing if any(row.is_done for row in _chosen(report))]
+        choices = [(report.problem, choice) for report in done if (choice := report.choice()) is not None]
+        good = sum(choice <= GOOD_CHOICE for _, choice in choices)
+        lines = [
+            f"Of {len(choosing)} problems in which the library chooses, its choice is within a factor {GOOD_CHOICE:g} of "
+            f"the best on {good} of the {len(choices)} where another method gets as far; on {len(done) - len(choices)} "
+            f"none does; on {len(choosing) - len(done)} it was not done in time."
+        ]
+        slow = [f"- {problem}: {choice:.2g} times the best" for problem, choice in choices if choice > GOOD_CHOICE]
+        return [*lines, "", *slow] if slow else lines
+
+    def references(self) -> str:
+        """What every problem is measured against, and how well that is known, as a table."""
+        lines = ["| problem | reference | known to |", "|---|---|---|"]
+        for report in self.reports:
+            for source, floor in dict.fromkeys((facts.reference, facts.floor) for facts in report.methods.values()):
+                lines.append(f"| {report.problem} | {source} | {floor:.1e} |")
         return "\n".join(lines)
 
     def orders(self) -> tuple[list[str], list[str], list[str]]:
@@ -123,7 +136,8 @@ def _line(report: WorkReport) -> str:
     front = ", ".join(dict.fromkeys(row.method for row in report.front()))
     if not rows:
         states = ", ".join(dict.fromkeys(row.status for row in _chosen(report)))
-        return f"| {report.problem} | {states or 'not run'} | - | - | - | - | {front} |"
+        words = states or ("not run" if report.auto in report.methods else "nothing to choose")
+        return f"| {report.problem} | {words} | - | - | - | - | {front} |"
     best = min(rows, key=report.error)
     choice = report.choice()
     reported = "-" if best.reported is None else f"{best.reported:.1e}"

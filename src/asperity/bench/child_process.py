@@ -40,13 +40,15 @@ class ChildProcess:
 
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
         """``function(*arguments)``, which both must pass to another process; raises what it raises, or `OutOfTime`."""
-        if self._process is None:
-            self._start()
+        self.start()
         assert self._pipe is not None
         self._pipe.send((function, arguments))
         return self._answer(seconds)
 
-    def _start(self) -> None:
+    def start(self) -> None:
+        """Start the process and prepare it, if there is none."""
+        if self._process is not None:
+            return
         # a fresh interpreter: a copy of this one would hold its threads' locks
         context = multiprocessing.get_context("spawn")
         self._pipe, other = context.Pipe()

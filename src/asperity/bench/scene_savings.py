@@ -113,7 +113,7 @@ def without_runs(scene: Scene) -> Scene:
     assert scene.circles is not None
     circles = scene.circles.copy()
     circles[:, RUN_COLUMN] = 0.0
-    return replace(scene, circles=circles)
+    return replace(scene, circles=circles, closed=None)
 
 
 def without_grid(scene: Scene) -> Scene:

@@ -11,13 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import AsperityError, InputError
-from ..spectral import ReferenceValue, WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
+from ..errors import InputError
+from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
 from ..spectral.machine import on_few_cores
 from ..spectral.stopwatch import measure
 from .child_process import ChildCrashed, ChildProcess, OutOfTime
+from .known_references import known_reference
 from .quantities import QUANTITIES
 from .scenes import scenes, standard_names, wall_of
+from .time_plan import TimePlan
+from .uniform_disk import DISK, sampled_velocities
 
 Say = Callable[[str], None]
 
@@ -29,25 +32,32 @@ class Effort:
     Attributes
     ----------
     quick : bool
-        Whether the shorter ladders and the cheaper references are used.
+        Whether the shorter ladders are used.
     repeats : int
+        Of every row; random methods, whose error is a mean over them, have ``RANDOM_FACTOR`` times as many.
     seconds : float
         Repeats and ladders end when they have taken this long; see `work_precision`.
-    row_seconds, reference_seconds : float
-        A row, or the references of a problem, that take longer are ended.
+    row_seconds : float
+        A row that takes longer is ended.
+    total_seconds : float
+        For all problems together, the processes' start included; see `TimePlan`. It is kept: what does not fit is
+        left out, and says so.
     """
 
     quick: bool
     repeats: int
     seconds: float
     row_seconds: float
-    reference_seconds: float
+    total_seconds: float
 
 
-QUICK = Effort(True, 5, 0.2, 1.5, 10.0)
-FULL = Effort(False, 5, 1.0, 10.0, 60.0)
-# Of the random walls every quantity that has a reference by itself; the others are of the standard set alone.
-RANDOM_QUANTITIES = ("law", "moment")
+RANDOM_FACTOR = 4
+QUICK = Effort(True, 4, 0.2, 1.5, 160.0)
+FULL = Effort(False, 4, 1.5, 12.0, 1380.0)
+# A row with less time than this is not begun.
+LEAST_SECONDS = 0.05
+# What is measured of the random walls.
+RANDOM_QUANTITY = "moment"
 
 
 def problem_names(patterns: Sequence[str] = ()) -> list[str]:
@@ -55,8 +65,8 @@ def problem_names(patterns: Sequence[str] = ()) -> list[str]:
 
     A pattern is a name with wildcards, or a scene or a quantity alone.
     """
-    standard = [f"{scene}/{quantity}" for scene in standard_names() for quantity in QUANTITIES]
-    random = [f"{scene}/{q}" for scene in scenes() if scene not in standard_names() for q in RANDOM_QUANTITIES]
+    standard = [f"{scene}/{one.name}" for scene in standard_names() for one in QUANTITIES.values() if scene in one.scenes]
+    random = [f"{scene}/{RANDOM_QUANTITY}" for scene in scenes() if scene not in standard_names()]
     if not patterns:
         return standard
     chosen = []
@@ -81,44 +91,49 @@ def run_problems(
     names: Sequence[str], effort: Effort, folder: Path | None = None, say: Say = print
 ) -> Iterator[WorkReport]:
     """The reports of problems, one after the other; a word to the user where there is none."""
+    plan = TimePlan(effort.total_seconds, sum(known_reference(name) is not None for name in names))
     for scene, group in groupby(names, key=lambda name: name.split("/")[0]):
         with ChildProcess(partial(prepare, scene)) as child:
             for name in group:
-                report = _run(name, effort, folder, child)
-                if isinstance(report, str):
-                    say(f"{name}: left out, {report}")
-                else:
-                    say(f"{name}: {len(report.rows)} rows")
-                    yield report
+                reference = known_reference(name)
+                if reference is None:
+                    say(f"{name}: left out, no independent reference is known")
+                    continue
+                # before the share is cut: the first process on a machine compiles for minutes
+                child.start()
+                report = _run(_problem(name), effort, folder, child, plan.next_share())
+                say(f"{name}: {len(report.rows)} rows")
+                yield report
 
 
-def _run(name: str, effort: Effort, folder: Path | None, child: ChildProcess) -> WorkReport | str:
-    """The report of one problem; or why there is none, where no independent reference is known in time."""
-    scene, quantity = name.split("/")
-    try:
-        references = child.call(references_of, name, effort.quick, seconds=effort.reference_seconds)
-    except OutOfTime:
-        return f"its references take more than {effort.reference_seconds:g} s"
-    except (ChildCrashed, AsperityError) as reason:
-        return f"its references fail: {reason}"
-    if not references:
-        return "no independent reference is known"
+def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: ChildProcess, share: float) -> WorkReport:
+    """The report of one problem, made within its share of the time."""
+    scene, quantity = problem.name.split("/")
     entries = QUANTITIES[quantity].methods(wall_of(scene))
+    methods = [method for method, _, _ in entries]
     ladders = {method.name: (quick if effort.quick else full) for method, quick, full in entries}
+    plan = TimePlan(share, len(methods))
+    ends: dict[str, TimePlan] = {}
 
     def runner(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
-        task = (name, references, method.name, budget, repeats, seconds)
+        if method.name not in ends:
+            child.start()
+            ends[method.name] = TimePlan(plan.next_share(), 1)
+        limit = min(effort.row_seconds, ends[method.name].remaining)
+        if limit < LEAST_SECONDS:
+            return WorkRow(method.name, budget, "left out", note="the time planned for this method was spent")
+        more = RANDOM_FACTOR * repeats if method.is_random else repeats
+        task = (problem.name, method.name, budget, more, min(seconds, 0.5 * limit))
         try:
-            return WorkRow.of_dict(child.call(measured, *task, seconds=effort.row_seconds))
+            return WorkRow.of_dict(child.call(measured, *task, seconds=limit))
         except OutOfTime:
-            return WorkRow(method.name, budget, "timed out", note=f"ended after {effort.row_seconds:g} s")
+            return WorkRow(method.name, budget, "timed out", note=f"ended after {limit:.2g} s")
         except ChildCrashed as reason:
             return WorkRow(method.name, budget, "failed", note=str(reason))
 
     return work_precision(
-        WorkProblem(name, references), [method for method, _, _ in entries], ladders, repeats=effort.repeats,
-        seconds=effort.seconds, warm_up=False, path=None if folder is None else folder / f"{file_stem(name)}.json",
-        runner=runner,
+        problem, methods, ladders, repeats=effort.repeats, seconds=effort.seconds, warm_up=False,
+        path=None if folder is None else folder / f"{file_stem(problem.name)}.json", runner=runner,
     )  # fmt: skip
 
 
@@ -129,20 +144,23 @@ def file_stem(name: str) -> str:
 
 def prepare(scene: str) -> None:
     """What a new process loads before anything is timed: the wall, and the compiled loops for it."""
-    from ..geometry import trace
+    from ..geometry import collide, trace
     from ..kernels import Legendre, WallLaw, discretise
     from ..kernels.wall_rows import adaptive_rows
 
     wall = wall_of(scene)
     trace(wall, [0.3, 0.6], [1.0, 2.0])
+    if scene in QUANTITIES["disk"].scenes:
+        collide(DISK, wall, 0.1, [[0.02, 1.0]], -sampled_velocities(1, np.random.default_rng(0)))
     adaptive_rows(wall, [1.0], 1e-2)
     discretise(WallLaw(wall), Legendre(2), "monte-carlo", samples=16)
 
 
-def references_of(name: str, quick: bool) -> tuple[ReferenceValue, ...]:
-    """The references of a problem, made in this process."""
-    scene, quantity = name.split("/")
-    return QUANTITIES[quantity].references(wall_of(scene), quick)
+@cache
+def _problem(name: str) -> WorkProblem:
+    reference = known_reference(name)
+    assert reference is not None  # `run_problems` asks for no other
+    return WorkProblem(name, reference)
 
 
 @cache
@@ -151,9 +169,7 @@ def _methods(name: str) -> dict[str, WorkMethod]:
     return {method.name: method for method, _, _ in QUANTITIES[quantity].methods(wall_of(scene))}
 
 
-def measured(
-    name: str, references: tuple[ReferenceValue, ...], method: str, budget: float, repeats: int, seconds: float
-) -> dict[str, object]:
+def measured(name: str, method: str, budget: float, repeats: int, seconds: float) -> dict[str, object]:
     """One row, measured in this process on one core, as a dictionary."""
     with on_few_cores(1), np.errstate(all="ignore"):
-        return measure(WorkProblem(name, references), _methods(name)[method], budget, repeats, seconds).as_dict()
+        return measure(_problem(name), _methods(name)[method], budget, repeats, seconds).as_dict()

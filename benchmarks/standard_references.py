@@ -1,0 +1,268 @@
+"""Make src/asperity/bench/standard_references.json: ``python -m benchmarks.standard_references [PROBLEM...]``.
+
+The benchmark's references come from here and not from its own runs. Polygons that resolve into beams are exact, and
+confirmed by a second way; the arcs' numbers come from `exact_rows`; grazing limits are in closed form; all other walls
+are sampled by rays of scrambled Sobol sequences, 16 independent ones, whose spread is the error. About a minute of
+one core a scene. Problems are patterns as for ``asperity bench``; the file keeps the others.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+from scipy.stats.qmc import Sobol
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.bench.known_references import FILE
+from asperity.bench.matrix_quantities import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
+from asperity.bench.uniform_disk import DISK, correlation_of
+from asperity.bench.scenes import RANDOM_WALLS, standard_names, wall_of
+from asperity.bench.standard_set import problem_names
+from asperity.checks import Floats
+from asperity.kernels.counting import count_pairs, sum_products
+from asperity.kernels.row_quadrature import row_matrix
+
+from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
+
+NETS, CHUNK, SEED = 16, 2**18, 20261121
+# Rays of the sampled references: of scenes, and of random walls, which only have a moment.
+RAYS, RANDOM_RAYS = 2**25, 2**23
+BASES = {"law": LAW_BASIS, "moment": MOMENT_BASIS, "resistance": RESISTANCE_BASIS}
+# Beams that leave more than this are no reference.
+RESOLVED = 1e-10
+# A second way confirms beams to this, or it says how far it came.
+ROW_TOLERANCE, MOST_ROW_RAYS = 1e-9, 4_000_000
+ROWS = {
+    "triangular-teeth": partial(tooth_row, psi=0.7),
+    "rectangular-teeth": partial(crevice_row, height_to_width=2.0),
+    "focusing-arc": partial(ArcRow.of, xi=1.2),
+}
+ROWS_BY_FORMULA = "rows by formula and Gauss-Kronrod in theta"
+# Largest eigenvalue off the constants, of a program of its own, not this library, and how far it knows it.
+ARC_LAMBDA2, ARC_ERROR = 0.3670253152, 3e-10
+# Rows of atoms jump from bin to bin, and those of crevices have kinks without end at grazing: they confirm no further.
+ROW_TOLERANCES = {"triangular-teeth": 1e-8, "rectangular-teeth": 1e-5, "focusing-arc": 1e-13}
+
+
+@dataclass(frozen=True)
+class Found:
+    """A value, its error and where it comes from."""
+
+    value: Floats
+    error: float
+    source: str
+
+
+def rays_of(wall: geo.Wall, number: int, net: int) -> Iterator[tuple[Floats, Floats]]:
+    """Incoming and outgoing angles of one scrambled net, in chunks."""
+    law, engine = ker.WallLaw(wall), Sobol(2, scramble=True, bits=52, rng=np.random.default_rng([SEED, net]))
+    tiny, below_one = np.finfo(float).tiny, np.nextafter(1.0, 0.0)
+    for start in range(0, number, CHUNK):
+        points = engine.random(min(CHUNK, number - start)).clip(tiny, below_one)
+        theta = np.arccos(1.0 - 2.0 * points[:, 1]).clip(1e-9, np.pi - 1e-9)
+        yield theta, law.respond(points[:, 0], theta)
+
+
+def sampled(wall: geo.Wall, bases: dict[str, ker.Basis], rays: int) -> dict[str, list[Floats]]:
+    """Symmetrised means of e_i(theta) e_j(theta') for every net and basis."""
+    nets: dict[str, list[Floats]] = {name: [] for name in bases}
+    for net in range(NETS):
+        sums = {name: np.zeros((basis.size, basis.size)) for name, basis in bases.items()}
+        for theta, out in rays_of(wall, rays // NETS, net):
+            for name, basis in bases.items():
+                if basis.is_partition:
+                    sums[name] += count_pairs(basis, theta, out) * np.outer(basis.heights, basis.heights)
+                else:
+                    sums[name] += sum_products(basis, theta, out)
+        for name, total in sums.items():
+            nets[name].append((total + total.T) * (0.5 * NETS / rays))
+    return nets
+
+
+def mean_and_error(values: list[Floats]) -> tuple[Floats, float]:
+    """Mean of the nets, and the Frobenius norm of its standard errors."""
+    table = np.asarray(values)
+    return table.mean(axis=0), float(np.sqrt(np.sum(table.var(axis=0, ddof=1)) / len(table)))
+
+
+def sampled_matrices(wall: geo.Wall, names: tuple[str, ...], rays: int) -> dict[str, Found]:
+    """Matrices by sampling."""
+    nets = sampled(wall, {name: BASES[name] for name in names}, rays)
+    source = f"{rays} rays of {NETS} scrambled Sobol sequences of their own, by their spread"
+    return {name: Found(*mean_and_error(values), source) for name, values in nets.items()}
+
+
+def beam_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | None:
+    """Matrices of a polygon whose beams resolve; adaptive rows must agree as far as they come."""
+    if not (wall.is_polygonal and wall.closes) or float(ker.PolygonLaw(wall).unresolved) > RESOLVED:
+        return None
+    found = {}
+    for name in names:
+        exact = ker.discretise(ker.PolygonLaw(wall), BASES[name], "exact")
+        other, doubt, _ = row_matrix(wall, BASES[name], ROW_TOLERANCE, MOST_ROW_RAYS)
+        found[name] = _confirmed(exact, other, doubt, "adaptive rows")
+    return found
+
+
+def _confirmed(exact: ker.KernelMatrix, other: Floats, doubt: float, way: str) -> Found:
+    """An exact matrix, if another way agrees; the error is its own bound."""
+    distance = float(np.linalg.norm(exact.symmetric - other))
+    if distance > doubt + 10.0 * exact.error.value:
+        raise SystemExit(f"{exact!r} and {way} differ by {distance:.2g}, more than {doubt:.2g}")
+    return Found(exact.symmetric, exact.error.value, f"exact; {way} agree to {max(distance, 1e-15):.0e}")
+
+
+def matrices_of_rows(row: Callable[[float], Atoms | ArcRow], tolerance: float) -> dict[str, Found]:
+    """Law, moment and resistance of a mirror-symmetric law with rows by formula, by adaptive Gauss-Kronrod in theta."""
+    bins = LAW_BASIS.size
+    edges, half, fluxes, doubts = np.sort(np.arccos(np.linspace(-1.0, 1.0, bins + 1))), bins // 2, [], []
+    for low, high in zip(edges[:half], edges[1 : half + 1], strict=True):
+        flux, doubt = mean_over_angles(lambda theta: np.diff(row(theta).distribution(edges)), low, high, tolerance)
+        fluxes.append(flux)
+        doubts.append(doubt)
+    law = bins * np.array([*fluxes, *(flux[::-1] for flux in reversed(fluxes))])
+    # every entry of a row may be off by its doubt
+    error = bins * float(np.linalg.norm(doubts)) * (2.0 * bins) ** 0.5
+
+    def outer(theta: float) -> Floats:
+        mean = row(theta).mean()
+        return np.outer([1.0, np.cos(theta), np.sin(theta)], [1.0, mean.real, mean.imag])
+
+    table, doubt = mean_over_angles(outer, tolerance=tolerance)
+    probe = np.array([0.5, 1.1, 2.0])
+    plane = np.stack([np.ones(3), np.cos(probe), np.sin(probe)], axis=1)
+    change = np.linalg.solve(plane, RESISTANCE_BASIS.evaluate(probe))
+    size = float(np.linalg.norm(change, 2)) ** 2
+    return {
+        "law": Found(0.5 * (law + law.T), error, ROWS_BY_FORMULA),
+        "moment": Found(np.diag([1.0, 3.0 * table[1, 1]]), 3.0 * doubt, ROWS_BY_FORMULA),
+        "resistance": Found(change.T @ table @ change, 3.0 * size * doubt, ROWS_BY_FORMULA),
+    }
+
+
+def teeth_matrices(scene: str, names: tuple[str, ...]) -> dict[str, Found]:
+    """The closed forms of the library, confirmed by rows of our own."""
+    other = matrices_of_rows(ROWS[scene], ROW_TOLERANCES[scene])
+    law = ker.WallLaw(wall_of(scene))
+    return {
+        name: _confirmed(ker.discretise(law, BASES[name]), other[name].value, other[name].error, ROWS_BY_FORMULA)
+        for name in names
+    }
+
+
+@cache
+def matrices_of(scene: str) -> dict[str, Found]:
+    """All matrices of a scene that its quantities need."""
+    wall = wall_of(scene)
+    if scene == "focusing-arc":
+        return matrices_of_rows(ROWS[scene], ROW_TOLERANCES[scene])
+    random = scene.startswith("random")
+    names = ("moment",) if random else tuple(BASES)
+    if scene in ROWS:
+        return teeth_matrices(scene, names)
+    return beam_matrices(wall, names) or sampled_matrices(wall, names, RANDOM_RAYS if random else RAYS)
+
+
+@cache
+def collision_of(scene: str) -> Found:
+    """The collision's correlation, from the moment of the foreshortened wall."""
+    wall = wall_of(scene).foreshorten(DISK)
+    found = (beam_matrices(wall, ("moment",)) or sampled_matrices(wall, ("moment",), RAYS))["moment"]
+    slope = correlation_of(1.0) - correlation_of(0.0)
+    value = np.asarray(correlation_of(float(found.value[1, 1])))
+    return Found(value, slope * found.error, f"{found.source}; psi by hand")
+
+
+def entry_of(scene: str) -> Found:
+    """<u, P u>/<u, u>."""
+    found = matrices_of(scene)["moment"]
+    return Found(found.value[1, 1], found.error, found.source)
+
+
+def resistance_found(scene: str) -> Found:
+    """The resistance from the matrix in 1, cos, sin."""
+    found = matrices_of(scene)["resistance"]
+    return Found(np.asarray(resistance_of(found.value)), found.error, found.source)
+
+
+def distance_found(scene: str) -> Found:
+    """W_1 between the rows and Lambert's, averaged, from formulas of the rows."""
+    tolerance = {"triangular-teeth": 1e-11}.get(scene, 1e-7)
+    value, error = mean_over_angles(
+        lambda theta: np.array([ROWS[scene](theta).distance_to_lambert()]), 0.0, 0.5 * np.pi, tolerance
+    )
+    return Found(2.0 * value[0], 2.0 * error + tolerance, ROWS_BY_FORMULA)
+
+
+def eta_found(scene: str) -> Found:
+    """Grazing flights by hand: flat tops keep them, vertical ends of a semicircle too, slopes and corners do not."""
+    zeta, words = {
+        "focusing-arc": (0.0, "no piece at a tip is level or vertical: zeta = 0"),
+        "koch": ((2.0 / 3.0) ** 4, "only the flat (2/3)^4 of the period keeps grazing flights"),
+        "mixed": (0.1 - 0.3 * np.log(3.0) / 4.0, "a flat tenth, and 0.3 of a semicircle, whose zeta is -(ln 3)/4"),
+    }[scene]
+    return Found(np.asarray((1.0 + zeta) / (1.0 - zeta)), 0.0, words)
+
+
+def eigenvalue_found(scene: str) -> Found | None:
+    """lambda_2 where a theorem gives it or another program does."""
+    if wall_of(scene).is_polygonal:
+        return Found(np.asarray(1.0), 0.0, "theorem: 1 is in the essential spectrum of isometries")
+    if scene == "focusing-arc":
+        return Found(np.asarray(ARC_LAMBDA2), ARC_ERROR, "another program, piecewise polynomials on graded panels")
+    return None
+
+
+MAKERS = {
+    "law": lambda scene: matrices_of(scene)["law"],
+    "moment": entry_of,
+    "collision": collision_of,
+    "disk": collision_of,
+    "lambda2": eigenvalue_found,
+    "resistance": resistance_found,
+    "distance": distance_found,
+    "eta": eta_found,
+}
+
+
+def main() -> None:
+    """Make what is asked for."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.standard_references", description=__doc__)
+    parser.add_argument("problems", nargs="*", help="SCENE, QUANTITY or SCENE/QUANTITY; all by default")
+    options = parser.parse_args()
+    names = problem_names(options.problems)
+    if not options.problems:
+        names += [f"random-{k}/moment" for k in range(RANDOM_WALLS)]
+    table = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    for name in names:
+        scene, quantity = name.split("/")
+        start = time.process_time()
+        found = MAKERS[quantity](scene)
+        if found is None:
+            continue
+        print(f"{name}: error {found.error:.2g}, {time.process_time() - start:.1f} s; {found.source}", flush=True)
+        table[name] = {"value": _rounded(found), "error": float(f"{found.error:.2g}"), "source": found.source}
+        lines = ",\n".join(f" {json.dumps(key)}: {json.dumps(table[key])}" for key in sorted(table))
+        FILE.write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+
+
+def _rounded(found: Found) -> float | list[float]:
+    """A number, or the upper triangle of a symmetric matrix, with no more digits than its error knows."""
+    digits = 17 if found.error < 1e-12 else 12
+    if found.value.ndim == 0:
+        return float(f"{float(found.value):.{digits}g}")
+    upper = found.value[np.triu_indices(len(found.value))]
+    return [float(f"{entry:.{digits}g}") for entry in upper]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

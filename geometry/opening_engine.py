@@ -1,0 +1,29 @@
+"""Which hollow of a cell a ray enters: compiled, taken in by the loops over rays. Loads numba."""
+
+from __future__ import annotations
+
+from numba import njit
+
+# In place of a hollow's number: a flat top, and an end of one that is a corner.
+FLAT_TOP, TOP_CORNER = -1, -2
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def opening_at(place, hollows):
+    """Number of the hollow that opens at a place of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
+    # the last hollow whose left end is not beyond the place
+    low, high = 0, hollows.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if hollows[middle, 0] <= place:
+            low = middle + 1
+        else:
+            high = middle
+    h = low - 1
+    if h < 0 or place >= hollows[h, 1] or (place == hollows[h, 0] and hollows[h, 11] > 0.0):
+        # a flat top, or an edge of it; the edges between two hollows are corners
+        edge = h >= 0 and (
+            (place == hollows[h, 0] and hollows[h, 11] > 1.0) or (place == hollows[h, 1] and hollows[h, 12] > 1.0)
+        )
+        return TOP_CORNER if edge else FLAT_TOP
+    return h

@@ -1,0 +1,113 @@
+"""Means of given piecewise polynomials over rows of the law of circular arcs, by their integrals up to any angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import Floats
+from .measure import SINE, gauss_on_intervals, gauss_rule
+from .panels import Panels
+
+if TYPE_CHECKING:
+    from .circular import ArcPieces, CircularArcLaw
+
+# exp(i theta' / 2 N) on a panel asks for this many Gauss nodes more than a polynomial of half the degree.
+MORE_NODES = 3
+# Ends of pieces held at a time.
+CHUNK = 2**15
+
+
+class ArcMeans:
+    r"""E[v(Theta') | theta] for functions v with the coefficients ``vectors`` on panels.
+
+    On a piece with N hits theta' = o + s delta with s = -+2 N, so that the integral of v(theta') sin(delta) is the
+    imaginary part of exp(-i o/s)/s times the difference of two values of F_N(t), the integral of v(theta')
+    exp(i theta'/s) from 0 to t: a table at the edges, and one Gauss rule from the edge to t.
+
+    Parameters
+    ----------
+    law : CircularArcLaw
+    panels : Panels
+    vectors : array of shape (n, k)
+    """
+
+    def __init__(self, law: CircularArcLaw, panels: Panels, vectors: Floats) -> None:
+        self.law, self.edges = law, panels.edges
+        self._polynomials = panels.legendre_series(vectors)
+        self._orders = self._polynomials.shape[1] // 2 + 1 + MORE_NODES
+        self._angle, weight = (part.reshape(-1, self._orders) for part in gauss_rule(self.edges, self._orders))
+        local = 2.0 * (self._angle - self.edges[:-1, None]) / np.diff(self.edges)[:, None] - 1.0
+        basis = np.polynomial.legendre.legvander(local, self._polynomials.shape[1] - 1)
+        self._weighted = weight[..., None] * np.matmul(basis, self._polynomials)
+        self._tables: dict[int, NDArray[np.complex128]] = {}
+
+    def __call__(self, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
+        """The means, shape (rows, k), and estimates of their errors for functions of sup norm and slope 1."""
+        pieces = self.law.pieces(theta, most_hits)
+        single = pieces.rest | pieces.alone
+        base = np.where(pieces.mirrored, np.pi - theta[pieces.ray], theta[pieces.ray])
+        slope = np.where(pieces.mirrored, 2.0, -2.0) * pieces.hits
+        offset = np.where(pieces.mirrored, -base, np.pi + base)
+        lower, upper = pieces.lower, np.maximum(pieces.upper, pieces.lower)
+        share = np.where(pieces.alone, 1.0, SINE.mass(lower, upper))
+        whole = np.bincount(pieces.ray, weights=share, minlength=theta.size)
+        found = np.empty((len(single), self._polynomials.shape[2]))
+        long = np.flatnonzero(~single)
+        for start in range(0, long.size, CHUNK):
+            part = long[start : start + CHUNK]
+            found[part] = self._integrals(offset[part], slope[part], lower[part], upper[part])
+        known = np.flatnonzero(single)
+        # rays with more hits than are followed leave together; a row of no width has one outgoing angle
+        end = np.where(pieces.mirrored, self.law.half_angle, np.pi - self.law.half_angle)
+        angle = np.where(pieces.rest, end, offset + slope * lower)[known]
+        here = self._moments(angle[:, None], self._cell(angle), share[known, None])
+        found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[self._cell(angle)])
+        total = np.stack([np.bincount(pieces.ray, weights=column, minlength=theta.size) for column in found.T], axis=1)
+        left = np.bincount(pieces.ray, weights=np.where(pieces.rest, share, 0.0), minlength=theta.size)
+        return total / whole[:, None], left / whole * self.law.half_angle / most_hits**2
+
+    def _integrals(self, offset: Floats, slope: Floats, lower: Floats, upper: Floats) -> Floats:
+        """The integrals of v(offset + slope delta) sin(delta)/2 over (lower, upper), shape (pieces, k)."""
+        ends = np.clip(np.stack([offset + slope * lower, offset + slope * upper]), 0.0, np.pi)
+        cell = self._cell(ends)
+        hits = np.abs(0.5 * slope).astype(np.intp)
+        table = self._up_to(int(hits.max(initial=1)))[hits - 1, cell]
+        angle, weight = gauss_on_intervals(self.edges[cell].ravel(), ends.ravel(), self._orders)
+        angle, weight = angle.reshape(-1, self._orders), weight.reshape(-1, self._orders)
+        phase = angle / np.tile(2.0 * hits, 2)[:, None]
+        each = self._polynomials[cell.ravel()]
+        parts = [
+            np.einsum("pd,pdk->pk", self._moments(angle, cell.ravel(), weight * wave(phase)), each)
+            for wave in (np.cos, np.sin)
+        ]
+        primitive = table + (parts[0] + 1j * parts[1]).reshape(table.shape)
+        difference = primitive[1] - primitive[0]
+        difference = np.where(slope[:, None] > 0.0, difference, difference.conj())
+        return np.asarray(0.5 * (np.exp(-1j * offset / slope)[:, None] * difference).imag / slope[:, None])
+
+    def _up_to(self, most: int) -> NDArray[np.complex128]:
+        """F_N at the edges for N = 1 ... most, shape (most, edges, k)."""
+        if most not in self._tables:
+            # for many N at once: products of small matrices, one a panel
+            phase = self._angle[:, None] / (2.0 * np.arange(1, most + 1)[:, None])
+            whole = np.matmul(np.exp(1j * phase), self._weighted).transpose(1, 0, 2)
+            empty = np.zeros((most, 1, whole.shape[2]))
+            self._tables[most] = np.concatenate([empty, np.cumsum(whole, axis=1)], axis=1)
+        return self._tables[most]
+
+    def _cell(self, angle: Floats) -> NDArray[np.intp]:
+        return np.clip(np.searchsorted(self.edges, angle, side="right") - 1, 0, len(self.edges) - 2)
+
+    def _moments(self, angle: Floats, cell: NDArray[np.intp], weight: Floats) -> Floats:
+        """Sums over the nodes, shape (cells, nodes), of the weights times the Legendre polynomials of these cells."""
+        low, high = self.edges[cell, None], self.edges[cell + 1, None]
+        local = (2.0 * angle - low - high) / (high - low)
+        before, current = np.ones_like(local), local
+        found = np.empty((len(local), self._polynomials.shape[1]))
+        for k in range(found.shape[1]):
+            found[:, k] = np.einsum("pq,pq->p", weight, before)
+            before, current = current, ((2 * k + 3) * local * current - (k + 1) * before) / (k + 2)
+        return found

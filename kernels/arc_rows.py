@@ -1,0 +1,82 @@
+"""Rows of the law of circular arcs against functions on panels: each piece of a row, cut at the panels' edges."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..checks import Floats
+from .measure import SINE, gauss_on_intervals
+from .panels import Panels
+from .ragged import ragged
+
+if TYPE_CHECKING:
+    from .circular import CircularArcLaw
+
+# theta' moves by less than half a panel on pieces of this share of it or less: with half the nodes what Gauss's rule
+# misses of a polynomial falls by the share to the power of its degree.
+SHORT_SHARE = 0.1
+# sin(delta) on a piece, whose length is at most half of the widest panel, asks for this many nodes more than p/2 + 1.
+SINE_NODES = 2
+# Pieces held at a time.
+CHUNK = 2**17
+
+
+def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
+    r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (rows, functions), and the rows' errors.
+
+    The outgoing angle is linear in the angle delta of the chord, of density sin(delta): on each piece between two
+    edges the functions are polynomials in delta, and a Gauss rule is exact but for the sine.
+    """
+    pieces = law.pieces(theta, most_hits)
+    ray, rest, alone = pieces.ray, pieces.rest, pieces.alone & ~pieces.rest
+    base = np.where(pieces.mirrored, np.pi - theta[ray], theta[ray])
+    # theta' = offset + slope delta
+    slope = np.where(pieces.mirrored, 2.0, -2.0) * pieces.hits
+    offset = np.where(pieces.mirrored, -base, np.pi + base)
+    lower, upper = pieces.lower, np.maximum(pieces.upper, pieces.lower)
+    ends = np.sort(np.stack([offset + slope * lower, offset + slope * upper]), axis=0)
+    first = np.clip(np.searchsorted(panels.edges, ends[0], side="right") - 1, 0, len(panels.edges) - 2)
+    last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
+    single = rest | alone
+    gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
+    owner, place = ragged(np.where(single, 0, last - first + 1))
+    for start in range(0, owner.size, CHUNK):
+        own, panel = owner[start : start + CHUNK], (first[owner] + place)[start : start + CHUNK]
+        low, high = panels.edges[panel], panels.edges[panel + 1]
+        cuts = np.sort((np.stack([low, high]) - offset[own]) / slope[own], axis=0)
+        near, far = np.clip(cuts, lower[own], upper[own])
+        scale, shift = 2.0 * slope[own] / (high - low), (2.0 * offset[own] - low - high) / (high - low)
+        _add_moments(gathered, near, far, scale, shift, ray[own] * (len(panels.edges) - 1) + panel, panels.degree)
+    # rays with more hits than are followed leave together; a row of no width has one outgoing angle
+    angle = np.where(rest, np.where(pieces.mirrored, law.half_angle, np.pi - law.half_angle), offset + slope * lower)
+    share = np.where(alone, 1.0, SINE.mass(lower, upper))[single]
+    panel = np.clip(np.searchsorted(panels.edges, angle[single], side="right") - 1, 0, len(panels.edges) - 2)
+    low, high = panels.edges[panel], panels.edges[panel + 1]
+    local = np.polynomial.legendre.legvander((2.0 * angle[single] - low - high) / (high - low), panels.degree)
+    np.add.at(gathered, (slice(None), ray[single] * (len(panels.edges) - 1) + panel), (share[:, None] * local).T)
+    mass = np.where(alone, 1.0, SINE.mass(lower, upper))
+    total = np.bincount(ray, weights=mass, minlength=theta.size)
+    moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
+    left = np.bincount(ray, weights=np.where(rest, mass, 0.0), minlength=theta.size)
+    return panels.of_legendre(moments.transpose(1, 2, 0)), left / total * law.half_angle / most_hits**2
+
+
+def _add_moments(
+    gathered: Floats, near: Floats, far: Floats, scale: Floats, shift: Floats, cell: Floats, degree: int
+) -> None:
+    """Add the integrals of L_k(scale delta + shift) over (near, far), k = 0 ... degree, to the columns ``cell``."""
+    full = degree // 2 + 1 + SINE_NODES
+    short = np.abs(scale) * (far - near) <= 2.0 * SHORT_SHARE
+    for chosen, nodes in ((short, full // 2 + 1), (~short, full)):
+        if not chosen.any():
+            continue
+        delta, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(near[chosen], far[chosen], nodes))
+        weight = weight * SINE.density(delta)
+        local = scale[chosen, None] * delta + shift[chosen, None]
+        before, current = np.ones_like(local), local
+        for k in range(degree + 1):
+            moment = np.einsum("ij,ij->i", weight, before)
+            gathered[k] += np.bincount(cell[chosen], weights=moment, minlength=gathered.shape[1])
+            before, current = current, ((2 * k + 3) * local * current - (k + 1) * before) / (k + 2)

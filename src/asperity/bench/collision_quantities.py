@@ -1,0 +1,94 @@
+"""The collision of a disk: <v1, K v1>/<v1, v1> in the limit of small scale, and of the true disk at a scale."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import geometry as geo
+from ..checks import Floats
+from ..estimates import Estimate
+from ..kernels import CollisionLaw, Legendre
+from ..spectral import WorkMethod
+from .quantity import QUICK_RAYS, RAYS, Methods, Quantity
+from .routes import RANDOM_ORDER
+from .scenes import standard_names
+from .uniform_disk import DISK, SINE_MEAN, COSINE_MEAN, sampled_velocities, square_of_v1, velocity_share
+
+if TYPE_CHECKING:
+    from ..geometry import Wall
+
+# True disks at every scale: their noise is about 0.002.
+TRUE_DISKS = 2**18
+# The rigid tracer has no Bezier curves.
+DISK_SCENES = tuple(name for name in standard_names() if name != "mixed")
+
+
+def _collision_methods(wall: Wall) -> Methods:
+    by_tolerance = WorkMethod("auto", lambda budget: by_operator(wall, tolerance=1.0 / budget))
+    by_nets = WorkMethod("QMC operator", lambda n, rng: by_operator(wall, method="qmc", samples=n, rng=rng), True)
+    by_sampling = WorkMethod("sampled velocities", lambda n, rng: by_velocities(wall, n, rng), True, RANDOM_ORDER)
+    by_means = WorkMethod("means over outgoing angles", lambda n: by_action(wall, n))
+    return [
+        (by_tolerance, (1e2, 1e6), (1e2, 1e4, 1e6, 1e8)),
+        (by_nets, QUICK_RAYS, RAYS),
+        (by_sampling, QUICK_RAYS, RAYS),
+        (by_means, (8, 16), (8, 16, 32, 64, 128)),
+    ]
+
+
+def by_operator(wall: Wall, **how: Any) -> Estimate:
+    """From the matrix of K on polynomials of degree below 2 in either angle, which hold v1."""
+    operator = CollisionLaw.from_wall(wall, DISK).operator(Legendre(2), Legendre(2, weight="sin2"), **how)
+    along, roll = velocity_share()
+    # v1 in the orthonormal product basis: only the mean over psi of sin(psi) is not a polynomial, so split by hand
+    moment = operator.theta_matrix.symmetric[1, 1]
+    psi = operator.flip[1, 1]
+    plane, turn = along**2 * SINE_MEAN / 3.0, roll**2 * COSINE_MEAN
+    error = plane / (plane + turn) * operator.theta_matrix.error.value
+    value = (plane * moment + turn * psi) / (plane + turn)
+    return Estimate(value, error, operator.theta_matrix.error.kind, operator.theta_matrix.method)
+
+
+def by_velocities(wall: Wall, number: int, rng: np.random.Generator) -> float:
+    """Sampled in the original coordinates: incoming velocities from Lambda^2, one collision each."""
+    incoming = -sampled_velocities(number, rng)
+    outgoing = CollisionLaw.from_wall(wall, DISK).sample(incoming, rng)
+    return float(np.mean(-incoming[:, 0] * outgoing[:, 0]) / square_of_v1())
+
+
+def by_action(wall: Wall, nodes: int) -> float:
+    """From K v1 at Gauss nodes in cos(theta) and Gauss-Chebyshev nodes in psi."""
+    along, roll = velocity_share()
+    cosines, weights = np.polynomial.legendre.leggauss(nodes)
+    theta = np.arccos(cosines)[:, None]
+    psi = np.pi * np.arange(1, 5) / 5.0
+    psi_weights = np.sin(psi) ** 2 / np.sum(np.sin(psi) ** 2)
+
+    def v1(angle: Any, roll_angle: Any) -> Floats:
+        return np.asarray(along * np.cos(angle) * np.sin(roll_angle) + roll * np.cos(roll_angle))
+
+    image = CollisionLaw.from_wall(wall, DISK).apply(v1, theta, psi)
+    total = np.sum(0.5 * weights[:, None] * psi_weights * v1(theta, psi) * image)
+    return float(total) / square_of_v1()
+
+
+def _disk_methods(wall: Wall) -> Methods:
+    scales = (10.0, 100.0, 1000.0)
+    method = WorkMethod("true disk, budget 1/eps", lambda inverse, rng: by_true_disks(wall, 1.0 / inverse, rng), True)
+    return [(method, scales, (*scales, 1e4, 1e5))]
+
+
+def by_true_disks(wall: Wall, scale: float, rng: np.random.Generator) -> float:
+    """<v1, K v1>/<v1, v1> of the disk with satellites above a wall of this scale."""
+    incoming = -sampled_velocities(TRUE_DISKS, rng)
+    position = np.column_stack([scale * wall.period * rng.random(TRUE_DISKS), 2.0 * np.pi * rng.random(TRUE_DISKS)])
+    # the incoming velocities follow sin(theta), as the flux through x2 = 0 does
+    hit = geo.collide(DISK, wall, scale, position, incoming)
+    found = float(np.mean((-incoming[:, 0] * hit.velocity[:, 0])[hit.escaped]))
+    return found / square_of_v1()
+
+
+COLLISION = Quantity("collision", "<v1, K v1>/<v1, v1> of a uniform disk", _collision_methods, standard_names())
+TRUE_DISK = Quantity("disk", "that of the true disk at scale eps, against the limit", _disk_methods, DISK_SCENES)

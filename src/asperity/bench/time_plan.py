@@ -1,0 +1,43 @@
+"""A total time shared among parts that come one after the other, so that it is kept whatever the parts do."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+# A part may take so many times its equal share of what is left: the others rarely need all of theirs.
+GENEROSITY = 2.0
+
+
+@dataclass
+class TimePlan:
+    """Shares ``seconds``, counted from its making, among ``parts``.
+
+    Whatever every part takes, if none takes more than its share the sum is at most ``seconds``: a share is never more
+    than what is left, and what a part leaves the later ones have.
+
+    Examples
+    --------
+    >>> plan = TimePlan(10.0, 2)
+    >>> round(plan.next_share())
+    10
+    """
+
+    seconds: float
+    parts: int
+    _begun: float = field(default_factory=time.monotonic, init=False)
+    _left: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._left = self.parts
+
+    @property
+    def remaining(self) -> float:
+        """Seconds that are left, at least 0."""
+        return max(self.seconds - (time.monotonic() - self._begun), 0.0)
+
+    def next_share(self) -> float:
+        """Seconds that the next part may take."""
+        share = min(GENEROSITY / max(self._left, 1), 1.0) * self.remaining
+        self._left -= 1
+        return share
