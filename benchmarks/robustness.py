@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,7 +108,7 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats) -> Verdict:
     other = np.flatnonzero(~same)
     # lost: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
     lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == LOST)
-    explained = _explained(wall, x[other], theta[other])
+    explained = _explained(wall, _part(traced, other), x[other], theta[other])
     for k in np.flatnonzero(~explained & (twin.status[other] == UNSETTLED)):
         explained[k] = _is_precise(wall, traced, other[k], float(x[other[k]]), float(theta[other[k]]))
     worst = float(distance[same].max(initial=0.0))
@@ -117,6 +116,19 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats) -> Verdict:
         len(x), int(lost.sum()), int(flagged.sum()), int(explained.sum()), int((~explained).sum()), worst,
         tuple(zip(x[other].tolist(), theta[other].tolist(), strict=True)),
     )  # fmt: skip
+
+
+def measure_robustness(rays: int) -> dict[str, Verdict]:
+    """Rays of each kind, shared among the walls, and what became of them all."""
+    rng = np.random.default_rng(0)
+    found = {}
+    for kind, make in KINDS.items():
+        each = [judge(wall, *make(wall, -(-rays // len(WALLS)), rng)) for wall in WALLS.values()]
+        numbers = (
+            sum(getattr(one, what) for one in each) for what in ("rays", "lost", "flagged", "conditioned", "wrong")
+        )
+        found[kind] = Verdict(*numbers, max(one.worst for one in each), ())
+    return found
 
 
 def wrong_twins(wall: geo.Wall, x: Floats, theta: Floats) -> int:
@@ -154,20 +166,23 @@ def _agree(traced: geo.Trace, twin: RefinedTrace) -> tuple[NDArray[np.bool_], Fl
     return near | limited | ((traced.status == twin.status) & ~gone), distance
 
 
-def _explained(wall: geo.Wall, x: Floats, theta: Floats) -> NDArray[np.bool_]:
+def _explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats) -> NDArray[np.bool_]:
     """Which rays the twin takes where the tracer took them, once moved by a few ulps of the cell or of the angle."""
     result = np.zeros(len(x), np.bool_)
-    if len(x) == 0:
-        return result
-    traced = geo.trace(wall, x, theta, max_collisions=COLLISIONS)
-    move: Callable[[float, float], tuple[Floats, Floats]] = lambda dx, dt: (  # noqa: E731
-        x + dx * EPS * wall.period, np.clip(theta + dt * EPS, 0.5 * theta, 0.5 * (theta + math.pi)),
-    )  # fmt: skip
     ulps = [sign * 2.0**k for k in range(-2, int(math.log2(CONDITION_ULPS)) + 1) for sign in (-1.0, 1.0)]
-    for step in ulps:
-        for moved in (move(step, 0.0), move(0.0, step), move(step, step), move(step, -step)):
-            result |= _agree(traced, refined_trace(wall.scene, *moved, COLLISIONS))[0]
+    moves = [move for ulp in ulps for move in ((ulp, 0.0), (0.0, ulp), (ulp, ulp), (ulp, -ulp))]
+    for dx, dt in moves:
+        rest = np.flatnonzero(~result)
+        if not len(rest):
+            break
+        place, angle = x[rest] + dx * EPS * wall.period, theta[rest]
+        angle = np.clip(angle + dt * EPS, 0.5 * angle, 0.5 * (angle + math.pi))
+        result[rest] = _agree(_part(traced, rest), refined_trace(wall.scene, place, angle, COLLISIONS))[0]
     return result
+
+
+def _part(traced: geo.Trace, rays: NDArray[np.int64]) -> geo.Trace:
+    return geo.Trace(traced.x[rays], traced.theta[rays], traced.collisions[rays], traced.status[rays])
 
 
 def _edges(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -184,6 +199,9 @@ def _edges(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats
     return x, low
 
 
+KINDS = {"corners": aimed_rays, "grazing": grazing_rays}
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.robustness", description=__doc__)
@@ -198,7 +216,7 @@ def main() -> None:
     print("|" + "---|" * 10)
     rng = np.random.default_rng(0)
     for name, wall in WALLS.items():
-        for kind, make in (("corners", aimed_rays), ("grazing", grazing_rays)):
+        for kind, make in KINDS.items():
             x, theta = make(wall, rays, rng)
             v = judge(wall, x, theta)
             sample = np.column_stack([x, theta])[:: -(-rays // max(1, precise))]

@@ -6,8 +6,12 @@ from asperity.spectral import Machine
 
 from .goals import all_goals, goal_table
 from .laws import LawTime, measure_laws
+from .memory import measure_memory
 from .metastable import metastable_table
+from .profiles import profile_tables
 from .rigid import speed_table
+from .robustness import RAYS as AIMED_RAYS
+from .robustness import measure_robustness
 from .runs import RunTime, measure_runs
 from .start import measure_start
 from .throughput import RAYS, Throughput, measure_throughput
@@ -18,13 +22,15 @@ def speed_and_goals(quick: bool) -> str:
     """The machine, the goals, and the tables."""
     throughput = measure_throughput(RAYS // 16 if quick else RAYS)
     laws, runs, start = measure_laws(), measure_runs(), measure_start()
-    goals = goal_table(all_goals(throughput, laws, runs, start))
+    robustness = measure_robustness(AIMED_RAYS // 50 if quick else AIMED_RAYS)
+    goals = goal_table(all_goals(throughput, laws, runs, start, robustness, measure_memory()))
     starts = ["| start | seconds |", "|---|---|", *(f"| {what} | {least:.2f} |" for what, least in start.items())]
     tables = (
         _throughput_table(throughput), _laws_table(laws), _runs_table(runs), speed_table(), metastable_table(),
         transport_table(), starts,
     )  # fmt: skip
-    head = [f"Machine: {Machine.here()}.", "", "## Goals", "", *goals, "", "## Speed"]
+    head = [f"Machine: {Machine.here()}.", "", "## Goals", "", *goals]
+    head += ["", "### What holds back those that are not met", "", *profile_tables(), "", "## Speed"]
     return "\n".join(head + [line for table in tables for line in ("", *table)])
 
 

@@ -170,7 +170,8 @@ def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray
         panel, values = basis.local(nodes)
         cell = np.repeat(np.arange(rows), np.diff(starts)) * (size // (basis.degree + 1)) + panel
         columns = [
-            np.bincount(cell, weights=weights * value, minlength=rows * size // (basis.degree + 1)) for value in values.T
+            np.bincount(cell, weights=weights * value, minlength=rows * size // (basis.degree + 1))
+            for value in values.T
         ]
         return np.stack(columns, axis=1).reshape(rows, size)
     found = np.empty((rows, size))

@@ -87,9 +87,7 @@ def adapted_trials(law: Law, k: int, tolerance: float, extra: int = 2) -> Trials
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
     chosen = np.append(0, first)
     whole = level.extended(vectors, parity)
-    return Trials(
-        level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:], mirrored, tuple(history)
-    )
+    return Trials(level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:], mirrored, tuple(history))
 
 
 class _Level:

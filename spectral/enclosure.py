@@ -165,9 +165,7 @@ def enclosures(
             law, trials.basis, trials.vectors, trials.values, MOST_ADAPTED_ROWS,
             mirrored=trials.mirrored, quotient_error=TRIAL_SHARE * tolerance,
         )  # fmt: skip
-        after = residuals(
-            law, trials.basis, trials.following, trials.following_values, 0, mirrored=trials.mirrored
-        )
+        after = residuals(law, trials.basis, trials.following, trials.following_values, 0, mirrored=trials.mirrored)
         basis, values, next_value = trials.basis, trials.values, _reach(after)
     else:
         if basis is None:
