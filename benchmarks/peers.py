@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
-import venv
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +13,16 @@ import numpy as np
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.bench.timing import least_time
 
 WORKER = Path(__file__).with_name("peer_worker.py")
-# name in `peer_worker` and requirements
-TRACERS = {"embree": ("embreex",), "mitsuba": ("mitsuba",), "billiards": ("billiards",)}
-CHAINS = {"deeptime": ("deeptime",), "pydtmc": ("PyDTMC",)}
-INSTALL_SECONDS, RUN_SECONDS = 600.0, 120.0
+# name in `peer_worker`, what it computes with, and requirements
+TRACERS = {"embree": ("single", "embreex"), "mitsuba": ("single", "mitsuba"), "billiards": ("double", "billiards")}
+CHAINS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
+# All of them together must end within the time of their section.
+MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS = 60.0, 120.0, 60.0
+# Without an index pip should say so soon.
+PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
 RAYS, REPEATS, ANGLE = 2**17, 3, 0.7
 # Maxwell's law in bins: a gap that any solver finds, and one that only a careful one tells from 0.
 BINS, GAPS = 256, (0.5, 1e-9)
@@ -28,47 +30,84 @@ BINS, GAPS = 256, (0.5, 1e-9)
 
 def peer_table(folder: Path) -> str:
     """Rays and spectra by the peers and by asperity, as Markdown."""
+    peers = PeerEnvironment(folder / "environment")
     folder.mkdir(parents=True, exist_ok=True)
-    python = _environment(folder / "environment")
-    return "\n".join([*_tracers(folder, python), "", *_chains(folder, python)])
+    return "\n".join([*_tracers(folder, peers), "", *_chains(folder, peers)])
 
 
-def _tracers(folder: Path, python: Path) -> list[str]:
+class PeerEnvironment:
+    """The peers' own Python, made in a folder by the first that asks for it; each package is installed once.
+
+    Parameters
+    ----------
+    folder : Path
+        An environment that an earlier run left there is used again.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
+        self._folder = folder
+        self._refusals: dict[str, str] = {}
+
+    def run(self, peer: str, package: str, data: Path) -> dict[str, Any] | str:
+        """What the peer's function in `peer_worker` gives for the data; or in words why it gives nothing."""
+        if package not in self._refusals:
+            self._refusals[package] = self._make() or self._install(package)
+        if self._refusals[package]:
+            return self._refusals[package]
+        output, refusal = _output([str(self.python), str(WORKER), peer, str(data)], RUN_SECONDS)
+        if refusal:
+            return f"fails: {refusal}"
+        answer: dict[str, Any] = json.loads(output.splitlines()[-1])
+        return answer
+
+    def _make(self) -> str:
+        if self.python.exists() and not _output([str(self.python), "-m", "pip", "--version"], RUN_SECONDS)[1]:
+            return ""
+        _, refusal = _output([sys.executable, "-m", "venv", "--clear", str(self._folder)], MAKE_SECONDS)
+        return f"no environment: {refusal}" if refusal else ""
+
+    def _install(self, package: str) -> str:
+        command = [str(self.python), "-m", "pip", "install", *PIP, "numpy", package]
+        _, refusal = _output(command, INSTALL_SECONDS)
+        return f"cannot be installed: {refusal}" if refusal else ""
+
+
+def _tracers(folder: Path, peers: PeerEnvironment) -> list[str]:
     wall, rng = geo.triangular_teeth(ANGLE), np.random.default_rng(0)
     x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
-    best = np.inf
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        traced = geo.trace(wall, x, theta, threads=1)
-        best = min(best, time.perf_counter() - start)
+    traced, seconds = least_time(lambda: geo.trace(wall, x, theta, threads=1), REPEATS)
+    rate = RAYS / seconds
     data = folder / "rays.npz"
     np.savez(data, corners=wall.vertices, x=x, theta=theta, out=traced.theta)
     lines = [
-        "| tracer of triangular teeth | version | million rays/s | wrong | lost |", "|---|---|---|---|---|",
-        f"| asperity, one thread | - | {RAYS / best / 1e6:.3g} | reference | {float(np.mean(~traced.escaped)):.1e} |",
-    ]  # fmt: skip
-    for peer, packages in TRACERS.items():
-        found = _run(python, peer, packages, data)
+        "| tracer of triangular teeth | version | precision | million rays/s | asperity is faster by | wrong | lost |",
+        "|---|---|---|---|---|---|---|",
+        f"| asperity, one thread | - | double | {rate / 1e6:.3g} | - | reference "
+        f"| {float(np.mean(~traced.escaped)):.1e} |",
+    ]
+    for peer, (precision, package) in TRACERS.items():
+        found = peers.run(peer, package, data)
         if isinstance(found, str):
-            lines.append(f"| {peer} | - | {found} | - | - |")
+            lines.append(f"| {peer} | - | {precision} | {found} | - | - | - |")
         else:
-            rates = f"{found['rate'] / 1e6:.3g} | {found['wrong']:.1e} | {found['lost']:.1e}"
-            lines.append(f"| {peer} | {found['version']} | {rates} |")
+            speed = f"{found['rate'] / 1e6:.3g} | {rate / found['rate']:.3g}"
+            lines.append(
+                f"| {peer} | {found['version']} | {precision} | {speed} | {found['wrong']:.1e} | {found['lost']:.1e} |"
+            )
     return lines
 
 
-def _chains(folder: Path, python: Path) -> list[str]:
+def _chains(folder: Path, peers: PeerEnvironment) -> list[str]:
     lines = ["| gap of a chain | version | right | found | relative error | seconds |", "|---|---|---|---|---|---|"]
     for gap in GAPS:
         matrix = ker.discretise(ker.maxwell(gap), ker.Bins(BINS))
-        start = time.perf_counter()
-        found = spec.spectrum(matrix, k=2).gap
-        seconds = time.perf_counter() - start
+        found, seconds = least_time(lambda matrix=matrix: spec.spectrum(matrix, k=2).gap, REPEATS)
         lines.append(f"| asperity | - | {gap:g} | {found:.6g} | {abs(found / gap - 1.0):.1e} | {seconds:.2g} |")
         data = folder / "chain.npz"
         np.savez(data, matrix=matrix.array, gap=gap)
-        for peer, packages in CHAINS.items():
-            answer = _run(python, peer, packages, data)
+        for peer, package in CHAINS.items():
+            answer = peers.run(peer, package, data)
             if isinstance(answer, str):
                 lines.append(f"| {peer} | - | {gap:g} | {answer} | - | - |")
             else:
@@ -78,29 +117,15 @@ def _chains(folder: Path, python: Path) -> list[str]:
     return lines
 
 
-def _environment(folder: Path) -> Path:
-    """The interpreter of an environment that is made if it is not there."""
-    python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-    if not python.exists():
-        venv.create(folder, with_pip=True)
-    return python
-
-
-def _run(python: Path, peer: str, packages: tuple[str, ...], data: Path) -> dict[str, Any] | str:
-    """What the peer printed; or in words why it did not."""
+def _output(command: list[str], seconds: float) -> tuple[str, str]:
+    """What a command prints, and in words why it failed, or nothing."""
     try:
-        install = [str(python), "-m", "pip", "install", "--quiet", "numpy", *packages]
-        done = subprocess.run(install, capture_output=True, text=True, timeout=INSTALL_SECONDS, check=False)
-        if done.returncode:
-            return f"cannot be installed: {_last_line(done.stderr)}"
-        command = [str(python), str(WORKER), peer, str(data)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=RUN_SECONDS, check=False)
-    except subprocess.TimeoutExpired as reason:
-        return f"ended after {reason.timeout:g} s"
-    if done.returncode:
-        return f"fails: {_last_line(done.stderr)}"
-    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
-    return answer
+        done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
+    except subprocess.TimeoutExpired:
+        return "", f"ended after {seconds:g} s"
+    except OSError as reason:
+        return "", str(reason)
+    return done.stdout, _last_line(done.stderr or done.stdout) if done.returncode else ""
 
 
 def _last_line(text: str) -> str:
