@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,8 @@ WORKER = Path(__file__).with_name("peer_worker.py")
 # name in `peer_worker`, what it computes with, and requirements
 TRACERS = {"embree": ("single", "embreex"), "mitsuba": ("single", "mitsuba"), "billiards": ("double", "billiards")}
 CHAINS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
-# All of them together must end within the time of their section.
-MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS = 60.0, 120.0, 60.0
+# Limits of single commands, and of all of them together, which end before their section does.
+MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 270.0
 # Without an index pip should say so soon.
 PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
 RAYS, REPEATS, ANGLE = 2**17, 3, 0.7
@@ -46,7 +47,7 @@ class PeerEnvironment:
 
     def __init__(self, folder: Path) -> None:
         self.python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-        self._folder = folder
+        self._folder, self._end = folder, time.monotonic() + ALL_SECONDS
         self._refusals: dict[str, str] = {}
 
     def run(self, peer: str, package: str, data: Path) -> dict[str, Any] | str:
@@ -55,22 +56,35 @@ class PeerEnvironment:
             self._refusals[package] = self._make() or self._install(package)
         if self._refusals[package]:
             return self._refusals[package]
-        output, refusal = _output([str(self.python), str(WORKER), peer, str(data)], RUN_SECONDS)
+        output, refusal = self._output([str(self.python), str(WORKER), peer, str(data)], RUN_SECONDS)
         if refusal:
             return f"fails: {refusal}"
         answer: dict[str, Any] = json.loads(output.splitlines()[-1])
         return answer
 
     def _make(self) -> str:
-        if self.python.exists() and not _output([str(self.python), "-m", "pip", "--version"], RUN_SECONDS)[1]:
+        if self.python.exists() and not self._output([str(self.python), "-m", "pip", "--version"], RUN_SECONDS)[1]:
             return ""
-        _, refusal = _output([sys.executable, "-m", "venv", "--clear", str(self._folder)], MAKE_SECONDS)
+        _, refusal = self._output([sys.executable, "-m", "venv", "--clear", str(self._folder)], MAKE_SECONDS)
         return f"no environment: {refusal}" if refusal else ""
 
     def _install(self, package: str) -> str:
         command = [str(self.python), "-m", "pip", "install", *PIP, "numpy", package]
-        _, refusal = _output(command, INSTALL_SECONDS)
+        _, refusal = self._output(command, INSTALL_SECONDS)
         return f"cannot be installed: {refusal}" if refusal else ""
+
+    def _output(self, command: list[str], seconds: float) -> tuple[str, str]:
+        """What a command prints, and in words why it failed, or nothing."""
+        limit = min(seconds, self._end - time.monotonic())
+        if limit <= 0.0:
+            return "", "the peers' time was up"
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=limit, check=False)
+        except subprocess.TimeoutExpired:
+            return "", f"ended after {limit:.0f} s"
+        except OSError as reason:
+            return "", str(reason)
+        return done.stdout, _last_line(done.stderr or done.stdout) if done.returncode else ""
 
 
 def _tracers(folder: Path, peers: PeerEnvironment) -> list[str]:
@@ -115,17 +129,6 @@ def _chains(folder: Path, peers: PeerEnvironment) -> list[str]:
                 figures = "none | -" if value is None else f"{value:.6g} | {abs(value / gap - 1.0):.1e}"
                 lines.append(f"| {peer} | {answer['version']} | {gap:g} | {figures} | {answer['seconds']:.2g} |")
     return lines
-
-
-def _output(command: list[str], seconds: float) -> tuple[str, str]:
-    """What a command prints, and in words why it failed, or nothing."""
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
-    except subprocess.TimeoutExpired:
-        return "", f"ended after {seconds:g} s"
-    except OSError as reason:
-        return "", str(reason)
-    return done.stdout, _last_line(done.stderr or done.stdout) if done.returncode else ""
 
 
 def _last_line(text: str) -> str:

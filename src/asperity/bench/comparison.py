@@ -10,8 +10,9 @@ from ..errors import InputError
 from ..spectral import WorkReport, WorkRow
 from .bench_run import BenchRun
 
-# A row is slower only if chance would show it once in so many rows, and by more than machines drift in a day.
-SIGNIFICANT, DRIFT = 0.01, 1.25
+# A row is slower only if chance would show it in less than this share of the rows, and by more than machines drift in a
+# day. Four repeats that are all slower than four others, the fewest that are run, have the p-value 1/70.
+SIGNIFICANT, DRIFT = 0.02, 1.25
 # An error that grew by less than this is that of another rounding or another sample.
 GREW = 2.0
 
@@ -27,7 +28,7 @@ class RowChange:
     time_ratio : float
         Least time now over least time before.
     p_value : float
-        Of the times being alike, by the Mann-Whitney test.
+        Of the times being alike, against their being longer (or shorter, as the ratio is), by the Mann-Whitney test.
     error_ratio : float
         Error now over error before, both at least what their reference can tell.
     status : str
@@ -119,7 +120,8 @@ def _change(report: WorkReport, row: WorkRow, old_report: WorkReport, old: WorkR
         return RowChange(report.problem, row.method, row.budget, 1.0, 1.0, 1.0, f"{row.status}: {row.note}")
     from scipy.stats import mannwhitneyu
 
-    p_value = float(mannwhitneyu(row.seconds, old.seconds, alternative="two-sided", method="exact").pvalue)
+    side = "greater" if row.least > old.least else "less"
+    p_value = float(mannwhitneyu(row.seconds, old.seconds, alternative=side, method="exact").pvalue)
     floor = max(facts.floor for facts in (report.methods[row.method], old_report.methods[row.method]))
     errors = [max(one.error(what), floor) for one, what in ((report, row), (old_report, old))]
     # a random error is known to its own spread only: a factor more for few repeats
