@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -104,7 +105,7 @@ def margin_below(matrix: Deflated, sign: float, vectors: Floats, values: Floats,
     if failed:
         return None
     terms = (size + PIVOT_ROUNDINGS) * UNIT_ROUNDOFF
-    (norm,) = get_lapack_funcs(("lange",), (factor,))
+    norm: Any = get_lapack_funcs("lange", (factor,))
     one_norm, largest_row = norm("1", factor), norm("I", factor)
     # | |S| | <= |S|_F; a rank one update has the norm of its vectors
     parts = float(np.linalg.norm(matrix.array)) + abs(threshold) + float(np.sum(moved**2))
