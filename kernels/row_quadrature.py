@@ -254,9 +254,7 @@ class _Integrator:
             rows = self.rows(panels.angle[panel[few], node[few]], tolerance[panel[few]])
             self.rays += rows.rays
             self.row_count += len(rows.theta)
-            panels.image[panel[few], node[few]] = means_of_basis(
-                self.basis, rows.nodes, rows.weights, rows.starts
-            )
+            panels.image[panel[few], node[few]] = means_of_basis(self.basis, rows.nodes, rows.weights, rows.starts)
             panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)
         touched = np.unique(panel)
         panels.error[touched] = panels.kept(touched).differences(self.basis)
