@@ -51,9 +51,7 @@ def tooth_row(theta: float, psi: float) -> Atoms:
     """Triangular teeth: between the values of X at which the number of hits changes all rays leave alike."""
     here, there = np.cos(theta - 0.5 * psi), np.cos(theta + 0.5 * psi)
     hits = np.arange(-1.0, np.ceil(2.0 * np.pi / psi) + 2.0)
-    cuts = np.concatenate(
-        [np.cos((hits + 0.5) * psi - theta), -np.cos((hits + 0.5) * psi - np.pi + theta), [0.0]]
-    )
+    cuts = np.concatenate([np.cos((hits + 0.5) * psi - theta), -np.cos((hits + 0.5) * psi - np.pi + theta), [0.0]])
     x = np.unique(np.concatenate([[0.0, 1.0], np.clip((cuts - here) / (there - here), 0.0, 1.0)]))
     middle = 0.5 * (x[1:] + x[:-1])
     c = (1.0 - middle) * here + middle * there

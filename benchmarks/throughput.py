@@ -48,9 +48,7 @@ def measure_throughput(rays: int = RAYS, repeats: int = REPEATS) -> list[Through
         _, two = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=2), repeats)
         lines = sum(isinstance(piece, geo.Segment) for piece in wall.pieces)
         flops = BOUNCE_FLOPS + LINE_FLOPS * lines + ARC_FLOPS * (len(wall.pieces) - lines)
-        rows.append(
-            Throughput(name, bounces / rays, bounces / one, bounces / two, peak / flops)
-        )
+        rows.append(Throughput(name, bounces / rays, bounces / one, bounces / two, peak / flops))
     return rows
 
 

@@ -65,7 +65,9 @@ def problem_names(patterns: Sequence[str] = ()) -> list[str]:
 
     A pattern is a name with wildcards, or a scene or a quantity alone.
     """
-    standard = [f"{scene}/{one.name}" for scene in standard_names() for one in QUANTITIES.values() if scene in one.scenes]
+    standard = [
+        f"{scene}/{one.name}" for scene in standard_names() for one in QUANTITIES.values() if scene in one.scenes
+    ]
     random = [f"{scene}/{RANDOM_QUANTITY}" for scene in scenes() if scene not in standard_names()]
     if not patterns:
         return standard
