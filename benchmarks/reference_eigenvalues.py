@@ -71,7 +71,9 @@ def _of_mushroom(wall: geo.Wall) -> Found:
         for angle in GRAZING_ANGLES
     ]
     source = f"grazing rays at {', '.join(f'{angle:g}' for angle in GRAZING_ANGLES)}: the essential spectrum's edge"
-    return Found(np.asarray(np.mean(ratios)), float(np.ptp(ratios)), f"{source}; nothing seen beyond, without proof")
+    return Found(
+        np.asarray(np.mean(ratios)), 4.0 * float(np.ptp(ratios)), f"{source}; nothing seen beyond, without proof"
+    )
 
 
 def _jackknifed(nets: list[Floats], constant: Floats) -> tuple[float, float]:

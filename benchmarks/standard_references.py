@@ -19,12 +19,11 @@ import numpy as np
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity import spectral as spec
 from asperity.bench.known_references import FILE
 from asperity.bench.matrix_quantities import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
-from asperity.bench.uniform_disk import DISK, correlation_of
-from asperity.bench.scenes import RANDOM_WALLS, standard_names, wall_of
+from asperity.bench.scenes import RANDOM_WALLS, wall_of
 from asperity.bench.standard_set import problem_names
+from asperity.bench.uniform_disk import DISK, correlation_of
 from asperity.checks import Floats
 from asperity.kernels.row_quadrature import row_matrix
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from typing import Any
 
 from .scene import Scene
 
@@ -38,7 +39,8 @@ def without_grid(scene: Scene) -> Scene:
 
 def without_formulas(scene: Scene) -> Scene:
     """Without closed forms of whole hollows, where the scene has such a table: every flight is followed."""
-    return replace(scene, closed=None) if has_formulas(scene) else scene
+    none: dict[str, Any] = {"closed": None}
+    return replace(scene, **none) if has_formulas(scene) else scene
 
 
 def has_formulas(scene: Scene) -> bool:

@@ -10,6 +10,8 @@ import time
 
 import numpy as np
 import pytest
+from benchmarks.__main__ import begin_or_go_on
+from benchmarks.sections import SECTIONS, section_text
 from click.testing import CliRunner
 
 from asperity import geometry as geo
@@ -24,13 +26,11 @@ from asperity.bench.extreme_row import ExtremeRow
 from asperity.bench.known_references import known_reference
 from asperity.bench.matrix_quantities import LAW_BASIS, resistance_of
 from asperity.bench.scenes import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
+from asperity.bench.spectral_quantities import eta_at
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
 from asperity.bench.time_plan import TimePlan
 from asperity.bench.timing import side_by_side
 from asperity.cli import main
-from benchmarks.__main__ import begin_or_go_on
-from benchmarks.sections import SECTIONS, section_text
-from asperity.bench.spectral_quantities import eta_at
 from asperity.errors import InputError
 from asperity.kernels.directions import Directions
 
