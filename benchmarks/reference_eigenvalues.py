@@ -70,10 +70,9 @@ def _of_mushroom(wall: geo.Wall) -> Found:
         float(np.mean(np.sin(angle) / np.sin(law.respond(entry, np.full_like(entry, angle)))))
         for angle in GRAZING_ANGLES
     ]
-    source = f"grazing rays at {', '.join(f'{angle:g}' for angle in GRAZING_ANGLES)}: the essential spectrum's edge"
-    return Found(
-        np.asarray(np.mean(ratios)), 4.0 * float(np.ptp(ratios)), f"{source}; nothing seen beyond, without proof"
-    )
+    angles = ", ".join(f"{angle:g}" for angle in GRAZING_ANGLES)
+    source = f"edge of the essential spectrum, from rays at the angles {angles}; nothing seen beyond, without proof"
+    return Found(np.asarray(np.mean(ratios)), 4.0 * float(np.ptp(ratios)), source)
 
 
 def _jackknifed(nets: list[Floats], constant: Floats) -> tuple[float, float]:

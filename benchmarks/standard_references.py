@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -82,7 +83,7 @@ def law_of_rows(row: Row, tolerance: float) -> Found:
     """The law in bins of a mirror-symmetric law with rows by formula, by adaptive Gauss-Kronrod in theta."""
     bins = LAW_BASIS.size
     edges, half, fluxes, doubts = np.sort(np.arccos(np.linspace(-1.0, 1.0, bins + 1))), bins // 2, [], []
-    for low, high in zip(edges[:half], edges[1 : half + 1], strict=True):
+    for low, high in pairwise(edges[: half + 1]):
         flux, doubt = mean_over_angles(lambda theta: np.diff(row(theta).distribution(edges)), low, high, tolerance)
         fluxes.append(flux)
         doubts.append(doubt)

@@ -225,7 +225,8 @@ def _half(name: str, wall: Wall) -> Saving:
     of the others interpolated between their tolerances in the logarithms.
     """
     halved, whole = ([_rows(one, tolerance) for tolerance in ROW_TOLERANCES] for one in (wall, WithoutMirror(wall)))
-    log_error, log_time = (np.log([row[k] for row in whole]) for k in (1, 2))
+    errors, rays = (np.array([row[k] for row in whole], dtype=np.float64) for k in (1, 2))
+    log_error, log_time = (np.log(part) for part in (errors, rays))
     slope, shift = np.polyfit(log_error, log_time, 1)
     others = [float(np.exp(slope * np.log(row[1]) + shift)) for row in halved]
     ratios = [other / row[2] for other, row in zip(others, halved, strict=True)]
