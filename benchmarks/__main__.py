@@ -38,7 +38,7 @@ def main() -> None:
         return
     flags = [f"--{name}" for name in ("quick", "peers", "write") if getattr(options, name)]
     command = " ".join(["python -m benchmarks", *flags])
-    _begin_or_go_on(options.out, options.quick)
+    begin_or_go_on(options.out, options.quick)
     texts = {
         section.name: (section.title, section_text(section, options.quick, options.out))
         for section in SECTIONS
@@ -61,7 +61,7 @@ def main() -> None:
     (options.out / RUN).unlink()
 
 
-def _begin_or_go_on(folder: Path, quick: bool) -> None:
+def begin_or_go_on(folder: Path, quick: bool) -> None:
     """Keep what an interrupted run with the same options left, and nothing else."""
     this = {"quick": quick, "version": __version__}
     mark = folder / RUN

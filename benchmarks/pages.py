@@ -6,7 +6,6 @@ import shutil
 from pathlib import Path
 
 from asperity.bench.bench_run import BenchRun
-from asperity.bench.standard_set import file_stem
 
 DOCS = Path(__file__).parents[1] / "docs"
 BENCHMARKS, STABILITY, PICTURES = DOCS / "benchmarks.md", DOCS / "stability.md", DOCS / "benchmark-pictures"
@@ -20,12 +19,14 @@ def write_between_marks(page: Path, text: str) -> None:
 
 
 def pictures(run: BenchRun, folder: Path) -> list[str]:
-    """Copy the pictures of a saved run into the documentation; the Markdown lines that show them."""
+    """Put the pictures of a saved run into the documentation instead of those there; the lines that show them."""
     PICTURES.mkdir(exist_ok=True)
+    for old in PICTURES.glob("*.png"):
+        old.unlink()
     lines = []
-    for report in run.reports:
-        name = f"{file_stem(report.problem)}.png"
+    for scene in run.by_scene():
+        name = f"{scene}.png"
         if (folder / name).exists():
             shutil.copyfile(folder / name, PICTURES / name)
-            lines += [f"![Error against run time: {report.problem}](benchmark-pictures/{name})", ""]
+            lines.append(f"![Error against run time: {scene}](benchmark-pictures/{name})")
     return lines

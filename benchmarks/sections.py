@@ -1,4 +1,4 @@
-"""The parts of the whole benchmark: each runs in a process of its own, within its time, and leaves its text in a file."""
+"""The parts of the whole benchmark: each in a process of its own and within its time, its text kept in a file."""
 
 from __future__ import annotations
 

@@ -12,28 +12,26 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
-from scipy.stats.qmc import Sobol
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity import spectral as spec
 from asperity.bench.known_references import FILE
 from asperity.bench.matrix_quantities import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
-from asperity.bench.uniform_disk import DISK, correlation_of
-from asperity.bench.scenes import RANDOM_WALLS, standard_names, wall_of
+from asperity.bench.scenes import RANDOM_WALLS, wall_of
 from asperity.bench.standard_set import problem_names
+from asperity.bench.uniform_disk import DISK, correlation_of
 from asperity.checks import Floats
-from asperity.kernels.counting import count_pairs, sum_products
 from asperity.kernels.row_quadrature import row_matrix
 
 from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
+from .reference_eigenvalues import reference_eigenvalue
+from .reference_rays import NETS, Found, mean_and_error, sampled_sums
 
-NETS, CHUNK, SEED = 16, 2**18, 20261121
 # Rays of the sampled references: of scenes, and of random walls, which only have a moment.
 RAYS, RANDOM_RAYS = 2**25, 2**23
 BASES = {"law": LAW_BASIS, "moment": MOMENT_BASIS, "resistance": RESISTANCE_BASIS}
@@ -47,56 +45,16 @@ ROWS = {
     "focusing-arc": partial(ArcRow.of, xi=1.2),
 }
 ROWS_BY_FORMULA = "rows by formula and Gauss-Kronrod in theta"
-# Largest eigenvalue off the constants, of a program of its own, not this library, and how far it knows it.
-ARC_LAMBDA2, ARC_ERROR = 0.3670253152, 3e-10
 # Rows of atoms jump from bin to bin, and those of crevices have kinks without end at grazing: they confirm no further.
-ROW_TOLERANCES = {"triangular-teeth": 1e-8, "rectangular-teeth": 1e-5, "focusing-arc": 1e-13}
+ARC_TOLERANCE, TRIANGULAR_TOLERANCE, RECTANGULAR_TOLERANCE = 1e-13, 1e-8, 1e-5
 
 
-@dataclass(frozen=True)
-class Found:
-    """A value, its error and where it comes from."""
-
-    value: Floats
-    error: float
-    source: str
-
-
-def rays_of(wall: geo.Wall, number: int, net: int) -> Iterator[tuple[Floats, Floats]]:
-    """Incoming and outgoing angles of one scrambled net, in chunks."""
-    law, engine = ker.WallLaw(wall), Sobol(2, scramble=True, bits=52, rng=np.random.default_rng([SEED, net]))
-    tiny, below_one = np.finfo(float).tiny, np.nextafter(1.0, 0.0)
-    for start in range(0, number, CHUNK):
-        points = engine.random(min(CHUNK, number - start)).clip(tiny, below_one)
-        theta = np.arccos(1.0 - 2.0 * points[:, 1]).clip(1e-9, np.pi - 1e-9)
-        yield theta, law.respond(points[:, 0], theta)
-
-
-def sampled(wall: geo.Wall, bases: dict[str, ker.Basis], rays: int) -> dict[str, list[Floats]]:
-    """Symmetrised means of e_i(theta) e_j(theta') for every net and basis."""
-    nets: dict[str, list[Floats]] = {name: [] for name in bases}
-    for net in range(NETS):
-        sums = {name: np.zeros((basis.size, basis.size)) for name, basis in bases.items()}
-        for theta, out in rays_of(wall, rays // NETS, net):
-            for name, basis in bases.items():
-                if basis.is_partition:
-                    sums[name] += count_pairs(basis, theta, out) * np.outer(basis.heights, basis.heights)
-                else:
-                    sums[name] += sum_products(basis, theta, out)
-        for name, total in sums.items():
-            nets[name].append((total + total.T) * (0.5 * NETS / rays))
-    return nets
-
-
-def mean_and_error(values: list[Floats]) -> tuple[Floats, float]:
-    """Mean of the nets, and the Frobenius norm of its standard errors."""
-    table = np.asarray(values)
-    return table.mean(axis=0), float(np.sqrt(np.sum(table.var(axis=0, ddof=1)) / len(table)))
+Row = Callable[[float], Atoms | ArcRow]
 
 
 def sampled_matrices(wall: geo.Wall, names: tuple[str, ...], rays: int) -> dict[str, Found]:
     """Matrices by sampling."""
-    nets = sampled(wall, {name: BASES[name] for name in names}, rays)
+    nets = sampled_sums(wall, {name: BASES[name] for name in names}, rays)
     source = f"{rays} rays of {NETS} scrambled Sobol sequences of their own, by their spread"
     return {name: Found(*mean_and_error(values), source) for name, values in nets.items()}
 
@@ -121,17 +79,22 @@ def _confirmed(exact: ker.KernelMatrix, other: Floats, doubt: float, way: str) -
     return Found(exact.symmetric, exact.error.value, f"exact; {way} agree to {max(distance, 1e-15):.0e}")
 
 
-def matrices_of_rows(row: Callable[[float], Atoms | ArcRow], tolerance: float) -> dict[str, Found]:
-    """Law, moment and resistance of a mirror-symmetric law with rows by formula, by adaptive Gauss-Kronrod in theta."""
+def law_of_rows(row: Row, tolerance: float) -> Found:
+    """The law in bins of a mirror-symmetric law with rows by formula, by adaptive Gauss-Kronrod in theta."""
     bins = LAW_BASIS.size
     edges, half, fluxes, doubts = np.sort(np.arccos(np.linspace(-1.0, 1.0, bins + 1))), bins // 2, [], []
-    for low, high in zip(edges[:half], edges[1 : half + 1], strict=True):
+    for low, high in pairwise(edges[: half + 1]):
         flux, doubt = mean_over_angles(lambda theta: np.diff(row(theta).distribution(edges)), low, high, tolerance)
         fluxes.append(flux)
         doubts.append(doubt)
     law = bins * np.array([*fluxes, *(flux[::-1] for flux in reversed(fluxes))])
     # every entry of a row may be off by its doubt
     error = bins * float(np.linalg.norm(doubts)) * (2.0 * bins) ** 0.5
+    return Found(0.5 * (law + law.T), error, ROWS_BY_FORMULA)
+
+
+def plane_of_rows(row: Row, tolerance: float) -> dict[str, Found]:
+    """Its moment and the matrix in 1, cos and sin."""
 
     def outer(theta: float) -> Floats:
         mean = row(theta).mean()
@@ -143,20 +106,32 @@ def matrices_of_rows(row: Callable[[float], Atoms | ArcRow], tolerance: float) -
     change = np.linalg.solve(plane, RESISTANCE_BASIS.evaluate(probe))
     size = float(np.linalg.norm(change, 2)) ** 2
     return {
-        "law": Found(0.5 * (law + law.T), error, ROWS_BY_FORMULA),
         "moment": Found(np.diag([1.0, 3.0 * table[1, 1]]), 3.0 * doubt, ROWS_BY_FORMULA),
         "resistance": Found(change.T @ table @ change, 3.0 * size * doubt, ROWS_BY_FORMULA),
     }
 
 
-def teeth_matrices(scene: str, names: tuple[str, ...]) -> dict[str, Found]:
-    """The closed forms of the library, confirmed by rows of our own."""
-    other = matrices_of_rows(ROWS[scene], ROW_TOLERANCES[scene])
-    law = ker.WallLaw(wall_of(scene))
+def teeth_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | None:
+    """The closed forms of the library for triangular and rectangular teeth, confirmed by rows of our own."""
+    law = ker.WallLaw(wall).closed_form
+    if isinstance(law, ker.TriangularTeethLaw):
+        row, tolerance = partial(tooth_row, psi=law.angle), TRIANGULAR_TOLERANCE
+    elif isinstance(law, ker.RectangularTeethLaw):
+        row, tolerance = partial(crevice_row, height_to_width=law.height_to_width), RECTANGULAR_TOLERANCE
+    else:
+        return None
+    other = plane_of_rows(row, tolerance)
+    if "law" in names:
+        other["law"] = law_of_rows(row, tolerance)
     return {
         name: _confirmed(ker.discretise(law, BASES[name]), other[name].value, other[name].error, ROWS_BY_FORMULA)
         for name in names
     }
+
+
+def best_matrices(wall: geo.Wall, names: tuple[str, ...], rays: int) -> dict[str, Found]:
+    """By formula, by beams, or by sampling."""
+    return teeth_matrices(wall, names) or beam_matrices(wall, names) or sampled_matrices(wall, names, rays)
 
 
 @cache
@@ -164,19 +139,18 @@ def matrices_of(scene: str) -> dict[str, Found]:
     """All matrices of a scene that its quantities need."""
     wall = wall_of(scene)
     if scene == "focusing-arc":
-        return matrices_of_rows(ROWS[scene], ROW_TOLERANCES[scene])
+        row = ROWS[scene]
+        return {"law": law_of_rows(row, ARC_TOLERANCE), **plane_of_rows(row, ARC_TOLERANCE)}
     random = scene.startswith("random")
     names = ("moment",) if random else tuple(BASES)
-    if scene in ROWS:
-        return teeth_matrices(scene, names)
-    return beam_matrices(wall, names) or sampled_matrices(wall, names, RANDOM_RAYS if random else RAYS)
+    return best_matrices(wall, names, RANDOM_RAYS if random else RAYS)
 
 
 @cache
 def collision_of(scene: str) -> Found:
     """The collision's correlation, from the moment of the foreshortened wall."""
     wall = wall_of(scene).foreshorten(DISK)
-    found = (beam_matrices(wall, ("moment",)) or sampled_matrices(wall, ("moment",), RAYS))["moment"]
+    found = best_matrices(wall, ("moment",), RAYS)["moment"]
     slope = correlation_of(1.0) - correlation_of(0.0)
     value = np.asarray(correlation_of(float(found.value[1, 1])))
     return Found(value, slope * found.error, f"{found.source}; psi by hand")
@@ -196,7 +170,8 @@ def resistance_found(scene: str) -> Found:
 
 def distance_found(scene: str) -> Found:
     """W_1 between the rows and Lambert's, averaged, from formulas of the rows."""
-    tolerance = {"triangular-teeth": 1e-11}.get(scene, 1e-7)
+    # slow where kinks are many
+    tolerance = 1e-11 if scene == "triangular-teeth" else 1e-7
     value, error = mean_over_angles(
         lambda theta: np.array([ROWS[scene](theta).distance_to_lambert()]), 0.0, 0.5 * np.pi, tolerance
     )
@@ -213,21 +188,12 @@ def eta_found(scene: str) -> Found:
     return Found(np.asarray((1.0 + zeta) / (1.0 - zeta)), 0.0, words)
 
 
-def eigenvalue_found(scene: str) -> Found | None:
-    """lambda_2 where a theorem gives it or another program does."""
-    if wall_of(scene).is_polygonal:
-        return Found(np.asarray(1.0), 0.0, "theorem: 1 is in the essential spectrum of isometries")
-    if scene == "focusing-arc":
-        return Found(np.asarray(ARC_LAMBDA2), ARC_ERROR, "another program, piecewise polynomials on graded panels")
-    return None
-
-
 MAKERS = {
     "law": lambda scene: matrices_of(scene)["law"],
     "moment": entry_of,
     "collision": collision_of,
     "disk": collision_of,
-    "lambda2": eigenvalue_found,
+    "lambda2": reference_eigenvalue,
     "resistance": resistance_found,
     "distance": distance_found,
     "eta": eta_found,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .itineraries import EPS, probe
+from .itineraries import EPS, inner, probe
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -19,7 +19,7 @@ MOST_STEPS = 80
 SAME_ANGLE = 1e-11
 
 
-@_compile
+@inner
 def edge_from(x, step, label, task):
     """An end of the piece around x, seen in the direction of ``step``: to a small share of its distance."""
     left, right = task[1][0], task[1][1]
@@ -44,14 +44,14 @@ def find_critical(label, present, absent, low, high, drift, scene, degree):
 
     ``drift`` is how fast its middle moves, as far as known.
     """
-    hollow, tables, period, limit, edges = scene
+    hollow, tables, period, limits, edges = scene
     left, right = hollow[0], hollow[1]
-    code = np.zeros(1, np.uint64)
+    code = np.zeros(2, np.uint64)
     for _ in range(MOST_STEPS):
         if abs(present - absent) <= SAME_ANGLE:
             break
         angle = 0.5 * (present + absent)
-        task = (angle, hollow, tables, period, limit, edges, degree, code)
+        task = (angle, hollow, tables, period, limits, edges, degree, code)
         width, before = high - low, 0.5 * (low + high)
         centre = before + drift * (angle - present)
         found = np.nan

@@ -4,9 +4,10 @@ For one incoming angle the map x -> theta' is analytic between changes of the it
 each with the label of its itinerary; gaps between samples of different labels are halved, all of them once a round.
 
 What stays the same along a row travels in two tuples. ``task``: incoming angle, hollow, tables of the wall, period
-(None if closed), limit of collisions, outgoing angles at which cells begin, degree of the functions that the row is
-for, and an array of one uint64 for the hash. ``chain``: place, outgoing angle, label and successor (-1: none) of every
-sample, in the order in which they were found, and two lists for gaps, each named by the sample on its left.
+(None if closed), limits (see `probe` and `is_spent`), outgoing angles at which cells begin, degree of the functions
+that the row is for, and an array of two uint64 for the hash of a ray and the flights spent on the row. ``chain``:
+place, outgoing angle, label and successor (-1: none) of every sample, in the order in which they were found, and two
+lists for gaps, each named by the sample on its left.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from numba import njit
 
 from .engine import ESCAPED, HASH_FACTOR, trace_ray
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+# Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers
+# are born as such, np.int64(0): for a bare 0 type inference compiles what it is passed to once more.
+inner = njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 # Samples of one row at most; what is then still undecided counts as error.
 MOST_SAMPLES = 1 << 13
@@ -30,7 +33,7 @@ WORST_SHARE = 0.1
 FIRST_LABEL = np.uint64(4)
 
 
-@_compile
+@inner
 def empty_chain():
     """Room for the samples of one row."""
     return (
@@ -43,24 +46,41 @@ def empty_chain():
     )
 
 
-@_compile
+@inner
 def probe(x, task):
-    """Outgoing angle of one ray and the label of its itinerary and of the cell that it goes to."""
-    theta, hollow, (joints, lines, circles, ellipses, beziers), period, limit, edges, _, code = task
-    _, vx, vy, _, status = trace_ray(
-        x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limit, None, code
+    """Outgoing angle of one ray and the label of its itinerary and of the cell that it goes to.
+
+    The first of the limits is that of collisions, the second how many of them count as flights at most: runs cost one
+    flight, whatever their length.
+    """
+    theta, hollow, (joints, lines, circles, ellipses, beziers, pairs, grid), period, limits, edges, _, code = task
+    _, vx, vy, bounces, status = trace_ray(
+        x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limits[0], None, code, pairs, grid
     )
+    code[1] += np.uint64(1 + min(bounces, limits[1]))
     if status != ESCAPED:
         return theta, np.uint64(status)
     # a ray along y = 0 within rounding
     out = min(max(math.atan2(vy, vx), 0.0), math.pi)
-    cell = 0
-    if edges.shape[0] > 0:
-        cell = np.searchsorted(edges, out)
+    cell = np.int64(0)
+    # np.searchsorted would take as long to compile as all of this file
+    high = edges.shape[0]
+    while cell < high:
+        middle = (cell + high) // 2
+        if edges[middle] < out:
+            cell = middle + 1
+        else:
+            high = middle
     return out, HASH_FACTOR * (code[0] + np.uint64(16)) + np.uint64(cell)
 
 
-@_compile
+@inner
+def is_spent(task):
+    """Whether the row has taken as many flights as it may: the third of the limits."""
+    return task[7][1] >= np.uint64(task[4][2])
+
+
+@inner
 def spread(first, second, degree):
     """Largest difference of cos, and of cos and sin of ``degree`` times the angle."""
     k = max(degree, 1)
@@ -70,7 +90,7 @@ def spread(first, second, degree):
     )
 
 
-@_compile
+@inner
 def undecided(before, task, chain):
     """What the gap after a sample may contribute to a row's error."""
     xs, outs, _, follow, _, _ = chain
@@ -79,7 +99,7 @@ def undecided(before, task, chain):
     return 0.5 * width * (spread(outs[before], outs[after], task[6]) + math.sqrt(width / whole))
 
 
-@_compile
+@inner
 def insert(x, before, count, task, chain):
     """Put a sample at x behind another one."""
     xs, outs, labels, follow, _, _ = chain
@@ -89,7 +109,7 @@ def insert(x, before, count, task, chain):
     follow[before] = count
 
 
-@_compile
+@inner
 def halve_gaps(task, chain, count, gap_count, goal, most):
     """Halve gaps until together they matter less than ``goal``; returns the number of samples."""
     xs, _, labels, follow, gaps, fresh = chain
@@ -103,7 +123,7 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
             break
         # the worst first, so that an accumulation of changes does not use up all samples before the others are found
         fair = max(0.25 * goal / gap_count, WORST_SHARE * worst)
-        fresh_count = 0
+        fresh_count = np.int64(0)
         moved = False
         for g in range(gap_count):
             i = gaps[g]
@@ -112,7 +132,8 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
                 fresh[fresh_count] = i
                 fresh_count += 1
                 continue
-            if xs[j] - xs[i] <= 2.0 * EPS * max(abs(xs[i]), abs(xs[j])) or count >= most:
+            narrow = xs[j] - xs[i] <= 2.0 * EPS * max(abs(xs[i]), abs(xs[j]))
+            if narrow or count >= most or is_spent(task):
                 continue
             k = count
             insert(0.5 * (xs[i] + xs[j]), i, k, task, chain)
@@ -131,7 +152,7 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
     return count
 
 
-@_compile
+@inner
 def sample_row(places, task, chain, goal):
     """Chain the samples at increasing places, and halve the gaps; returns the number of samples, and the last one.
 
@@ -139,7 +160,7 @@ def sample_row(places, task, chain, goal):
     """
     xs, outs, labels, follow, gaps, _ = chain
     left, right = task[1][0], task[1][1]
-    count, gap_count = 0, 0
+    count, gap_count = np.int64(0), np.int64(0)
     for x in places:
         if x <= left or x >= right or (count > 0 and x <= xs[count - 1]):
             continue
@@ -152,10 +173,10 @@ def sample_row(places, task, chain, goal):
         count += 1
     last = count - 1
     follow[last] = -1
-    return halve_gaps(task, chain, count, gap_count, goal, 3 * MOST_SAMPLES // 4), last
+    return halve_gaps(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
 
 
-@_compile
+@inner
 def add_change(x, first, task, chain, count, goal):
     """A place x, in the piece that begins with the sample ``first``, has another label: find the edges around it."""
     xs, _, _, follow, gaps, _ = chain
@@ -164,4 +185,4 @@ def add_change(x, first, task, chain, count, goal):
         before = follow[before]
     insert(x, before, count, task, chain)
     gaps[0], gaps[1] = before, count
-    return halve_gaps(task, chain, count + 1, 2, goal, MOST_SAMPLES)
+    return halve_gaps(task, chain, count + 1, np.int64(2), goal, np.int64(MOST_SAMPLES))

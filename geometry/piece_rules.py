@@ -9,11 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from .itineraries import EPS, FIRST_LABEL, probe
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+from .itineraries import EPS, FIRST_LABEL, inner, is_spent, probe
 
 ORDERS = (4, 7, 12, 20, 32)
 # Nodes of one row at most.
@@ -40,7 +37,7 @@ def gauss_tables() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.concatenate(places), np.concatenate(weights), np.array(starts)
 
 
-@_compile
+@inner
 def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, strict):
     """One rule after the other on [low, high], until two of them agree.
 
@@ -54,10 +51,10 @@ def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, stric
     old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
     k = max(degree, 1)
     error = 2.0 * width
-    used, rays = 0, 0
+    used, rays = np.int64(0), np.int64(0)
     for level in range(least, len(ORDERS)):
         first, last = starts[level], starts[level + 1]
-        if last - first > MOST_NODES - filled - 2:
+        if last - first > MOST_NODES - filled - 2 or is_spent(task):
             break
         new0, new1, new2 = 0.0, 0.0, 0.0
         for n in range(first, last):
@@ -85,7 +82,7 @@ def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, stric
     return used, error, np.nan, rays
 
 
-@_compile
+@inner
 def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, filled, strict):
     """Nodes on a piece, which is halved where the rules do not agree; ``out`` is the angle of a ray of it.
 
@@ -94,7 +91,7 @@ def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, fi
     whole = task[1][1] - task[1][0]
     low_stack, high_stack = np.empty(MOST_HALVINGS + 2), np.empty(MOST_HALVINGS + 2)
     low_stack[0], high_stack[0] = ends
-    depth, error, rays = 1, 0.0, 0
+    depth, error, rays = np.int64(1), 0.0, np.int64(0)
     while depth > 0:
         depth -= 1
         low, high = low_stack[depth], high_stack[depth]
@@ -103,8 +100,8 @@ def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, fi
         rays += spent
         if not math.isnan(other):
             return filled, error, other, rays
-        room = MOST_NODES - filled - 2
-        if miss > allowed and depth < MOST_HALVINGS and high - low > NARROWEST * whole and room >= ORDERS[-1]:
+        able = MOST_NODES - filled - 2 >= ORDERS[-1] and not is_spent(task)
+        if miss > allowed and depth < MOST_HALVINGS and high - low > NARROWEST * whole and able:
             middle = 0.5 * (low + high)
             low_stack[depth], high_stack[depth] = middle, high
             low_stack[depth + 1], high_stack[depth + 1] = low, middle

@@ -15,18 +15,18 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree)
     """Places in rows where a ray has another label than the piece that it belongs to: pieces of a neighbour say where.
 
     Rows ``k`` and ``k + 1`` are compared where ``linked[k]``. Pieces of the one no wider than the other's
-    ``least_widths`` do not count. Returns the numbers of the rows, the places, and the number of rays.
+    ``least_widths`` do not count. Returns the numbers of the rows, the places, and the numbers of rays and flights.
     """
-    hollow, tables, period, limit, edges = scene
+    hollow, tables, period, limits, edges = scene
     lows, highs, labels = pieces
-    code = np.zeros(1, np.uint64)
+    code = np.zeros(2, np.uint64)
     rows, places = [0 for _ in range(0)], [0.0 for _ in range(0)]
     rays = 0
     for k in range(thetas.shape[0] - 1):
         if not linked[k]:
             continue
         for here, there in ((k, k + 1), (k + 1, k)):
-            task = (thetas[there], hollow, tables, period, limit, edges, degree, code)
+            task = (thetas[there], hollow, tables, period, limits, edges, degree, code)
             m, end = starts[there], starts[there + 1]
             for p in range(starts[here], starts[here + 1]):
                 if highs[p] - lows[p] <= least_widths[there]:
@@ -40,4 +40,4 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree)
                     if probe(x, task)[1] != labels[m]:
                         rows.append(there)
                         places.append(x)
-    return np.array(rows, dtype=np.int64), np.array(places), rays
+    return np.array(rows, dtype=np.int64), np.array(places), rays, np.int64(code[1])

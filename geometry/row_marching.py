@@ -16,6 +16,8 @@ from .itineraries import (
     MOST_SAMPLES,
     add_change,
     empty_chain,
+    inner,
+    is_spent,
     sample_row,
     spread,
     undecided,
@@ -24,20 +26,12 @@ from .piece_rules import MOST_NODES, SPARE, integrate_piece
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
-# Samples that a row starts from, at irregular places so that no symmetry of the wall hides a piece from all of them.
-FIRST_SAMPLES = 32
-GOLDEN = 0.6180339887498949
-# Neighbouring rows have other places: any large number without pattern does.
-ROW_SHIFT = 12345.6789
-# More of them at either end, each nearer to it by this ratio.
-END_SAMPLES, END_RATIO = 10, 0.3
 # Pieces of a row that its neighbours start from.
 MOST_SEEDS = 128
-# Rounding of the mean of a row, and of the place of a change as a share of the opening. Rays are good to a few units of
-# EPS times the derivative of their map, seldom above some hundreds except next to a change: measured, not proved.
+# Rounding of the mean of a row, as a share of the opening, and of the place of a change, as one of the hollow's size.
+# Rays are good to a few units of EPS times the derivative of their map, seldom above some hundreds except next to a
+# change: measured, not proved.
 ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
-# The first and the last sample are this share of the row's tolerance, or of the opening, away from the ends.
-MARGIN = 1e-3
 # The share of the tolerance that the Gauss rules may spend, and that all undecided gaps may take.
 RULE_SHARE, GAP_SHARE = 0.5, 0.25
 # The share of what the rules may spend that any piece may, however short it is.
@@ -46,52 +40,43 @@ LEAST_SHARE = 0.02
 LATE_SHARE = 0.05
 
 
-@_compile
-def first_places(theta, hollow, goal, seeds):
-    """Places of the samples that a row starts from, in increasing order.
-
-    They lie elsewhere in every row, so that the rows together leave no large part of all rays unseen, and crowd at the
-    ends of the opening, where the pieces of a smooth hollow become ever narrower.
-    """
-    left, right = hollow[0], hollow[1]
-    whole = right - left
-    margin = MARGIN * min(goal, MARGIN * whole)
-    first = np.empty(FIRST_SAMPLES + 2 * (END_SAMPLES + 1) + seeds.shape[0])
-    shift = (theta * ROW_SHIFT) % 1.0
-    for n in range(FIRST_SAMPLES):
-        first[n] = left + whole * (n + 0.25 + 0.5 * ((n * GOLDEN + shift) % 1.0)) / FIRST_SAMPLES
-    share = 1.0 / FIRST_SAMPLES
-    count = FIRST_SAMPLES
-    for _ in range(END_SAMPLES):
-        share *= END_RATIO
-        first[count], first[count + 1] = left + share * whole, right - share * whole
-        count += 2
-    first[count], first[count + 1] = left + margin, right - margin
-    first[count + 2 :] = seeds
-    first.sort()
-    return first
+@inner
+def merged(first, second):
+    """Two increasing sequences as one."""
+    both = np.empty(first.shape[0] + second.shape[0])
+    i, j = np.int64(0), np.int64(0)
+    for k in range(both.shape[0]):
+        if j == second.shape[0] or (i < first.shape[0] and first[i] <= second[j]):
+            both[k] = first[i]
+            i += 1
+        else:
+            both[k] = second[j]
+            j += 1
+    return both
 
 
-@_compile
-def march_row(task, goal, rules, least, seeds, chain, nodes, pieces):
+@inner
+def march_row(task, goal, rules, least, places, chain, nodes, pieces):
     """Nodes and masses of one row; returns their number, the error, the lost width, the number of pieces and of rays.
 
-    ``pieces`` receives first and last place and label of every piece.
+    What a row that has spent its flights leaves undone is in its error. ``pieces`` receives first and last
+    place and label of every piece.
     """
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
-    hollow, degree = task[1], task[6]
+    hollow, degree, code = task[1], task[6], task[7]
     left, right = hollow[0], hollow[1]
     whole = right - left
-    count, last = sample_row(first_places(task[0], hollow, goal, seeds), task, chain, GAP_SHARE * goal)
-    rays = 0
+    code[1] = np.uint64(0)
+    count, last = sample_row(places, task, chain, GAP_SHARE * goal)
+    rays = np.int64(0)
     # the margins count with the first and the last sample
     node[0], mass[0] = outs[0], xs[0] - left
     node[1], mass[1] = outs[last], right - xs[last]
-    filled, number, lost = 2, 0, 0.0
+    filled, number, lost = np.int64(2), np.int64(0), 0.0
     error = ROUNDING * whole
     error += mass[0] * spread(outs[0], outs[1], degree) + mass[1] * spread(outs[last], outs[last - 1], degree)
-    i = 0
+    i = np.int64(0)
     while i >= 0:
         j = i
         while follow[j] >= 0 and labels[follow[j]] == labels[i]:
@@ -99,7 +84,7 @@ def march_row(task, goal, rules, least, seeds, chain, nodes, pieces):
         if j != i:
             ready, miss, other, spent = integrate_piece(
                 (xs[i], xs[j]), outs[i], labels[i], RULE_SHARE * goal, LEAST_SHARE, rules, least, task, nodes, filled,
-                count < MOST_SAMPLES - 4,
+                count < MOST_SAMPLES - 4 and not is_spent(task),
             )  # fmt: skip
             rays += spent
             if not math.isnan(other):
@@ -122,18 +107,18 @@ def march_row(task, goal, rules, least, seeds, chain, nodes, pieces):
             else:
                 mass[filled - 1] += width
                 error += width
-            error += undecided(j, task, chain) + EDGE_ROUNDING * whole * spread(outs[j], outs[following], degree)
+            error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[2] * spread(outs[j], outs[following], degree)
         i = following
     return filled, error, lost, number, rays + count
 
 
-@_compile
+@inner
 def room_for_pieces(count):
     """First places, last places and labels."""
     return np.empty(count), np.empty(count), np.empty(count, np.uint64)
 
 
-@_compile
+@inner
 def longer(array, size):
     """The array with room for so many entries."""
     bigger = np.empty(size, array.dtype)
@@ -144,37 +129,48 @@ def longer(array, size):
 @_compile
 def wide_middles(lows, highs, least):
     """The middles of the pieces wider than that: of the widest ones, if they are many."""
-    wide = highs - lows > least
-    if wide.sum() > MOST_SEEDS:
-        wide = highs - lows >= np.sort(highs - lows)[-MOST_SEEDS]
-    return 0.5 * (lows[wide] + highs[wide])
+    many = True
+    while many:
+        count = 0
+        for k in range(lows.shape[0]):
+            count += highs[k] - lows[k] > least
+        many = count > MOST_SEEDS
+        least *= 2.0
+    middles = np.empty(count)
+    count = 0
+    for k in range(lows.shape[0]):
+        if highs[k] - lows[k] > 0.5 * least:
+            middles[count] = 0.5 * (lows[k] + highs[k])
+            count += 1
+    return middles
 
 
 @_compile
 def march_rows(thetas, tolerances, scene, degree, rules, least, seeds, seed_starts):
     """Rows at increasing angles.
 
-    ``scene``: hollow, tables, period, limit of collisions, edges of cells. A row starts also from its seeds, and from
-    the middles of the pieces of the row before, so that a narrow piece is followed until it vanishes. Returns outgoing
+    ``scene``: hollow, tables, period, limits, edges of cells. A row starts from its seeds, which increase, and from the
+    middles of the pieces of the row before, so that a narrow piece is followed until it vanishes. Returns outgoing
     angles and masses, one row after the other, and where each row starts; the same of first places, last places and
-    labels of the pieces; and the error, the width lost and the number of rays of each row.
+    labels of the pieces; and the error, the width lost and the numbers of rays and of flights of each row.
     """
-    hollow, tables, period, limit, edges = scene
+    hollow, tables, period, limits, edges = scene
     whole = hollow[1] - hollow[0]
-    chain, code = empty_chain(), np.zeros(1, np.uint64)
+    chain, code = empty_chain(), np.zeros(2, np.uint64)
     nodes = np.empty(MOST_NODES + SPARE), np.empty(MOST_NODES + SPARE)
     pieces = room_for_pieces(MOST_SAMPLES)
     n = thetas.shape[0]
     node_starts, piece_starts = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
-    errors, lost, rays = np.empty(n), np.empty(n), np.empty(n, np.int64)
+    errors, lost, rays, flights = np.empty(n), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
     all_nodes = np.empty(1024), np.empty(1024)
     all_pieces = room_for_pieces(1024)
     previous = np.empty(0)
     for k in range(n):
-        task = (thetas[k], hollow, tables, period, limit, edges, degree, code)
+        task = (thetas[k], hollow, tables, period, limits, edges, degree, code)
         goal = tolerances[k] * whole
-        places = np.concatenate((previous, seeds[seed_starts[k] : seed_starts[k + 1]]))
+        places = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
         filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, least, places, chain, nodes, pieces)
+        flights[k] = np.int64(code[1])
         previous = wide_middles(pieces[0][:number], pieces[1][:number], goal)
         begin, end = node_starts[k], node_starts[k] + filled
         if end > all_nodes[0].shape[0]:
@@ -187,4 +183,4 @@ def march_rows(thetas, tolerances, scene, degree, rules, least, seeds, seed_star
         all_pieces[0][begin:end], all_pieces[1][begin:end] = pieces[0][:number], pieces[1][:number]
         all_pieces[2][begin:end] = pieces[2][:number]
         piece_starts[k + 1] = end
-    return all_nodes, node_starts, all_pieces, piece_starts, errors, lost, rays
+    return all_nodes, node_starts, all_pieces, piece_starts, errors, lost, rays, flights

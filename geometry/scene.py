@@ -97,6 +97,15 @@ def scene_of(wall: Wall) -> Scene:
     return tables.scene(wall.period, not wall.closes)
 
 
+def scene_in_one(wall: Wall) -> Scene:
+    """The tables of a wall that closes as if its cell were one hollow: one list of all pieces, the flat tops too."""
+    tables = _Tables()
+    places = [(float(x), float(y)) for x, y in wall.vertices]
+    chain = _Chain(list(wall.pieces), places, _corners(list(wall.pieces)))
+    tables.add_hollow(0.0, wall.period, [chain], edges=(2, 2))
+    return tables.scene(wall.period, False)
+
+
 @dataclass
 class _Chain:
     """Connected pieces with their joints; ``places`` and ``corners`` have one entry more than ``pieces``."""

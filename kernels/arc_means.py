@@ -12,7 +12,7 @@ from .measure import SINE, gauss_on_intervals, gauss_rule
 from .panels import Panels
 
 if TYPE_CHECKING:
-    from .circular import ArcPieces, CircularArcLaw
+    from .circular import CircularArcLaw
 
 # exp(i theta' / 2 N) on a panel asks for this many Gauss nodes more than a polynomial of half the degree.
 MORE_NODES = 3

@@ -55,7 +55,9 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
     panel = np.clip(np.searchsorted(panels.edges, angle[single], side="right") - 1, 0, len(panels.edges) - 2)
     low, high = panels.edges[panel], panels.edges[panel + 1]
     local = np.polynomial.legendre.legvander((2.0 * angle[single] - low - high) / (high - low), panels.degree)
-    np.add.at(gathered, (slice(None), ray[single] * (len(panels.edges) - 1) + panel), (share[:, None] * local).T)
+    cell = ray[single] * (len(panels.edges) - 1) + panel
+    for moment, values in zip(gathered, local.T, strict=True):
+        moment += np.bincount(cell, weights=share * values, minlength=moment.size)
     mass = np.where(alone, 1.0, SINE.mass(lower, upper))
     total = np.bincount(ray, weights=mass, minlength=theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]

@@ -15,6 +15,8 @@ from .stable_angles import kept_inside
 SAME_ANGLE = 16.0 * np.finfo(np.float64).eps
 # Merging compares all pairs, and the number of branches of a chain grows exponentially unless they merge.
 MOST_BRANCHES = 64
+# Pairs of an interval and a kink of the next law that are compared: some hundred megabytes.
+MOST_PAIRS = 2**23
 
 
 def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
@@ -52,7 +54,10 @@ def chained(laws: Sequence[Law], theta: Floats) -> tuple[Floats, Floats]:
 
 
 def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
-    """Kinks of a chain: those of the first law, and where its branches meet kinks of the rest."""
+    """Kinks of a chain: those of the first law, and where its branches meet kinks of the rest.
+
+    Where these are too many to be compared, the later ones are left out, all of them for what is known.
+    """
     kinks, left_out = laws[0].kinks(limit)
     for place in range(1, len(laws)):
         target, more = laws[place].kinks(limit)
@@ -61,6 +66,8 @@ def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
         # Both probes in one call, so that a slot is the same isometry in both.
         probe = low + np.array([[0.25], [0.75]]) * (high - low)
         probability, angle = chained(laws[:place], probe)
+        if target.size * angle[0].size > MOST_PAIRS:
+            return kinks, 1.0
         used, sign = np.all(probability > 0.0, axis=0), np.sign(angle[1] - angle[0])
         offset = angle[0] - sign * probe[0][:, None]
         source = sign[..., None] * (target - offset[..., None])

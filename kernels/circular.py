@@ -178,7 +178,7 @@ class CircularArcLaw(DrivenLaw):
         pieces = np.where((high > low) | alone, most - fewest + 2.0, 0.0).astype(np.intp)
         owner = np.repeat(np.arange(base.size), pieces)
         order = np.arange(owner.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-        hits = fewest[owner] + order
+        hits = np.asarray(fewest[owner] + order, dtype=np.float64)
         # The last piece of every row holds all the rays with more hits, at the mean of their outgoing angles.
         rest = order == pieces[owner] - 1
         lower = np.where(rest, low[owner], np.maximum(low[owner], total[owner] / (2.0 * hits + 1.0)))

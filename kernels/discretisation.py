@@ -30,7 +30,7 @@ from .matrix_algebra import frobenius_error
 from .measure import SINE
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
-from .row_quadrature import MOST_RAYS, is_affordable, row_matrix
+from .row_quadrature import MOST_FLIGHTS, is_affordable, row_matrix
 from .sampling import DEFAULT_SAMPLES, RANDOMISATIONS, SamplingMethod, responder, sampled_array
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
@@ -47,8 +47,8 @@ ROUNDING = 8.0 * np.finfo(np.float64).eps
 # cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
 DISPLACED = np.finfo(np.float64).eps
 SEED_WITHOUT_RNG = 0
-# Rays of adaptive rows that nobody asked for by name: a second or a few; beyond them the shortfall is reported.
-QUICK_RAYS = 2_000_000
+# Flights of adaptive rows that nobody asked for by name: a second or so; beyond them the shortfall is reported.
+QUICK_FLIGHTS = 8_000_000
 # Methods that a sum has if all its terms have them.
 SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
 
@@ -257,8 +257,8 @@ class _Maker:
             symmetric, error = arc_matrix(law.half_angle, self.basis)
             how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
         elif isinstance(law, WallLaw):
-            most_rays = MOST_RAYS if self.patient else QUICK_RAYS
-            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, most_rays, patient=self.patient)
+            most = MOST_FLIGHTS if self.patient else QUICK_FLIGHTS
+            symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, most, patient=self.patient)
             how = (
                 f"adaptive rows and panels, {rays} rays, predicted cheaper than sampling: Gauss against Kronrod, "
                 "plus undecided entry points and twice the asymmetry"

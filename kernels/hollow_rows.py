@@ -15,8 +15,10 @@ from ..checks import Floats
 if TYPE_CHECKING:
     from ..geometry.scene import Scene
 
-# Collisions after which a ray counts as lost.
-MOST_COLLISIONS = 100_000
+# Collisions after which a ray counts as lost, and those that count as flights where runs of them are done in one.
+MOST_COLLISIONS, MOST_IN_RUNS = 100_000, 8
+# A row may take as many flights as it needs, unless its owner says otherwise; a ray in a channel as many collisions.
+NO_LIMIT = 2**62
 # Rounds in which rows are done again because a neighbour has a piece that they have overlooked.
 MOST_ROUNDS = 8
 # Critical angles looked for at a time, and the least width of their pieces as a share of the widest of them.
@@ -52,9 +54,10 @@ class HollowRows:
     degree: int
     edges: Floats
     least_level: int
+    most_flights: int = NO_LIMIT
 
     def __post_init__(self) -> None:
-        self.rays = 0
+        self.rays, self.flights = 0, 0
         self._theta = np.empty(0)
         self._pieces: dict[float, _Pieces] = {}
         self._overlooked: dict[float, list[float]] = {}
@@ -72,14 +75,25 @@ class HollowRows:
         # empty tables instead of absent ones, so that one compiled version serves all walls: compiling takes 20 s
         tables = (
             scene.joints,
-            np.zeros((len(scene.joints), 5)) if scene.lines is None else scene.lines,
+            np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines,
             *(
                 np.zeros((0, columns)) if table is None else table
-                for columns, table in ((19, scene.circles), (19, scene.ellipses), (14, scene.beziers))
+                for columns, table in (
+                    (19, scene.circles),
+                    (19, scene.ellipses),
+                    (14, scene.beziers),
+                    (10, scene.pairs),
+                )
             ),
+            # so many lines that they have a grid are rare enough for a version of their own
+            scene.grid,
         )
         period = scene.cell if scene.is_open else None
-        return scene.hollows[self.hollow], tables, period, MOST_COLLISIONS, self.edges
+        has_channels = scene.pairs is not None
+        has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, 10] > 0.0)))
+        most = NO_LIMIT if has_channels else MOST_COLLISIONS
+        limits = most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_flights
+        return scene.hollows[self.hollow], tables, period, limits, self.edges
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Row], set[float]]:
         """Rows at angles that increase, and those angles of earlier calls whose rows are now known to be wrong."""
@@ -106,29 +120,37 @@ class HollowRows:
             theta, tolerances, self._bounds, self.degree, gauss_tables(), self.least_level,
             np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
         )  # fmt: skip
-        (nodes, widths), node_starts, pieces, piece_starts, errors, lost, rays = found
+        (nodes, widths), node_starts, pieces, piece_starts, errors, lost, rays, flights = found
         self.rays += int(rays.sum())
+        self.flights += int(flights.sum())
         rows = {}
         for k, angle in enumerate(theta.tolist()):
             own = slice(node_starts[k], node_starts[k + 1])
             rows[angle] = Row(nodes[own], widths[own], float(errors[k]), float(lost[k]))
             own = slice(piece_starts[k], piece_starts[k + 1])
             low, high, label = (part[own].copy() for part in pieces)
-            self._pieces[angle] = _Pieces(low, high, label, float(tolerances[k] * self.width))
+            # a row without flights for all its pieces has overlooked some, and says so
+            matters = np.inf if flights[k] >= self.most_flights else float(tolerances[k] * self.width)
+            self._pieces[angle] = _Pieces(low, high, label, matters)
         self._theta = np.union1d(self._theta, theta)
         return rows
 
     def _seeds(self, angle: float, least: float) -> Floats:
-        """Places in the pieces of the nearest rows that are known, and those where this row has overlooked some."""
+        """Where the samples of a row begin, in increasing order.
+
+        Also in the pieces of the nearest rows that are known, and where this row has overlooked some.
+        """
         from ..geometry.row_marching import wide_middles
+        from ..geometry.row_places import first_places
 
         k = int(np.searchsorted(self._theta, angle))
         known = [self._pieces[near] for near in self._theta[max(0, k - 1) : k + 2].tolist()]
-        places = [wide_middles(row.low, row.high, least) for row in known]
+        left, right = self.scene.hollows[self.hollow, :2].tolist()
+        places = [first_places(angle, left, right, least), *(wide_middles(row.low, row.high, least) for row in known)]
         if angle in self._pieces:
             # its own changes are known already, up to the gaps that were left
             places += [self._pieces[angle].low, self._pieces[angle].high]
-        return np.concatenate([*places, np.array(self._overlooked.get(angle, []), dtype=np.float64)])
+        return np.sort(np.concatenate([*places, np.array(self._overlooked.get(angle, []), dtype=np.float64)]))
 
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among these and their neighbours whose rows have overlooked pieces."""
@@ -143,8 +165,9 @@ class HollowRows:
         pieces = tuple(np.concatenate([row[part] for row in rows]) for part in range(3))
         starts = np.cumsum([0, *(len(row.low) for row in rows)])
         least = np.array([row.width_that_matters for row in rows])
-        owner, places, rays = find_overlooked(angles, least, pieces, starts, linked, self._bounds, self.degree)
-        self.rays += rays
+        found = find_overlooked(angles, least, pieces, starts, linked, self._bounds, self.degree)
+        owner, places, rays, flights = found
+        self.rays, self.flights = self.rays + rays, self.flights + flights
         for angle, x in zip(angles[owner].tolist(), places.tolist(), strict=True):
             self._overlooked.setdefault(angle, []).append(x)
         return set(angles[owner].tolist())

@@ -138,10 +138,10 @@ class Panels(Basis):
         ``moments`` has shape (..., panels, degree + 1).
         """
         turned = np.matmul(np.moveaxis(moments, -2, 0), self._coefficients)
-        return np.moveaxis(turned, 0, -2).reshape((*moments.shape[:-2], self.size))
+        return np.asarray(np.moveaxis(turned, 0, -2).reshape((*moments.shape[:-2], self.size)))
 
     def legendre_series(self, vectors: Floats) -> Floats:
-        """Coefficients in the panels' Legendre polynomials, shape (panels, degree + 1, k), from ``vectors`` (size, k)."""
+        """Coefficients in the panels' Legendre polynomials, (panels, degree + 1, k), from ``vectors``, (size, k)."""
         return np.asarray(np.matmul(self._coefficients, vectors.reshape(-1, self.degree + 1, vectors.shape[1])))
 
     def evaluate(self, angle: ArrayLike) -> Floats:

@@ -19,10 +19,11 @@ from .wall_rows import WallRows
 if TYPE_CHECKING:
     from ..geometry import Wall
 
-# Rays after which the matrix is handed over as it is, with the error that it has: some seconds.
-MOST_RAYS = 10_000_000
+# Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
+# it has: some seconds. One row may take a share of them: rows that need more have pieces without number.
+MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.02
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
-ROWS_A_PIECE, RAYS_A_CHANGE = 100, 100
+ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
 # part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
 ASYMMETRY_FACTOR = 2.0
@@ -45,9 +46,9 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# Rows of a wall that takes more than this share of the rays for a first look have pieces without number.
+# Rows of a wall that takes more than this share of the flights for a first look have pieces without number.
 FIRST_SHARE = 0.05
-# The order in the number of rays that they are trusted to have.
+# The order in the number of flights that they are trusted to have.
 PRESUMED_ORDER = 2.0
 # Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
 LEAST_CUT = 1e-7
@@ -63,21 +64,22 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     A row has several changes of itinerary a piece, each found by about 30 rays, and a matrix needs about a thousand
     rows for an error of 1e-6 and as many kinks in theta as pieces: the cost grows like the square of the pieces. A
     change of cell costs as much as one of itinerary, in each row, and the rows of each cell are integrated anew.
-    Where the wall overhangs, rays stay in its cavities for long, and rows have changes without end.
+    Where the wall overhangs, rays stay in its cavities for long, and rows have changes without end. Islands do not
+    hold them so.
     """
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
-    predicted = ROWS_A_PIECE * RAYS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
+    predicted = ROWS_A_PIECE * FLIGHTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
     overhangs = bool(np.any(np.diff(wall.vertices[:, 0]) < 0.0))
-    return bool(wall.closes) and not overhangs and predicted <= MOST_RAYS
+    return not overhangs and predicted <= MOST_FLIGHTS
 
 
 def row_matrix(
-    wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS, *, patient: bool = True
+    wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS, *, patient: bool = True
 ) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
-    Who is not patient stops where the first rows already speak against meeting the tolerance with so many rays.
+    Who is not patient stops where the first rows already speak against meeting the tolerance with so many flights.
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
     of that difference scaled by what dividing the panel showed where they are smooth; plus the errors of the rows;
@@ -85,13 +87,13 @@ def row_matrix(
     """
     small = isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS
     inner = Legendre(FEWEST_FUNCTIONS) if small else basis
-    matrix, error, rays = _Integrator(wall, inner, tolerance, most_rays, patient).run()
+    matrix, error, rays = _Integrator(wall, inner, tolerance, most_flights, patient).run()
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), error, rays
 
 
-def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOST_RAYS) -> tuple[Floats, float]:
+def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS) -> tuple[Floats, float]:
     """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
-    integrator = _Integrator(wall, basis, tolerance, most_rays, patient=True)
+    integrator = _Integrator(wall, basis, tolerance, most_flights, patient=True)
     _, error, _ = integrator.run()
     edges = np.union1d(integrator.panels.low, integrator.panels.high)
     return np.union1d(edges, np.pi - edges) if integrator.halved else edges, error
@@ -100,11 +102,11 @@ def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_rays: int = MOS
 class _Integrator:
     """One matrix in the making."""
 
-    def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_rays: int, patient: bool) -> None:
+    def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_flights: int, patient: bool) -> None:
         self.basis = basis
         self.tolerance = max(tolerance, 8.0 * np.finfo(np.float64).eps * basis.size)
-        self.most_rays, self.patient = most_rays, patient
-        self.rays, self.row_count = 0, 0
+        self.most_flights, self.patient = most_flights, patient
+        self.rays, self.flights, self.row_count = 0, 0, 0
         self.progress: list[tuple[int, float]] = []
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
@@ -118,7 +120,7 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        self.rows = WallRows(wall, degree, inside, least)
+        self.rows = WallRows(wall, degree, inside, least, int(LARGEST_ROW * most_flights))
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
@@ -128,10 +130,10 @@ class _Integrator:
         self._add_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
-        """Divide panels until the error is small enough, or no rays are left: first for coarser tolerances."""
+        """Divide panels until the error is small enough, or no flights are left: first for coarser tolerances."""
         for stage in range(self.stages, -1, -1):
             error = self._meet(self._begin(stage))
-            if self.rays >= self.most_rays or self._is_hopeless():
+            if self.flights >= self.most_flights or self._is_hopeless():
                 break
         return self._state()[0], error, self.rays
 
@@ -147,12 +149,12 @@ class _Integrator:
         return tolerance
 
     def _meet(self, tolerance: float) -> float:
-        """Divide panels until the error is below the tolerance, or no rays are left; returns the error."""
+        """Divide panels until the error is below the tolerance, or no flights are left; returns the error."""
         goal = tolerance
         while True:
             _, known, hidden = self._state()
-            self.progress.append((self.rays, known + hidden))
-            if known + hidden <= tolerance or self.rays >= self.most_rays or self._is_hopeless():
+            self.progress.append((self.flights, known + hidden))
+            if known + hidden <= tolerance or self.flights >= self.most_flights or self._is_hopeless():
                 return known + hidden
             # errors that only the asymmetry shows lie in panels whose rules agree by chance
             goal = min(goal, max(tolerance - hidden, 0.25 * known))
@@ -162,15 +164,15 @@ class _Integrator:
             self._divide(chosen)
 
     def _is_hopeless(self) -> bool:
-        """Whether the first rows alone took a good part of the rays, and left more than the others can make good.
+        """Whether the first rows alone took a good part of the flights, and left more than the others can make good.
 
         Later progress is no guide: errors fall by jumps, when the last of the pieces that matter are seen.
         """
         if self.patient or len(self.progress) != 1:
             return False
-        rays, error = self.progress[0]
-        needed = rays * max(error / self.tolerance, 1.0) ** (1.0 / PRESUMED_ORDER)
-        return rays > FIRST_SHARE * self.most_rays and needed > self.most_rays
+        flights, error = self.progress[0]
+        needed = flights * max(error / self.tolerance, 1.0) ** (1.0 / PRESUMED_ORDER)
+        return flights > FIRST_SHARE * self.most_flights and needed > self.most_flights
 
     def _state(self) -> tuple[Floats, float, float]:
         """The matrix, the error that its panels and rows are known to have, and what its asymmetry adds."""
@@ -197,7 +199,8 @@ class _Integrator:
         # a panel far below the worst waits for a later round
         chosen &= able & (panels.error > 0.02 * np.max(panels.error, where=able, initial=0.0))
         # no more than what is left of the budget buys, at the cost of a row so far
-        most = int((self.most_rays - self.rays) * self.row_count / max(1, self.rays)) // (2 * len(NODES))
+        left = (self.most_flights - self.flights) * self.row_count / max(1, self.flights)
+        most = int(left) // (2 * len(NODES))
         worst = np.zeros(len(order), dtype=np.bool_)
         worst[order[max(0, len(order) - most) :]] = True
         return np.asarray(chosen & worst)
@@ -252,7 +255,7 @@ class _Integrator:
         for first in range(0, len(panel), ROWS_AT_ONCE):
             few = slice(first, first + ROWS_AT_ONCE)
             rows = self.rows(panels.angle[panel[few], node[few]], tolerance[panel[few]])
-            self.rays += rows.rays
+            self.rays, self.flights = self.rays + rows.rays, self.flights + rows.flights
             self.row_count += len(rows.theta)
             panels.image[panel[few], node[few]] = means_of_basis(self.basis, rows.nodes, rows.weights, rows.starts)
             panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, finite_number
 from ..errors import InputError
-from .hollow_rows import HollowRows
+from .hollow_rows import NO_LIMIT, HollowRows
 from .law import AngleFunction
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ class AdaptiveRows:
         Estimated error of the mean of a function of sup norm 1 and the degree asked for.
     lost : array, shape (rows,)
         Probability of rays that did not escape; they are sent back.
-    rays : int
-        Number of rays traced.
+    rays, flights : int
+        Number of rays traced, and of their flights from one collision to the next: what the rows have cost.
     """
 
     theta: Floats
@@ -47,6 +47,7 @@ class AdaptiveRows:
     error: Floats
     lost: Floats
     rays: int
+    flights: int
 
     def mean(self, function: AngleFunction) -> Floats:
         """E[f(Theta') | theta] for every row, shape ``(rows,) + extra`` for f with values ``theta.shape + extra``."""
@@ -115,9 +116,13 @@ def adaptive_rows(
 class WallRows:
     """Rows of one wall for one kind of functions; what is the same for all calls is made once."""
 
-    def __init__(self, wall: Wall, degree: int, edges: Floats, least_level: int = 0) -> None:
+    def __init__(
+        self, wall: Wall, degree: int, edges: Floats, least_level: int = 0, most_flights: int = NO_LIMIT
+    ) -> None:
         self.wall = wall
         self.degree = degree
+        # of one row in one hollow; its error tells what it had to leave undone
+        self.most_flights = most_flights
         # the first of the Gauss rules on a piece that may be used
         self.least_level = least_level
         # a writable copy: for read-only arrays all would be compiled again
@@ -128,7 +133,8 @@ class WallRows:
     @cached_property
     def _hollows(self) -> list[HollowRows]:
         """The rows of one hollow of each shape."""
-        return [HollowRows(self.wall.scene, k, self.degree, self.edges, self.least_level) for k, _ in self._shapes]
+        task = self.degree, self.edges, self.least_level, self.most_flights
+        return [HollowRows(self.wall.scene, k, *task) for k, _ in self._shapes]
 
     @property
     def _shares(self) -> list[float]:
@@ -153,8 +159,8 @@ class WallRows:
         incoming, place = np.unique(theta, return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
         np.minimum.at(tolerances, place, np.broadcast_to(tolerance, theta.shape))
-        before = sum(rows.rays for rows in self._hollows)
-        flat = 1.0 - sum(self._shares)
+        before = self._spent()
+        flat = self.wall.flat_top / self.wall.period if self.wall.closes else 0.0
         nodes: list[list[Floats]] = [[] for _ in incoming]
         weights: list[list[Floats]] = [[] for _ in incoming]
         error, lost = np.zeros(len(incoming)), np.zeros(len(incoming))
@@ -167,7 +173,7 @@ class WallRows:
                 weights[k].append(scale * row.widths)
                 error[k] += scale * row.error
                 lost[k] += scale * row.lost
-        if flat > 8.0 * np.finfo(np.float64).eps:
+        if flat > 0.0:
             for k, angle in enumerate(incoming.tolist()):
                 nodes[k].append(np.array([np.pi - angle]))
                 weights[k].append(np.array([flat]))
@@ -178,8 +184,12 @@ class WallRows:
             np.cumsum([0, *(sum(map(len, nodes[k])) for k in place.tolist())]),
             error[place],
             lost[place],
-            sum(rows.rays for rows in self._hollows) - before,
+            *(now - then for now, then in zip(self._spent(), before, strict=True)),
         )
+
+    def _spent(self) -> tuple[int, int]:
+        """Rays and flights so far."""
+        return sum(rows.rays for rows in self._hollows), sum(rows.flights for rows in self._hollows)
 
     def critical_angles(self, low: float, high: float) -> Floats:
         """Angles in (low, high), increasing, where pieces of rows are born or vanish: the most important ones known."""

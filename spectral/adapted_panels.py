@@ -12,7 +12,7 @@ from ..checks import Floats
 from ..errors import InputError
 from ..kernels import Law, Legendre, Panels
 from ..kernels.angle_panels import KRONROD, NODES
-from ..kernels.basis_rows import BasisRows, basis_rows
+from ..kernels.basis_rows import BasisRows, basis_rows, traces_rows
 from ..kernels.measure import SINE
 from ..kernels.products import one_blas_thread
 
@@ -24,7 +24,8 @@ FIRST_KINKS, WIDEST = 40, np.pi / 10
 NARROWEST = 1e-7
 # A level divides the worst panels, those that hold this share of the squared residuals.
 SHARE = 0.9
-MOST_LEVELS, MOST_PANELS = 12, 400
+# Levels at most; and panels beyond which none are divided, where rows are traced and where they are not.
+MOST_LEVELS, MOST_PANELS = 12, {True: 60, False: 200}
 # Trial functions of one parity that are iterated together, beyond those asked for.
 GUARD = 12
 MOST_ITERATIONS, SETTLED = 60, 0.02
@@ -70,7 +71,7 @@ def adapted_trials(law: Law, k: int, tolerance: float, extra: int = 2) -> Trials
     panels with large ones are divided.
     """
     mirrored = bool(law.mirror_symmetric)
-    edges = _first_edges(law, mirrored)
+    edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[traces_rows(law)]
     history: list[tuple[int, float]] = []
     goal = np.sqrt(tolerance)
     while True:
@@ -81,7 +82,7 @@ def adapted_trials(law: Law, k: int, tolerance: float, extra: int = 2) -> Trials
         goal = np.sqrt(tolerance * _room(values, k))
         joint = float(np.sqrt(squares[:, :k].sum()))
         history.append((level.panels.size, joint))
-        if joint <= goal or len(history) == MOST_LEVELS or len(edges) > MOST_PANELS:
+        if joint <= goal or len(history) == MOST_LEVELS or len(edges) > most_panels:
             break
         edges = _divided(edges, squares[:, :k].sum(axis=1))
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ UNIT_ROUNDOFF = 0.5 * float(np.finfo(np.float64).eps)
 # Roundings of an entry of the shifted matrix, beside one for each vector that is moved: its product with the sign, the
 # shift, and two products and sums of the deflation.
 ENTRY_ROUNDINGS = 6
+# Of gamma_{n+1} the one beyond n is the division by a pivot; where BLAS multiplies by its reciprocal it is one more,
+# and one is for the square root.
+PIVOT_ROUNDINGS = 3
 
 
 @dataclass(frozen=True)
@@ -76,19 +80,22 @@ def margin_below(matrix: Deflated, sign: float, vectors: Floats, values: Floats,
     -----
     B = threshold - sign * matrix is made, with the vectors (approximate eigenvectors of the given values) and the
     deflated direction moved far up, and factorised as B = R^T R. If that runs to completion then R^T R = B + E with
-    \|E\| <= gamma_{n+1} \| |R^T| |R| \| <= gamma_{n+1} \| |R| \|_1 \| |R| \|_inf in the spectral norm and
-    gamma_k = k u / (1 - k u), for every order of summation. So x^T B x >= -margin for all unit x, and for x orthogonal
-    to the vectors x^T B x is threshold - sign * x^T S x: by the minimax principle nothing else lies above.
+    \|E\| <= gamma_{n+3} \| |R^T| |R| \| <= gamma_{n+3} \| |R| \|_1 \| |R| \|_inf in the spectral norm and
+    gamma_k = k u / (1 - k u), for every order of summation and pivots by their reciprocals. So x^T B x >= -margin for
+    all unit x, and for x orthogonal to the vectors x^T B x is threshold - sign * x^T S x: by the minimax principle
+    nothing else lies above.
 
     Source: N. J. Higham, *Accuracy and Stability of Numerical Algorithms* (2nd ed. 2002), Theorem 10.3.
     """
+    from scipy.linalg import get_lapack_funcs
     from scipy.linalg.blas import dsyr2, dsyrk
-    from scipy.linalg.lapack import dlange, dpotrf
+    from scipy.linalg.lapack import dpotrf
 
     size, roots = len(matrix.array), np.sqrt(sign * values + 1.0 + np.abs(values).max(initial=0.0))
     moved = vectors * roots
-    shifted = np.multiply(matrix.array.T, -sign, order="F")
-    shifted.ravel(order="K")[:: size + 1] += threshold
+    # one triangle is used, in the order of BLAS
+    shifted = np.multiply(matrix.array, -sign).T
+    np.einsum("ii->i", shifted)[:] += threshold
     if matrix.constant is not None and matrix.image is not None:
         dsyr2(sign, matrix.constant, matrix.image, lower=1, a=shifted, overwrite_a=1)
         moved = np.column_stack([moved, matrix.constant * np.sqrt(1.0 + abs(threshold))])
@@ -97,10 +104,12 @@ def margin_below(matrix: Deflated, sign: float, vectors: Floats, values: Floats,
     factor, failed = dpotrf(shifted, lower=1, clean=1, overwrite_a=1)
     if failed:
         return None
-    gamma = (size + 1) * UNIT_ROUNDOFF / (1.0 - (size + 1) * UNIT_ROUNDOFF)
+    terms = (size + PIVOT_ROUNDINGS) * UNIT_ROUNDOFF
+    norm: Any = get_lapack_funcs("lange", (factor,))
+    one_norm, largest_row = norm("1", factor), norm("I", factor)
     # | |S| | <= |S|_F; a rank one update has the norm of its vectors
     parts = float(np.linalg.norm(matrix.array)) + abs(threshold) + float(np.sum(moved**2))
     if matrix.image is not None:
         parts += 2.0 * float(np.linalg.norm(matrix.image))
     entries = (ENTRY_ROUNDINGS + moved.shape[1]) * UNIT_ROUNDOFF * parts
-    return float(gamma * dlange("1", factor) * dlange("I", factor) + entries)
+    return float(terms / (1.0 - terms) * one_norm * largest_row + entries)

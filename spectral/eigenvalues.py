@@ -67,7 +67,7 @@ class Spectrum:
     vectors : array of shape (n, k)
         Coefficients of the orthonormal eigenfunctions in ``basis``, constants first.
     residuals : array of shape (k,)
-        Norm of S v - lambda v.
+        Norm of S v - lambda v; S is averaged with its mirror image where the eigenfunctions have parities.
     gap, slem : float
         1 - the largest eigenvalue off the constants; the largest modulus there.
     gap_errors : SpectrumErrors
@@ -186,14 +186,16 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     constant = np.asarray(matrix.basis.constant)
     rest, names = outermost_by_parity(matrix, constant, max(k - 1, 1))
     chosen = np.sort(np.argsort(-np.abs(rest.values), kind="stable")[: k - 1])
-    listed = np.column_stack([constant, rest.vectors])
-    images = 0.5 * (matrix.symmetric @ listed + (listed.T @ matrix.symmetric).T)
-    own = np.concatenate([[constant @ images[:, 0]], rest.values])
-    residuals = np.linalg.norm(images - listed * own, axis=0)
-    changes, proved = np.append(0.0, two_grid_changes(matrix, rest)), np.append(0.0, rest.errors)
+    image = 0.5 * (matrix.symmetric @ constant + constant @ matrix.symmetric)
+    first = float(constant @ image)
+    defect = float(np.linalg.norm(image - first * constant))
+    # the constants' own pair, then the others
+    values, vectors = np.append(first, rest.values), np.column_stack([constant, rest.vectors])
+    residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
+    changes = np.append(0.0, two_grid_changes(matrix, rest))
 
     def errors_of(places: NDArray[np.intp]) -> SpectrumErrors:
-        return _errors(matrix, own[places], listed[:, places], np.maximum(residuals, proved)[places], changes[places])
+        return _errors(matrix, values[places], vectors[:, places], algebraic[places], changes[places])
 
     # without a second function the gap is 1 by convention, and nothing is known of it
     unknown = frozen([np.inf])
@@ -203,8 +205,8 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         gap, slem = float(1.0 - rest.values[0]), float(np.abs(rest.values).max())
     places = np.append(0, 1 + chosen)
     return Spectrum(
-        values=frozen(own[places]),
-        vectors=frozen(listed[:, places]),
+        values=frozen(values[places]),
+        vectors=frozen(vectors[:, places]),
         residuals=frozen(residuals[places]),
         errors=errors_of(places),
         gap=gap,
@@ -220,11 +222,11 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
 
 
 def _errors(
-    matrix: KernelMatrix, values: Floats, vectors: Floats, residuals: Floats, changes: Floats
+    matrix: KernelMatrix, values: Floats, vectors: Floats, algebraic: Floats, changes: Floats
 ) -> SpectrumErrors:
-    rounding = matrix.basis.size * np.finfo(np.float64).eps * max(1.0, float(np.max(np.abs(values))))
+    rounding = matrix.basis.size * np.finfo(np.float64).eps
     return SpectrumErrors(
-        algebraic=frozen(residuals + rounding),
+        algebraic=frozen(algebraic + rounding),
         # an entry's error moves an eigenvalue by no more than the Frobenius norm; sampled ones have their own part
         discretisation=frozen(changes + (0.0 if matrix.samples else float(matrix.error))),
         sampling=frozen(sampling_errors(matrix, vectors, values)),

@@ -13,7 +13,7 @@ from ..checks import Floats, whole_number
 from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind
 from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
-from ..kernels.basis_rows import integrates_panels
+from ..kernels.basis_rows import integrates_panels, traces_rows
 from ..kernels.measure import SINE
 from .adapted_panels import adapted_trials
 from .deflation import off_constants
@@ -27,8 +27,8 @@ Label = Literal["indexed", "contains-spectrum"]
 LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
 # The squared residuals of adapted trial functions, and the errors of their quotients, may take this share of an
-# enclosure each; so many rows may be spent on the quotients.
-TRIAL_SHARE, MOST_ADAPTED_ROWS = 0.3, 20_000
+# enclosure each. Rows that may be spent on the quotients: where they are traced, and where they have a closed form.
+TRIAL_SHARE, MOST_TRACED_ROWS, MOST_EXACT_ROWS = 0.3, 4_000, 40_000
 # Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
 QUOTIENT_ROUNDING = 4.0 * EPS
 
@@ -161,12 +161,14 @@ def enclosures(
         raise AccuracyError(f"{law!r} is not reversible: its spectrum need not be real", np.inf)
     if basis is None and integrates_panels(law):
         trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
+        basis, values = trials.basis, trials.values
+        most_rows = MOST_TRACED_ROWS if traces_rows(law) else MOST_EXACT_ROWS
         found = residuals(
-            law, trials.basis, trials.vectors, trials.values, MOST_ADAPTED_ROWS,
-            mirrored=trials.mirrored, quotient_error=TRIAL_SHARE * tolerance,
+            law, basis, trials.vectors, values, most_rows, mirrored=trials.mirrored,
+            quotient_error=TRIAL_SHARE * tolerance,
         )  # fmt: skip
-        after = residuals(law, trials.basis, trials.following, trials.following_values, 0, mirrored=trials.mirrored)
-        basis, values, next_value = trials.basis, trials.values, _reach(after)
+        after = residuals(law, basis, trials.following, trials.following_values, 0, mirrored=trials.mirrored)
+        next_value = _reach(after)
     else:
         if basis is None:
             basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))

@@ -21,6 +21,11 @@ SMALL, LARGEST_SHARE = 512, 1.0 / 24.0
 # Relative accuracy that is asked of Lanczos; and the vectors and restarts that it may take: some hundred products,
 # still less than LAPACK takes.
 LANCZOS_TOLERANCE, LEAST_SPACE, MOST_RESTARTS = 1e-13, 24, 16
+# Joint residual above which LAPACK's answer is worth its time; Lanczos loses digits where it starts anew in a cluster.
+LARGEST_RESIDUAL = 1e-11
+# Values beyond those asked for: of a compact operator the squares of a few leave less than that of the last one asked
+# for, and no factorisation is needed.
+GUARDS = 6
 # Further searches where the proof shows that values are missing, and for how many more each.
 SEARCHES, MORE_VALUES = 2, 8
 # What is between the last value and the threshold of the proof, in backward errors n u of a factorisation.
@@ -39,6 +44,8 @@ class Extremes:
         Orthonormal.
     top : int
         So many of them are the largest ones, counted from the upper end; the others are counted from the lower end.
+    residuals : array of shape (m,)
+        Norms of S v - lambda v.
     errors : array of shape (m,)
         Bounds, to rounding: every value is this near the eigenvalue of its rank.
     method : str
@@ -48,6 +55,7 @@ class Extremes:
     values: Floats
     vectors: Floats
     top: int
+    residuals: Floats
     errors: Floats
     method: str
 
@@ -111,7 +119,9 @@ def counted_from_above(values: Floats, which: Which) -> int:
 
 def _proved(matrix: Deflated, k: int, which: Which) -> Extremes | None:
     """By Lanczos and Cholesky; None where the one does not converge or the other does not bear it out."""
-    found = _more(matrix, _nothing(len(matrix.array)), k, "LM" if which == "moduli" else "LA")
+    end: Literal["LM", "LA"] = "LM" if which == "moduli" else "LA"
+    none = _nothing(len(matrix.array))
+    found = _more(matrix, none, k + GUARDS, end) or _more(matrix, none, k, end)
     for _ in range(SEARCHES):
         if found is not None and which == "moduli" and np.all(found[0] <= 0.0):
             found = _more(matrix, found, 1, "LA")
@@ -120,15 +130,18 @@ def _proved(matrix: Deflated, k: int, which: Which) -> Extremes | None:
         listed = _without_others(matrix, found, k, which)
         if listed is not None:
             return listed
-        found = _more(matrix, found, MORE_VALUES, "LM" if which == "moduli" else "LA")
+        found = _more(matrix, found, MORE_VALUES, end)
     return None
 
 
 def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Extremes | None:
-    """The k wanted ones of those found, if no other eigenvalue is beyond the last of them."""
+    """The k wanted ones of those found, if they are good and no other eigenvalue is beyond the last of them."""
     values, vectors = found
     rounding = len(matrix.array) * EPS * max(1.0, float(np.abs(values).max()))
-    joint = float(np.linalg.norm(matrix @ vectors - vectors * values)) + rounding
+    residuals = np.linalg.norm(matrix @ vectors - vectors * values, axis=0)
+    joint = float(np.linalg.norm(residuals)) + rounding
+    if joint > LARGEST_RESIDUAL:
+        return None
     places = wanted(values, k, which)
     chosen = values[places]
     top = counted_from_above(chosen, which)
@@ -148,7 +161,7 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
     how = "Frobenius norms" if others <= last else "Cholesky factorisations"
     sides = f"above {reach[1.0]:.12g}" + (f" or below {-reach[-1.0]:.12g}" if -1.0 in reach else "")
     return Extremes(
-        chosen, vectors[:, places], top, 2.0 * joint + np.concatenate([upper, lower]),
+        chosen, vectors[:, places], top, residuals[places], 2.0 * joint + np.concatenate([upper, lower]),
         f"Lanczos, and by {how} no other eigenvalue is {sides}",
     )  # fmt: skip
 
@@ -196,5 +209,6 @@ def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which) -> 
     values, vectors = values[places], vectors[:, places]
     top = counted_from_above(values, which)
     norm = max(1.0, float(np.abs(values).max(initial=0.0)))
-    errors = np.full(len(values), len(array) * EPS * norm)
-    return Extremes(values, vectors, top, errors, "all eigenvalues by LAPACK")
+    residuals = np.linalg.norm(Deflated.of(array, constant) @ vectors - vectors * values, axis=0)
+    errors = residuals + len(array) * EPS * norm
+    return Extremes(values, vectors, top, residuals, errors, "all eigenvalues by LAPACK")

@@ -13,6 +13,7 @@ from ..estimates import ErrorKind, Estimate
 from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
 from ..kernels.algebra import made_of_isometries
 from ..kernels.basis_rows import integrates_panels
+from .adapted_panels import adapted_trials
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge, essential_edge
@@ -23,8 +24,9 @@ from .separation import lambertian_share
 
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 
-# Eigenvalues that are enclosed in the search of the largest one off the constants.
-ENCLOSED = 3
+# Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
+# exact the look is that counts them.
+ENCLOSED, MOST_ENCLOSED, FIRST_LOOK = 3, 8, 1e-2
 
 
 @dataclass(frozen=True)
@@ -251,7 +253,7 @@ def _at_edge(law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Sp
 
 def _by_enclosure(law: Law, tolerance: float) -> SpectralGap | None:
     """The gap from an indexed enclosure, where the separation of the spectrum is known."""
-    for number in (ENCLOSED, 2 * ENCLOSED):
+    for number in (ENCLOSED, 2 * ENCLOSED) if isinstance(law, DensityLaw) else _number_to_enclose(law):
         found = enclosures(law, number, tolerance=tolerance)
         listed = [item for item in found if item.label == "indexed" and item.index]
         if not listed:
@@ -266,6 +268,14 @@ def _by_enclosure(law: Law, tolerance: float) -> SpectralGap | None:
         gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
         return SpectralGap(gap, error, kind, f"indexed enclosure; {found.method}", "isolated", (str(top),), law.frame)
     return None
+
+
+def _number_to_enclose(law: Law) -> tuple[int, ...]:
+    """How many of the largest moduli reach down to the largest value off the constants, at a first look."""
+    look = adapted_trials(law, MOST_ENCLOSED, FIRST_LOOK)
+    order = np.argsort(-np.abs(look.values), kind="stable")
+    positive = np.flatnonzero(look.values[order][1:] > 0.0)
+    return (int(positive[0]) + 2,) if positive.size else ()
 
 
 def _lower_bound(law: Law) -> tuple[str, ...]:

@@ -11,6 +11,9 @@ import numpy as np
 from ..checks import Floats, finite_array, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..kernels import KernelMatrix
+from .deflation import symmetric_half
+from .extremes import Extremes, outermost
+from .parity import Parity, outermost_by_parity
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -46,10 +49,13 @@ class LeadingEigenvalues:
     complete : bool
         Whether the count proves that no larger eigenvalue is missing.
     counted : int
-        Eigenvalues above ``threshold``, by the signs of a factorisation; -1 where none was made.
+        Eigenvalues above ``threshold``, by the signs of a factorisation; -1 where none was made. Of dense matrices the
+        number of those that are listed: no more are above ``threshold``, the last of them, plus ``margin``.
     threshold, margin : float
         The matrix that was factorised differs from S - threshold by at most ``margin`` in norm.
     method : str
+    parity : tuple of {"even", "odd"}
+        Of the eigenvectors of a `KernelMatrix` of a mirror-symmetric law, which is solved in two halves; else empty.
     """
 
     values: Floats
@@ -61,6 +67,7 @@ class LeadingEigenvalues:
     threshold: float
     margin: float
     method: str
+    parity: tuple[Parity, ...] = ()
 
 
 def leading_eigenvalues(
@@ -94,7 +101,7 @@ def leading_eigenvalues(
     Sparse matrices: blocks of vectors are multiplied by (sigma - S)^(-1), sigma just above the spectrum, until they
     settle, and an LDL^T factorisation without pivoting of S - tau, tau in a gap below the k-th value, has as many
     positive pivots as S has eigenvalues above tau (Sylvester). The factors are multiplied out: the difference from
-    S - tau bounds how far the counted spectrum is moved. Dense matrices: LAPACK's complete solver. For a
+    S - tau bounds how far the counted spectrum is moved. Dense matrices: see `asperity.spectral.extremes`. For a
     LinearOperator nothing can be factorised: ``complete`` is False, and the residuals are all that is known.
 
     Examples
@@ -111,7 +118,8 @@ def leading_eigenvalues(
     whole_number("k", k, 1)
     source = np.random.default_rng(0) if rng is None else rng
     if isinstance(matrix, KernelMatrix):
-        return _dense(0.5 * (matrix.symmetric + matrix.symmetric.T), k)
+        found, parity = outermost_by_parity(matrix, None, k, "largest")
+        return _listed(found, parity if "none" not in parity else ())
     if isinstance(matrix, LinearOperator):
         return _matrix_free(matrix, k, source)
     if issparse(matrix):
@@ -124,17 +132,15 @@ def leading_eigenvalues(
 
 
 def _dense(array: Floats, k: int) -> LeadingEigenvalues:
-    from scipy.linalg import eigh
+    return _listed(outermost(symmetric_half(array), None, k, "largest"), ())
 
-    values, vectors = eigh(array)
-    values, vectors = values[::-1], vectors[:, ::-1]
-    number = min(k, len(values))
-    kept = vectors[:, :number]
-    residuals = np.linalg.norm(array @ kept - kept * values[:number], axis=0)
-    margin = len(values) * EPS * float(np.abs(values).max(initial=0.0))
+
+def _listed(found: Extremes, parity: tuple[Parity, ...]) -> LeadingEigenvalues:
+    number = len(found.values)
     return LeadingEigenvalues(
-        frozen(values[:number]), frozen(kept), frozen(residuals), float(residuals.max(initial=0.0)) + margin, True,
-        len(values), -np.inf, margin, "all eigenvalues by LAPACK",
+        frozen(found.values), frozen(found.vectors), frozen(found.residuals), float(found.errors.max(initial=0.0)),
+        True, number, float(found.values.min(initial=np.inf)), float(found.errors.max(initial=0.0)), found.method,
+        parity,
     )  # fmt: skip
 
 

@@ -51,7 +51,8 @@ def outermost_by_parity(
     split = halves(matrix)
     if split is None:
         found = outermost(symmetric_half(matrix.symmetric), constant, k, which)
-        return found, ("none",) * len(found.values)
+        nothing: Parity = "none"
+        return found, (nothing,) * len(found.values)
     parts: list[tuple[Extremes, csr_array[Any], Parity]] = []
     names: tuple[Parity, Parity] = ("even", "odd")
     for half, name in zip(split, names, strict=True):
@@ -68,6 +69,7 @@ def _merged(
     """The k wanted ones of both halves: each of these lists as many of its own."""
     values = np.concatenate([part.values for part, _, _ in parts])
     vectors = np.concatenate([half @ part.vectors for part, half, _ in parts], axis=1)
+    residuals = np.concatenate([part.residuals for part, _, _ in parts])
     errors = np.concatenate([part.errors for part, _, _ in parts])
     names = np.repeat([name for _, _, name in parts], [len(part.values) for part, _, _ in parts])
     order = np.argsort(-values, kind="stable")
@@ -75,7 +77,7 @@ def _merged(
     methods = dict.fromkeys(part.method for part, _, _ in parts)
     values = values[order]
     top = counted_from_above(values, which)
-    found = Extremes(values, vectors[:, order], top, errors[order], "; ".join(methods))
+    found = Extremes(values, vectors[:, order], top, residuals[order], errors[order], "; ".join(methods))
     return found, tuple(names[order].tolist())
 
 

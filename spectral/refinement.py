@@ -22,6 +22,8 @@ SHALLOW = 0.5
 FIRST_SAMPLES, LARGEST_SAMPLES = 2**17, 2**22
 # At an edge of the essential spectrum more rays show nothing: the edge is known by itself.
 SAMPLES_AT_EDGE, DEGREE_AT_EDGE, TOLERANCE_AT_EDGE = 2**19, 24, 1e-4
+# Quadratures with an error above this many standard errors of as many rays are given up.
+POOR = 4.0
 # Share of the tolerance that a matrix may spend.
 MATRIX_SHARE = 0.1
 FEWEST_LEVELS = 3
@@ -90,6 +92,7 @@ class SharedMatrices:
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
         self._made: dict[tuple[Basis, int, float], KernelMatrix] = {}
+        self._by_rays = False
 
     def __call__(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
         """The matrix of a law, by a flip where it is the other convention's."""
@@ -97,8 +100,22 @@ class SharedMatrices:
             return self(law.law, basis, samples, tolerance).in_specular_frame()
         key = (basis, samples, tolerance)
         if key not in self._made:
-            self._made[key] = discretise(law, basis, tolerance=tolerance, samples=samples, rng=self.rng)
+            self._made[key] = self._better(law, basis, samples, tolerance)
         return self._made[key]
+
+    def _better(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
+        """By quadrature, unless its error is beyond the tolerance and beyond what an eigenvalue has from rays.
+
+        The Frobenius error bounds that of an eigenvalue; from n rays this is about n^(-1/2) whatever the basis.
+        """
+        if not self._by_rays:
+            found = discretise(law, basis, tolerance=tolerance, samples=samples, rng=self.rng)
+            poor = float(found.error) > max(tolerance, POOR / np.sqrt(samples))
+            if found.samples or not poor or not law.reversible:
+                return found
+            # it would be no better on larger bases
+            self._by_rays = True
+        return discretise(law, basis, method="monte-carlo", tolerance=tolerance, samples=samples, rng=self.rng)
 
 
 def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> Refinement:

@@ -32,7 +32,7 @@ def two_grid_changes(matrix: KernelMatrix, found: Extremes) -> Floats:
 
 
 def _coarser_grids(matrix: KernelMatrix, top: int, bottom: int, levels: int) -> list[Floats]:
-    """The eigenvalues of these ranks on successively coarser bases, as many as the basis has; NaN where there is none."""
+    """The eigenvalues of these ranks on successively coarser bases; NaN where there is none."""
     from scipy.sparse import csr_array
 
     found: list[Floats] = []

@@ -10,6 +10,8 @@ if TYPE_CHECKING:
     from .work_report import WorkReport
 
 MARKERS = "osv^D<>Ph*X"
+# An axis of less than this ratio has at most one labelled power of ten.
+DECADE = 10.0
 
 
 def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
@@ -36,7 +38,9 @@ def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
     ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel=f"{report.norms[0]} error", title=report.problem)
     from matplotlib.ticker import NullFormatter
 
-    # within a decade matplotlib labels the minor ticks, too, and they overlap
-    ax.xaxis.set_minor_formatter(NullFormatter())
-    ax.legend(fontsize="small")
+    for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
+        if high > DECADE * low:
+            # matplotlib labels minor ticks of a few decades, too, and they overlap
+            axis.set_minor_formatter(NullFormatter())
+    ax.legend(fontsize="x-small", framealpha=0.6)
     return ax

@@ -10,6 +10,7 @@ written comes with an error: from coarser rules or from the spread, and for mome
 
 from __future__ import annotations
 
+import heapq
 import json
 import math
 import sys
@@ -28,9 +29,14 @@ FILE = Path(__file__).with_suffix(".json")
 ANGLES = (0.21, 0.83, 1.37, 1.96, 2.77)
 MOST_HITS = 5000
 # Samples of a row that stands for itself, and of one of many under a moment.
-ROW_SAMPLES, MOMENT_SAMPLES = 16384, 512
+ROW_SAMPLES, MOMENT_SAMPLES = 16384, 1024
+# Exactness of the rows of a panel of width 1, and of one so narrow that it may be coarser.
+ROW_EXACTNESS, FAIR_WIDTH = 1e-8, 0.02
+# The moment: Gauss's rule on a panel, the sum of what panels may miss, and the rays after which it is left at that.
+RULE = tuple(0.5 * part + (0.5, 0.0)[k] for k, part in enumerate(np.polynomial.legendre.leggauss(12)))
+GOAL, MOST_RAYS = 1e-10, 15_000_000
 # Rays that the library may spend on finding cuts; where its error is then above the limit, rays are averaged instead.
-CUT_RAYS, CUT_TOLERANCE, ROUGH = 800_000, 1e-5, 1e-3
+CUT_RAYS, CUT_TOLERANCE, ROUGH = 300_000, 1e-5, 1e-2
 # Sides of the grid of strata, and the number of replicates; in a row, of shifted midpoint sums.
 STRATA, REPLICATES, MIDPOINTS = 500, 8, 1 << 16
 # Walks along a row, each with the places at which the one before met a piece that it had not seen.
@@ -103,21 +109,22 @@ def bezier_time(row, own, px, py, vx, vy):
     g1 = (row[3] - px) * vy - (row[4] - py) * vx
     g2 = (row[5] - px) * vy - (row[6] - py) * vx
     g3 = (row[7] - px) * vy - (row[8] - py) * vx
+    if min(g0, g1, g2, g3) > 0.0 or max(g0, g1, g2, g3) < 0.0:
+        return np.inf, 0.0
     # derivative/3 = d0 (1-s)^2 + 2 d1 s(1-s) + d2 s^2
     d0, d1, d2 = g1 - g0, g2 - g1, g3 - g2
     a, b, c = d0 - 2 * d1 + d2, 2 * (d1 - d0), d0
-    cuts = np.array([0.0, 1.0, 1.0, 1.0])
+    first = second = 1.0
     disc = b * b - 4 * a * c
     if disc > 0.0:
         q = -0.5 * (b + math.copysign(math.sqrt(disc), b))
         r0 = q / a if a != 0.0 else 2.0
         r1 = c / q if q != 0.0 else 2.0
-        cuts[1] = r0 if 0.0 < r0 < 1.0 else 1.0
-        cuts[2] = r1 if 0.0 < r1 < 1.0 else 1.0
-        cuts.sort()
+        first = r0 if 0.0 < r0 < 1.0 else 1.0
+        second = r1 if 0.0 < r1 < 1.0 else 1.0
+    least, most = min(first, second), max(first, second)
     roots, count = np.empty(3), 0
-    for part in range(3):
-        low, high = cuts[part], cuts[part + 1]
+    for low, high in ((0.0, least), (least, most), (most, 1.0)):
         flow, fhigh = cubic(g0, g1, g2, g3, low), cubic(g0, g1, g2, g3, high)
         if low == high or flow * fhigh > 0.0:
             continue
@@ -149,10 +156,10 @@ def bezier_time(row, own, px, py, vx, vy):
         count += 1
     skip = -1
     if own >= 0.0:
-        least = 1e-6
+        nearest = 1e-6
         for k in range(count):
-            if abs(roots[k] - own) < least:
-                least, skip = abs(roots[k] - own), k
+            if abs(roots[k] - own) < nearest:
+                nearest, skip = abs(roots[k] - own), k
     best, best_s = np.inf, 0.0
     for k in range(count):
         if k != skip:
@@ -243,7 +250,9 @@ def follow(table, x, theta):
 
 @compiled
 def row_integral(table, theta, low, high, samples, exactness):
-    """The integral of cos theta' over the entry points, and the error: what narrow gaps and the last rules leave open.
+    """The integral of cos theta' over the entry points, its error, and the number of rays.
+
+    The error is what narrow gaps and the last rules leave open.
 
     Gaps are halved until they matter less than the exactness, as far as their ends show, and rules have to agree to it.
     """
@@ -254,23 +263,26 @@ def row_integral(table, theta, low, high, samples, exactness):
     for n in range(40):
         ladder[samples + 2 * n] = low + width * 0.4 ** (n + 3)
         ladder[samples + 2 * n + 1] = high - width * 0.4 ** (n + 3)
+    rays = 0
     for _ in range(ATTEMPTS):
         ladder.sort()
-        total, error, strange = walk(table, theta, ladder, exactness)
+        total, error, strange, spent = walk(table, theta, ladder, exactness)
+        rays += spent
         if strange.shape[0] == 0:
             break
         ladder = np.concatenate((ladder, strange))
-    return total, error + 2.0 * (ladder[0] - low) + 2.0 * (high - ladder[-1])
+    return total, error + 2.0 * (ladder[0] - low) + 2.0 * (high - ladder[-1]), rays
 
 
 @compiled
 def walk(table, theta, ladder, exactness):
-    """The integral from the first to the last place of the ladder, its error, and places in pieces of other labels."""
+    """The integral from the first to the last place of the ladder, its error, places of other labels, and the rays."""
     xs, outs, labels = np.empty(200), np.empty(200), np.empty(200, np.uint64)
     strange = [0.0 for _ in range(0)]
     last = ladder[0]
     last_out, last_label = follow(table, last, theta)
     start, total, error, gaps, pieces = last, 0.0, 0.0, 0.0, 0
+    rays = ladder.shape[0]
     for k in range(1, ladder.shape[0]):
         # the places still to be reached, the nearest one on top: the middle of a gap goes on top of its far end
         xs[0] = ladder[k]
@@ -287,8 +299,10 @@ def walk(table, theta, ladder, exactness):
                 xs[count] = 0.5 * (last + x)
                 outs[count], labels[count] = follow(table, xs[count], theta)
                 count += 1
+                rays += 1
             else:
-                value, miss, other = piece_integral(table, theta, start, last, last_label, exactness)
+                value, miss, other, spent = piece_integral(table, theta, start, last, last_label, exactness)
+                rays += spent
                 if not math.isnan(other):
                     strange.append(other)
                 total += value + 0.5 * (math.cos(last_out) + math.cos(out)) * gap
@@ -297,23 +311,24 @@ def walk(table, theta, ladder, exactness):
                 pieces += 1
                 start, last, last_out, last_label = x, x, out, label
                 count -= 1
-    value, miss, other = piece_integral(table, theta, start, last, last_label, exactness)
+    value, miss, other, spent = piece_integral(table, theta, start, last, last_label, exactness)
     if not math.isnan(other):
         strange.append(other)
     # where in its gap a change lies is by chance
-    return total + value, error + miss + 3.0 * math.sqrt(gaps), np.array(strange)
+    return total + value, error + miss + 3.0 * math.sqrt(gaps), np.array(strange), rays + spent
 
 
 @compiled
 def piece_integral(table, theta, low, high, label, exactness):
-    """tanh-sinh over a piece, finer until two rules agree, the error, and a place of another label (nan: none).
+    """tanh-sinh over a piece, finer until two rules agree: with error, a place of another label (nan: none), and rays.
 
     What such rays weigh counts as error.
     """
     half = 0.5 * (high - low)
     old, step, total, strange, miss, other = 0.0, FIRST_STEP, 0.0, 0.0, 2.0 * half, np.nan
+    rays = 0
     if half <= 0.0:
-        return 0.0, 0.0, np.nan
+        return 0.0, 0.0, np.nan, 0
     for level in range(LEVELS + 1):
         total, strange = 0.5 * total, 0.5 * strange
         number = int(REACH / step)
@@ -326,6 +341,7 @@ def piece_integral(table, theta, low, high, label, exactness):
             distance = 2.0 * half / (1.0 + math.exp(2.0 * abs(u)))
             x = low + distance if u < 0.0 else high - distance
             out, here = follow(table, x, theta)
+            rays += 1
             total += weight * math.cos(out)
             if here != label and distance > 1e-13:
                 strange += weight
@@ -336,7 +352,7 @@ def piece_integral(table, theta, low, high, label, exactness):
                 break
         old = total
         step *= 0.5
-    return total, miss + 2.0 * strange, other
+    return total, miss + 2.0 * strange, other, rays
 
 
 def opening(wall):
@@ -348,7 +364,7 @@ def opening(wall):
 def row_of(wall, theta):
     """E[cos Theta' | theta] and its error."""
     table, (left, right) = table_of(wall), opening(wall)
-    value, error = row_integral(table, theta, left, right, ROW_SAMPLES, 1e-14)
+    value, error, _ = row_integral(table, theta, left, right, ROW_SAMPLES, 1e-14)
     if error > ROUGH:
         shifts = np.random.default_rng(7).random(REPLICATES)
         sums = [midpoint_sum(table, theta, left, right, shift) for shift in shifts]
@@ -365,9 +381,6 @@ def midpoint_sum(table, theta, left, right, shift):
     return total * (right - left) / MIDPOINTS
 
 
-FINE, COARSE = np.polynomial.legendre.leggauss(12), np.polynomial.legendre.leggauss(8)
-
-
 def moment_of(wall):
     """<u, P u>/<u, u> and its error: flat tops, which reflect u to -u, in closed form."""
     table, (left, right) = table_of(wall), opening(wall)
@@ -380,21 +393,48 @@ def moment_of(wall):
         return 3.0 * share * float(np.mean(means)) - flat, 9.0 * share * float(np.std(means, ddof=1)) / math.sqrt(
             REPLICATES
         )
-    moment, flux, error = 0.0, 0.0, 0.0
-    for low, high in pairwise(edges):
-        fine, coarse = (panel(table, left, right, low, high, rule) for rule in (FINE, COARSE))
-        moment, flux, error = moment + fine[0], flux + fine[1], error + fine[2] + abs(fine[0] - coarse[0])
+    moment, flux, error = adaptive_sums(table, left, right, edges)
     scale = 3.0 / wall.period
     return scale * moment - flat, scale * (error + 2.0 * abs(flux))
 
 
-def panel(table, left, right, low, high, rule):
-    """Integrals of cos theta E[cos Theta'] and of E[cos Theta'] for sin(theta)/2 d theta, and the rows' error."""
-    s, weight = 0.5 * (1.0 + rule[0]), 0.5 * rule[1]
-    angle = low + (high - low) * s * s * (3.0 - 2.0 * s)
-    weight = (high - low) * 6.0 * s * (1.0 - s) * weight * 0.5 * np.sin(angle)
-    rows = np.array([row_integral(table, theta, left, right, MOMENT_SAMPLES, 1e-8) for theta in angle])
-    return (weight * np.cos(angle)) @ rows[:, 0], weight @ rows[:, 0], weight @ rows[:, 1]
+def adaptive_sums(table, left, right, edges):
+    """Integrals of cos theta E[cos Theta'] and of E[cos Theta'] for sin(theta)/2 d theta, and the error of the first.
+
+    The worst panel is halved until the differences between panels and their halves are small, or the rays are used up.
+    A half is trusted no more than that difference, though what it leaves is smaller.
+    """
+    panels, rays = [], 0
+    for low, high in pairwise(edges):
+        panels.append((-np.inf, low, high, panel_sums(table, left, right, low, high, *RULE)))
+        rays += panels[-1][3][3]
+    while np.isinf(panels[0][0]) or (rays < MOST_RAYS and -panels[0][0] > GOAL / len(panels)):
+        _, low, high, whole = heapq.heappop(panels)
+        middle = 0.5 * (low + high)
+        halves = [panel_sums(table, left, right, *ends, *RULE) for ends in ((low, middle), (middle, high))]
+        doubt = 0.5 * abs(whole[0] - halves[0][0] - halves[1][0])
+        heapq.heappush(panels, (-doubt, low, middle, halves[0]))
+        heapq.heappush(panels, (-doubt, middle, high, halves[1]))
+        rays += halves[0][3] + halves[1][3]
+    sums = np.array([panel[3] for panel in panels])
+    doubts = -sum(panel[0] for panel in panels)
+    return math.fsum(sums[:, 0]), math.fsum(sums[:, 1]), doubts + math.fsum(sums[:, 2])
+
+
+@compiled
+def panel_sums(table, left, right, low, high, places, weights):
+    """The integrals of cos theta E[cos Theta'] and of E[cos Theta'] over a panel, the rows' errors, and the rays."""
+    moment, flux, error, rays = 0.0, 0.0, 0.0, 0
+    exactness = ROW_EXACTNESS * max(1.0, FAIR_WIDTH / (high - low))
+    for k in range(places.shape[0]):
+        s = places[k]
+        theta = low + (high - low) * s * s * (3.0 - 2.0 * s)
+        weight = (high - low) * 6.0 * s * (1.0 - s) * weights[k] * 0.5 * math.sin(theta)
+        value, miss, spent = row_integral(table, theta, left, right, MOMENT_SAMPLES, exactness)
+        moment, flux = moment + weight * math.cos(theta) * value, flux + weight * value
+        error += weight * abs(math.cos(theta)) * miss
+        rays += spent
+    return moment, flux, error, rays
 
 
 @compiled

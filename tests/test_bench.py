@@ -10,23 +10,31 @@ import time
 
 import numpy as np
 import pytest
+from benchmarks.__main__ import begin_or_go_on
+from benchmarks.sections import SECTIONS, section_text
 from click.testing import CliRunner
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench import quantities, routes, scene_savings
+from asperity.bench import collision_quantities, quantities, routes, scene_savings, uniform_disk
 from asperity.bench.bench_run import BenchRun
 from asperity.bench.child_process import ChildCrashed, ChildProcess, OutOfTime
 from asperity.bench.comparison import compare_runs
 from asperity.bench.extreme_report import run_extremes
 from asperity.bench.extreme_row import ExtremeRow
-from asperity.bench.matrix_references import matrix_references
+from asperity.bench.known_references import known_reference
+from asperity.bench.matrix_quantities import LAW_BASIS, resistance_of
 from asperity.bench.scenes import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
-from asperity.bench.standard_set import Effort, problem_names, references_of, run_problems
+from asperity.bench.spectral_quantities import eta_at
+from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
+from asperity.bench.time_plan import TimePlan
+from asperity.bench.timing import side_by_side
 from asperity.cli import main
 from asperity.errors import InputError
+from asperity.kernels.directions import Directions
 
 RAYS = 2**12
+WITHOUT_REFERENCE = [f"{scene}/lambda2" for scene in ("cusps", "mushroom", "mixed")]
 
 
 def run_report(rows, problem="teeth/law"):
@@ -61,59 +69,99 @@ def test_random_walls_are_walls_and_the_same_for_ever():
 
 
 def test_problems_are_found_by_scene_by_quantity_and_by_both():
-    assert len(problem_names()) == 8 * len(quantities.QUANTITIES)
+    assert len(problem_names()) == sum(len(one.scenes) for one in quantities.QUANTITIES.values())
     assert problem_names(["koch/law"]) == ["koch/law"]
-    assert problem_names(["cusps"]) == [f"cusps/{quantity}" for quantity in quantities.QUANTITIES]
+    assert problem_names(["cusps"]) == [f"cusps/{name}" for name in ("law", "moment", "lambda2", "collision", "disk")]
     assert len(problem_names(["moment"])) == 8
-    assert problem_names(["random-3"]) == ["random-3/law", "random-3/moment"]
+    assert problem_names(["distance"]) == [f"{name}/distance" for name in standard_names()[:3]]
+    assert problem_names(["random-3"]) == ["random-3/moment"]
     with pytest.raises(InputError, match="expected SCENE"):
         problem_names(["hilbert-curve"])
 
 
-@pytest.mark.parametrize("name", ["triangular-teeth", "rectangular-teeth"])
-def test_two_references_of_a_polygon_agree_within_their_errors(name):
-    (first, one, _, made), (second, two, _, other) = matrix_references(wall_of(name), ker.Bins(8), quick=True)
-    # the matrix and not its diagonal
-    assert np.linalg.norm(first.symmetric - second.symmetric) <= one + 3.0 * two
-    assert not set(made) & set(other)
+def test_every_problem_but_those_named_has_a_reference():
+    without = [name for name in problem_names() if known_reference(name) is None]
+    assert without == WITHOUT_REFERENCE
+    assert all(known_reference(f"random-{number}/moment") is not None for number in range(RANDOM_WALLS))
+
+
+@pytest.mark.parametrize("name", ["triangular-teeth", "focusing-arc", "cusps", "mushroom", "profile", "mixed"])
+def test_a_law_that_is_kept_is_markov_symmetric_and_that_of_the_wall(name):
+    law = known_reference(f"{name}/law")
+    size = LAW_BASIS.size
+    assert law.value.shape == (size, size) and np.array_equal(law.value, law.value.T)
+    # equal bins: the constant is kept
+    assert np.abs(law.value.sum(axis=1) - 1.0).max() <= 4.0 * law.error + 1e-12
+    # rays of another seed
+    seen = ker.discretise(ker.WallLaw(wall_of(name)), LAW_BASIS, "qmc", samples=2**16, rng=np.random.default_rng(5))
+    assert np.linalg.norm(seen.symmetric - law.value) <= 3.0 * seen.error.value + law.error
+
+
+@pytest.mark.parametrize("name", standard_names())
+def test_a_moment_that_is_kept_is_that_of_the_wall(name):
+    moment = known_reference(f"{name}/moment")
+    seen = ker.discretise(ker.WallLaw(wall_of(name)), ker.Legendre(2), "qmc", samples=2**16)
+    assert abs(seen.symmetric[1, 1] - float(moment.value)) <= 4.0 * seen.error.value + moment.error
+    assert moment.error <= 2e-5
+
+
+def test_known_numbers_are_the_references():
+    assert float(known_reference("triangular-teeth/moment").value) == pytest.approx(0.134541971359171, abs=1e-14)
+    assert float(known_reference("focusing-arc/moment").value) == pytest.approx(0.327558333378, abs=1e-12)
+    # Chumley, Feres, Zhang 2013: zeta = -(ln 3)/4 for semicircles
+    assert float(known_reference("mixed/eta").value) == pytest.approx(1.0358388, abs=1e-7)
+    edge = known_reference("koch/lambda2")
+    assert edge.is_exact and "theorem" in edge.source
 
 
 @pytest.mark.parametrize("name", ["triangular-teeth", "focusing-arc", "mixed"])
 def test_every_sampled_route_is_within_its_reported_error(name):
     wall = wall_of(name)
-    (reference, error, _, _) = matrix_references(wall, ker.Bins(4), quick=True)[0]
+    reference = known_reference(f"{name}/law")
     for route in routes.routes_for(wall):
         if route.is_random:
-            found = route.matrix(wall, ker.Bins(4), 2**14, np.random.default_rng(1))
-            distance = float(np.linalg.norm(found.symmetric - reference.symmetric))
-            # the Frobenius norm of noise on ten free entries is within a factor of three of its mean
-            assert distance <= 3.0 * found.error.value + error, route.name
+            found = route.matrix(wall, LAW_BASIS, 2**14, np.random.default_rng(1))
+            distance = float(np.linalg.norm(found.symmetric - reference.value))
+            # the Frobenius norm of noise on a thousand entries is close to its mean
+            assert distance <= 2.0 * found.error.value + reference.error, route.name
+
+
+@pytest.mark.parametrize(("law", "expected"), [(ker.specular(), 1.0), (ker.retroreflection(), 1.5)])
+def test_the_resistance_is_read_off_a_matrix(law, expected):
+    matrix = ker.discretise(law, Directions())
+    assert resistance_of(matrix.symmetric) == pytest.approx(expected, abs=1e-13)
+
+
+@pytest.mark.parametrize(("name", "angle"), [("koch", 1e-5), ("mixed", 1e-5), ("focusing-arc", 1e-4)])
+def test_rays_at_a_small_angle_come_to_the_diffusivity(name, angle):
+    wall = wall_of(name)
+    assert eta_at(wall, angle) == pytest.approx(float(known_reference(f"{name}/eta").value), abs=2e-3)
 
 
 def test_the_correlation_of_v1_is_that_of_the_ideal_disks():
-    smooth, rough = ker.smooth_matrix(quantities.DISK), ker.no_slip_matrix(quantities.DISK)
-    velocity = quantities.sampled_velocities(200_000, np.random.default_rng(2))
+    smooth, rough = ker.smooth_matrix(uniform_disk.DISK), ker.no_slip_matrix(uniform_disk.DISK)
+    velocity = uniform_disk.sampled_velocities(200_000, np.random.default_rng(2))
     square = np.mean(velocity[:, 0] ** 2)
-    along, roll = quantities.velocity_share()
+    along, roll = uniform_disk.velocity_share()
     assert square == pytest.approx(along**2 / 4 + roll**2 / 4, rel=0.02)
     for matrix, moment in ((smooth, -1.0), (rough, 1.0)):
         incoming = -velocity
         sampled = np.mean(-incoming[:, 0] * (incoming @ matrix.T)[:, 0]) / square
-        assert sampled == pytest.approx(quantities.correlation_of(moment), abs=0.02)
+        assert sampled == pytest.approx(uniform_disk.correlation_of(moment), abs=0.02)
 
 
 @pytest.mark.parametrize("way", ["operator", "velocities", "action"])
 def test_three_ways_to_the_collision_agree(way):
     wall = wall_of("triangular-teeth")
-    exact = quantities._collision_references(wall, True)[0].value
+    exact = known_reference("triangular-teeth/collision").value
     if way == "operator":
-        assert float(quantities._by_operator(wall)) == pytest.approx(exact, abs=1e-13)
+        assert float(collision_quantities.by_operator(wall)) == pytest.approx(exact, abs=1e-13)
     elif way == "action":
-        assert quantities._by_action(wall, 64) == pytest.approx(exact, abs=1e-3)
+        assert collision_quantities.by_action(wall, 64) == pytest.approx(exact, abs=1e-3)
     else:
         # standard deviation of one sample below 2
         rng = np.random.default_rng(3)
-        assert abs(quantities._by_velocities(wall, RAYS, rng) - exact) <= 4 * 2 / RAYS**0.5
+        assert abs(collision_quantities.by_velocities(wall, RAYS, rng) - exact) <= 4 * 2 / RAYS**0.5
 
 
 # processes and runs
@@ -132,7 +180,7 @@ def test_a_call_that_takes_too_long_is_ended_and_the_next_one_works():
 
 
 def test_a_problem_runs_in_its_process_and_goes_on_from_its_file(tmp_path):
-    effort = Effort(True, 1, 0.01, 60.0, 60.0)
+    effort = Effort(True, 1, 0.01, 60.0, 120.0)
     (report,) = run_problems(["triangular-teeth/collision"], effort, tmp_path, lambda line: None)
     assert {row.status for row in report.rows} <= {"done", "left out"}
     assert report.error(report.rows[0]) <= 1e-12
@@ -143,24 +191,64 @@ def test_a_problem_runs_in_its_process_and_goes_on_from_its_file(tmp_path):
 
 
 def test_what_has_no_independent_reference_says_so():
-    assert references_of("cusps/lambda2", quick=True) == ()
-    assert references_of("mixed/disk", quick=True) == ()
-    (edge,) = references_of("koch/lambda2", quick=True)
-    assert edge.is_exact and "theorem" in edge.source
+    said = []
+    assert list(run_problems(["cusps/lambda2"], QUICK, None, said.append)) == []
+    assert said == ["cusps/lambda2: left out, no independent reference is known"]
 
 
-def test_the_second_eigenvalue_of_the_focusing_arc_has_a_reference_that_holds():
-    (reference,) = references_of("focusing-arc/lambda2", quick=True)
-    # by another program, from piecewise polynomials on panels of its own
-    assert abs(float(reference.value) - 0.3670253152) <= max(reference.error, 1e-6) <= 1e-4
+def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("asperity.bench.time_plan.time.monotonic", lambda: now[0])
+    for greedy in (lambda number: True, lambda number: number % 2, lambda number: number > 6):
+        start, plan = now[0], TimePlan(100.0, 10)
+        for number in range(10):
+            share = plan.next_share()
+            assert share >= min(100.0 - (now[0] - start), 1.0)
+            now[0] += share if greedy(number) else 0.0
+        assert now[0] - start <= 100.0 + 1e-9
+
+
+def test_the_time_of_a_run_is_kept_and_what_it_left_out_is_said(tmp_path):
+    effort = dataclasses.replace(QUICK, total_seconds=0.01)
+    (report,) = run_problems(["triangular-teeth/collision"], effort, tmp_path, lambda line: None)
+    assert {(row.status, row.note) for row in report.rows} <= {
+        ("left out", "the time planned for this method was spent"),
+        ("left out", "a smaller budget met the time limit"),
+    }
+
+
+def test_both_sets_are_done_in_the_time_that_is_promised():
+    # three minutes, and forty with everything else
+    assert QUICK.total_seconds <= 170.0
+    assert sum(section.seconds for section in SECTIONS) <= 40.0 * 60.0
+    assert FULL.total_seconds < sum(section.seconds for section in SECTIONS)
+
+
+def test_a_run_of_sections_goes_on_where_it_was_and_a_finished_one_begins_anew(tmp_path):
+    (tmp_path / "peers.md").write_text("of before")
+    begin_or_go_on(tmp_path, quick=True)
+    assert not (tmp_path / "peers.md").exists()
+    (tmp_path / "peers.md").write_text("of now\n")
+    begin_or_go_on(tmp_path, quick=True)
+    peers = next(section for section in SECTIONS if section.name == "peers")
+    assert section_text(peers, True, tmp_path) == "of now"
+    begin_or_go_on(tmp_path, quick=False)
+    assert not (tmp_path / "peers.md").exists()
+
+
+def test_jobs_side_by_side_are_told_apart_beyond_their_noise():
+    slower = side_by_side(lambda: time.sleep(0.002), lambda: time.sleep(0.02) or 1, 3)
+    assert slower.differs and slower.second == 1
+    assert slower.low <= slower.high and slower.ratio > 2.0
 
 
 def test_a_run_is_written_and_read_again(tmp_path):
     run = run_report([("auto", 1e-3, [0.2, 0.3]), ("rows", 1e-3, [0.15, 0.2])])
     names = {path.name for path in run.save(tmp_path)}
-    assert names == {"summary.md", "tables.md", "bench.json", "teeth-law.png"}
+    assert names == {"summary.md", "tables.md", "bench.json", "teeth.png"}
     assert BenchRun.of_json((tmp_path / "bench.json").read_text()) == run
-    assert "1 of the 1 problems" in run.summary() and "| 1.3 |" in run.summary()
+    assert "on 1 of the 1 where" in run.summary() and "| 1.3 |" in run.summary()
+    assert "| teeth/law | by hand | 1.0e-09 |" in run.references()
     json.loads(run.to_json(), parse_constant=lambda word: pytest.fail(word))
 
 

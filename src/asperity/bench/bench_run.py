@@ -8,7 +8,6 @@ from pathlib import Path
 
 from ..errors import FileExistsRefusal, InputError
 from ..spectral import WorkReport, WorkRow
-from .standard_set import file_stem
 
 FORMAT = 1
 SUMMARY, TABLES, DATA = "summary.md", "tables.md", "bench.json"
@@ -52,8 +51,8 @@ class BenchRun:
         choices = [(report.problem, choice) for report in done if (choice := report.choice()) is not None]
         good = sum(choice <= GOOD_CHOICE for _, choice in choices)
         lines = [
-            f"Of {len(choosing)} problems in which the library chooses, its choice is within a factor {GOOD_CHOICE:g} of "
-            f"the best on {good} of the {len(choices)} where another method gets as far; on {len(done) - len(choices)} "
+            f"Of {len(choosing)} problems in which the library chooses, its choice is within a factor "
+            f"{GOOD_CHOICE:g} of the best on {good} of the {len(choices)} where another method gets as far; on {len(done) - len(choices)} "
             f"none does; on {len(choosing) - len(done)} it was not done in time."
         ]
         slow = [f"- {problem}: {choice:.2g} times the best" for problem, choice in choices if choice > GOOD_CHOICE]
@@ -85,21 +84,25 @@ class BenchRun:
         return "\n\n".join(f"## {report.problem}\n\n{report.table()}" for report in self.reports)
 
     def save(self, folder: Path) -> list[Path]:
-        """Write summary, tables, data, and a picture a problem; returns what was written."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
+        """Write summary, tables, data, and a picture a scene; returns what was written."""
+        from .scene_picture import draw_scene
 
         written = [folder / SUMMARY, folder / TABLES, folder / DATA]
         for path, text in zip(written, (self.summary(), self.tables(), self.to_json()), strict=True):
             path.write_text(text + "\n", encoding="utf-8")
-        for report in self.reports:
-            if any(row.is_done for row in report.rows):
-                ax = report.plot()
-                assert isinstance(ax.figure, Figure)
-                FigureCanvasAgg(ax.figure)
-                written.append(folder / f"{file_stem(report.problem)}.png")
-                ax.figure.savefig(written[-1], dpi=110)
+        for scene, reports in self.by_scene().items():
+            drawn = [report for report in reports if any(row.is_done for row in report.rows)]
+            if drawn:
+                written.append(folder / f"{scene}.png")
+                draw_scene(drawn).savefig(written[-1], dpi=100)
         return written
+
+    def by_scene(self) -> dict[str, list[WorkReport]]:
+        """The reports of every scene."""
+        found: dict[str, list[WorkReport]] = {}
+        for report in self.reports:
+            found.setdefault(report.problem.split("/")[0], []).append(report)
+        return found
 
     def to_json(self) -> str:
         """All reports."""

@@ -14,7 +14,7 @@ from ..spectral import WorkMethod
 from .quantity import QUICK_RAYS, RAYS, Methods, Quantity
 from .routes import RANDOM_ORDER
 from .scenes import standard_names
-from .uniform_disk import DISK, SINE_MEAN, COSINE_MEAN, sampled_velocities, square_of_v1, velocity_share
+from .uniform_disk import COSINE_MEAN, DISK, SINE_MEAN, sampled_velocities, square_of_v1, velocity_share
 
 if TYPE_CHECKING:
     from ..geometry import Wall

@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..checks import Floats
 from ..geometry import Trace, trace
-from ..geometry.scene import Scene
-from ..kernels import Legendre, WallLaw, discretise
+from ..geometry.scene import Scene, scene_in_one
+from ..geometry.scene_switches import has_formulas, without_formulas, without_grid, without_pairs, without_runs
+from ..kernels import KernelMatrix, Legendre, PolygonLaw, WallLaw, discretise
 from ..kernels.row_quadrature import row_matrix
 from .scenes import standard_names, wall_of
-from .timing import least_time
+from .timing import SideBySide, side_by_side
 
 if TYPE_CHECKING:
     from ..geometry import Wall
 
-QUICK_RAYS, RAYS, REPEATS = 2**12, 2**17, 3
+# Rays enough that a tenth of their time is well above the noise, and turns for the spread.
+RAYS, REPEATS, QUICK_REPEATS = 2**18, 7, 3
 SEED = 9
-# The column of `Scene.circles` below whose value a run along an arc is skipped, and the first of a hollow's grid.
-RUN_COLUMN, GRID_COLUMNS = 10, slice(13, 20)
 # Rays differ by rounding where a run of hits is taken in one step.
 ROUNDED = 1e-9
-# Adaptive rows are compared on walls of so few pieces, to this tolerance: a second at most.
-ROW_PIECES, ROW_TOLERANCE = 3, 1e-2
-# Columns of `Scene.lines` with the range of a line's rows in `pairs`.
-PAIR_COLUMNS = slice(5, 7)
+# Adaptive rows are compared on walls of so few pieces, to these tolerances.
+ROW_PIECES, ROW_TOLERANCES = 3, (1e-2, 3e-3, 1e-3)
+BASIS = Legendre(2)
+# Beams a hollow, where the hollows of one shape are resolved once.
+BEAMS = 1000
 
 
 @dataclass(frozen=True)
@@ -39,23 +41,39 @@ class Saving:
     scene, what : str
     seconds, seconds_without : float
         Least times with it left out and with it computed.
+    low, high : float
+        Least and greatest ratio of the two in one turn; for rows of half of the angles, at one tolerance.
     difference : float
         Largest difference of the results, or that in units of their errors where they have some.
     is_same : bool
         Whether the results are the same: to rounding, or within their errors, five of those from samples.
+    unit : str
+        Of the times: seconds, or rays, which have no noise.
     """
 
     scene: str
     what: str
     seconds: float
     seconds_without: float
+    low: float
+    high: float
     difference: float
     is_same: bool
+    unit: str = "s"
 
     @property
     def factor(self) -> float:
         """How many times as long it takes without."""
         return self.seconds_without / self.seconds
+
+    def row(self) -> str:
+        """A line of the table; a factor that is not beyond its noise says so."""
+        same = f"{'yes' if self.is_same else 'NO'} ({self.difference:.1g})"
+        times = f"{self.factor:.2g} ({self.low:.2g} to {self.high:.2g})"
+        if self.low <= 1.0 <= self.high:
+            times += ", noise"
+        with_it, without = (f"{time:.2g} {self.unit}" for time in (self.seconds, self.seconds_without))
+        return f"| {self.scene} | {self.what} | {with_it} | {without} | {times} | {same} |"
 
 
 class WithoutMirror:
@@ -81,70 +99,52 @@ def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Savi
     """Everything that one scene leaves out and that can be switched off."""
     wall = wall_of(name)
     plan, scene = wall.plan(), wall.scene
+    followed = without_formulas(scene)
     found = []
+
+    def traced(what: str, with_it: Scene, without: Scene) -> None:
+        found.append(_traced(name, what, wall, (with_it, without), rays, repeats))
+
+    if has_formulas(scene):
+        traced("flights in hollows with a formula", scene, followed)
     if plan.channels or plan.wedges:
-        what = f"runs between {plan.channels} channels and {plan.wedges} wedges"
-        found.append(_traced(name, what, wall, without_pairs(scene), rays, repeats))
+        traced(f"runs between {plan.channels} channels and {plan.wedges} wedges", followed, without_pairs(followed))
     if plan.arcs_with_runs:
-        found.append(_traced(name, f"runs on {plan.arcs_with_runs} arcs", wall, without_runs(scene), rays, repeats))
+        traced(f"runs on {plan.arcs_with_runs} arcs", followed, without_runs(followed))
     if plan.hollows_with_grid:
         what = f"pieces off the way, by a grid in {plan.hollows_with_grid} hollows"
-        found.append(_traced(name, what, wall, without_grid(scene), rays, repeats))
+        traced(what, followed, without_grid(followed))
     if plan.pieces_left_out or plan.hollows > 1:
         what = f"{plan.pieces_left_out} flat tops and {plan.hollows - 1} other hollows"
-        found.append(_traced(name, what, wall, as_one_hollow(wall), rays, repeats))
+        traced(what, followed, without_formulas(scene_in_one(wall)))
+    if plan.distinct_hollows < plan.hollows and wall.is_polygonal:
+        found.append(_alike(name, wall, repeats))
     if WallLaw(wall).exact_law is not None or WallLaw(wall).closed_form is not None:
         found.append(_tracing(name, wall, rays, repeats))
     if plan.mirror_symmetric and len(wall.pieces) <= ROW_PIECES:
-        found.append(_half(name, wall, repeats))
+        found.append(_half(name, wall))
     return found
 
 
-def without_pairs(scene: Scene) -> Scene:
-    """The tables without channels and wedges: every hit between facing lines is a step."""
-    assert scene.lines is not None
-    lines = scene.lines.copy()
-    lines[:, PAIR_COLUMNS] = 0.0
-    return replace(scene, pairs=None, lines=lines)
-
-
-def without_runs(scene: Scene) -> Scene:
-    """The tables without runs along arcs: every hit on an arc is a step."""
-    assert scene.circles is not None
-    circles = scene.circles.copy()
-    circles[:, RUN_COLUMN] = 0.0
-    return replace(scene, circles=circles, closed=None)
-
-
-def without_grid(scene: Scene) -> Scene:
-    """The tables without grids: every line of a hollow is tested."""
-    hollows = scene.hollows.copy()
-    hollows[:, GRID_COLUMNS] = 0.0
-    return replace(scene, hollows=hollows, grid=None)
-
-
-def as_one_hollow(wall: Wall) -> Scene:
-    """The tables of the whole cell as one hollow: a single list of all pieces, the flat tops among them."""
-    from ..geometry.scene import _Chain, _corners, _Tables
-
-    tables = _Tables()
-    places = [(float(x), float(y)) for x, y in wall.vertices]
-    chain = _Chain(list(wall.pieces), places, _corners(list(wall.pieces)))
-    tables.add_hollow(0.0, wall.period, [chain], edges=(2, 2))
-    return tables.scene(wall.period, False)
-
-
-def _traced(name: str, what: str, wall: Wall, other: Scene, rays: int, repeats: int) -> Saving:
+def _traced(name: str, what: str, wall: Wall, scenes: tuple[Scene, Scene], rays: int, repeats: int) -> Saving:
     rng = np.random.default_rng(SEED)
     # rays that enter a hollow: those on flat tops are never traced
     hollow = scene_hollows(wall)[rng.integers(len(wall.hollows), size=rays)]
     x = hollow[:, 0] + (hollow[:, 1] - hollow[:, 0]) * rng.random(rays)
     theta = np.arccos(1.0 - 2.0 * rng.random(rays))
-    plain = SceneWithout(wall, other)
-    with_it, seconds = least_time(lambda: trace(wall, x, theta, threads=1), repeats)
-    without, longer = least_time(lambda: trace(plain, x, theta, threads=1), repeats)  # type: ignore[arg-type]
-    difference = largest_difference(with_it, without)
-    return Saving(name, what, seconds, longer, difference, difference <= ROUNDED)
+
+    def job(scene: Scene) -> Callable[[], Trace]:
+        other = SceneWithout(wall, scene)
+        return lambda: trace(other, x, theta, threads=1)  # type: ignore[arg-type]
+
+    times = side_by_side(job(scenes[0]), job(scenes[1]), repeats)
+    difference = largest_difference(times.first, times.second)
+    return _saving(name, what, times, difference, difference <= ROUNDED)
+
+
+def _saving(name: str, what: str, times: SideBySide[Any, Any], difference: float, is_same: bool) -> Saving:
+    seconds = times.first_seconds, times.second_seconds
+    return Saving(name, what, *seconds, times.low, times.high, difference, is_same)
 
 
 def scene_hollows(wall: Wall) -> Floats:
@@ -163,47 +163,111 @@ def largest_difference(first: Trace, second: Trace) -> float:
     return float(error[most]) if gone.mean() > 0.999 else float("inf")
 
 
+def _alike(name: str, wall: Wall, repeats: int) -> Saving:
+    """Beams of every hollow, against those of the different ones alone."""
+    plan = wall.plan()
+    parts = [_alone(wall, number) for number in range(len(wall.hollows))]
+
+    def together() -> tuple[Floats, float]:
+        matrix = _by_beams(wall)
+        return matrix.symmetric, matrix.error.value
+
+    def one_by_one() -> tuple[Floats, float]:
+        shares = [part.period / wall.period for part in parts]
+        laws = [_by_beams(part) for part in parts]
+        level = (1.0 - sum(shares)) * np.diag([1.0, -1.0])
+        total = sum((share * law.symmetric for share, law in zip(shares, laws, strict=True)), level)
+        return total, sum(share * law.error.value for share, law in zip(shares, laws, strict=True))
+
+    times = side_by_side(together, one_by_one, repeats)
+    distance = float(np.linalg.norm(times.first[0] - times.second[0]))
+    score = distance / (times.first[1] + times.second[1])
+    what = f"{plan.hollows - plan.distinct_hollows} hollows that are like others ({BEAMS} beams each)"
+    return _saving(name, what, times, score, score <= 1.0)
+
+
+def _by_beams(wall: Wall) -> KernelMatrix:
+    return discretise(PolygonLaw(wall, max_beams=BEAMS), BASIS, "exact")
+
+
+def _alone(wall: Wall, number: int) -> Wall:
+    """One hollow of a polygonal wall as a wall whose period is its opening."""
+    from ..geometry import Wall
+
+    hollow = wall.hollows[number]
+    corners = wall.vertices[hollow.first : hollow.last + 1] - [hollow.left, 0.0]
+    corners[[0, -1]] = (0.0, 0.0), (hollow.width, 0.0)
+    return Wall.from_vertices(corners)
+
+
 def _tracing(name: str, wall: Wall, rays: int, repeats: int) -> Saving:
-    """The law's matrix without tracing, against the same from as many rays."""
-    law, basis = WallLaw(wall), Legendre(2)
-    exact, seconds = least_time(lambda: discretise(WallLaw(wall), basis), repeats)
-    sampled, longer = least_time(
-        lambda: discretise(law, basis, "qmc", samples=rays, rng=np.random.default_rng(SEED)), repeats
+    """The law's matrix from rays, and the same without tracing to the error that these rays leave."""
+    sampled = _by_rays(wall, rays)
+    tolerance = sampled.error.value
+    # a law remembers what it has computed, so each run has its own
+    times = side_by_side(
+        lambda: discretise(WallLaw(wall), BASIS, tolerance=tolerance), lambda: _by_rays(wall, rays), repeats
     )
-    distance = float(np.linalg.norm(exact.symmetric - sampled.symmetric))
-    score = distance / (exact.error.value + sampled.error.value)
-    return Saving(name, f"tracing altogether (against {rays} rays)", seconds, longer, score, score <= 5.0)
+    distance = float(np.linalg.norm(times.first.symmetric - times.second.symmetric))
+    score = distance / (times.first.error.value + times.second.error.value)
+    what = f"tracing altogether, for an error of {tolerance:.0e} ({rays} rays)"
+    return _saving(name, what, times, score, score <= 5.0)
 
 
-def _half(name: str, wall: Wall, repeats: int) -> Saving:
-    """Adaptive rows of half of the angles, against those of all."""
-    whole = WithoutMirror(wall)
-    halved, seconds = least_time(lambda: row_matrix(wall, Legendre(2), ROW_TOLERANCE), repeats)
-    full, longer = least_time(lambda: row_matrix(whole, Legendre(2), ROW_TOLERANCE), repeats)  # type: ignore[arg-type]
-    score = float(np.linalg.norm(halved[0] - full[0])) / (halved[1] + full[1])
-    return Saving(name, "half of the angles, by symmetry", seconds, longer, score, score <= 1.0)
+def _by_rays(wall: Wall, rays: int) -> KernelMatrix:
+    return discretise(WallLaw(wall), BASIS, "qmc", samples=rays, rng=np.random.default_rng(SEED))
+
+
+def _half(name: str, wall: Wall) -> Saving:
+    """Adaptive rows of half of the angles, against those of all, at equal error.
+
+    Both stop at errors of their own below the tolerance. So times are compared at the errors of the halved rows, those
+    of the others interpolated between their tolerances in the logarithms.
+    """
+    halved, whole = ([_rows(one, tolerance) for tolerance in ROW_TOLERANCES] for one in (wall, WithoutMirror(wall)))
+    errors, rays = (np.array([row[k] for row in whole], dtype=np.float64) for k in (1, 2))
+    log_error, log_time = (np.log(part) for part in (errors, rays))
+    slope, shift = np.polyfit(log_error, log_time, 1)
+    others = [float(np.exp(slope * np.log(row[1]) + shift)) for row in halved]
+    ratios = [other / row[2] for other, row in zip(others, halved, strict=True)]
+    scores = [
+        float(np.linalg.norm(row[0] - other[0])) / (row[1] + other[1]) for row, other in zip(halved, whole, strict=True)
+    ]
+    seconds = halved[-1][2], others[-1]
+    what = "half of the angles, by symmetry (rows, at equal error)"
+    return Saving(name, what, *seconds, min(ratios), max(ratios), max(scores), max(scores) <= 1.0, "rays")
+
+
+def _rows(wall: Wall | WithoutMirror, tolerance: float) -> tuple[Floats, float, float]:
+    """Matrix, error and rays of adaptive rows: their time is that of their rays, without its noise."""
+    symmetric, error, rays = row_matrix(wall, BASIS, tolerance)  # type: ignore[arg-type]
+    return symmetric, error, float(rays)
 
 
 def savings_table(quick: bool = False) -> str:
     """All scenes: their plans in words, and a line for everything that can be switched off."""
-    lines = ["| scene | leaves out | seconds | without that | times | same result |", "|---|---|---|---|---|---|"]
+    lines = ["| scene | leaves out | time | without that | times | same result |", "|---|---|---|---|---|---|"]
     for name in standard_names():
-        for one in savings_of(name, QUICK_RAYS if quick else RAYS):
-            same = f"{'yes' if one.is_same else 'NO'} ({one.difference:.1g})"
-            lines.append(
-                f"| {name} | {one.what} | {one.seconds:.2g} | {one.seconds_without:.2g} | {one.factor:.2g} | {same} |"
-            )
+        lines += [one.row() for one in savings_of(name, repeats=QUICK_REPEATS if quick else REPEATS)]
     lines += ["", "| scene | what the tracer does |", "|---|---|"]
     return "\n".join([*lines, *(f"| {name} | {plan_words(wall_of(name))} |" for name in standard_names())])
 
 
 def plan_words(wall: Wall) -> str:
-    """The plan of a wall in words."""
+    """The plan of a wall in words, without what it has none of."""
     plan = wall.plan()
-    half = "; mirror-symmetric: half of the angles give the other half" if plan.mirror_symmetric else ""
-    return (
-        f"{plan.pieces_traced} pieces ({', '.join(plan.primitives)}) in {plan.hollows} hollows, "
-        f"{plan.distinct_hollows} distinct; {plan.pieces_left_out} flat tops of {plan.flat_share:.0%} of the period "
-        f"left out; runs on {plan.arcs_with_runs} arcs, in {plan.channels} channels, {plan.wedges} wedges; "
-        f"{plan.hollows_with_grid} grids{half}"
-    )
+    words = [
+        f"{plan.pieces_traced} pieces ({', '.join(plan.primitives)}) in {plan.hollows} hollow{'s' * (plan.hollows > 1)}"
+    ]
+    if plan.hollows > plan.distinct_hollows:
+        words[0] += f", {plan.distinct_hollows} of them different"
+    if plan.pieces_left_out:
+        words.append(f"{plan.pieces_left_out} flat tops of {plan.flat_share:.0%} of the period left out")
+    runs = {"arcs": plan.arcs_with_runs, "channels": plan.channels, "wedges": plan.wedges}
+    if any(runs.values()):
+        words.append("runs of hits on " + ", ".join(f"{number} {what}" for what, number in runs.items() if number))
+    if plan.hollows_with_grid:
+        words.append(f"{plan.hollows_with_grid} grids")
+    if plan.mirror_symmetric:
+        words.append("mirror-symmetric: half of the angles give the other half")
+    return "; ".join(words)

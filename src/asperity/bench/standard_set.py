@@ -162,7 +162,7 @@ def prepare(scene: str) -> None:
 def _problem(name: str) -> WorkProblem:
     reference = known_reference(name)
     assert reference is not None  # `run_problems` asks for no other
-    return WorkProblem(name, reference)
+    return WorkProblem(name, (reference,))
 
 
 @cache

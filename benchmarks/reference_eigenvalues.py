@@ -1,0 +1,90 @@
+"""lambda_2 of the standard set by other ways than the library's: theorems, another program, rays and extrapolation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.bench.scenes import wall_of
+from asperity.checks import Floats
+
+from .reference_rays import NETS, Found, sampled_sums
+
+RAYS = 2**25
+# Of the focusing arcs, by piecewise polynomials in another program; how far it knows it.
+ARC_LAMBDA2, ARC_ERROR = 0.3670253152, 3e-10
+# Sizes in which Legendre matrices are extrapolated.
+SIZES = (16, 32, 64)
+# Degrees of the panels of the cusps, coarser and finer; towards each special angle there are so many, the last of this
+# share of the first.
+DEGREES, PANELS, SMALLEST = (2, 3), 9, 1e-3
+GRAZING_ANGLES, GRAZING_POINTS = (1e-5, 1e-6, 1e-7), 2**22
+
+
+def reference_eigenvalue(scene: str) -> Found | None:
+    """The largest spectral value off the constants, or None where it is not known independently."""
+    wall = wall_of(scene)
+    if wall.is_polygonal:
+        return Found(np.asarray(1.0), 0.0, "theorem: 1 is in the essential spectrum of isometries")
+    makers = {"focusing-arc": _of_arc, "cusps": _of_cusps, "mixed": _of_mixed, "mushroom": _of_mushroom}
+    return makers[scene](wall)
+
+
+def _of_arc(wall: geo.Wall) -> Found:
+    return Found(np.asarray(ARC_LAMBDA2), ARC_ERROR, "another program, piecewise polynomials on graded panels")
+
+
+def _of_cusps(wall: geo.Wall) -> Found:
+    """On panels graded towards pi/2, where rays stay in the cusp for long, as well as towards grazing."""
+    near = 0.25 * np.pi * np.geomspace(SMALLEST, 1.0, PANELS)
+    edges = np.unique(
+        np.concatenate([[0.0, np.pi], near, np.pi - near, 0.5 * np.pi - near, [0.5 * np.pi], 0.5 * np.pi + near])
+    )
+    bases: dict[str, ker.Basis] = {str(degree): ker.Panels(edges, degree) for degree in DEGREES}
+    nets = sampled_sums(wall, bases, RAYS)
+    coarse, fine = (_jackknifed(nets[name], basis.constant) for name, basis in bases.items())
+    error = abs(fine[0] - coarse[0]) + 2.0 * fine[1]
+    source = (
+        f"panels of degree {DEGREES[1]}, graded towards pi/2 and grazing, from {RAYS} rays; two degrees, and spread"
+    )
+    return Found(np.asarray(fine[0]), error, source)
+
+
+def _of_mixed(wall: geo.Wall) -> Found:
+    """Galerkin values rise with the basis, at a rate that three sizes show: Aitken's extrapolation."""
+    basis = ker.Legendre(SIZES[-1])
+    nets = sampled_sums(wall, {"": basis}, RAYS)[""]
+    parts = [_jackknifed([net[:n, :n] for net in nets], basis.constant[:n]) for n in SIZES]
+    first, second, third = (value for value, _ in parts)
+    rest = (third - second) ** 2 / ((second - first) - (third - second))
+    source = f"Legendre {SIZES}, from {RAYS} rays, extrapolated; error half of the extrapolation, and spread"
+    return Found(np.asarray(third + rest), 0.5 * rest + 2.0 * parts[-1][1], source)
+
+
+def _of_mushroom(wall: geo.Wall) -> Found:
+    """The edge of the essential spectrum, E[sin(theta)/sin(theta')] as theta -> 0, by rays at three small angles."""
+    entry = (np.arange(GRAZING_POINTS) + 0.5) / GRAZING_POINTS
+    law = ker.WallLaw(wall)
+    ratios = [
+        float(np.mean(np.sin(angle) / np.sin(law.respond(entry, np.full_like(entry, angle)))))
+        for angle in GRAZING_ANGLES
+    ]
+    angles = ", ".join(f"{angle:g}" for angle in GRAZING_ANGLES)
+    source = f"edge of the essential spectrum, from rays at the angles {angles}; nothing seen beyond, without proof"
+    return Found(np.asarray(np.mean(ratios)), 4.0 * float(np.ptp(ratios)), source)
+
+
+def _jackknifed(nets: list[Floats], constant: Floats) -> tuple[float, float]:
+    """Largest eigenvalue off the constants of the mean of independent matrices, without its bias, and its error."""
+    total = np.sum(nets, axis=0)
+    whole = _largest(total / NETS, constant)
+    parts = np.array([_largest((total - net) / (NETS - 1), constant) for net in nets])
+    value = NETS * whole - (NETS - 1) * float(parts.mean())
+    return value, float(np.sqrt((NETS - 1) * parts.var()))
+
+
+def _largest(matrix: Floats, constant: Floats) -> float:
+    direction = constant / np.linalg.norm(constant)
+    off = np.eye(len(matrix)) - np.outer(direction, direction)
+    return float(np.linalg.eigvalsh(off @ matrix @ off)[-1])

@@ -1,0 +1,126 @@
+"""The outermost eigenvalues of large dense matrices: complete, within their errors, whatever their multiplicities."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import qr
+
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.spectral.completeness import Deflated, margin_below, norm_beyond
+from asperity.spectral.extremes import end_values, outermost
+
+SIZE = 600
+RNG = np.random.default_rng(7)
+BASIS = qr(RNG.normal(size=(SIZE, SIZE)))[0]
+BULK = RNG.uniform(-0.3, 0.3, SIZE)
+
+
+def with_spectrum(leading: list[float]) -> np.ndarray:
+    """A full symmetric matrix with these eigenvalues and others of modulus below 0.3; and a cluster at 0.3."""
+    values = BULK.copy()
+    values[: len(leading)] = leading
+    array = (BASIS * values) @ BASIS.T
+    return 0.5 * (array + array.T)
+
+
+SPECTRA = {
+    "simple": [0.9, 0.8, -0.7, 0.6, -0.5],
+    "double": [0.9, 0.9, 0.8, 0.8, -0.9, -0.9, -0.9],
+    "nearly double": [0.9, 0.9 - 1e-11, 0.8, -0.85, -0.85 + 1e-12],
+    "ten copies": [0.95] * 10 + [-0.95] * 3,
+    "gap 1e-12": [1.0 - 1e-12, 1.0 - 3e-12, 0.5, -0.4],
+    "half and half": [0.5] * 300 + [-0.5] * 300,
+}
+
+
+@pytest.mark.parametrize("leading", SPECTRA.values(), ids=SPECTRA)
+@pytest.mark.parametrize("k", [1, 3, 5])
+def test_the_values_of_largest_modulus_are_those_of_their_ranks_within_their_errors(leading, k):
+    array = with_spectrum(leading)
+    exact = np.sort(np.concatenate([leading, BULK[len(leading) :]]))[::-1]
+    found = outermost(array, None, k)
+    ranks = np.concatenate([np.arange(found.top), len(exact) + np.arange(found.top - len(found.values), 0)])
+    assert np.all(np.abs(found.values - exact[ranks]) <= found.errors)
+    assert np.all(found.errors < 1e-10)
+    # nothing else is larger in modulus than the least of the k largest, but for its error
+    left_out = np.delete(exact, ranks)
+    assert np.abs(left_out).max() <= np.sort(np.abs(found.values))[::-1][k - 1] + found.errors.max()
+    assert np.linalg.norm(found.vectors.T @ found.vectors - np.eye(len(found.values))) < 1e-10
+
+
+def test_the_largest_value_is_found_where_all_moduli_are_at_the_lower_end():
+    found = outermost(with_spectrum([-0.9, -0.8, -0.7]), None, 2)
+    assert found.top == 1
+    assert found.values[0] == pytest.approx(np.sort(BULK[3:])[-1], abs=1e-10)
+    assert np.allclose(found.values[1:], [-0.8, -0.9], rtol=0.0, atol=1e-10)
+
+
+def test_lanczos_alone_would_miss_a_copy_and_the_factorisation_says_so():
+    array = with_spectrum([0.9, 0.9, 0.8])
+    matrix = Deflated.of(array, None)
+    one = BASIS[:, [0]]
+    assert margin_below(matrix, 1.0, one, np.array([0.9]), 0.85) is None
+    both = BASIS[:, :2]
+    margin = margin_below(matrix, 1.0, both, np.array([0.9, 0.9]), 0.8 + 1e-10)
+    assert margin is not None and 0.0 < margin < 1e-10
+
+
+@pytest.mark.parametrize("below", [1e-8, 1e-10])
+def test_a_threshold_below_an_eigenvalue_is_never_proved(below):
+    """The proof is one-sided: it may fail for a threshold above the spectrum by rounding, never pass for one below."""
+    array = with_spectrum([0.9])
+    margin = margin_below(Deflated.of(array, None), 1.0, np.empty((SIZE, 0)), np.empty(0), 0.9 - below)
+    assert margin is None or margin >= below
+    lower = margin_below(Deflated.of(array, None), -1.0, np.empty((SIZE, 0)), np.empty(0), -BULK[1:].min() - below)
+    assert lower is None or lower >= below
+
+
+def test_the_margin_of_rounding_is_below_a_hundred_times_the_dimension_in_roundings():
+    margin = margin_below(Deflated.of(with_spectrum([0.9]), None), 1.0, np.empty((SIZE, 0)), np.empty(0), 0.95)
+    assert margin is not None and margin < 100 * SIZE * np.finfo(float).eps
+
+
+def test_a_deflated_matrix_is_the_compression_to_the_complement():
+    array, constant = with_spectrum([0.9, -0.8]), BASIS[:, 3] * 0.6 + BASIS[:, 0] * 0.8
+    projector = np.eye(SIZE) - np.outer(constant, constant)
+    exact = projector @ array @ projector
+    matrix = Deflated.of(array, constant)
+    block = RNG.normal(size=(SIZE, 2))
+    assert np.allclose(matrix @ block, exact @ block, rtol=0.0, atol=1e-12)
+    assert np.allclose(matrix @ block[:, 0], exact @ block[:, 0], rtol=0.0, atol=1e-12)
+    assert matrix.frobenius == pytest.approx(np.linalg.norm(exact), rel=1e-12)
+    values = np.linalg.eigvalsh(exact)[::-1]
+    assert norm_beyond(matrix, values[:1]) >= np.abs(values[1:]).max()
+    found = outermost(array, constant, 2)
+    ranks = np.concatenate([np.arange(found.top), SIZE + np.arange(found.top - len(found.values), 0)])
+    assert np.all(np.abs(found.values - values[ranks]) <= found.errors)
+
+
+def test_end_values_are_the_ends_of_the_spectrum():
+    upper, lower = end_values(with_spectrum([0.9, 0.8, -0.7]), None, 2, 1)
+    assert np.allclose(upper, [0.9, 0.8], rtol=0.0, atol=1e-12)
+    assert np.allclose(lower, [-0.7], rtol=0.0, atol=1e-12)
+
+
+# ---- what is built upon them ------------------------------------------------------------------------------------
+@pytest.mark.parametrize("known", [True, None], ids=["mirror-symmetric", "symmetry unknown"])
+def test_large_and_small_matrices_have_the_same_kind_of_spectrum(known):
+    """Maxwell's law in 1200 bins: two eigenvalues of multiplicity 600, off the constants; with g^l of another law."""
+    law = ker.maxwell(0.5)
+    matrix = ker.discretise(law, ker.Bins(1200))
+    if known is None:
+        matrix = ker.KernelMatrix(matrix.symmetric, matrix.basis, matrix.error, reversible=True)
+    found = spec.spectrum(matrix, k=6)
+    assert np.allclose(np.abs(found.values[1:]), 0.5, rtol=0.0, atol=1e-9) and found.values[0] == pytest.approx(1.0)
+    assert "no other eigenvalue" in found.completeness
+    assert found.gap == pytest.approx(0.5, abs=1e-9) and found.gap_errors.algebraic[0] < 1e-10
+    assert set(found.parity) == ({"none"} if known is None else {"even", "odd"})
+
+
+def test_the_leading_eigenvalues_of_mirror_symmetric_laws_are_labelled():
+    matrix = ker.discretise(ker.henyey_greenstein(0.5), ker.Legendre(32))
+    found = spec.leading_eigenvalues(matrix, 4)
+    assert np.allclose(found.values, 0.5 ** np.arange(4.0), rtol=0.0, atol=1e-9)
+    assert found.complete and found.parity == ("even", "odd", "even", "odd")
