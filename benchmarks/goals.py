@@ -146,7 +146,7 @@ def _large_matrix(name: str, matrix: ker.KernelMatrix) -> Goal:
 
 
 def _true_disk() -> Goal:
-    from asperity.bench.quantities import DISK, sampled_velocities
+    from asperity.bench.uniform_disk import DISK, sampled_velocities
 
     rng = np.random.default_rng(0)
     wall, scale = geo.triangular_teeth(0.7), 1e-3

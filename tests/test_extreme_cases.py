@@ -6,8 +6,9 @@ import json
 
 import pytest
 
+import precise_collision
 from asperity import geometry as geo
-from asperity.bench import extreme_rays
+from asperity.bench import extreme_disks, extreme_rays
 from asperity.bench.extreme_report import case_names, run_case
 from asperity.bench.extreme_walls import extreme_walls
 from precise_extremes import FILE, judge_of, judged, rays_of
@@ -65,3 +66,15 @@ def test_the_data_are_what_their_script_computes(name):
 def test_the_check_of_rays_can_fail(name, other):
     assert extreme_rays.compare_rays(name, extreme_walls()[name]()).verdict == "met"
     assert extreme_rays.compare_rays(name, other).verdict == "not met"
+
+
+@pytest.mark.parametrize("scale", [1e-1, 1e-8])
+def test_the_disks_data_are_what_their_script_computes(scale):
+    stored = json.loads(precise_collision.FILE.read_text())[f"{scale:g}"]
+    position, velocity = precise_collision.disks_of(scale)
+    assert precise_collision.judged(scale, position[3], velocity[3]) == stored[3]
+
+
+def test_the_check_of_disks_can_fail(monkeypatch):
+    monkeypatch.setattr(extreme_disks, "WALL", geo.triangular_teeth(0.70001))
+    assert extreme_disks.disk_cases(10)["true disk, scale 0.001"]().verdict == "not met"

@@ -1,4 +1,4 @@
-"""Extreme disks, spectra and matrices against what is known exactly."""
+"""Extreme masses, spectra and matrices against what is known exactly."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def law_cases(rays: int, most_bins: int) -> dict[str, Callable[[], ExtremeRow]]:
         name = f"collision with m/J = {ratio:g}"
         cases[name] = partial(_collision, name, ratio, rays)
     for gap in (1e-3, 1e-6, 1e-9, 1e-12):
-        name = f"gap of {gap:g}"
+        name = f"gap of {gap:g}, multiplicity {GAP_SIZE // 2 - 1}"
         cases[name] = partial(_gap, name, gap)
     spectra = {
         "eigenvalue of multiplicity 8": np.repeat([0.5, 0.1], [8, SPECTRUM_SIZE - 9]),
@@ -40,10 +40,6 @@ def law_cases(rays: int, most_bins: int) -> dict[str, Callable[[], ExtremeRow]]:
     for bins in (1_000, most_bins):
         name = f"matrix of {bins} bins"
         cases[name] = partial(_many_bins, name, bins)
-    if hasattr(geo, "collide"):
-        from .extreme_disks import disk_cases
-
-        cases.update(disk_cases(rays))
     return cases
 
 

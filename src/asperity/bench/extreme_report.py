@@ -11,7 +11,7 @@ from ..errors import AsperityError, InputError
 from .child_process import ChildCrashed, ChildProcess, OutOfTime
 from .extreme_row import ExtremeRow
 
-# Rays a case, bins of the largest matrix, and the limit of a case.
+# Disks and collisions a case, bins of the largest matrix, and the limit of a case.
 QUICK_SIZE, QUICK_BINS, QUICK_SECONDS = 100, 2_000, 20.0
 SIZE, MOST_BINS, SECONDS = 1_000, 10_000, 180.0
 
@@ -86,11 +86,12 @@ def run_extremes(
 
 @cache
 def _cases(quick: bool) -> dict[str, Callable[[], ExtremeRow]]:
+    from .extreme_disks import disk_cases
     from .extreme_laws import law_cases
     from .extreme_rays import ray_cases
 
-    rays = QUICK_SIZE if quick else SIZE
-    return {**ray_cases(), **law_cases(rays, QUICK_BINS if quick else MOST_BINS)}
+    size = QUICK_SIZE if quick else SIZE
+    return {**ray_cases(), **disk_cases(size), **law_cases(size, QUICK_BINS if quick else MOST_BINS)}
 
 
 def _load() -> None:
