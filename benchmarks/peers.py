@@ -21,7 +21,7 @@ WORKER = Path(__file__).with_name("peer_worker.py")
 TRACERS = {"embree": ("single", "embreex"), "mitsuba": ("single", "mitsuba"), "billiards": ("double", "billiards")}
 CHAINS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
 # Limits of single commands, and of all of them together, which end before their section does.
-MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 270.0
+MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 210.0
 # Without an index pip should say so soon.
 PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
 RAYS, REPEATS, ANGLE = 2**17, 3, 0.7

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,6 +62,11 @@ WALLS: dict[str, geo.Wall] = {
         period=1.0,
     ),
 }
+
+
+# Rays of a kind: places and angles of so many on a wall.
+Rays = Callable[[geo.Wall, int, np.random.Generator], tuple[Floats, Floats]]
+COUNTED = ("rays", "lost", "flagged", "conditioned", "wrong")
 
 
 @dataclass(frozen=True)
@@ -120,14 +127,19 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats) -> Verdict:
 
 def measure_robustness(rays: int) -> dict[str, Verdict]:
     """Rays of each kind, shared among the walls, and what became of them all."""
-    rng = np.random.default_rng(0)
+    each = -(-rays // len(WALLS))
+
+    def judged(number: int, make: Rays) -> Verdict:
+        wall = list(WALLS.values())[number]
+        return judge(wall, *make(wall, each, np.random.default_rng([0, number])))
+
     found = {}
-    for kind, make in KINDS.items():
-        each = [judge(wall, *make(wall, -(-rays // len(WALLS)), rng)) for wall in WALLS.values()]
-        numbers = (
-            sum(getattr(one, what) for one in each) for what in ("rays", "lost", "flagged", "conditioned", "wrong")
-        )
-        found[kind] = Verdict(*numbers, max(one.worst for one in each), ())
+    # the twin is a loop on one thread
+    with ThreadPoolExecutor() as pool:
+        for kind, make in KINDS.items():
+            verdicts = list(pool.map(judged, range(len(WALLS)), [make] * len(WALLS)))
+            sums = (sum(getattr(one, name) for one in verdicts) for name in COUNTED)
+            found[kind] = Verdict(*sums, max(one.worst for one in verdicts), ())
     return found
 
 
@@ -199,7 +211,7 @@ def _edges(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats
     return x, low
 
 
-KINDS = {"corners": aimed_rays, "grazing": grazing_rays}
+KINDS: dict[str, Rays] = {"corners": aimed_rays, "grazing": grazing_rays}
 
 
 def main() -> None:
