@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -120,7 +121,7 @@ def _change(report: WorkReport, row: WorkRow, old_report: WorkReport, old: WorkR
         return RowChange(report.problem, row.method, row.budget, 1.0, 1.0, 1.0, f"{row.status}: {row.note}")
     from scipy.stats import mannwhitneyu
 
-    side = "greater" if row.least > old.least else "less"
+    side: Literal["greater", "less"] = "greater" if row.least > old.least else "less"
     p_value = float(mannwhitneyu(row.seconds, old.seconds, alternative=side, method="exact").pvalue)
     floor = max(facts.floor for facts in (report.methods[row.method], old_report.methods[row.method]))
     errors = [max(one.error(what), floor) for one, what in ((report, row), (old_report, old))]
