@@ -17,7 +17,7 @@ from .uniform_disk import DISK, sampled_velocities
 # Written by tests/precise_collision.py
 DATA = "extreme_disks.json"
 EPS = float(np.finfo(np.float64).eps)
-# Measured below 4; a margin of eight.
+# Measured below 0.4; the margin is that of single rays.
 UNITS = 32.0
 # Rounding errors of a handful of contacts, each of which may magnify them some tens of times; measured below 600.
 ROUNDED = 2.0**14 * EPS
