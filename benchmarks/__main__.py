@@ -19,9 +19,9 @@ from asperity.spectral import Machine
 
 from .goals import all_goals, goal_table
 from .laws import LawTime, measure_laws
-from .metastable import metastable_table
+from .metastable import Solver, metastable_table
 from .pages import BENCHMARKS, STABILITY, pictures, write_between_marks
-from .peers import peer_table
+from .peers import deeptime_solver, peer_table
 from .rigid import speed_table
 from .runs import RunTime, measure_runs
 from .start import measure_start
@@ -39,7 +39,8 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     flags = [f"--{name}" for name in ("quick", "peers", "write") if getattr(options, name)]
     command = f"Measured by `{' '.join(['python -m benchmarks', *flags])}`."
-    speed = [command, "", *_speed(RAYS // 16 if options.quick else RAYS)]
+    peers = {"deeptime": deeptime_solver(options.out / "peers")} if options.peers else {}
+    speed = [command, "", *_speed(RAYS // 16 if options.quick else RAYS, peers)]
     _say("the standard set")
     standard = _run(problem_names(), options.quick, options.out / "standard")
     _say("random walls")
@@ -74,7 +75,7 @@ def _run(names: list[str], quick: bool, folder: Path) -> BenchRun:
     return run
 
 
-def _speed(rays: int) -> list[str]:
+def _speed(rays: int, peers: dict[str, Solver]) -> list[str]:
     """The machine, the goals, and the tables that they rest on."""
     throughput, laws, runs, start = measure_throughput(rays), measure_laws(), measure_runs(), measure_start()
     goals = goal_table(all_goals(throughput, laws, runs, start))
@@ -82,7 +83,7 @@ def _speed(rays: int) -> list[str]:
     return [
         f"Machine: {Machine.here()}.", "", "## Goals", "", *goals, "", "## Speed", "",
         *_throughput_table(throughput), "", *_laws_table(laws), "", *_runs_table(runs), "", *speed_table(), "",
-        *metastable_table(), "", *starts,
+        *metastable_table(peers), "", *starts,
     ]  # fmt: skip
 
 

@@ -11,10 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+
+from .metastable import WELLS, Solver
 
 WORKER = Path(__file__).with_name("peer_worker.py")
 # name in `peer_worker` and requirements
@@ -31,6 +34,21 @@ def peer_table(folder: Path) -> str:
     folder.mkdir(parents=True, exist_ok=True)
     python = _environment(folder / "environment")
     return "\n".join([*_tracers(folder, python), "", *_chains(folder, python)])
+
+
+def deeptime_solver(folder: Path) -> Solver:
+    """Eigenvalues by deeptime, in a process of the peers' environment; its start is part of the time."""
+    folder.mkdir(parents=True, exist_ok=True)
+    python, data = _environment(folder / "environment"), folder / "wells.npz"
+
+    def solve(matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
+        np.savez(data, entries=matrix.data, columns=matrix.indices, starts=matrix.indptr, wanted=WELLS)
+        answer = _run(python, "deeptime_wells", CHAINS["deeptime"], data)
+        if isinstance(answer, str):
+            raise RuntimeError(answer)
+        return np.array(answer["values"]), f"none; {answer['version']}, {answer['seconds']:.2f} s without its start"
+
+    return solve
 
 
 def _tracers(folder: Path, python: Path) -> list[str]:

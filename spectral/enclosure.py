@@ -196,7 +196,7 @@ def _first_that_separates(
 
 
 def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Floats, tuple[Parity, ...], float]:
-    """Values, vectors and parities of largest modulus, descending, constants first; what comes next, with its residual."""
+    """Pairs of largest modulus, descending, constants first, with their parities; what comes next with its residual."""
     symmetric = _galerkin(law, basis, tolerance)
     constant = np.asarray(basis.constant)
     rest, inner, names = _off_constants(symmetric, constant, halves_of(basis) if law.mirror_symmetric else None)
