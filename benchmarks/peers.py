@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 import venv
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +41,8 @@ def deeptime_solver(folder: Path) -> Solver:
     """Eigenvalues by deeptime, in a process of the peers' environment; its start is part of the time."""
     folder.mkdir(parents=True, exist_ok=True)
     python, data = _environment(folder / "environment"), folder / "wells.npz"
+    # before anything is timed
+    _install(python, CHAINS["deeptime"])
 
     def solve(matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
         np.savez(data, entries=matrix.data, columns=matrix.indices, starts=matrix.indptr, wanted=WELLS)
@@ -106,11 +109,10 @@ def _environment(folder: Path) -> Path:
 
 def _run(python: Path, peer: str, packages: tuple[str, ...], data: Path) -> dict[str, Any] | str:
     """What the peer printed; or in words why it did not."""
+    refusal = _install(python, packages)
+    if refusal:
+        return refusal
     try:
-        install = [str(python), "-m", "pip", "install", "--quiet", "numpy", *packages]
-        done = subprocess.run(install, capture_output=True, text=True, timeout=INSTALL_SECONDS, check=False)
-        if done.returncode:
-            return f"cannot be installed: {_last_line(done.stderr)}"
         command = [str(python), str(WORKER), peer, str(data)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=RUN_SECONDS, check=False)
     except subprocess.TimeoutExpired as reason:
@@ -119,6 +121,17 @@ def _run(python: Path, peer: str, packages: tuple[str, ...], data: Path) -> dict
         return f"fails: {_last_line(done.stderr)}"
     answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
     return answer
+
+
+@lru_cache
+def _install(python: Path, packages: tuple[str, ...]) -> str:
+    """Put packages into the environment, once; empty, or in words why they are not there."""
+    command = [str(python), "-m", "pip", "install", "--quiet", "numpy", *packages]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=INSTALL_SECONDS, check=False)
+    except subprocess.TimeoutExpired as reason:
+        return f"cannot be installed within {reason.timeout:g} s"
+    return f"cannot be installed: {_last_line(done.stderr)}" if done.returncode else ""
 
 
 def _last_line(text: str) -> str:
