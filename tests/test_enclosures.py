@@ -126,3 +126,29 @@ def test_neighbours_of_the_other_parity_do_not_widen_an_enclosure():
     first, second = (next(item for item in found if item.parity == "even" and item.index) for found in (paper, turned))
     assert first.low <= second.high and second.low <= first.high
     assert 0.5 < first.width / second.width < 2.0
+
+
+MIXTURES = {
+    "two phase functions": (
+        0.5 * ker.henyey_greenstein(0.9) + 0.5 * ker.henyey_greenstein(0.5),
+        lambda degree: 0.5 * 0.9**degree + 0.5 * 0.5**degree,
+    ),
+    "specular, Lambertian and a phase function": (
+        0.25 * ker.maxwell(0.5) + 0.75 * ker.henyey_greenstein(0.6),
+        lambda degree: np.where(degree > 0, 0.125 * (-1.0) ** degree + 0.75 * 0.6**degree, 1.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("basis", [None, ker.Bins(32)], ids=["polynomials", "steps"])
+@pytest.mark.parametrize("mixture", MIXTURES)
+def test_indexed_eigenvalues_of_mixtures_are_enclosed(mixture, basis):
+    """On the polynomial of degree l all parts are multiples of the identity, up to the sign of specular reflection."""
+    law, eigenvalue = MIXTURES[mixture]
+    exact = eigenvalue(np.arange(400.0))
+    exact = exact[np.argsort(-np.abs(exact), kind="stable")]
+    found = [item for item in spec.enclosures(law, 4, basis) if item.label == "indexed"]
+    assert len(found) >= 3
+    for item in found:
+        assert exact[item.index] in item
+        assert item.width <= 100.0 * max(abs(item.value - exact[item.index]), EPS)
