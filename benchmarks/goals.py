@@ -126,7 +126,6 @@ def _large_matrices() -> list[Goal]:
     incoming = np.arccos(1.0 - 2.0 * rng.random(LARGE_SAMPLES))
     matrices = {
         "Henyey-Greenstein 0.9": ker.discretise(ker.henyey_greenstein(0.9), basis),
-        "Maxwell 0.5": ker.discretise(ker.maxwell(0.5), basis),
         "focusing arc": ker.discretise(arc, basis, method="qmc", samples=LARGE_SAMPLES, rng=rng),
         "pairs of angles": ker.estimate(incoming, arc.sample(incoming, rng), basis, symmetrise=True),
     }

@@ -141,6 +141,18 @@ def deeptime(data):
     return spectral(1.0 - values[0], data, time.perf_counter() - start, "deeptime")
 
 
+def deeptime_wells(data):
+    """The leading eigenvalues of a sparse chain."""
+    from deeptime.markov.tools.analysis import eigenvalues
+    from scipy.sparse import csr_matrix
+
+    matrix = csr_matrix((data["entries"], data["columns"], data["starts"]))
+    start = time.perf_counter()
+    values = eigenvalues(matrix, k=int(data["wanted"]))
+    seconds = time.perf_counter() - start
+    return {"version": version("deeptime"), "seconds": seconds, "values": np.real(values).tolist()}
+
+
 def pydtmc(data):
     from pydtmc import MarkovChain
 

@@ -10,11 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.timing import least_time
+
+from .metastable import WELLS, metastable_table
 
 WORKER = Path(__file__).with_name("peer_worker.py")
 # name in `peer_worker`, what it computes with, and requirements
@@ -33,7 +36,8 @@ def peer_table(folder: Path) -> str:
     """Rays and spectra by the peers and by asperity, as Markdown."""
     peers = PeerEnvironment(folder / "environment")
     folder.mkdir(parents=True, exist_ok=True)
-    return "\n".join([*_tracers(folder, peers), "", *_chains(folder, peers)])
+    wells = metastable_table({"deeptime": lambda matrix: _deeptime_wells(folder, peers, matrix)})
+    return "\n".join([*_tracers(folder, peers), "", *_chains(folder, peers), "", *wells])
 
 
 class PeerEnvironment:
@@ -129,6 +133,16 @@ def _chains(folder: Path, peers: PeerEnvironment) -> list[str]:
                 figures = "none | -" if value is None else f"{value:.6g} | {abs(value / gap - 1.0):.1e}"
                 lines.append(f"| {peer} | {answer['version']} | {gap:g} | {figures} | {answer['seconds']:.2g} |")
     return lines
+
+
+def _deeptime_wells(folder: Path, peers: PeerEnvironment, matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
+    """Eigenvalues of a sparse chain by deeptime, in a process whose start is part of the time."""
+    data = folder / "wells.npz"
+    np.savez(data, entries=matrix.data, columns=matrix.indices, starts=matrix.indptr, wanted=WELLS)
+    answer = peers.run("deeptime_wells", CHAINS["deeptime"], data)
+    if isinstance(answer, str):
+        raise RuntimeError(answer)
+    return np.array(answer["values"]), f"none; {answer['version']}, {answer['seconds']:.2f} s without its start"
 
 
 def _last_line(text: str) -> str:

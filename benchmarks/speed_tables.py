@@ -7,7 +7,6 @@ from asperity.spectral import Machine
 from .goals import all_goals, goal_table
 from .laws import LawTime, measure_laws
 from .memory import measure_memory
-from .metastable import metastable_table
 from .profiles import profile_tables
 from .rigid import speed_table
 from .robustness import RAYS as AIMED_RAYS
@@ -26,7 +25,7 @@ def speed_and_goals(quick: bool) -> str:
     goals = goal_table(all_goals(throughput, laws, runs, start, robustness, measure_memory()))
     starts = ["| start | seconds |", "|---|---|", *(f"| {what} | {least:.2f} |" for what, least in start.items())]
     tables = (
-        _throughput_table(throughput), _laws_table(laws), _runs_table(runs), speed_table(), metastable_table(),
+        _throughput_table(throughput), _laws_table(laws), _runs_table(runs), speed_table(),
         transport_table(), starts,
     )  # fmt: skip
     head = [f"Machine: {Machine.here()}.", "", "## Goals", "", *goals]

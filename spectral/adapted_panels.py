@@ -15,6 +15,7 @@ from ..kernels.angle_panels import KRONROD, NODES
 from ..kernels.basis_rows import BasisRows, basis_rows, traces_rows
 from ..kernels.measure import SINE
 from ..kernels.products import one_blas_thread
+from .parity import Parity
 
 # Degree on each panel: Kronrod's rule is then still exact for products of two functions.
 DEGREE = 6
@@ -29,6 +30,7 @@ MOST_LEVELS, MOST_PANELS = 12, {True: 60, False: 200}
 # Trial functions of one parity that are iterated together, beyond those asked for.
 GUARD = 12
 MOST_ITERATIONS, SETTLED = 60, 0.02
+PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
 # Rows are as exact as this share of the residual that is wanted.
 ROW_SHARE = 0.03
 
@@ -45,8 +47,8 @@ class Trials:
         Coefficients in ``basis``, of unit norm.
     following : array of shape (n, 2)
         Those that come next by modulus, ``following_values`` their values.
-    residual : float
-        The joint residual of ``vectors``, at Kronrod's nodes.
+    parities : tuple of {"even", "odd", "none"}
+        Of ``vectors``.
     mirrored : bool
         Whether every function is even or odd under theta -> pi - theta.
     """
@@ -56,6 +58,7 @@ class Trials:
     vectors: Floats
     following_values: Floats
     following: Floats
+    parities: tuple[Parity, ...]
     mirrored: bool
     levels: tuple[tuple[int, float], ...]
 
@@ -88,7 +91,10 @@ def adapted_trials(law: Law, k: int, tolerance: float, extra: int = 2) -> Trials
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
     chosen = np.append(0, first)
     whole = level.extended(vectors, parity)
-    return Trials(level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:], mirrored, tuple(history))
+    return Trials(
+        level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
+        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, tuple(history),
+    )  # fmt: skip
 
 
 class _Level:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
+from ..estimates import Estimate
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from .parity import Parity, outermost_by_parity
 from .sampling import NORMAL_95, sampling_errors, sampling_quantile
@@ -111,6 +112,20 @@ class Spectrum:
     def gap_error(self) -> float:
         """Total error of the gap, as in ``errors.total()``."""
         return float(self.gap_errors.total()[0])
+
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Every eigenvalue with its total error, to be quoted.
+
+        Examples
+        --------
+        >>> from asperity import kernels as ker, spectral as spec
+        >>> found = spec.spectrum(ker.henyey_greenstein(0.5), k=2).estimates()[1]
+        >>> abs(float(found) - 0.5) <= found.error, found.kind
+        (True, 'estimate')
+        """
+        method = f"{self.basis!r}, {self.method}; algebraic + two-grid and matrix + {self.errors.quantile:.3g} sampling"
+        pairs = zip(self.values, self.errors.total(), strict=True)
+        return tuple(Estimate(float(value), float(error), "estimate", method) for value, error in pairs)
 
     def eigenfunction(self, index: int, theta: Any) -> Floats:
         """Values of the eigenfunction of ``values[index]`` at the angles theta; mean square 1 under the measure."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,12 @@ from ..kernels.measure import SINE
 from .adapted_panels import adapted_trials
 from .deflation import off_constants
 from .eigenvalues import check_reversible
+from .parity import Parity, halves_of
 from .separation import Separation, rest_of_spectrum
 from .trials import EPS, Residuals, images, residuals
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Label = Literal["indexed", "contains-spectrum"]
 
@@ -54,6 +58,8 @@ class Enclosure:
         ``"bound"``: to rounding; ``"estimate"`` where a quadrature or the separation is estimated.
     reason : str
         What the label rests on, or why the eigenvalue could not be indexed.
+    parity : {"even", "odd", "none"}
+        Of the trial function under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric.
     """
 
     value: float
@@ -64,6 +70,7 @@ class Enclosure:
     residual: float
     kind: ErrorKind
     reason: str
+    parity: Parity = "none"
 
     @property
     def width(self) -> float:
@@ -74,7 +81,9 @@ class Enclosure:
         return self.low <= number <= self.high
 
     def __str__(self) -> str:
-        return f"[{self.low:.15g}, {self.high:.15g}] {self.label} ({self.kind}: {self.reason})"
+        name = self.label if self.index is None else f"{self.label} {self.index}"
+        parity = "" if self.parity == "none" else f", {self.parity}"
+        return f"[{self.low:.15g}, {self.high:.15g}] {name}{parity} ({self.kind}: {self.reason})"
 
 
 @dataclass(frozen=True)
@@ -168,17 +177,17 @@ def enclosures(
             quotient_error=TRIAL_SHARE * tolerance,
         )  # fmt: skip
         after = residuals(law, basis, trials.following, trials.following_values, 0, mirrored=trials.mirrored)
-        next_value = _reach(after)
+        names, next_value = trials.parities, _reach(after)
     else:
         if basis is None:
             basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
-        values, vectors, next_value = _trial(law, basis, k, tolerance)
+        values, vectors, names, next_value = _trial(law, basis, k, tolerance)
         found = residuals(law, basis, vectors, values)
     order = np.argsort(-np.abs(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.rows} rows"
     exact = isinstance(law, DensityLaw)
-    items = tuple(_enclosed(found, apart, order, place, exact) for place in range(len(values)))
+    items = tuple(_enclosed(found, apart, order, place, names, exact) for place in range(len(values)))
     return Enclosures(items, apart[1], law.frame, method)
 
 
@@ -202,24 +211,43 @@ def _first_that_separates(
     return 0, refused or Separation(np.inf, "estimate", "no trial function is apart from the next")
 
 
-def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Floats, float]:
-    """Values and vectors of largest modulus, descending, constants first; and what comes next with its residual."""
+def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Floats, tuple[Parity, ...], float]:
+    """Pairs of largest modulus, descending, constants first, with their parities; what comes next with its residual."""
     symmetric = _galerkin(law, basis, tolerance)
     constant = np.asarray(basis.constant)
-    rest, inner = off_constants(symmetric, constant)
+    rest, inner, names = _off_constants(symmetric, constant, halves_of(basis) if law.mirror_symmetric else None)
     order = np.argsort(-np.abs(rest), kind="stable")
     chosen = np.sort(order[: k - 1])[::-1]
     values, vectors = np.append(1.0, rest[chosen]), np.column_stack([constant, inner[:, chosen]])
+    first: Parity = "even" if law.mirror_symmetric and "none" not in names else "none"
+    listed = (first, *(names[place] for place in chosen))
     following = order[k - 1 : k - 1 + EXTRA]
     if not following.size:
-        return values, vectors, 0.0
+        return values, vectors, listed, 0.0
     after = residuals(law, basis, inner[:, following], rest[following], most_rows=0)
-    return values, vectors, _reach(after)
+    return values, vectors, listed, _reach(after)
 
 
 def _reach(after: Residuals) -> float:
     """Up to what modulus the intervals of these functions reach."""
     return float(np.max(np.abs(after.quotients) + after.norms))
+
+
+def _off_constants(
+    symmetric: Floats, constant: Floats, split: tuple[csr_array[Any], csr_array[Any]] | None
+) -> tuple[Floats, Floats, list[Parity]]:
+    """Eigenvalues, ascending, and vectors off the constants; of each parity by themselves where there are parities."""
+    if split is None:
+        values, vectors = off_constants(symmetric, constant)
+        unknown: Parity = "none"
+        return values, vectors, [unknown] * len(values)
+    even, odd = split
+    values, vectors = off_constants(np.asarray(even.T @ symmetric @ even), np.asarray(even.T @ constant))
+    odd_values, odd_vectors = np.linalg.eigh(np.asarray(odd.T @ symmetric @ odd))
+    order = np.argsort(np.concatenate([values, odd_values]), kind="stable")
+    names: list[Parity] = ["even" if place < len(values) else "odd" for place in order]
+    everything = np.concatenate([even @ vectors, odd @ odd_vectors], axis=1)
+    return np.concatenate([values, odd_values])[order], everything[:, order], names
 
 
 def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
@@ -235,22 +263,32 @@ def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
 
 
 def _enclosed(
-    found: Residuals, known: tuple[int, Separation], order: NDArray[np.intp], place: int, exact: bool
+    found: Residuals,
+    known: tuple[int, Separation],
+    order: NDArray[np.intp],
+    place: int,
+    names: tuple[Parity, ...],
+    exact: bool,
 ) -> Enclosure:
     number, apart = known
+    own = names[place]
     value, norm = float(found.quotients[place]), float(found.norms[place])
     rank = int(np.flatnonzero(order == place)[0])
     if rank == 0 and place == 0 and number:
-        return Enclosure(1.0, 1.0, 1.0, "indexed", 0, norm, apart.kind, f"P 1 = 1; {apart.reason}")
+        return Enclosure(1.0, 1.0, 1.0, "indexed", 0, norm, apart.kind, f"P 1 = 1; {apart.reason}", own)
     if rank < number:
-        low, high = _temple(found, apart.radius, order[:number], place)
+        # the law maps even functions to even ones and odd ones to odd ones: neighbours are those of the same parity
+        alike = np.array([other for other in order[:number] if names[other] == own], dtype=np.intp)
+        low, high = _temple(found, apart.radius, alike, place)
         kind: ErrorKind = "bound" if exact and apart.kind == "bound" else "estimate"
         reason = f"{apart.reason}: the rest is within {apart.radius:.6g}"
-        return Enclosure(value, low, high, "indexed", rank, norm, kind, reason)
+        return Enclosure(value, low, high, "indexed", rank, norm, kind, reason, own)
     radius = norm + float(found.quotient_errors[place]) + QUOTIENT_ROUNDING
     reason = f"not indexed: the rest of the spectrum reaches {apart.radius:.6g} for all that is known ({apart.reason})"
     kind = "bound" if exact else "estimate"
-    return Enclosure(value, value - radius, min(value + radius, 1.0), "contains-spectrum", None, norm, kind, reason)
+    return Enclosure(
+        value, value - radius, min(value + radius, 1.0), "contains-spectrum", None, norm, kind, reason, own
+    )
 
 
 def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], place: int) -> tuple[float, float]:

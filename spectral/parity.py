@@ -35,9 +35,7 @@ def halves(matrix: KernelMatrix) -> tuple[csr_array[Any], csr_array[Any]] | None
     >>> [half.shape for half in halves(discretise(lambertian(), Legendre(5)))]
     [(5, 3), (5, 2)]
     """
-    if matrix.mirror_symmetric is not True or not is_mirror_symmetric(matrix.basis):
-        return None
-    return _halves(matrix.basis)
+    return halves_of(matrix.basis) if matrix.mirror_symmetric else None
 
 
 def outermost_by_parity(
@@ -81,7 +79,10 @@ def _merged(
     return found, tuple(names[order].tolist())
 
 
-def _halves(basis: Basis) -> tuple[csr_array[Any], csr_array[Any]] | None:
+def halves_of(basis: Basis) -> tuple[csr_array[Any], csr_array[Any]] | None:
+    """The even and the odd functions of a basis; None where the flip does not keep it."""
+    if not is_mirror_symmetric(basis):
+        return None
     here = np.arange(basis.size)
     if isinstance(basis, Bins):
         # a large matrix need not be made to see that bins change places

@@ -107,3 +107,48 @@ def test_what_cannot_be_enclosed_is_refused():
     rotation = ker.MatrixLaw(np.roll(np.eye(8), 1, axis=1))
     with pytest.raises(AccuracyError, match="not reversible"):
         spec.enclosures(rotation, 2)
+
+
+def test_enclosures_of_mirror_symmetric_laws_say_their_parity():
+    """g^l belongs to the polynomial of degree l: even where l is."""
+    found = spec.enclosures(ker.henyey_greenstein(0.8), 4)
+    assert [item.parity for item in found] == ["even", "odd", "even", "odd"]
+    assert all(0.8**degree in found[degree] for degree in range(4))
+    assert "indexed 1, odd (bound:" in str(found[1])
+    skew = ker.MatrixLaw([[0.6, 0.3, 0.1], [0.3, 0.5, 0.2], [0.1, 0.2, 0.7]])
+    assert {item.parity for item in spec.enclosures(skew, 2)} == {"none"}
+
+
+def test_neighbours_of_the_other_parity_do_not_widen_an_enclosure():
+    """Of arcs in Feres' convention the odd eigenvalues change sign; the even ones and their enclosures do not."""
+    law = ker.CircularArcLaw(0.9)
+    paper, turned = spec.enclosures(law, 3), spec.enclosures(law.in_specular_frame(), 3)
+    first, second = (next(item for item in found if item.parity == "even" and item.index) for found in (paper, turned))
+    assert first.low <= second.high and second.low <= first.high
+    assert 0.5 < first.width / second.width < 2.0
+
+
+MIXTURES = {
+    "two phase functions": (
+        0.5 * ker.henyey_greenstein(0.9) + 0.5 * ker.henyey_greenstein(0.5),
+        lambda degree: 0.5 * 0.9**degree + 0.5 * 0.5**degree,
+    ),
+    "specular, Lambertian and a phase function": (
+        0.25 * ker.maxwell(0.5) + 0.75 * ker.henyey_greenstein(0.6),
+        lambda degree: np.where(degree > 0, 0.125 * (-1.0) ** degree + 0.75 * 0.6**degree, 1.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("basis", [None, ker.Bins(32)], ids=["polynomials", "steps"])
+@pytest.mark.parametrize("mixture", MIXTURES)
+def test_indexed_eigenvalues_of_mixtures_are_enclosed(mixture, basis):
+    """On the polynomial of degree l all parts are multiples of the identity, up to the sign of specular reflection."""
+    law, eigenvalue = MIXTURES[mixture]
+    exact = eigenvalue(np.arange(400.0))
+    exact = exact[np.argsort(-np.abs(exact), kind="stable")]
+    found = [item for item in spec.enclosures(law, 4, basis) if item.label == "indexed"]
+    assert len(found) >= 3
+    for item in found:
+        assert exact[item.index] in item
+        assert item.width <= 100.0 * max(abs(item.value - exact[item.index]), EPS)

@@ -97,7 +97,7 @@ def test_a_polygon_has_no_gap_and_the_summary_says_so(teeth):
 
 def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
     text = arcs.summary()
-    assert "Bins(32) by quadrature: Frobenius error" in text and "tolerance 0.01 met" in text
+    assert "Bins(32) by quadrature: Frobenius error" in text and f"tolerance {0.01 * math.sqrt(32):g} met" in text
     # the foreshortened arc is elliptic and has no closed form
     assert f"{arcs.collision_matrix.samples} rays" in text and "against the sampling noise" in text
     assert "paper convention: 0.63" in text and "specular convention: 0.6" in text
@@ -115,9 +115,30 @@ def test_the_consequences_are_those_of_the_library(arcs, teeth):
     assert "no relaxation time" in teeth.summary()
 
 
+def test_the_eigenvalues_and_enclosures_can_be_quoted(arcs, teeth):
+    """Value, error, kind, method and convention of each, in the text and in JSON; 0.3670253152 is the reference."""
+    text, read = arcs.summary(), arcs.as_dict()
+    assert "paper convention, estimate: Legendre(48)" in text and "of the matrix none is missing: all" in text
+    listed = read["eigenvalues"]
+    assert {"convention", "kind", "method", "values", "errors", "parity", "completeness"} <= set(listed)
+    assert abs(listed["values"][1] - 0.3670253152) <= listed["errors"][1] and listed["parity"][:3] == [
+        "even",
+        "odd",
+        "even",
+    ]
+    enclosed = read["enclosures"]
+    assert len(enclosed) == len(arcs.enclosures) == 3
+    assert enclosed[1]["low"] <= 0.3670253152 <= enclosed[1]["high"]
+    assert (enclosed[1]["convention"], enclosed[1]["kind"], enclosed[1]["parity"]) == ("paper", "estimate", "odd")
+    assert all(str(item) in text for item in arcs.enclosures)
+    assert teeth.enclosures is None and teeth.as_dict()["enclosures"] is None
+    assert "no eigenvalue next to it is isolated" in teeth.summary()
+
+
 def test_a_tolerance_that_was_not_met_is_said_loudly(teeth):
     missed = replace(teeth.matrix, error=replace(teeth.matrix.error, value=0.5, error=0.5))
-    assert "Frobenius error 0.5 (bound), tolerance 0.001 NOT met" in replace(teeth, matrix=missed).summary()
+    # 1e-3 for each of 16 bins
+    assert "Frobenius error 0.5 (bound), tolerance 0.004 NOT met" in replace(teeth, matrix=missed).summary()
 
 
 def test_a_gap_that_was_not_decided_is_not_rounded_away(arcs):
@@ -140,9 +161,10 @@ def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):
     monkeypatch.setattr("asperity.study.spectral_gap", refuse)
     monkeypatch.setattr("asperity.study.gaps_in_both_conventions", refuse)
     monkeypatch.setattr("asperity.study.spectrum", refuse)
+    monkeypatch.setattr("asperity.study.enclosures", refuse)
     report = study_wall(geo.rectangular_teeth(1.0), bins=8)
-    assert set(report.refusals) == {"gap", "specular_gap", "collision_gap", "spectrum"}
-    assert report.summary().count("refused: the counts speak against symmetry") == 4
+    assert set(report.refusals) == {"gap", "specular_gap", "collision_gap", "spectrum", "enclosures"}
+    assert report.summary().count("refused: the counts speak against symmetry") == 5
     assert json.loads(report.to_json())["gap"] == {"paper": None, "specular": None}
     assert len(report.save(tmp_path)) == len(PICTURES) + len(DATA)
 

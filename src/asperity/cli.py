@@ -54,7 +54,9 @@ def main() -> None:
 @click.argument("wall")
 @with_disk
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for pictures, matrix and JSON; made if missing.")
-@click.option("--tolerance", default=1e-3, show_default=True, help="Error asked of gaps and matrices.")
+@click.option(
+    "--tolerance", default=1e-3, show_default=True, help="Error asked of gaps, and of matrices for every bin."
+)
 @click.option("--bins", default=128, show_default=True, help="Number of equal-measure bins of the matrix.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random generator.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the summary.")
@@ -106,7 +108,7 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
     from .geometry import wall_from_text
     from .kernels import WallLaw
     from .spectral import enclosures, spectral_gap
-    from .study_text import enclosures_as_list, gap_as_dict, quotation
+    from .study_text import enclosures_as_list, enclosures_as_text, gap_as_dict, quotation
 
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
@@ -118,7 +120,7 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
         return
     click.echo("\n".join([quotation(found), *(f"  {line}" for line in found.evidence)]))
     if enclosed is not None:
-        click.echo("\n".join(["enclosures:", *(f"  {item}" for item in enclosed)]))
+        click.echo("\n".join(["enclosures:", *(f"  {line}" for line in enclosures_as_text(enclosed))]))
 
 
 @main.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -17,7 +18,7 @@ from .estimates import Estimate
 from .geometry import Disk, Wall, trace
 from .kernels import Bins, CollisionLaw, KernelMatrix, Law, Legendre, WallLaw, discretise
 from .kernels.measure import SINE
-from .spectral import SpectralGap, Spectrum, gaps_in_both_conventions, spectral_gap, spectrum
+from .spectral import Enclosures, SpectralGap, Spectrum, enclosures, gaps_in_both_conventions, spectral_gap, spectrum
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,6 +28,12 @@ TOLERANCE = 1e-3
 CHECK_RAYS = 2**16
 # Enough polynomials for the ten largest eigenvalues; the gap refines its own basis.
 SPECTRUM_BASIS, EIGENVALUES = Legendre(48), 10
+# Share of the tolerance that the matrix behind a spectrum may spend.
+MATRIX_SHARE = 0.1
+# Eigenvalues that are enclosed, the constants' included: some seconds on a traced wall.
+ENCLOSED = 3
+# Rays of a sampled matrix: enough to see how many more it takes, and as many as a few seconds allow.
+FIRST_SAMPLES, MOST_SAMPLES = 2**20, 2**24
 PICTURES = ("wall.png", "kernel.png", "spectrum.png", "collision.png")
 DATA = ("kernel.npz", "study.json")
 
@@ -67,7 +74,8 @@ class Study:
     wall : Wall
     disk : Disk
     tolerance : float
-        What was asked of the matrices (Frobenius norm) and of the gaps.
+        What was asked of the gaps, and of the image of every bin: times the root of their number in the Frobenius norm
+        of the matrices.
     tracer : TracerCheck or None
         None for walls without hollows, and for open walls, whose rays pass from cell to cell.
     matrix : KernelMatrix
@@ -77,6 +85,8 @@ class Study:
         self-adjoint. None also where ``refusals`` says why.
     spectrum : Spectrum or None
         Ten eigenvalues of P~; of the matrix in bins where the law has no gap.
+    enclosures : Enclosures or None
+        Intervals that hold eigenvalues of P~ itself; None where ``refusals`` says why.
     collision : CollisionLaw
     collision_matrix : KernelMatrix
         P~ of the foreshortened wall, in bins.
@@ -98,6 +108,7 @@ class Study:
     gap: SpectralGap | None
     specular_gap: SpectralGap | None
     spectrum: Spectrum | None
+    enclosures: Enclosures | None
     collision: CollisionLaw
     collision_matrix: KernelMatrix
     collision_gap: SpectralGap | None
@@ -204,11 +215,11 @@ def study_wall(
             return None
 
     # silent where standard error is not a terminal, and in the first two seconds
-    with tqdm(total=7, desc=name, delay=2, disable=None, leave=False) as progress:
+    with tqdm(total=8, desc=name, delay=2, disable=None, leave=False) as progress:
         tracer = check_tracer(wall, rng) if wall.hollows else None
         progress.update()
         law = WallLaw(wall)
-        matrix = discretise(law, basis, tolerance=tolerance, rng=rng)
+        matrix = _matrix(law, basis, tolerance, rng)
         progress.update()
         specular_gap = None
         if wall.is_mirror_symmetric:
@@ -226,15 +237,21 @@ def study_wall(
         except AccuracyError as reason:
             refusals["spectrum"] = str(reason)
         progress.update()
+        enclosed = None
+        try:
+            enclosed = _enclosures(law, gap, tolerance)
+        except AccuracyError as reason:
+            refusals["enclosures"] = str(reason)
+        progress.update()
         collision = CollisionLaw.from_wall(wall, disk)
-        collision_matrix = discretise(collision.law, basis, tolerance=tolerance, rng=rng)
+        collision_matrix = _matrix(collision.law, basis, tolerance, rng)
         progress.update()
         collision_gap = gap_of(collision.law, "collision_gap")
         progress.update()
         consequences = consequences_of(wall, law, gap, specular_gap, found)
     return Study(
-        name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, collision, collision_matrix,
-        collision_gap, MappingProxyType(_conservation(collision, rng)), MappingProxyType(refusals),
+        name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed, collision,
+        collision_matrix, collision_gap, MappingProxyType(_conservation(collision, rng)), MappingProxyType(refusals),
         consequences,
     )  # fmt: skip
 
@@ -265,7 +282,24 @@ def _spectrum(
     if gap is not None and gap.verdict == "no gap":
         # whatever the basis, these are numbers of the grid; those of the matrix that is shown and saved
         return spectrum(matrix, k=EIGENVALUES)
-    return spectrum(law, EIGENVALUES, basis=SPECTRUM_BASIS, tolerance=0.1 * tolerance, rng=rng)
+    return spectrum(law, EIGENVALUES, basis=SPECTRUM_BASIS, tolerance=MATRIX_SHARE * tolerance, rng=rng)
+
+
+def _enclosures(law: WallLaw, gap: SpectralGap | None, tolerance: float) -> Enclosures:
+    if gap is not None and gap.verdict == "no gap":
+        raise AccuracyError("1 belongs to the essential spectrum, and no eigenvalue next to it is isolated", 0.0)
+    return enclosures(law, ENCLOSED, tolerance=MATRIX_SHARE * tolerance)
+
+
+def _matrix(law: Law, basis: Bins, tolerance: float, rng: np.random.Generator) -> KernelMatrix:
+    """In bins; where rays are needed, as many as the error of a first sample asks for."""
+    wanted = tolerance * float(np.sqrt(basis.size))
+    found = discretise(law, basis, tolerance=wanted, samples=FIRST_SAMPLES, rng=rng)
+    if not found.samples or found.tolerance_met:
+        return found
+    # the error falls at least like the root of their number
+    more = 2 ** math.ceil(2.0 * math.log2(float(found.error) / wanted))
+    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, MOST_SAMPLES), rng=rng)
 
 
 def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:

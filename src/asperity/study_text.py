@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,9 +34,7 @@ def summary_of(study: Study) -> str:
     ]
     if study.tracer is not None:
         lines += _tracer_lines(study.tracer)
-    lines += [
-        "law P~     " + line if i == 0 else "           " + line for i, line in enumerate(_matrix_lines(study.matrix))
-    ]
+    lines += _block("law P~", _matrix_lines(study.matrix))
     lines += [f"gap        {_gap_line(study, 'gap')}"]
     if study.wall.is_mirror_symmetric:
         lines += [f"           {_gap_line(study, 'specular_gap')}"]
@@ -44,11 +43,9 @@ def summary_of(study: Study) -> str:
             "           specular convention: not asked, the cell has no mirror axis and P_F need not be self-adjoint"
         ]
     lines += [
-        f"spectrum   {_spectrum_line(study)}",
-        *(
-            "follows    " * (i == 0) + "           " * (i > 0) + line
-            for i, line in enumerate(study.consequences.lines())
-        ),
+        *_block("spectrum", _spectrum_lines(study)),
+        *_block("enclosed", _enclosure_lines(study)),
+        *_block("follows", study.consequences.lines()),
         f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
         f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep",
     ]
@@ -61,6 +58,11 @@ def summary_of(study: Study) -> str:
         f"to {study.conservation['rolling_momentum_defect']:.1e} (relative)",
     ]
     return "\n".join(lines)
+
+
+def _block(title: str, lines: Sequence[str]) -> list[str]:
+    """Lines under one title."""
+    return [f"{title if i == 0 else '':11s}{line}" for i, line in enumerate(lines)]
 
 
 def _tracer_lines(tracer: TracerCheck) -> list[str]:
@@ -110,15 +112,35 @@ def _gap_line(study: Study, which: str) -> str:
     return f"{words} ({gap.kind}: {gap.method}), {met}"
 
 
-def _spectrum_line(study: Study) -> str:
+def _spectrum_lines(study: Study) -> list[str]:
+    """Eigenvalues with their errors; then how they were found."""
     found = study.spectrum
     if found is None:
-        return f"refused: {study.refusals['spectrum']}"
-    values = ", ".join(f"{value:.6g}" for value in found.values[:SHOWN_EIGENVALUES])
+        return [f"refused: {study.refusals['spectrum']}"]
+    shown = [
+        rounded(number) + ("" if parity == "none" else f" {parity}")
+        for number, parity in zip(found.estimates()[:SHOWN_EIGENVALUES], found.parity, strict=False)
+    ]
     caution = ""
     if study.gap is not None and study.gap.verdict == "no gap":
         caution = "; they belong to the grid, for the law has no gap"
-    return f"{values} ({found.convention} convention, {found.basis!r}, {found.method}{caution})"
+    method = found.estimates()[0].method
+    return [
+        f"{', '.join(shown)} ({found.convention} convention, estimate: {method}{caution})",
+        f"of the matrix none is missing: {found.completeness}",
+    ]
+
+
+def _enclosure_lines(study: Study) -> list[str]:
+    found = study.enclosures
+    if found is None:
+        return [f"refused: {study.refusals.get('enclosures', 'not asked for')}"]
+    return enclosures_as_text(found)
+
+
+def enclosures_as_text(found: Enclosures) -> list[str]:
+    """One line an enclosure, to paste into a paper, and one line of what they have in common."""
+    return [f"{found.convention} convention; {found.method}", *map(str, found)]
 
 
 def rounded(number: Estimate) -> str:
@@ -172,10 +194,12 @@ def study_as_dict(study: Study) -> dict[str, Any]:
         "law": _matrix(study.matrix),
         "gap": {"paper": _gap(study.gap), "specular": _gap(study.specular_gap)},
         "eigenvalues": None if found is None else {
-            "convention": found.convention, "basis": repr(found.basis), "method": found.method,
-            "values": found.values.tolist(),
+            "convention": found.convention, "basis": repr(found.basis), "method": found.estimates()[0].method,
+            "values": found.values.tolist(), "errors": finite(found.errors.total()), "kind": "estimate",
+            "parity": list(found.parity), "completeness": found.completeness,
             **{part: finite(getattr(found.errors, part)) for part in ("algebraic", "discretisation", "sampling")},
         },
+        "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
         "collision": {
             "mass": disk.mass, "inertia": disk.inertia, "foreshortening": disk.foreshortening,
             "law": _matrix(study.collision_matrix), "gap": _gap(study.collision_gap), **study.conservation,
@@ -213,7 +237,8 @@ def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
     return [
         {
             "value": item.value, "low": item.low, "high": item.high, "label": item.label, "index": item.index,
-            "residual": item.residual, "kind": item.kind, "reason": item.reason,
+            "residual": item.residual, "kind": item.kind, "reason": item.reason, "parity": item.parity,
+            "method": found.method, "convention": found.convention,
         }
         for item in found
     ]  # fmt: skip
