@@ -107,8 +107,7 @@ class _Level:
         angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
         self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
         rows: BasisRows = basis_rows(law, self.panels)
-        images, self.row_errors = rows(angle.ravel(), row_tolerance)
-        self._images = images
+        self._images, _ = rows(angle.ravel(), row_tolerance)
         # values of each panel's own functions, shape (panels, nodes, degree + 1); of norm 1 on what is kept
         self.norm = np.sqrt(0.5) if mirrored else 1.0
         self.local = self.panels.local(angle)[1] * self.norm
