@@ -120,7 +120,7 @@ def _(law: WallLaw, basis: Basis) -> BasisRows:
 
 @singledispatch
 def function_rows(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
-    """As `basis_rows` for the functions with the coefficients ``vectors``, shape (n, k); errors are those of the worst."""
+    """As `basis_rows` for functions with the coefficients ``vectors``, shape (n, k); errors are those of the worst."""
     rows = basis_rows(law, basis)
     angle, _ = gauss_rule(basis.edges, HEIGHT_PROBES)
     height = float(np.abs(basis.evaluate(angle) @ vectors).max())

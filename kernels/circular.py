@@ -188,8 +188,8 @@ class CircularArcLaw(DrivenLaw):
 
 
 def followed_hits(tolerance: float) -> int:
-    """How many hits N to follow, so that integrals over theta of means of functions of slope 5 err by the tolerance.
+    """How many hits N to follow, so that integrals over theta of means of functions of slope 10 err by less.
 
     Rays with more hits are a share of 1/(4 N^2), for theta within xi/N of xi, and leave within 2 xi/N of their place.
     """
-    return int(np.clip(np.ceil((5.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))
+    return int(np.clip(np.ceil((100.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))

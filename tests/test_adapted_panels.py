@@ -72,9 +72,7 @@ def test_sums_and_the_other_frame_have_the_rows_of_their_parts():
     assert not integrates_panels(arc @ arc)
     images, _ = basis_rows(law.in_specular_frame(), panels)(ANGLES, 1e-12)
     smooth = panels.project(lambda theta: theta**2)
-    assert np.allclose(
-        images @ smooth, law.in_specular_frame().apply(lambda theta: theta**2, ANGLES), atol=1e-10
-    )
+    assert np.allclose(images @ smooth, law.in_specular_frame().apply(lambda theta: theta**2, ANGLES), atol=1e-10)
 
 
 # tests/precise_arc_eigenvalues.py: the second and the third eigenvalue by modulus, and how far from them it converged
@@ -124,6 +122,6 @@ def test_trial_functions_are_orthonormal_and_of_one_parity():
     gram = found.vectors.T @ found.vectors
     assert np.allclose(gram, np.eye(3), atol=1e-4)
     assert found.mirrored and found.values[0] == 1.0
-    here = found.basis.evaluate(0.5 * np.pi + 0.5 * NODES) @ found.vectors
+    here = found.basis.evaluate(0.5 * np.pi + 0.5 * NODES[NODES != 0.0]) @ found.vectors
     sign = np.array([1.0, -1.0, -1.0])
     assert np.allclose(here[::-1], sign * here, atol=1e-12)
