@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # exp(i theta' / 2 N) on a panel asks for this many Gauss nodes more than a polynomial of half the degree.
 MORE_NODES = 3
+# Angles at which the variation of functions is looked at.
+SPREAD_PROBES = 9
 # Ends of pieces held at a time.
 CHUNK = 2**15
 
@@ -45,7 +47,7 @@ class ArcMeans:
         self._tables: dict[int, NDArray[np.complex128]] = {}
 
     def __call__(self, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
-        """The means, shape (rows, k), and estimates of their errors for functions of sup norm and slope 1."""
+        """The means, shape (rows, k), and how much the rays with more hits can be off in the worst of the functions."""
         pieces = self.law.pieces(theta, most_hits)
         single = pieces.rest | pieces.alone
         base = np.where(pieces.mirrored, np.pi - theta[pieces.ray], theta[pieces.ray])
@@ -67,7 +69,18 @@ class ArcMeans:
         found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[self._cell(angle)])
         total = np.stack([np.bincount(pieces.ray, weights=column, minlength=theta.size) for column in found.T], axis=1)
         left = np.bincount(pieces.ray, weights=np.where(pieces.rest, share, 0.0), minlength=theta.size)
-        return total / whole[:, None], left / whole * self.law.half_angle / most_hits**2
+        return total / whole[:, None], left / whole * self._spread(most_hits)
+
+    def _spread(self, most_hits: int) -> float:
+        """How much the functions vary where rays with more hits leave: within 2 xi/N of xi and of pi - xi."""
+        xi = self.law.half_angle
+        near = xi + 2.0 * xi / most_hits * np.linspace(-1.0, 1.0, SPREAD_PROBES)
+        values = []
+        for angle in (near, np.pi - near):
+            cell = self._cell(angle)
+            moments = self._moments(angle[:, None], cell, np.ones((angle.size, 1)))
+            values.append(np.einsum("pd,pdk->pk", moments, self._polynomials[cell]))
+        return float(max(np.abs(value - value[SPREAD_PROBES // 2]).max() for value in values))
 
     def _integrals(self, offset: Floats, slope: Floats, lower: Floats, upper: Floats) -> Floats:
         """The integrals of v(offset + slope delta) sin(delta)/2 over (lower, upper), shape (pieces, k)."""

@@ -62,7 +62,8 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
     total = np.bincount(ray, weights=mass, minlength=theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
     left = np.bincount(ray, weights=np.where(rest, mass, 0.0), minlength=theta.size)
-    return panels.of_legendre(moments.transpose(1, 2, 0)), left / total * law.half_angle / most_hits**2
+    # two angles of a function of sup norm 1
+    return panels.of_legendre(moments.transpose(1, 2, 0)), 2.0 * left / total
 
 
 def _add_moments(

@@ -16,6 +16,7 @@ from .circular import CircularArcLaw, followed_hits
 from .ideal import LambertianLaw
 from .law import Law
 from .legendre import Legendre
+from .measure import gauss_rule
 from .panels import Panels
 from .products import cell_index
 from .reflection import is_mirror_symmetric, reflection_matrix
@@ -28,6 +29,8 @@ from .weighted_sum import Combination
 VALUES_AT_ONCE = 2_000_000
 # The first of the Gauss rules on a piece of a row that may be used for polynomials on panels.
 PANEL_LEVEL = 2
+# Angles on an interval at which the height of functions is looked at.
+HEIGHT_PROBES = 5
 
 # From angles and the wanted errors of the means of functions of sup norm 1: the images, shape (rows, size), and the
 # errors, shape (rows,); nan where nothing is known of them.
@@ -117,13 +120,16 @@ def _(law: WallLaw, basis: Basis) -> BasisRows:
 
 @singledispatch
 def function_rows(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
-    """As `basis_rows` for the functions with the coefficients ``vectors``, shape (n, k)."""
+    """As `basis_rows` for functions with the coefficients ``vectors``, shape (n, k); errors are those of the worst."""
     rows = basis_rows(law, basis)
+    angle, _ = gauss_rule(basis.edges, HEIGHT_PROBES)
+    height = float(np.abs(basis.evaluate(angle) @ vectors).max())
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         step = max(1, VALUES_AT_ONCE // basis.size)
         parts = [rows(theta[start : start + step], tolerance) for start in range(0, theta.size, step)]
-        return np.concatenate([images @ vectors for images, _ in parts]), np.concatenate([error for _, error in parts])
+        images = np.concatenate([image @ vectors for image, _ in parts])
+        return images, height * np.concatenate([error for _, error in parts])
 
     return means
 

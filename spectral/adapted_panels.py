@@ -27,6 +27,8 @@ NARROWEST = 1e-7
 SHARE = 0.9
 # Levels at most; and panels beyond which none are divided, where rows are traced and where they are not.
 MOST_LEVELS, MOST_PANELS = 12, {True: 60, False: 200}
+# Trial functions that tell what comes next.
+EXTRA = 2
 # Trial functions of one parity that are iterated together, beyond those asked for.
 GUARD = 12
 MOST_ITERATIONS, SETTLED = 60, 0.02
@@ -63,7 +65,7 @@ class Trials:
     levels: tuple[tuple[int, float], ...]
 
 
-def adapted_trials(law: Law, k: int, tolerance: float, extra: int = 2) -> Trials:
+def adapted_trials(law: Law, k: int, tolerance: float, most_levels: int = MOST_LEVELS) -> Trials:
     """Trial functions of the k eigenvalues of largest modulus, with Kato-Temple bounds of about the tolerance.
 
     Notes
@@ -80,12 +82,12 @@ def adapted_trials(law: Law, k: int, tolerance: float, extra: int = 2) -> Trials
     while True:
         level = _Level(law, edges, mirrored, ROW_SHARE * goal)
         with one_blas_thread():
-            values, vectors, parity = level.leading(k + extra, SETTLED * goal)
+            values, vectors, parity = level.leading(k + EXTRA, SETTLED * goal)
         squares = level.squared_residuals(values, vectors, parity)
         goal = np.sqrt(tolerance * _room(values, k))
         joint = float(np.sqrt(squares[:, :k].sum()))
         history.append((level.panels.size, joint))
-        if joint <= goal or len(history) == MOST_LEVELS or len(edges) > most_panels:
+        if joint <= goal or len(history) == most_levels or len(edges) > most_panels:
             break
         edges = _divided(edges, squares[:, :k].sum(axis=1))
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
@@ -111,8 +113,7 @@ class _Level:
         angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
         self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
         rows: BasisRows = basis_rows(law, self.panels)
-        images, self.row_errors = rows(angle.ravel(), row_tolerance)
-        self._images = images
+        self._images, _ = rows(angle.ravel(), row_tolerance)
         # values of each panel's own functions, shape (panels, nodes, degree + 1); of norm 1 on what is kept
         self.norm = np.sqrt(0.5) if mirrored else 1.0
         self.local = self.panels.local(angle)[1] * self.norm

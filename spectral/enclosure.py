@@ -129,9 +129,11 @@ def enclosures(
     k : int
         Number of eigenvalues, the constants' included.
     basis : Basis, optional
-        Where the trial functions are sought; Legendre polynomials by default.
+        Where the trial functions are sought. By default panels that adapt to the law, for walls, arcs, Lambertian
+        reflection and sums of these; Legendre polynomials for other laws.
     tolerance : float
-        Wanted Frobenius error of the matrix that gives the trial functions. It makes them better, not truer.
+        Wanted half width of the enclosures, where the panels adapt; else the wanted Frobenius error of the matrix that
+        gives the trial functions. It makes them better, not truer.
 
     Returns
     -------

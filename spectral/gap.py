@@ -9,7 +9,7 @@ import numpy as np
 
 from ..checks import positive_number
 from ..errors import AccuracyError, InputError
-from ..estimates import ErrorKind, Estimate
+from ..estimates import Estimate
 from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
 from ..kernels.algebra import made_of_isometries
 from ..kernels.basis_rows import integrates_panels
@@ -18,7 +18,7 @@ from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge, essential_edge
 from .ideal_parts import ideal_spectrum
-from .refinement import EIGENVALUES, NEGLIGIBLE, Refinement, SharedMatrices, refined
+from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .relaxation import largest_modulus
 from .separation import lambertian_share
 
@@ -26,7 +26,10 @@ Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 
 # Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
 # exact the look is that counts them.
-ENCLOSED, MOST_ENCLOSED, FIRST_LOOK = 3, 8, 1e-2
+ENCLOSED, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK = 3, 8, 1e-2, 2
+# Enclosures somewhat wider than the tolerance are sought once more, to this share of it; a gap whose error misses the
+# tolerance is handed over as it is where that is below the largest miss, a share of the gap.
+CLOSER, LARGEST_MISS = 0.25, 1e-3
 
 
 @dataclass(frozen=True)
@@ -217,8 +220,8 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     if edge.low >= 1.0 - tolerance:
         # nothing fits between the edge and 1 that the tolerance could tell
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    if isinstance(law, DensityLaw) or (edge.high <= NEGLIGIBLE and integrates_panels(law)):
-        enclosed = _by_enclosure(law, tolerance)
+    if isinstance(law, DensityLaw) or integrates_panels(law):
+        enclosed = _by_enclosure(law, tolerance, edge)
         if enclosed is not None:
             return enclosed
     steps = refined(law, tolerance, matrices, edge)
@@ -251,31 +254,39 @@ def _at_edge(law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Sp
     )  # fmt: skip
 
 
-def _by_enclosure(law: Law, tolerance: float) -> SpectralGap | None:
+def _by_enclosure(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
     """The gap from an indexed enclosure, where the separation of the spectrum is known."""
-    for number in (ENCLOSED, 2 * ENCLOSED) if isinstance(law, DensityLaw) else _number_to_enclose(law):
-        found = enclosures(law, number, tolerance=tolerance)
-        listed = [item for item in found if item.label == "indexed" and item.index]
-        if not listed:
-            continue
-        top = max(listed, key=lambda item: item.value)
-        # nothing that is not listed is larger
-        if top.low <= max(found.separation.radius, 0.0) and top.low < 0.0:
-            continue
-        if top.low <= found.separation.radius or 0.5 * top.width > tolerance:
-            continue
-        kind: ErrorKind = top.kind
-        gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
-        return SpectralGap(gap, error, kind, f"indexed enclosure; {found.method}", "isolated", (str(top),), law.frame)
-    return None
+    if isinstance(law, DensityLaw):
+        found = (_enclosed_gap(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
+        return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
+    number = _number_to_enclose(law, edge)
+    gap = None if number is None else _enclosed_gap(law, number, tolerance)
+    if number is not None and gap is not None and tolerance < gap.error <= tolerance / CLOSER:
+        gap = _enclosed_gap(law, number, CLOSER * tolerance) or gap
+    # other bases than adapted panels would hardly do better
+    return gap if gap is not None and gap.error <= max(tolerance, LARGEST_MISS * gap.value) else None
 
 
-def _number_to_enclose(law: Law) -> tuple[int, ...]:
-    """How many of the largest moduli reach down to the largest value off the constants, at a first look."""
-    look = adapted_trials(law, MOST_ENCLOSED, FIRST_LOOK)
-    order = np.argsort(-np.abs(look.values), kind="stable")
-    positive = np.flatnonzero(look.values[order][1:] > 0.0)
-    return (int(positive[0]) + 2,) if positive.size else ()
+def _enclosed_gap(law: Law, number: int, tolerance: float) -> SpectralGap | None:
+    found = enclosures(law, number, tolerance=tolerance)
+    listed = [item for item in found if item.label == "indexed" and item.index]
+    top = max(listed, key=lambda item: item.value, default=None)
+    # nothing that is not listed is larger
+    if top is None or top.low <= max(found.separation.radius, 0.0):
+        return None
+    gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
+    return SpectralGap(gap, error, top.kind, f"indexed enclosure; {found.method}", "isolated", (str(top),), law.frame)
+
+
+def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
+    """How many of the largest moduli reach down to the largest value off the constants, at a first look.
+
+    None where that value is not beyond the essential spectrum.
+    """
+    look = adapted_trials(law, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK)
+    values = look.values[np.argsort(-np.abs(look.values), kind="stable")]
+    found = np.flatnonzero(values[1:] > edge.high)
+    return int(found[0]) + 2 if found.size else None
 
 
 def _lower_bound(law: Law) -> tuple[str, ...]:

@@ -81,13 +81,15 @@ def residuals(
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
-    kept, total, error = np.zeros((2, 0)), np.zeros((0, 2, len(values))), np.zeros((0, 2, len(values)))
+    kept = np.zeros((2, 0))
+    # integrals, the differences of the two rules, and what the errors of the rows do
+    total, error, doubt = (np.zeros((0, 2, len(values))) for _ in range(3))
     rows = 0
     while low.size:
-        fresh, doubt = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
+        fresh = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
         rows += low.size * len(NODES)
         kept = np.concatenate([kept, [low, high]], axis=1)
-        total, error = np.concatenate([total, fresh]), np.concatenate([error, doubt])
+        total, error, doubt = (np.concatenate(both) for both in zip((total, error, doubt), fresh, strict=True))
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
         wanted = np.stack(
@@ -105,9 +107,9 @@ def residuals(
         middle = kept[:, worst].mean(axis=0)
         low, high = np.append(kept[0, worst], middle), np.append(middle, kept[1, worst])
         rest = np.setdiff1d(np.arange(len(share)), worst)
-        kept, total, error = kept[:, rest], total[rest], error[rest]
+        kept, total, error, doubt = kept[:, rest], total[rest], error[rest], doubt[rest]
     correction, square = total.sum(axis=0)
-    correction_error, square_error = error.sum(axis=0)
+    correction_error, square_error = (error + doubt).sum(axis=0)
     return Residuals(values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), rows)
 
 
@@ -158,8 +160,9 @@ class _TrialFunctions:
 
 def _integrals(
     function: _TrialFunctions, values: Floats, low: Floats, high: Floats, copies: float
-) -> tuple[Floats, Floats]:
-    """Integrals of v (P v - rho v) and of its square over each panel, with the differences of the two rules.
+) -> tuple[Floats, Floats, Floats]:
+    """Integrals of v (P v - rho v) and of its square over each panel, with the differences of the two rules and what
+    the errors of the rows do.
 
     An error e of a row adds e v to the first and 2 e (P v - rho v) + e^2 to the second.
     """
@@ -175,8 +178,8 @@ def _integrals(
     density = copies * half[:, None] * SINE.density(angle)
     return (
         np.einsum("pq,pqjk->pjk", density * KRONROD, parts),
-        np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts))
-        + np.einsum("pq,pqjk->pjk", density * KRONROD, doubts),
+        np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts)),
+        np.einsum("pq,pqjk->pjk", density * KRONROD, doubts),
     )
 
 

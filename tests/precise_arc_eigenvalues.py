@@ -1,0 +1,19 @@
+"""Eigenvalues of focusing arcs by a second method: the complete Galerkin matrix on graded panels, entry by entry.
+
+``python tests/precise_arc_eigenvalues.py`` prints what tests/test_adapted_panels.py holds the enclosures against. The
+entries are integrals over the polygons of each number of hits (kernels/arc_quadrature.py), which share nothing with
+rows, residuals and adapted panels but the law; moduli converge from below.
+"""
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+
+HALF_ANGLES = (0.6, 0.9, 1.2)
+DEGREE, SMALLEST = 4, 1e-3
+
+if __name__ == "__main__":
+    for half_angle in HALF_ANGLES:
+        basis = ker.Panels.for_wall(geo.focusing_arcs(half_angle), DEGREE, SMALLEST)
+        found = spec.spectrum(ker.discretise(ker.CircularArcLaw(half_angle), basis), k=3)
+        print(half_angle, *(f"{value:.12f}" for value in found.values[1:]), flush=True)
