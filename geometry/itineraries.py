@@ -51,13 +51,13 @@ def probe(x, task):
     """Outgoing angle of one ray and the label of its itinerary and of the cell that it goes to.
 
     The first of the limits is that of collisions, the second how many of them count as flights at most: runs cost one
-    flight, whatever their length.
+    flight, whatever their length. So does every cell of an open wall that the ray passes.
     """
     theta, hollow, (joints, lines, circles, ellipses, beziers, pairs, grid), period, limits, edges, _, code = task
-    _, vx, vy, bounces, status = trace_ray(
+    last, vx, vy, bounces, status = trace_ray(
         x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limits[0], None, code, pairs, grid
     )
-    code[1] += np.uint64(1 + min(bounces, limits[1]))
+    code[1] += np.uint64(1 + min(bounces, limits[1]) + np.int64(abs(last - x) / (hollow[1] - hollow[0])))
     if status != ESCAPED:
         return theta, np.uint64(status)
     # a ray along y = 0 within rounding
