@@ -13,6 +13,7 @@ lists for gaps, each named by the sample on its left.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -21,7 +22,9 @@ from .engine import ESCAPED, HASH_FACTOR, trace_ray
 
 # Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers
 # are born as such, np.int64(0): for a bare 0 type inference compiles what it is passed to once more.
-inner = njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+# A dictionary, because numba's annotations do not know the two options.
+_NO_WRAPPERS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = njit(cache=True, nogil=True, error_model="numpy", **_NO_WRAPPERS)
 
 # Samples of one row at most; what is then still undecided counts as error.
 MOST_SAMPLES = 1 << 13
