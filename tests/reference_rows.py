@@ -36,8 +36,9 @@ ROW_EXACTNESS, FAIR_WIDTH = 1e-8, 0.02
 # The moment: Gauss's rule on a panel, the sum of what panels may miss, and the rays after which it is left at that.
 RULE = tuple(0.5 * part + (0.5, 0.0)[k] for k, part in enumerate(np.polynomial.legendre.leggauss(12)))
 GOAL, MOST_RAYS = 1e-10, 8_000_000
-# Flights that the library may spend on finding cuts; where its error is then above the limit, rays are averaged instead.
-CUT_FLIGHTS, CUT_TOLERANCE, ROUGH = 1_200_000, 1e-5, 1e-2
+# Flights that the library may spend on finding cuts. Where its error is then above the limit, rays are averaged instead;
+# likewise where that of a row is.
+CUT_FLIGHTS, CUT_TOLERANCE, ROUGH, ROUGH_ROW = 1_200_000, 1e-5, 1e-2, 1e-3
 # Sides of the grid of strata, and the number of replicates; in a row, of shifted midpoint sums.
 STRATA, REPLICATES, MIDPOINTS = 500, 8, 1 << 16
 # Walks along a row, each with the places at which the one before met a piece that it had not seen.
@@ -366,7 +367,7 @@ def row_of(wall, theta):
     """E[cos Theta' | theta] and its error."""
     table, (left, right) = table_of(wall), opening(wall)
     value, error, _ = row_integral(table, theta, left, right, ROW_SAMPLES, 1e-14)
-    if error > ROUGH:
+    if error > ROUGH_ROW:
         shifts = np.random.default_rng(7).random(REPLICATES)
         sums = [midpoint_sum(table, theta, left, right, shift) for shift in shifts]
         value, error = np.mean(sums), 3.0 * np.std(sums, ddof=1) / math.sqrt(REPLICATES)
