@@ -36,8 +36,8 @@ ROW_EXACTNESS, FAIR_WIDTH = 1e-8, 0.02
 # The moment: Gauss's rule on a panel, the sum of what panels may miss, and the rays after which it is left at that.
 RULE = tuple(0.5 * part + (0.5, 0.0)[k] for k, part in enumerate(np.polynomial.legendre.leggauss(12)))
 GOAL, MOST_RAYS = 1e-10, 8_000_000
-# Flights that the library may spend on finding cuts. Where its error is then above the limit, rays are averaged instead;
-# likewise where that of a row is.
+# Flights that the library may spend on finding cuts. Where its error is then above the limit, or that of a row is above
+# its own, rays are averaged instead.
 CUT_FLIGHTS, CUT_TOLERANCE, ROUGH, ROUGH_ROW = 1_200_000, 1e-5, 1e-2, 1e-3
 # Sides of the grid of strata, and the number of replicates; in a row, of shifted midpoint sums.
 STRATA, REPLICATES, MIDPOINTS = 500, 8, 1 << 16
