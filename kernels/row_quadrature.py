@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..checks import Floats
 from .angle_panels import NODES, AnglePanels
 from .basis import Basis
+from .hollow_rows import NO_LIMIT
 from .legendre import Legendre
 from .products import cell_index
 from .reflection import is_mirror_symmetric, reflection_matrix
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     from ..geometry import Wall
 
 # Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
-# it has: some seconds. One row may take a share of them: rows that need more have pieces without number.
-MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.02
+# it has: some seconds. Who is not patient gives one row this share of them: longer ones have pieces without number.
+MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.05
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
@@ -121,7 +122,7 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        self.rows = WallRows(wall, degree, inside, least, int(LARGEST_ROW * most_flights))
+        self.rows = WallRows(wall, degree, inside, least, NO_LIMIT if patient else int(LARGEST_ROW * most_flights))
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
