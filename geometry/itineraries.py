@@ -13,6 +13,7 @@ lists for gaps, each named by the sample on its left.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -21,7 +22,9 @@ from .engine import ESCAPED, HASH_FACTOR, trace_ray
 
 # Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers
 # are born as such, np.int64(0): for a bare 0 type inference compiles what it is passed to once more.
-inner = njit(cache=True, nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+# A dictionary, because numba's annotations do not know the two options.
+_NO_WRAPPERS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = njit(cache=True, nogil=True, error_model="numpy", **_NO_WRAPPERS)
 
 # Samples of one row at most; what is then still undecided counts as error.
 MOST_SAMPLES = 1 << 13
@@ -51,13 +54,13 @@ def probe(x, task):
     """Outgoing angle of one ray and the label of its itinerary and of the cell that it goes to.
 
     The first of the limits is that of collisions, the second how many of them count as flights at most: runs cost one
-    flight, whatever their length.
+    flight, whatever their length. So does every cell of an open wall that the ray passes.
     """
     theta, hollow, (joints, lines, circles, ellipses, beziers, pairs, grid), period, limits, edges, _, code = task
-    _, vx, vy, bounces, status = trace_ray(
+    last, vx, vy, bounces, status = trace_ray(
         x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limits[0], None, code, pairs, grid
     )
-    code[1] += np.uint64(1 + min(bounces, limits[1]))
+    code[1] += np.uint64(1 + min(bounces, limits[1]) + np.int64(abs(last - x) / (hollow[1] - hollow[0])))
     if status != ESCAPED:
         return theta, np.uint64(status)
     # a ray along y = 0 within rounding

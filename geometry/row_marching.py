@@ -129,7 +129,8 @@ def longer(array, size):
 @_compile
 def wide_middles(lows, highs, least):
     """The middles of the pieces wider than that: of the widest ones, if they are many."""
-    many = True
+    # doubled until they are few
+    least, many = max(least, EPS * EPS), True
     while many:
         count = 0
         for k in range(lows.shape[0]):

@@ -12,6 +12,7 @@ from ..checks import Floats
 from .angle_panels import NODES, AnglePanels
 from .basis import Basis
 from .basis_rows import VALUES_AT_ONCE, means_of_basis
+from .hollow_rows import NO_LIMIT
 from .legendre import Legendre
 from .reflection import is_mirror_symmetric, reflection_matrix
 from .wall_rows import WallRows
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
     from ..geometry import Wall
 
 # Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
-# it has: some seconds. One row may take a share of them: rows that need more have pieces without number.
-MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.02
+# it has: some seconds. Who is not patient gives one row this share of them: longer ones have pieces without number.
+MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.05
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
@@ -64,14 +65,14 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     A row has several changes of itinerary a piece, each found by about 30 rays, and a matrix needs about a thousand
     rows for an error of 1e-6 and as many kinks in theta as pieces: the cost grows like the square of the pieces. A
     change of cell costs as much as one of itinerary, in each row, and the rows of each cell are integrated anew.
-    Where the wall overhangs, rays stay in its cavities for long, and rows have changes without end. Islands do not
-    hold them so.
+    Where the wall overhangs, rays stay in its cavities for long, and rows have changes without end. Where it does not
+    close, rays near grazing pass cells without number: measured on three walls with islands, rows were behind rays.
     """
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
     predicted = ROWS_A_PIECE * FLIGHTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
     overhangs = bool(np.any(np.diff(wall.vertices[:, 0]) < 0.0))
-    return not overhangs and predicted <= MOST_FLIGHTS
+    return bool(wall.closes) and not overhangs and predicted <= MOST_FLIGHTS
 
 
 def row_matrix(
@@ -120,7 +121,7 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        self.rows = WallRows(wall, degree, inside, least, int(LARGEST_ROW * most_flights))
+        self.rows = WallRows(wall, degree, inside, least, NO_LIMIT if patient else int(LARGEST_ROW * most_flights))
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)

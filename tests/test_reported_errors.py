@@ -27,6 +27,6 @@ def test_errors_of_rows_hold_and_are_not_vacuous(tolerance: float) -> None:
 
 @pytest.mark.parametrize("kind", [0, 3, 9, 11])
 def test_errors_of_first_moments_hold(kind: int) -> None:
-    found = [outcome for outcome in outcomes([kind], [1e-3, 1e-5], most_flights=2_000_000) if outcome.what == "moment"]
+    found = [outcome for outcome in outcomes([kind], [1e-3, 1e-5], most_flights=4_000_000) if outcome.what == "moment"]
     assert not any(outcome.exceeds or outcome.is_open for outcome in found)
     assert found[1].reported < 1e-4
