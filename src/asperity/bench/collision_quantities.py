@@ -26,7 +26,7 @@ DISK_SCENES = tuple(name for name in standard_names() if name != "mixed")
 
 
 def _collision_methods(wall: Wall) -> Methods:
-    by_tolerance = WorkMethod("auto", lambda budget: by_operator(wall, tolerance=1.0 / budget))
+    by_tolerance = WorkMethod("auto", lambda n, rng: by_operator(wall, tolerance=1.0 / n, rng=rng), True)
     by_nets = WorkMethod("QMC operator", lambda n, rng: by_operator(wall, method="qmc", samples=n, rng=rng), True)
     by_sampling = WorkMethod("sampled velocities", lambda n, rng: by_velocities(wall, n, rng), True, RANDOM_ORDER)
     by_means = WorkMethod("means over outgoing angles", lambda n: by_action(wall, n))
