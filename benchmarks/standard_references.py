@@ -144,7 +144,10 @@ def matrices_of(scene: str) -> dict[str, Found]:
     wall = wall_of(scene)
     if scene == "focusing-arc":
         row = ROWS[scene]
-        return {"law": law_of_rows(row, ARC_TOLERANCE), **plane_of_rows(row, ARC_TOLERANCE)}
+        found = {"law": law_of_rows(row, ARC_TOLERANCE), **plane_of_rows(row, ARC_TOLERANCE)}
+        for name, one in found.items():
+            _confirmed(ker.discretise(ker.WallLaw(wall), BASES[name]), one.value, one.error, one.source)
+        return found
     random = scene.startswith("random")
     names = ("moment",) if random else tuple(BASES)
     return best_matrices(wall, names, RANDOM_RAYS if random else RAYS)
