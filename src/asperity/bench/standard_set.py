@@ -53,7 +53,7 @@ class Effort:
 
 RANDOM_FACTOR = 4
 QUICK = Effort(True, 4, 0.2, 1.5, 160.0)
-FULL = Effort(False, 4, 1.5, 12.0, 1380.0)
+FULL = Effort(False, 4, 1.5, 12.0, 1200.0)
 # A row with less time than this is not begun.
 LEAST_SECONDS = 0.05
 # What is measured of the random walls.
