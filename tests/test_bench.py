@@ -102,7 +102,7 @@ def test_a_moment_that_is_kept_is_that_of_the_wall(name):
     moment = known_reference(f"{name}/moment")
     seen = ker.discretise(ker.WallLaw(wall_of(name)), ker.Legendre(2), "qmc", samples=2**16)
     assert abs(seen.symmetric[1, 1] - float(moment.value)) <= 4.0 * seen.error.value + moment.error
-    assert moment.error <= 2e-5
+    assert moment.error <= 5e-5
 
 
 def test_rows_of_arcs_by_formula_are_those_of_the_law():
@@ -212,7 +212,7 @@ def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
         start, plan = now[0], TimePlan(100.0, 10)
         for number in range(10):
             share = plan.next_share()
-            assert share >= min(100.0 - (now[0] - start), 1.0)
+            assert 0.0 < share <= 100.0 - (now[0] - start)
             now[0] += share if greedy(number) else 0.0
         assert now[0] - start <= 100.0 + 1e-9
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-# A part may take so many times its equal share of what is left: the others rarely need all of theirs.
-GENEROSITY = 2.0
-
 
 @dataclass
 class TimePlan:
     """Shares ``seconds``, counted from its making, among ``parts``.
 
-    Whatever every part takes, if none takes more than its share the sum is at most ``seconds``: a share is never more
-    than what is left, and what a part leaves the later ones have.
+    If no part takes more than its share the sum is at most ``seconds``: a share is never more than what is left, and
+    what a part leaves the later ones have.
 
     Examples
     --------
@@ -25,7 +22,7 @@ class TimePlan:
 
     seconds: float
     parts: int
-    _begun: float = field(default_factory=time.monotonic, init=False)
+    _begun: float = field(default_factory=lambda: time.monotonic(), init=False)
     _left: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -38,6 +35,7 @@ class TimePlan:
 
     def next_share(self) -> float:
         """Seconds that the next part may take."""
-        share = min(GENEROSITY / max(self._left, 1), 1.0) * self.remaining
-        self._left -= 1
+        # nearly twice an equal share, for the others rarely need all of theirs; the last part has all that is left
+        share = 2.0 / (self._left + 1) * self.remaining
+        self._left = max(self._left - 1, 1)
         return share
