@@ -52,6 +52,8 @@ class Effort:
 
 
 RANDOM_FACTOR = 4
+# The library's choice is what is asked for: it has the time of so many other methods.
+AUTO_WEIGHT = 4.0
 QUICK = Effort(True, 4, 0.2, 1.5, 145.0)
 FULL = Effort(False, 4, 1.5, 12.0, 1200.0)
 # A row with less time than this is not begun.
@@ -120,7 +122,7 @@ def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: Child
     def runner(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
         if method.name not in ends:
             child.start()
-            ends[method.name] = TimePlan(plan.next_share(), 1)
+            ends[method.name] = TimePlan(plan.next_share(AUTO_WEIGHT if method.name == problem.auto else 1.0), 1)
         limit = min(effort.row_seconds, ends[method.name].remaining)
         if limit < LEAST_SECONDS:
             return WorkRow(method.name, budget, "left out", note="the time planned for this method was spent")

@@ -33,9 +33,8 @@ class TimePlan:
         """Seconds that are left, at least 0."""
         return max(self.seconds - (time.monotonic() - self._begun), 0.0)
 
-    def next_share(self) -> float:
-        """Seconds that the next part may take."""
-        # nearly twice an equal share, for the others rarely need all of theirs; the last part has all that is left
-        share = 2.0 / (self._left + 1) * self.remaining
+    def next_share(self, weight: float = 1.0) -> float:
+        """Seconds that the next part may take, if it counts as ``weight`` of the later ones."""
+        share = weight / (weight + self._left - 1) * self.remaining
         self._left = max(self._left - 1, 1)
         return share
