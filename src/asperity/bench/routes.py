@@ -21,8 +21,6 @@ MakeMatrix = Callable[..., KernelMatrix]
 # Sampled rays converge like the root of their number. Strata and scrambled nets in two dimensions gain the root of
 # their own side where the integrand jumps along curves, as indicators of bins and the laws of most walls do: 3/4.
 RANDOM_ORDER, JUMPING_ORDER = 0.5, 0.75
-# Beams that make a reference of a polygon: some seconds for a Koch curve, whose caves never resolve completely.
-REFERENCE_BEAMS = 400_000
 
 
 @dataclass(frozen=True)
@@ -70,7 +68,7 @@ def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelM
     return discretise(law, basis)
 
 
-def beam_matrix(wall: Wall, basis: Basis, budget: float = REFERENCE_BEAMS) -> KernelMatrix:
+def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
     """From at most so many beams a hollow, with a bound for the others."""
     return discretise(PolygonLaw(wall, max_beams=int(budget)), basis, "exact")
 
