@@ -103,8 +103,9 @@ def run_problems(
                 if reference is None:
                     say(f"{name}: left out, no independent reference is known")
                     continue
-                # before the share is cut: the first process on a machine compiles for minutes
-                child.start()
+                if plan.remaining >= LEAST_SECONDS:
+                    # before the share is cut: the first process on a machine compiles for minutes
+                    child.start()
                 report = _run(_problem(name), effort, folder, child, plan.next_share())
                 say(f"{name}: {len(report.rows)} rows")
                 yield report
@@ -121,7 +122,9 @@ def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: Child
 
     def runner(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
         if method.name not in ends:
-            child.start()
+            if plan.remaining >= LEAST_SECONDS:
+                # its start counts to the problem, but not to the method
+                child.start()
             ends[method.name] = TimePlan(plan.next_share(AUTO_WEIGHT if method.name == problem.auto else 1.0), 1)
         limit = min(effort.row_seconds, ends[method.name].remaining)
         if limit < LEAST_SECONDS:
