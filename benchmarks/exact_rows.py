@@ -85,7 +85,9 @@ class ArcRow:
     def of(cls, theta: float, xi: float) -> ArcRow:
         """The row at an incoming angle."""
         low, high = abs(theta - xi), np.pi - abs(np.pi - theta - xi)
-        most = (xi + theta) / (2.0 * max(low, 1e-300)) + 2.0
+        tiny = np.finfo(float).tiny
+        # hits at the least and at the greatest delta
+        most = 2.0 + 0.5 * max((xi + theta) / max(low, tiny), (xi - theta + high) / max(np.pi - high, tiny))
         many = np.arange(int(min(most, MOST_HITS)))
         cuts = np.concatenate([(2.0 * many * np.pi - xi + theta) / (1 + 2 * many), (xi + theta) / (1 + 2 * many)])
         cuts = np.concatenate([[low, high, 0.5 * np.pi], cuts])  # the two formulas meet at a right angle

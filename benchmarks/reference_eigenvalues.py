@@ -11,7 +11,7 @@ from asperity.checks import Floats
 
 from .reference_rays import NETS, Found, sampled_sums
 
-RAYS = 2**25
+RAYS = 2**24
 # Of the focusing arcs, by piecewise polynomials in another program; how far it knows it.
 ARC_LAMBDA2, ARC_ERROR = 0.3670253152, 3e-10
 # Sizes in which Legendre matrices are extrapolated.

@@ -51,9 +51,9 @@ class BenchRun:
         choices = [(report.problem, choice) for report in done if (choice := report.choice()) is not None]
         good = sum(choice <= GOOD_CHOICE for _, choice in choices)
         lines = [
-            f"Of {len(choosing)} problems in which the library chooses, its choice is within a factor "
-            f"{GOOD_CHOICE:g} of the best on {good} of the {len(choices)} where another method gets as far; on {len(done) - len(choices)} "
-            f"none does; on {len(choosing) - len(done)} it was not done in time."
+            f"The library chooses in {len(choosing)} problems. It is within a factor {GOOD_CHOICE:g} of the best on "
+            f"{good} of the {len(choices)} where another method gets as far; on {len(done) - len(choices)} none does; "
+            f"on {len(choosing) - len(done)} it was not done in time."
         ]
         slow = [f"- {problem}: {choice:.2g} times the best" for problem, choice in choices if choice > GOOD_CHOICE]
         return [*lines, "", *slow] if slow else lines

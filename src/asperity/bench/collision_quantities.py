@@ -26,7 +26,7 @@ DISK_SCENES = tuple(name for name in standard_names() if name != "mixed")
 
 
 def _collision_methods(wall: Wall) -> Methods:
-    by_tolerance = WorkMethod("auto", lambda budget: by_operator(wall, tolerance=1.0 / budget))
+    by_tolerance = WorkMethod("auto", lambda n, rng: by_operator(wall, tolerance=1.0 / n, rng=rng), True)
     by_nets = WorkMethod("QMC operator", lambda n, rng: by_operator(wall, method="qmc", samples=n, rng=rng), True)
     by_sampling = WorkMethod("sampled velocities", lambda n, rng: by_velocities(wall, n, rng), True, RANDOM_ORDER)
     by_means = WorkMethod("means over outgoing angles", lambda n: by_action(wall, n))
@@ -80,12 +80,12 @@ def _disk_methods(wall: Wall) -> Methods:
     return [(method, scales, (*scales, 1e4, 1e5))]
 
 
-def by_true_disks(wall: Wall, scale: float, rng: np.random.Generator) -> float:
-    """<v1, K v1>/<v1, v1> of the disk with satellites above a wall of this scale."""
-    incoming = -sampled_velocities(TRUE_DISKS, rng)
-    position = np.column_stack([scale * wall.period * rng.random(TRUE_DISKS), 2.0 * np.pi * rng.random(TRUE_DISKS)])
+def by_true_disks(wall: Wall, scale: float, rng: np.random.Generator, number: int = TRUE_DISKS) -> float:
+    """<v1, K v1>/<v1, v1> of the disk with satellites above a wall whose period is this scale."""
+    incoming = -sampled_velocities(number, rng)
+    position = np.column_stack([scale * rng.random(number), 2.0 * np.pi * rng.random(number)])
     # the incoming velocities follow sin(theta), as the flux through x2 = 0 does
-    hit = geo.collide(DISK, wall, scale, position, incoming)
+    hit = geo.collide(DISK, wall, scale / wall.period, position, incoming)
     found = float(np.mean((-incoming[:, 0] * hit.velocity[:, 0])[hit.escaped]))
     return found / square_of_v1()
 

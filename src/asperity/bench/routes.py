@@ -11,6 +11,7 @@ import numpy as np
 from ..kernels import KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
 from ..kernels.matrix_algebra import frobenius_error
 from ..kernels.row_quadrature import row_matrix
+from .quantity import QUICK_RAYS, RAYS
 
 if TYPE_CHECKING:
     from ..geometry import Wall
@@ -20,8 +21,6 @@ MakeMatrix = Callable[..., KernelMatrix]
 # Sampled rays converge like the root of their number. Strata and scrambled nets in two dimensions gain the root of
 # their own side where the integrand jumps along curves, as indicators of bins and the laws of most walls do: 3/4.
 RANDOM_ORDER, JUMPING_ORDER = 0.5, 0.75
-# Beams that make a reference of a polygon: some seconds for a Koch curve, whose caves never resolve completely.
-REFERENCE_BEAMS = 400_000
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelM
     return discretise(law, basis)
 
 
-def beam_matrix(wall: Wall, basis: Basis, budget: float = REFERENCE_BEAMS) -> KernelMatrix:
+def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
     """From at most so many beams a hollow, with a bound for the others."""
     return discretise(PolygonLaw(wall, max_beams=int(budget)), basis, "exact")
 
@@ -102,16 +101,15 @@ def monte_carlo_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.G
     return estimate(theta, WallLaw(wall).respond(rng.random(int(budget)), theta), basis)
 
 
-def auto_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
-    """As the library chooses, to the tolerance 1/budget."""
-    return discretise(WallLaw(wall), basis, tolerance=1.0 / budget)
+def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
+    """As the library chooses, to the tolerance 1/budget; it may sample, so every repeat has its own generator."""
+    return discretise(WallLaw(wall), basis, tolerance=1.0 / budget, rng=rng)
 
 
-_QUICK_RAYS, _RAYS = tuple(4.0**k for k in (6, 7, 8)), tuple(4.0**k for k in (6, 7, 8, 9, 10, 11))
-AUTO = Route("auto", auto_matrix, "1/tolerance", (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8))
+AUTO = Route("auto", auto_matrix, "1/tolerance", (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
 CLOSED_FORM = Route("closed form", closed_form_matrix, "-", (1.0,), (1.0,))
 BEAMS = Route("beams", beam_matrix, "beams a hollow", (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
 ROWS = Route("adaptive rows", adaptive_row_matrix, "1/tolerance", (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
-QMC = Route("randomised QMC", qmc_matrix, "rays", _QUICK_RAYS, _RAYS, True, JUMPING_ORDER)
-STRATIFIED = Route("stratified", stratified_matrix, "rays", _QUICK_RAYS, _RAYS, True, JUMPING_ORDER)
-MONTE_CARLO = Route("Monte Carlo", monte_carlo_matrix, "rays", _QUICK_RAYS, _RAYS, True, RANDOM_ORDER)
+QMC = Route("randomised QMC", qmc_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+STRATIFIED = Route("stratified", stratified_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+MONTE_CARLO = Route("Monte Carlo", monte_carlo_matrix, "rays", QUICK_RAYS, RAYS, True, RANDOM_ORDER)

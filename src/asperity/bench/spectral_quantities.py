@@ -25,8 +25,8 @@ def _second(matrix_or_law: Any, **how: Any) -> Estimate:
     return Estimate(1.0 - found.gap, found.gap_error, "estimate", f"{found.basis!r}, {found.method}")
 
 
-def _auto_second(wall: Wall, budget: float) -> Estimate:
-    gap = spectral_gap(WallLaw(wall), tolerance=1.0 / budget)
+def _auto_second(wall: Wall, budget: float, rng: np.random.Generator) -> Estimate:
+    gap = spectral_gap(WallLaw(wall), tolerance=1.0 / budget, rng=rng)
     return Estimate(1.0 - gap.value, gap.error, gap.kind, f"{gap.verdict}: {gap.method}")
 
 
@@ -36,7 +36,7 @@ def _eigenvalue_methods(wall: Wall) -> Methods:
 
     sizes = (4.0, 8.0, 16.0)
     return [
-        (WorkMethod("auto", lambda budget: _auto_second(wall, budget)), (1e2,), (1e2, 1e4, 1e6)),
+        (WorkMethod("auto", lambda n, rng: _auto_second(wall, n, rng), True), (1e2,), (1e2, 1e4, 1e6)),
         (WorkMethod("Legendre", lambda n: _second(WallLaw(wall), basis=Legendre(n))), sizes, (*sizes, 32.0, 64.0)),
         (WorkMethod("bins", lambda n: _second(WallLaw(wall), basis=Bins(n))), sizes, (*sizes, 32.0, 64.0, 128.0)),
         (WorkMethod("panels", panels), (1.0, 2.0), (1.0, 2.0, 3.0, 4.0)),

@@ -5,16 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-# A part may take so many times its equal share of what is left: the others rarely need all of theirs.
-GENEROSITY = 2.0
-
 
 @dataclass
 class TimePlan:
     """Shares ``seconds``, counted from its making, among ``parts``.
 
-    Whatever every part takes, if none takes more than its share the sum is at most ``seconds``: a share is never more
-    than what is left, and what a part leaves the later ones have.
+    If no part takes more than its share the sum is at most ``seconds``: a share is never more than what is left, and
+    what a part leaves the later ones have.
 
     Examples
     --------
@@ -25,7 +22,7 @@ class TimePlan:
 
     seconds: float
     parts: int
-    _begun: float = field(default_factory=time.monotonic, init=False)
+    _begun: float = field(default_factory=lambda: time.monotonic(), init=False)
     _left: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -36,8 +33,8 @@ class TimePlan:
         """Seconds that are left, at least 0."""
         return max(self.seconds - (time.monotonic() - self._begun), 0.0)
 
-    def next_share(self) -> float:
-        """Seconds that the next part may take."""
-        share = min(GENEROSITY / max(self._left, 1), 1.0) * self.remaining
-        self._left -= 1
+    def next_share(self, weight: float = 1.0) -> float:
+        """Seconds that the next part may take, if it counts as ``weight`` of the later ones."""
+        share = weight / (weight + self._left - 1) * self.remaining
+        self._left = max(self._left - 1, 1)
         return share
