@@ -8,12 +8,16 @@ from concurrent.futures import ThreadPoolExecutor
 
 from ..checks import whole_number
 
-# Rays in one block: large enough to hide the cost of handing a block to a thread, small enough to share evenly.
-BLOCK = 8192
+# Rays in one block: handing a block to a thread costs some 30 us, as much as a thousand of the cheapest rays, and one
+# thread at a time does so. So blocks are large, but small enough to share them evenly, some to every thread.
+LEAST_BLOCK, MOST_BLOCK = 2**13, 2**15
+BLOCKS_PER_THREAD = 4
 
 
-def in_blocks(run: Callable[[slice], None], count: int, threads: int | None, block: int = BLOCK) -> None:
+def in_blocks(run: Callable[[slice], None], count: int, threads: int | None, block: int | None = None) -> None:
     """Call ``run`` with slices that cover ``range(count)``, on ``threads`` threads, by default one a processor.
+
+    What ``run`` does with an index must not depend on the slice that contains it.
 
     Examples
     --------
@@ -22,6 +26,8 @@ def in_blocks(run: Callable[[slice], None], count: int, threads: int | None, blo
     slice(3, 5, None)
     """
     workers = os.cpu_count() or 1 if threads is None else whole_number("threads", threads, 1)
+    if block is None:
+        block = min(MOST_BLOCK, max(LEAST_BLOCK, -(-count // (BLOCKS_PER_THREAD * workers))))
     blocks = [slice(first, min(first + block, count)) for first in range(0, count, block)]
     if workers == 1 or len(blocks) <= 1:
         for part in blocks:

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from .angle_engine import PI, PI_REST, arcsine, sine_cosine
-from .closed_forms import BOWL, CHAIN_COLUMNS, FAN, FAN_COLUMN, NONE
+from .closed_forms import CHAIN_COLUMNS, FAN, FAN_COLUMN, NONE
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
 
 # Status of a ray that is left to the loop.
@@ -121,47 +121,50 @@ def cross_fan(form, place, angle, hits, vx, vy, turn):
 
 
 @_compile
-def cross(form, rays, x, theta, cell, limit, out, room):
-    """Take the rays with the given numbers, all in one hollow, through it."""
-    count = rays.shape[0]
-    place, angle, hits = room[0, :count], room[1, :count], room[2, :count]
-    for j in range(count):
-        place[j] = x[rays[j]] - np.floor(x[rays[j]] / cell) * cell
-        angle[j] = theta[rays[j]]
+def cross(form, place, angle, hits, room):
+    """Take rays of one hollow through it."""
+    count = place.shape[0]
     if form[0] == FAN:
-        cross_fan(form, place, angle, hits, room[3, :count], room[4, :count], room[5, :count])
-    elif form[0] == BOWL:
-        cross_bowl(form, place, angle, hits, room[3, :count], room[4, :count])
-    out_x, out_theta, bounces, status = out
-    for j in range(count):
-        i = rays[j]
-        out_x[i] = np.floor(x[i] / cell) * cell + place[j]
-        out_theta[i] = angle[j]
-        bounces[i] = int(hits[j])
-        status[i] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
+        cross_fan(form, place, angle, hits, room[0, :count], room[1, :count], room[2, :count])
+    else:
+        cross_bowl(form, place, angle, hits, room[0, :count], room[1, :count])
+
+
+@_compile
+def cell_of(x, cell):
+    """Left end of the cell in which a place lies."""
+    return np.floor(x / cell) * cell
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def trace_closed(x, theta, hollows, closed, cell, limit, out_x, out_theta, bounces, status):
     """Trace a block of rays through flat tops and closed forms; all others get the status `UNDECIDED`."""
-    out = (out_x, out_theta, bounces, status)
     room = np.empty((6, RAYS))
-    rays, others = np.empty(RAYS, np.int64), np.empty(RAYS, np.int64)
+    rays, others, met = np.empty(RAYS, np.int64), np.empty(RAYS, np.int64), np.empty(RAYS, np.int64)
     # the rays of a hollow in a block are a list: the first one, and for each the next one, numbers from 0 in the block
     heads = np.full(hollows.shape[0], -1)
-    met = np.empty(RAYS, np.int64)
     whole = hollows.shape[0] == 1 and hollows[0, 0] == 0.0 and hollows[0, 1] == cell
     for first in range(0, x.shape[0], RAYS):
         count = min(RAYS, x.shape[0] - first)
+        starts = x[first : first + count]
         if whole:
+            # the only hollow: its rays need not be gathered, and are taken through it where their results are to stand
+            place, angle, hits = out_x[first : first + count], out_theta[first : first + count], room[3, :count]
             for j in range(count):
-                rays[j] = first + j
-            cross(closed[0], rays[:count], x, theta, cell, limit, out, room)
+                place[j] = starts[j] - cell_of(starts[j], cell)
+            for j in range(count):
+                angle[j] = theta[first + j]
+            cross(closed[0], place, angle, hits, room)
+            for j in range(count):
+                place[j] += cell_of(starts[j], cell)
+            for j in range(count):
+                bounces[first + j] = int(hits[j])
+                status[first + j] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
             continue
         kinds = 0
         for j in range(count):
             i = first + j
-            h = opening_at(x[i] - math.floor(x[i] / cell) * cell, hollows)
+            h = opening_at(x[i] - cell_of(x[i], cell), hollows)
             if h == FLAT_TOP:
                 out_x[i], out_theta[i], bounces[i], status[i] = x[i], PI - theta[i], 1, ESCAPED
             elif h == TOP_CORNER or closed[h, 0] == NONE:
@@ -180,4 +183,12 @@ def trace_closed(x, theta, hollows, closed, cell, limit, out_x, out_theta, bounc
                 rays[count] = first + j
                 count += 1
                 j = others[j]
-            cross(closed[h], rays[:count], x, theta, cell, limit, out, room)
+            place, angle, hits = room[4, :count], room[5, :count], room[3, :count]
+            for j in range(count):
+                place[j] = x[rays[j]] - cell_of(x[rays[j]], cell)
+                angle[j] = theta[rays[j]]
+            cross(closed[h], place, angle, hits, room)
+            for j in range(count):
+                i = rays[j]
+                out_x[i], out_theta[i], bounces[i] = place[j] + cell_of(x[i], cell), angle[j], int(hits[j])
+                status[i] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED

@@ -18,6 +18,7 @@ import math
 import numpy as np
 from numba import njit
 
+from .angle_engine import direction_angle, sine_cosine
 from .arc_engine import arc_incidence, arc_reflect, arc_time, on_arc
 from .bezier_engine import bend_number, bezier_hit, bezier_value
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
@@ -144,7 +145,8 @@ def trace_ray(
     ellipse_low, ellipse_high = int(hollow[7]), int(hollow[8])
     bezier_low, bezier_high = int(hollow[9]), int(hollow[10])
     slack = JOINT_ULPS * EPS * size
-    px, py, vx, vy = x, 0.0, -math.cos(theta), -math.sin(theta)
+    sine, cosine = sine_cosine(theta)
+    px, py, vx, vy = x, 0.0, -cosine, -sine
     shift = 0.0
     bounces, steps = 0, 0
     own_kind, own_index, own_s = LID, -1, -1.0
@@ -356,4 +358,4 @@ def trace_rays(
             grid,
         )
         out_x[i] = base + place
-        out_theta[i] = math.atan2(vy, vx)
+        out_theta[i] = direction_angle(vx, vy)

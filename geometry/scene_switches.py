@@ -39,8 +39,3 @@ def without_grid(scene: Scene) -> Scene:
 def without_formulas(scene: Scene) -> Scene:
     """Without closed forms of whole hollows: every flight is followed."""
     return replace(scene, closed=None)
-
-
-def has_formulas(scene: Scene) -> bool:
-    """Whether rays through some hollow are followed by a formula from the opening to the exit."""
-    return scene.closed is not None

@@ -11,7 +11,7 @@ import numpy as np
 from ..checks import Floats
 from ..geometry import Trace, trace
 from ..geometry.scene import Scene, scene_in_one
-from ..geometry.scene_switches import has_formulas, without_formulas, without_grid, without_pairs, without_runs
+from ..geometry.scene_switches import without_formulas, without_grid, without_pairs, without_runs
 from ..kernels import KernelMatrix, Legendre, PolygonLaw, WallLaw, discretise
 from ..kernels.row_quadrature import row_matrix
 from .scenes import standard_names, wall_of
@@ -105,8 +105,8 @@ def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Savi
     def traced(what: str, with_it: Scene, without: Scene) -> None:
         found.append(_traced(name, what, wall, (with_it, without), rays, repeats))
 
-    if has_formulas(scene):
-        traced("flights in hollows with a formula", scene, followed)
+    if plan.closed_forms:
+        traced(f"flights in {plan.closed_forms} hollows of two lines or one arc", scene, followed)
     if plan.channels or plan.wedges:
         traced(f"runs between {plan.channels} channels and {plan.wedges} wedges", followed, without_pairs(followed))
     if plan.arcs_with_runs:
@@ -263,6 +263,8 @@ def plan_words(wall: Wall) -> str:
         words[0] += f", {plan.distinct_hollows} of them different"
     if plan.pieces_left_out:
         words.append(f"{plan.pieces_left_out} flat tops of {plan.flat_share:.0%} of the period left out")
+    if plan.closed_forms:
+        words.append(f"{plan.closed_forms} of two lines or one arc, in closed form")
     runs = {"arcs": plan.arcs_with_runs, "channels": plan.channels, "wedges": plan.wedges}
     if any(runs.values()):
         words.append("runs of hits on " + ", ".join(f"{number} {what}" for what, number in runs.items() if number))
