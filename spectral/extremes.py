@@ -145,10 +145,13 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
     places = wanted(values, k, which)
     chosen = values[places]
     top = counted_from_above(chosen, which)
-    last = float(np.abs(chosen).min())
-    ends = {1.0: float(chosen[top - 1]) if which == "largest" or chosen[0] < 0.0 else last}
-    if which == "moduli":
-        ends[-1.0] = last
+    if which == "largest":
+        last = float(chosen[-1])
+        ends = {1.0: last}
+    else:
+        # the largest value is wanted in any case, also where it is not among the k largest moduli
+        last = float(np.sort(np.abs(chosen))[-min(k, len(chosen))])
+        ends = {1.0: min(last, float(chosen[0])), -1.0: last}
     others, reach = norm_beyond(matrix, values), {}
     for sign, end in ends.items():
         threshold = end + joint + CLEARANCE * rounding
@@ -158,7 +161,7 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
         reach[sign] = threshold + margin
     upper = np.maximum(reach[1.0] - chosen[:top], 0.0)
     lower = np.maximum(reach.get(-1.0, 0.0) + chosen[top:], 0.0)
-    how = "Frobenius norms" if others <= last else "Cholesky factorisations"
+    how = "Frobenius norms" if others <= min(ends.values()) else "Cholesky factorisations"
     sides = f"above {reach[1.0]:.12g}" + (f" or below {-reach[-1.0]:.12g}" if -1.0 in reach else "")
     return Extremes(
         chosen, vectors[:, places], top, residuals[places], 2.0 * joint + np.concatenate([upper, lower]),
