@@ -22,7 +22,7 @@ from asperity.kernels.wall_rows import adaptive_rows
 
 TESTS = Path(__file__).parents[1] / "tests"
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-FLIGHTS = 3_000_000
+FLIGHTS = 8_000_000
 
 
 @dataclass(frozen=True)
