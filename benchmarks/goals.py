@@ -59,7 +59,7 @@ def all_goals(
     ]  # fmt: skip
     wanted = {
         "triangular teeth, first moment": (1e-14, 0.01),
-        "triangular teeth, Bins(512)": (1e-13, 0.1),
+        "triangular teeth, Bins(512) as an operator": (1e-13, 0.1),
         "triangular teeth, Legendre(64)": (1e-13, 0.1),
         "polygon of 16 vertices, whole law": (1e-12, 0.5),
         "focusing arc, first moment": (1e-10, 1.0),

@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from tests import precise_triangular
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -38,7 +39,7 @@ def measure_laws(repeats: int = REPEATS) -> list[LawTime]:
     teeth, arc = geo.triangular_teeth(0.7), geo.focusing_arcs(1.2)
     rows = [
         _moment("triangular teeth, first moment", teeth, TRIANGULAR_MOMENT, repeats),
-        _against("triangular teeth, Bins(512)", ker.TriangularTeethLaw(0.7), ker.Bins(512), teeth, repeats),
+        _precise(repeats),
         _against("triangular teeth, Legendre(64)", ker.TriangularTeethLaw(0.7), ker.Legendre(64), teeth, repeats),
         _polygon(repeats),
     ]
@@ -60,6 +61,16 @@ def _rows(wall: geo.Wall, tolerance: float, repeats: int) -> LawTime:
     error = abs(float(matrix[1, 1]) - ARC_MOMENT)
     what = f"focusing arc by adaptive rows, first moment to {tolerance:g}"
     return LawTime(what, error, reported, seconds, _monte_carlo(wall) / seconds**0.5)
+
+
+def _precise(repeats: int) -> LawTime:
+    """The closed form's matrix as an operator, against 40 digits; what it reports is a bound of the Frobenius norm."""
+    bins = ker.Bins(precise_triangular.BINS)
+    law = ker.TriangularTeethLaw(precise_triangular.ANGLE)
+    matrix, seconds = least_time(lambda: ker.discretise(law, bins), repeats)
+    error = float(np.linalg.norm(matrix.symmetric - precise_triangular.reference(), 2))
+    what = f"triangular teeth, Bins({bins.size}) as an operator"
+    return LawTime(what, error, matrix.error.value, seconds, float("nan"))
 
 
 def _against(what: str, law: ker.Law, basis: ker.Basis, wall: geo.Wall, repeats: int) -> LawTime:

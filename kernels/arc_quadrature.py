@@ -12,7 +12,7 @@ from .basis import Basis
 from .measure import gauss_on_intervals
 from .panels import Panels
 from .products import add_blocks, cell_index
-from .ragged import ragged
+from .ragged_lists import ragged
 from .reflection import is_mirror_symmetric, reflection_matrix
 from .stable_angles import flipped, kept_inside
 

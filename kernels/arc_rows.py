@@ -9,7 +9,7 @@ import numpy as np
 from ..checks import Floats
 from .measure import SINE, gauss_on_intervals
 from .panels import Panels
-from .ragged import ragged
+from .ragged_lists import ragged
 
 if TYPE_CHECKING:
     from .circular import CircularArcLaw

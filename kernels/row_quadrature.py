@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from ..checks import Floats
 from .angle_panels import NODES, AnglePanels
 from .basis import Basis
-from .basis_rows import VALUES_AT_ONCE, means_of_basis
 from .hollow_rows import NO_LIMIT
 from .legendre import Legendre
+from .panel_rows import VALUES_AT_ONCE, means_of_basis
 from .reflection import is_mirror_symmetric, reflection_matrix
 from .wall_rows import WallRows
 

@@ -12,8 +12,8 @@ from ..checks import Floats
 from ..errors import InputError
 from ..kernels import Law, Legendre, Panels
 from ..kernels.angle_panels import KRONROD, NODES
-from ..kernels.basis_rows import BasisRows, basis_rows, traces_rows
 from ..kernels.measure import SINE
+from ..kernels.panel_rows import BasisRows, basis_rows, traces_rows
 from ..kernels.products import one_blas_thread
 from .parity import Parity
 

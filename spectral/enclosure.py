@@ -13,8 +13,8 @@ from ..checks import Floats, whole_number
 from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind
 from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
-from ..kernels.basis_rows import integrates_panels, traces_rows
 from ..kernels.measure import SINE
+from ..kernels.panel_rows import integrates_panels, traces_rows
 from .adapted_panels import adapted_trials
 from .deflation import off_constants
 from .eigenvalues import check_reversible

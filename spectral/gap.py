@@ -12,7 +12,7 @@ from ..errors import AccuracyError, InputError
 from ..estimates import Estimate
 from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
 from ..kernels.algebra import made_of_isometries
-from ..kernels.basis_rows import integrates_panels
+from ..kernels.panel_rows import integrates_panels
 from .adapted_panels import adapted_trials
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures

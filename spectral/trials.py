@@ -9,11 +9,11 @@ import numpy as np
 from ..checks import Floats
 from ..kernels import Basis, DensityLaw, Law, Legendre, Panels
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
-from ..kernels.basis_rows import function_rows
 from ..kernels.density import GAUSS_NODES
 from ..kernels.kernel_quadrature import GRAZING_EDGES
 from ..kernels.law import AngleFunction
 from ..kernels.measure import SINE, gauss_on_intervals
+from ..kernels.panel_rows import function_rows
 
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
 SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9

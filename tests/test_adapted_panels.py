@@ -10,8 +10,8 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.kernels.angle_panels import NODES
 from asperity.kernels.arc_quadrature import arc_matrix
-from asperity.kernels.basis_rows import basis_rows, function_rows, integrates_panels
 from asperity.kernels.measure import gauss_rule
+from asperity.kernels.panel_rows import basis_rows, function_rows, integrates_panels
 from asperity.spectral.adapted_panels import adapted_trials
 
 ANGLES = np.concatenate([0.05 + 0.3 * np.arange(10.0), [1e-6, 1.2, np.pi - 1e-6]])
@@ -55,7 +55,7 @@ def test_rows_integrated_over_theta_give_the_matrix_of_polygons(panels):
 
 def test_rows_of_traced_walls_are_those_of_the_closed_form(panels):
     wall = geo.focusing_arcs(0.9)
-    from asperity.kernels.basis_rows import means_of_basis
+    from asperity.kernels.panel_rows import means_of_basis
     from asperity.kernels.wall_rows import WallRows
 
     rows = WallRows(wall, 1, panels.edges[1:-1], 2)(ANGLES[:5], 1e-8)
