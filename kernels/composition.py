@@ -52,7 +52,7 @@ class Composition(Law):
         if not flat:
             raise InputError("laws: expected at least one, got none")
         set_facts(self, laws=tuple(flat), frame=common_frame(flat, "compose"))
-        palindrome = all(law is back for law, back in zip(flat, reversed(flat), strict=True))
+        palindrome = all(law is back or law == back for law, back in zip(flat, reversed(flat), strict=True))
         set_facts(self, reversible=True if palindrome and all(law.reversible for law in flat) else None)
         set_facts(self, mirror_symmetric=True if all(law.mirror_symmetric for law in flat) else None)
         set_facts(self, fan_out=math.prod(law.fan_out for law in flat))

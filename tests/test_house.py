@@ -126,7 +126,13 @@ def distributions(tmp_path_factory):
 def source_files() -> set[str]:
     package = ROOT / "src" / "asperity"
     folders = [package, *(package / room for room in ("geometry", "kernels", "spectral"))]
-    found = {path.relative_to(package.parent).as_posix() for folder in folders for path in folder.rglob("*.py")}
+    kinds = ("*.py", "*.pyi", "*.json")
+    found = {
+        path.relative_to(package.parent).as_posix()
+        for folder in folders
+        for kind in kinds
+        for path in folder.rglob(kind)
+    }
     return found | {"asperity/py.typed"}
 
 
