@@ -1,7 +1,7 @@
 """Reflection laws and collision laws as Markov kernels: bases, laws and their algebra, matrices, estimation.
 
-Names are imported when they are first used, so that ``import asperity`` stays quick; the stub beside this file says where
-each one is at home.
+Names are imported when they are first used, so that ``import asperity`` stays quick; the stub beside this file says
+where each one is at home.
 """
 
 import lazy_loader

@@ -1,7 +1,7 @@
 """Spectra and gaps of reflection laws, and what follows from them, with errors that can be quoted.
 
-Names are imported when they are first used, so that ``import asperity`` stays quick; the stub beside this file says where
-each one is at home.
+Names are imported when they are first used, so that ``import asperity`` stays quick; the stub beside this file says
+where each one is at home.
 """
 
 import lazy_loader

@@ -160,9 +160,9 @@ def test_the_specular_frame_of_a_sum_is_the_sum_of_the_frames() -> None:
 
 
 def test_a_composition_that_reads_the_same_backwards_is_reversible() -> None:
-    ends, middle = [ker.TriangularTeethLaw(0.7) for _ in range(2)], ker.CircularArcLaw(1.2)
-    assert ker.Composition((ends[0], middle, ends[1])).reversible
-    assert ker.Composition((ends[0], middle, ker.TriangularTeethLaw(0.8))).reversible is None
+    ends, middle = [TriangularTeethLaw(0.7) for _ in range(2)], CircularArcLaw(1.2)
+    assert Composition((ends[0], middle, ends[1])).reversible
+    assert Composition((ends[0], middle, TriangularTeethLaw(0.8))).reversible is None
 
 
 def test_reversibility_in_the_specular_frame_needs_the_mirror_symmetry() -> None:
