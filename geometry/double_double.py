@@ -14,6 +14,8 @@ from numba import njit
 
 # Relative error of one operation on double-doubles: 15 u^2 is below 2^-102.
 EPS_DOUBLE_DOUBLE = 2.0**-102
+# A bounce is fewer than 64 operations in a row on each coordinate, each within EPS_DOUBLE_DOUBLE of the cell's size.
+LOCAL_ERROR = 64.0 * EPS_DOUBLE_DOUBLE
 # 2^27 + 1 splits a double into two halves of 26 bits (Dekker).
 _SPLITTER = 134217729.0
 # pi/2 as the sum of three doubles: an angle up to 4 is reduced with an error below 2^-160.

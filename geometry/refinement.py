@@ -47,7 +47,8 @@ class RefinedTrace:
 
 def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 2**62) -> RefinedTrace:
     """Trace rays (two arrays of one dimension) in double-double arithmetic, whatever double precision makes of them."""
-    from .refined_engine import refined_arcs, refined_rays
+    from .refined_arc_engine import refined_arcs
+    from .refined_engine import refined_rays
 
     count = len(x)
     circles = _rows(scene.circles, 19)
