@@ -71,12 +71,12 @@ def _stability(quick: bool, folder: Path) -> str:
 
 
 SECTIONS = (
-    Section("speed", "", 300.0, lambda quick, folder: speed_and_goals(quick)),
+    Section("speed", "", 400.0, lambda quick, folder: speed_and_goals(quick)),
     Section("standard", "The standard set", FULL.total_seconds + MARGIN, _standard),
     Section("random", "Twenty random walls", RANDOM_EFFORT.total_seconds + MARGIN, _random),
     Section("savings", "What the scenes leave out", 100.0, lambda quick, folder: savings_table(quick)),
     Section("peers", "Peers", 240.0, lambda quick, folder: peer_table(folder / "peers")),
-    Section("stability", "", 330.0, _stability),
+    Section("stability", "", 400.0, _stability),
 )
 
 

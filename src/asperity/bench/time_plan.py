@@ -17,7 +17,7 @@ class TimePlan:
     --------
     >>> plan = TimePlan(10.0, 2)
     >>> round(plan.next_share())
-    10
+    5
     """
 
     seconds: float
