@@ -77,9 +77,8 @@ def tracer_profile(rays: int = RAYS) -> list[str]:
         )
     return [
         *lines, "",
-        f"Sine and cosine of the angle in and the angle out alone take {scale * by_polynomials:.0f} ns a ray by "
-        "polynomials, which hollows with a closed form use for several rays at once, and "
-        f"{scale * by_library:.0f} ns by the mathematical library, which the loop over flights calls.",
+        f"Sine and cosine of the angle in and the angle out alone take {scale * by_polynomials:.0f} ns a ray by the "
+        f"tracer's polynomials, for several rays at once; the mathematical library takes {scale * by_library:.0f} ns.",
     ]  # fmt: skip
 
 
