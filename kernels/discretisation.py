@@ -49,6 +49,9 @@ DISPLACED = np.finfo(np.float64).eps
 SEED_WITHOUT_RNG = 0
 # Flights of adaptive rows that nobody asked for by name: a second or so; beyond them the shortfall is reported.
 QUICK_FLIGHTS = 8_000_000
+# Where `auto` may sample, so many rays tell how many the tolerance needs: the error of scrambled nets falls like their
+# number to a power of about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
+FIRST_RAYS, NET_ORDER, NET_MARGIN = 2**14, 0.75, 2.0
 # Methods that a sum has if all its terms have them.
 SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
 
@@ -78,14 +81,15 @@ def discretise(
         is that difference. ``"qmc"``: rays from 8 independently scrambled Sobol sequences; the error is from their
         spread. ``"monte-carlo"``: independent rays; the error is from the variance of the counts. ``"auto"`` takes
         the first of these that the law has, except that quadrature in the entry point comes after ``"qmc"`` where it
-        is slow: for traced walls of many pieces, by a prediction of its cost, and for driven laws without a wall. Where
-        it falls short of the tolerance on a traced wall, rays are sampled too, and the more exact matrix is returned.
+        is slow: for traced walls of many pieces, by a prediction of its cost, and for driven laws without a wall. Of a
+        traced wall a few rays are sampled first, and as many as the tolerance needs where ``samples`` are more; where
+        quadrature falls short of the tolerance, all of them, and the more exact matrix is returned.
         ``KernelMatrix.method`` says what was used.
     tolerance : float
         Wanted Frobenius error of ``symmetric``. If it is not met the matrix says so: in its ``error`` and its repr.
     samples : int, optional
-        Number of rays where rays are sampled, 2**20 by default; ``"qmc"`` rounds up to 8 times a power of two, for
-        the quadrature of other driven laws it is the number of nodes.
+        Number of rays where rays are sampled, of ``"auto"`` the largest; 2**20 by default. ``"qmc"`` rounds up to 8
+        times a power of two, for the quadrature of other driven laws it is the number of nodes.
     rng : numpy.random.Generator, optional
         Source of randomness; by default a fixed one, so that results are reproducible.
     symmetrise : bool
@@ -169,12 +173,34 @@ class _Maker:
                 methods = self.methods(law, isometries=False)
         if isinstance(law, Combination) and methods[0] != "exact":
             return self._sum(law, "auto")
-        if isinstance(law, WallLaw) and methods[:2] == ("quadrature", "qmc"):
-            return self._by_rows_or_rays(law)
+        if isinstance(law, WallLaw) and methods[0] in ("quadrature", "qmc"):
+            return self._few_rays(law) or self._by_rows_or_rays(law, methods[0])
         return self._made_by(law, methods[0])
 
-    def _by_rows_or_rays(self, law: WallLaw) -> KernelMatrix:
+    def _few_rays(self, law: WallLaw) -> KernelMatrix | None:
+        """A sampled matrix of fewer rays than asked for, where these are enough for the tolerance."""
+        # another stream, so that a look that finds them too few changes no result
+        source, number = self.rng.spawn(1)[0], FIRST_RAYS
+        while number < self.samples:
+            try:
+                found = replace(self, samples=number, rng=source)._sampled(law, "qmc")
+            except AccuracyError:
+                # a bin without rays, or rays that do not escape: these few are no measure
+                return None
+            if float(found.error) <= self.tolerance:
+                return found
+            if self.tolerance <= 0.0:
+                return None
+            needed = NET_MARGIN * number * (float(found.error) / self.tolerance) ** (1.0 / NET_ORDER)
+            if needed > self.samples:
+                return None
+            number = max(2 * number, int(needed))
+        return None
+
+    def _by_rows_or_rays(self, law: WallLaw, first: Method) -> KernelMatrix:
         """Adaptive rows, or rays where rows fall short of the tolerance and rays are more exact."""
+        if first == "qmc":
+            return self._sampled(law, "qmc")
         rows = self._quadrature(law)
         if float(rows.error) <= self.tolerance:
             return rows
