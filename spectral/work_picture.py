@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -10,7 +11,7 @@ if TYPE_CHECKING:
     from .work_report import WorkReport
 
 MARKERS = "osv^D<>Ph*X"
-# An axis of less than this ratio has at most one labelled power of ten.
+# An axis covers a power of ten at least, so that one is labelled.
 DECADE = 10.0
 
 
@@ -38,9 +39,10 @@ def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
     ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel=f"{report.norms[0]} error", title=report.problem)
     from matplotlib.ticker import NullFormatter
 
-    for axis, (low, high) in ((ax.xaxis, ax.get_xlim()), (ax.yaxis, ax.get_ylim())):
-        if high > DECADE * low:
-            # matplotlib labels minor ticks of a few decades, too, and they overlap
-            axis.set_minor_formatter(NullFormatter())
+    for axis, (low, high), limit in ((ax.xaxis, ax.get_xlim(), ax.set_xlim), (ax.yaxis, ax.get_ylim(), ax.set_ylim)):
+        middle, reach = sqrt(low * high), sqrt(max(high / low, DECADE))
+        limit(middle / reach, middle * reach)
+        # matplotlib labels minor ticks of a few decades, too, and they overlap
+        axis.set_minor_formatter(NullFormatter())
     ax.legend(fontsize="x-small", framealpha=0.6)
     return ax
