@@ -8,10 +8,12 @@ from numba import njit
 FLAT_TOP, TOP_CORNER = -1, -2
 
 
-@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
-def opening_at(place, hollows):
-    """Number of the hollow that opens at a place of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
-    # the last hollow whose left end is not beyond the place
+_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+
+@_compile
+def last_hollow(place, hollows):
+    """Number of the last hollow whose left end is not beyond a place of the cell, -1 where there is none."""
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -19,7 +21,13 @@ def opening_at(place, hollows):
             low = middle + 1
         else:
             high = middle
-    h = low - 1
+    return low - 1
+
+
+@_compile
+def opening_at(place, hollows):
+    """Number of the hollow that opens at a place of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
+    h = last_hollow(place, hollows)
     if h < 0 or place >= hollows[h, 1] or (place == hollows[h, 0] and hollows[h, 11] > 0.0):
         # a flat top, or an edge of it; the edges between two hollows are corners
         edge = h >= 0 and (

@@ -12,6 +12,7 @@ from numba import njit
 
 from .contact_engine import CLEAR, NO, NOTHING, ZERO, first_in_hollow, next_root, satellite_after
 from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
+from .opening_engine import last_hollow
 
 TOP = 7
 # Cells that one satellite may pass, and satellites that may pass the lowest point, in one flight.
@@ -28,14 +29,7 @@ _inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 @_inline
 def hollow_at(hollows, place):
     """The hollow over which a place of the cell lies, or -1 over a flat top."""
-    low, high = 0, hollows.shape[0]
-    while low < high:
-        middle = (low + high) // 2
-        if hollows[middle, 0] <= place:
-            low = middle + 1
-        else:
-            high = middle
-    h = low - 1
+    h = last_hollow(place, hollows)
     return h if h >= 0 and place < hollows[h, 1] else -1
 
 

@@ -173,12 +173,19 @@ class _Maker:
                 methods = self.methods(law, isometries=False)
         if isinstance(law, Combination) and methods[0] != "exact":
             return self._sum(law, "auto")
-        if isinstance(law, WallLaw) and methods[0] in ("quadrature", "qmc"):
-            return self._few_rays(law) or self._by_rows_or_rays(law, methods[0])
+        if isinstance(law, WallLaw):
+            few = self._few_rays(law)
+            if few is not None:
+                return few
+            if methods[0] == "quadrature":
+                return self._by_rows_or_rays(law)
         return self._made_by(law, methods[0])
 
     def _few_rays(self, law: WallLaw) -> KernelMatrix | None:
         """A sampled matrix of fewer rays than asked for, where these are enough for the tolerance."""
+        if self.tolerance * self.samples < 1.0:
+            # no order of nets comes to that: a look would be in vain
+            return None
         # another stream, so that a look that finds them too few changes no result
         source, number = self.rng.spawn(1)[0], FIRST_RAYS
         while number < self.samples:
@@ -189,18 +196,14 @@ class _Maker:
                 return None
             if float(found.error) <= self.tolerance:
                 return found
-            if self.tolerance <= 0.0:
-                return None
             needed = NET_MARGIN * number * (float(found.error) / self.tolerance) ** (1.0 / NET_ORDER)
             if needed > self.samples:
                 return None
             number = max(2 * number, int(needed))
         return None
 
-    def _by_rows_or_rays(self, law: WallLaw, first: Method) -> KernelMatrix:
+    def _by_rows_or_rays(self, law: WallLaw) -> KernelMatrix:
         """Adaptive rows, or rays where rows fall short of the tolerance and rays are more exact."""
-        if first == "qmc":
-            return self._sampled(law, "qmc")
         rows = self._quadrature(law)
         if float(rows.error) <= self.tolerance:
             return rows
