@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
-from .measure import SINE, gauss_on_intervals, gauss_rule
+from .arc_lines import outgoing_lines
+from .measure import gauss_on_intervals, gauss_rule
 from .panels import Panels
 
 if TYPE_CHECKING:
@@ -48,27 +49,20 @@ class ArcMeans:
 
     def __call__(self, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
         """The means, shape (rows, k), and how much the rays with more hits can be off in the worst of the functions."""
-        pieces = self.law.pieces(theta, most_hits)
-        single = pieces.rest | pieces.alone
-        base = np.where(pieces.mirrored, np.pi - theta[pieces.ray], theta[pieces.ray])
-        slope = np.where(pieces.mirrored, 2.0, -2.0) * pieces.hits
-        offset = np.where(pieces.mirrored, -base, np.pi + base)
-        lower, upper = pieces.lower, np.maximum(pieces.upper, pieces.lower)
-        share = np.where(pieces.alone, 1.0, SINE.mass(lower, upper))
-        whole = np.bincount(pieces.ray, weights=share, minlength=theta.size)
+        lines = outgoing_lines(self.law, theta, most_hits)
+        single, share = lines.single, lines.mass
+        whole = lines.of_rows(share, theta.size)
         found = np.empty((len(single), self._polynomials.shape[2]))
         long = np.flatnonzero(~single)
         for start in range(0, long.size, CHUNK):
             part = long[start : start + CHUNK]
-            found[part] = self._integrals(offset[part], slope[part], lower[part], upper[part])
+            found[part] = self._integrals(lines.offset[part], lines.slope[part], lines.lower[part], lines.upper[part])
         known = np.flatnonzero(single)
-        # rays with more hits than are followed leave together; a row of no width has one outgoing angle
-        end = np.where(pieces.mirrored, self.law.half_angle, np.pi - self.law.half_angle)
-        angle = np.where(pieces.rest, end, offset + slope * lower)[known]
+        angle = lines.angle[known]
         here = self._moments(angle[:, None], self._cell(angle), share[known, None])
         found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[self._cell(angle)])
-        total = np.stack([np.bincount(pieces.ray, weights=column, minlength=theta.size) for column in found.T], axis=1)
-        left = np.bincount(pieces.ray, weights=np.where(pieces.rest, share, 0.0), minlength=theta.size)
+        total = np.stack([lines.of_rows(column, theta.size) for column in found.T], axis=1)
+        left = lines.of_rows(np.where(lines.rest, share, 0.0), theta.size)
         return total / whole[:, None], left / whole * self._spread(most_hits)
 
     def _spread(self, most_hits: int) -> float:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..checks import Floats
+from .arc_lines import outgoing_lines
 from .measure import SINE, gauss_on_intervals
 from .panels import Panels
 from .ragged_lists import ragged
@@ -29,17 +30,12 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
     The outgoing angle is linear in the angle delta of the chord, of density sin(delta): on each piece between two
     edges the functions are polynomials in delta, and a Gauss rule is exact but for the sine.
     """
-    pieces = law.pieces(theta, most_hits)
-    ray, rest, alone = pieces.ray, pieces.rest, pieces.alone & ~pieces.rest
-    base = np.where(pieces.mirrored, np.pi - theta[ray], theta[ray])
-    # theta' = offset + slope delta
-    slope = np.where(pieces.mirrored, 2.0, -2.0) * pieces.hits
-    offset = np.where(pieces.mirrored, -base, np.pi + base)
-    lower, upper = pieces.lower, np.maximum(pieces.upper, pieces.lower)
+    lines = outgoing_lines(law, theta, most_hits)
+    ray, slope, offset, lower, upper = lines[:5]
+    single = lines.single
     ends = np.sort(np.stack([offset + slope * lower, offset + slope * upper]), axis=0)
     first = np.clip(np.searchsorted(panels.edges, ends[0], side="right") - 1, 0, len(panels.edges) - 2)
     last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
-    single = rest | alone
     gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
     owner, place = ragged(np.where(single, 0, last - first + 1))
     for start in range(0, owner.size, CHUNK):
@@ -49,19 +45,16 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
         near, far = np.clip(cuts, lower[own], upper[own])
         scale, shift = 2.0 * slope[own] / (high - low), (2.0 * offset[own] - low - high) / (high - low)
         _add_moments(gathered, near, far, scale, shift, ray[own] * (len(panels.edges) - 1) + panel, panels.degree)
-    # rays with more hits than are followed leave together; a row of no width has one outgoing angle
-    angle = np.where(rest, np.where(pieces.mirrored, law.half_angle, np.pi - law.half_angle), offset + slope * lower)
-    share = np.where(alone, 1.0, SINE.mass(lower, upper))[single]
-    panel = np.clip(np.searchsorted(panels.edges, angle[single], side="right") - 1, 0, len(panels.edges) - 2)
+    angle = lines.angle[single]
+    panel = np.clip(np.searchsorted(panels.edges, angle, side="right") - 1, 0, len(panels.edges) - 2)
     low, high = panels.edges[panel], panels.edges[panel + 1]
-    local = np.polynomial.legendre.legvander((2.0 * angle[single] - low - high) / (high - low), panels.degree)
+    local = np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), panels.degree)
     cell = ray[single] * (len(panels.edges) - 1) + panel
     for moment, values in zip(gathered, local.T, strict=True):
-        moment += np.bincount(cell, weights=share * values, minlength=moment.size)
-    mass = np.where(alone, 1.0, SINE.mass(lower, upper))
-    total = np.bincount(ray, weights=mass, minlength=theta.size)
+        moment += np.bincount(cell, weights=lines.mass[single] * values, minlength=moment.size)
+    total = lines.of_rows(lines.mass, theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
-    left = np.bincount(ray, weights=np.where(rest, mass, 0.0), minlength=theta.size)
+    left = lines.of_rows(np.where(lines.rest, lines.mass, 0.0), theta.size)
     # two angles of a function of sup norm 1
     return panels.of_legendre(moments.transpose(1, 2, 0)), 2.0 * left / total
 
