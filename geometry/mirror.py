@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 # Mirror images agree to rounding if their points differ by this much, relative to the wall's size: a mirrored point
 # rounds once, but the two halves of a wall may have been computed by formulas of some fifty operations.
 MIRROR_TOLERANCE = 256.0 * EPS
-INSIDE = np.array([0.25, 0.5, 0.75])
+# Where pieces are compared besides their starts; the same read backwards.
+PARAMETERS = np.array([0.25, 0.5, 0.75, 1.0])
 
 
 def has_mirror_axis(wall: Wall) -> bool:
@@ -28,15 +29,16 @@ def has_mirror_axis(wall: Wall) -> bool:
     piece of the one can be the first of the other; so the cell may start anywhere.
     """
     tolerance = MIRROR_TOLERANCE * max(wall.period, float(np.abs(wall.vertices).max()), wall.depth)
-    image = wall.mirrored()
     if wall.islands:
+        image = wall.mirrored()
         islands, images = map(_with_bottom_starts, (wall.islands, image.islands))
         return _agree(wall.pieces, image.pieces, tolerance) and all(
             any(_agree(loop[k:] + loop[:k], other, tolerance) for other in images for k in range(len(loop)))
             for loop in islands
         )
-    own, other = _steps(wall.pieces), _steps(image.pieces)
-    starts = np.flatnonzero(np.abs(own - other[0]).max(axis=1) <= tolerance).tolist()
+    own = _steps(wall.pieces)
+    other = _mirrored(own)
+    starts = np.flatnonzero(np.abs(own - other[0]).max(axis=(1, 2)) <= tolerance).tolist()
     return any(np.abs(np.roll(own, -k, axis=0) - other).max() <= tolerance for k in starts)
 
 
@@ -52,14 +54,21 @@ def _with_bottom_starts(islands: Sequence[Sequence[Curve]]) -> list[tuple[Curve,
 
 
 def _steps(path: Sequence[Curve]) -> Floats:
-    """For every piece its points at three parameters and at its end, seen from its start; shape (n, 8)."""
-    rows = np.empty((len(path), 8))
+    """For every piece its points at three parameters and at its end, seen from its start; shape (n, 4, 2)."""
+    start, end = (np.array([getattr(piece, name) for piece in path]) for name in ("start", "end"))
+    # the points of a segment follow from its ends
+    steps = PARAMETERS[:, None] * (end - start)[:, None, :]
     for i, piece in enumerate(path):
-        start, end = np.array(piece.start), np.array(piece.end)
-        # the points of a segment follow from its ends
-        points = start + INSIDE[:, None] * (end - start) if isinstance(piece, Segment) else piece.point(INSIDE)
-        rows[i] = np.vstack([points - start, end - start]).ravel()
-    return rows
+        if not isinstance(piece, Segment):
+            steps[i, :-1] = piece.point(PARAMETERS[:-1]) - start[i]
+    return np.asarray(steps)
+
+
+def _mirrored(steps: Floats) -> Floats:
+    """The steps of the mirror image, which runs backwards: parameter t is 1 - t there."""
+    end = steps[:, -1:]
+    points = np.concatenate([steps[:, -2::-1] - end, -end], axis=1)
+    return np.asarray(points[::-1] * [-1.0, 1.0])
 
 
 def _agree(path: Sequence[Curve], other: Sequence[Curve], tolerance: float) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from fractions import Fraction
 from itertools import pairwise
 from math import frexp, ldexp
 
@@ -12,15 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, finite_array, frozen
 from ..errors import InputError, WallError
+from .exact_points import EPS, ExactPoints
 
 Integers = NDArray[np.int64]
 
 # Codes in `Triangulation.beyond`: at least 0 another triangle's edge; else the opening, or `FIRST_WALL - edge`.
 OPENING = -1
 FIRST_WALL = -2
-# Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
-CROSS_ULPS = 3.0 + 16.0 * 2.0**-52
-EPS = 2.0**-53
 # Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 8 EPS.
 PARALLEL = 32.0 * EPS
 
@@ -103,9 +100,9 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     points = _checked(hollow_vertices)
     relative = points - points[0]
     unit = ldexp(1.0, frexp(float(np.abs(relative).max()))[1])
-    corners, beyond = _clipped(points / unit)
+    corners, beyond = _clipped(ExactPoints(points / unit))
     entrance = int(np.flatnonzero(beyond == OPENING)[0])
-    high, low = _directions(points)
+    high, low = _directions(ExactPoints(points))
     for array in (corners, beyond):
         array.setflags(write=False)
     return Triangulation(frozen(relative / unit), unit, corners, beyond, frozen(high), frozen(low), entrance)
@@ -130,56 +127,21 @@ def _checked(hollow_vertices: ArrayLike) -> Floats:
     return np.asarray(points[keep])
 
 
-def _exact_sign(a: Floats, b: Floats, c: Floats) -> int:
-    ax, ay, bx, by, cx, cy = (Fraction(float(value)) for point in (a, b, c) for value in point)
-    cross = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    return (cross > 0) - (cross < 0)
-
-
-def _signs(a: Floats, b: Floats, points: Floats) -> NDArray[np.int8]:
-    """On which side of the line from a to b each point lies: 1 left, -1 right, 0 on it. Exact."""
-    first = (b[0] - a[0]) * (points[:, 1] - a[1])
-    second = (b[1] - a[1]) * (points[:, 0] - a[0])
-    cross = first - second
-    signs: NDArray[np.int8] = np.sign(cross).astype(np.int8)
-    doubtful = np.abs(cross) <= CROSS_ULPS * EPS * (np.abs(first) + np.abs(second))
-    # products of exact zeros are zero, for all others the sign is not certain
-    doubtful &= (first != 0.0) | (second != 0.0)
-    for i in doubtful.nonzero()[0]:
-        signs[i] = _exact_sign(a, b, points[i])
-    return signs
-
-
-def _enters(corners: list[Floats], start: Floats, end: Floats) -> bool:
-    """Whether a segment meets the open triangle, exactly."""
-    low, high = Fraction(0), Fraction(1)
-    for k in range(3):
-        a, b = corners[k], corners[(k + 1) % 3]
-        ax, ay, bx, by = (Fraction(float(value)) for value in (*a, *b))
-        at = [(bx - ax) * (Fraction(float(q[1])) - ay) - (by - ay) * (Fraction(float(q[0])) - ax) for q in (start, end)]
-        if at[0] <= 0 and at[1] <= 0:
-            return False
-        if at[0] < 0 or at[1] < 0:
-            root = at[0] / (at[0] - at[1])
-            low, high = (max(low, root), high) if at[0] < 0 else (low, min(high, root))
-    return low < high
-
-
-def _clipped(points: Floats, slits_first: bool = False) -> tuple[Integers, Integers]:
+def _clipped(chain: ExactPoints, slits_first: bool = False) -> tuple[Integers, Integers]:
     """Clip ears until nothing is left; the edges remember what lies beyond them.
 
     Parts of the hollow that hang together by a point or by a slit of no width need ``slits_first``, which is slower.
     """
-    count = len(points)
+    count = len(chain.points)
     ring = list(range(count))
     link = [FIRST_WALL - e for e in range(count - 1)] + [OPENING]
     corners = np.empty((count - 2, 3), np.int64)
     beyond = np.full(3 * (count - 2), OPENING, np.int64)
     place = count - 1
     for triangle in range(count - 2):
-        k = _next_ear(points, ring, place, slits_first)
+        k = _next_ear(chain, ring, place, slits_first)
         if k < 0 and not slits_first:
-            return _clipped(points, slits_first=True)
+            return _clipped(chain, slits_first=True)
         if k < 0:
             raise WallError(
                 f"hollow_vertices: no triangulation beyond vertex {ring[place % len(ring)]}; expected a chain that "
@@ -202,78 +164,67 @@ def _clipped(points: Floats, slits_first: bool = False) -> tuple[Integers, Integ
     return corners, beyond
 
 
-def _next_ear(points: Floats, ring: list[int], place: int, slits_first: bool) -> int:
+def _next_ear(chain: ExactPoints, ring: list[int], place: int, slits_first: bool) -> int:
     """Position in the ring of a vertex that can be cut off, or -1.
 
     A true ear, or else a vertex in line with its neighbours, or else the end of a slit of no width; or that first.
     """
     size = len(ring)
-    loop = points[ring]
     straight, slit = -1, -1
     for step in range(size):
         k = (place + step) % size
-        a, b, c = loop[k - 1], loop[k], loop[(k + 1) % size]
-        turn = int(_signs(a, b, c[None])[0])
-        if turn > 0 and not slits_first and (size == 3 or _is_ear(loop, k)):
+        a, b, c = ring[k - 1], ring[k], ring[(k + 1) % size]
+        turn = chain.turn(a, b, c)
+        if turn > 0 and not slits_first and (size == 3 or _is_ear(chain, ring, k)):
             return k
         if turn == 0:
-            from_a = [Fraction(float(a[i])) - Fraction(float(b[i])) for i in (0, 1)]
-            from_c = [Fraction(float(c[i])) - Fraction(float(b[i])) for i in (0, 1)]
-            if from_a[0] * from_c[0] + from_a[1] * from_c[1] < 0:
+            if chain.is_between(a, b, c):
                 straight = k if straight < 0 else straight
-            elif slit < 0 and not _surrounds(np.delete(loop, k, axis=0), b):
+            elif slit < 0 and not _surrounds(chain, ring[:k] + ring[k + 1 :], b):
                 slit = k
                 if slits_first:
                     return k
     if slits_first:
-        return _next_ear(points, ring, place, False)
+        return _next_ear(chain, ring, place, False)
     return straight if straight >= 0 else slit
 
 
-def _surrounds(loop: Floats, point: Floats) -> bool:
+def _surrounds(chain: ExactPoints, loop: list[int], point: int) -> bool:
     """Whether a loop winds around a point: then a fold that ends there is a plate in the hollow, not a slit of it."""
-    winding = 0
-    for start, end in zip(loop, np.roll(loop, -1, axis=0), strict=True):
-        if start[1] <= point[1] < end[1]:
-            winding += int(_signs(start, end, point[None])[0]) > 0
-        elif end[1] <= point[1] < start[1]:
-            winding -= int(_signs(start, end, point[None])[0]) < 0
+    winding, height = 0, chain.points[:, 1]
+    for start, end in zip(loop, [*loop[1:], loop[0]], strict=True):
+        if height[start] <= height[point] < height[end]:
+            winding += chain.turn(start, end, point) > 0
+        elif height[end] <= height[point] < height[start]:
+            winding -= chain.turn(start, end, point) < 0
     return winding != 0
 
 
-def _is_ear(loop: Floats, k: int) -> bool:
+def _is_ear(chain: ExactPoints, ring: list[int], k: int) -> bool:
     """Whether no edge of the ring meets the open triangle at its convex vertex k."""
-    size = len(loop)
-    corners = [loop[k - 1], loop[k], loop[(k + 1) % size]]
-    outside = np.zeros(size, bool)
+    size = len(ring)
+    triangle = ring[k - 1], ring[k], ring[(k + 1) % size]
+    outside, loop = np.zeros(size, bool), np.array([*ring, ring[0]])
     for side in range(3):
-        signs = _signs(corners[side], corners[(side + 1) % 3], loop)
-        outside |= (signs <= 0) & (np.roll(signs, -1) <= 0)
+        behind = chain.sides(triangle[side], triangle[(side + 1) % 3], loop) <= 0
+        outside |= behind[:-1] & behind[1:]
     # the two sides themselves
     outside[k - 1] = outside[k] = True
-    return not any(_enters(corners, loop[e], loop[(e + 1) % size]) for e in (~outside).nonzero()[0])
+    return not any(chain.enters(triangle, ring[e], ring[(e + 1) % size]) for e in (~outside).nonzero()[0])
 
 
-def _directions(points: Floats) -> tuple[Floats, Floats]:
+def _directions(chain: ExactPoints) -> tuple[Floats, Floats]:
     """Directions of the edges modulo pi, in two doubles, the same for edges that are exactly parallel.
 
     In extended precision where the machine has it: then 10^4 reflections turn by a sum that is good to an ulp.
     """
-    wide = np.diff(points.astype(np.longdouble), axis=0)
+    wide = np.diff(chain.points.astype(np.longdouble), axis=0)
     flip = (wide[:, 1] < 0) | ((wide[:, 1] == 0) & (wide[:, 0] < 0))
     wide[flip] *= -1
     direction = np.arctan2(wide[:, 1], wide[:, 0])
     order = np.argsort(direction, kind="stable")
-    for before, after in pairwise(order):
-        if direction[after] - direction[before] <= PARALLEL and _parallel(points, before, after):
+    for before, after in pairwise(order.tolist()):
+        if direction[after] - direction[before] <= PARALLEL and chain.are_parallel(before, after):
             direction[after] = direction[before]
     high = direction.astype(np.float64)
     return high, (direction - high).astype(np.float64)
-
-
-def _parallel(points: Floats, first: int, second: int) -> bool:
-    edges = []
-    for e in (first, second):
-        (ax, ay), (bx, by) = points[e], points[e + 1]
-        edges.append((Fraction(float(bx)) - Fraction(float(ax)), Fraction(float(by)) - Fraction(float(ay))))
-    return edges[0][0] * edges[1][1] == edges[0][1] * edges[1][0]
