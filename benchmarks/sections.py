@@ -21,7 +21,7 @@ from .peers import peer_table
 from .speed_tables import speed_and_goals
 
 # Short ladders in any case: there are many random walls, and only the choice is asked for.
-RANDOM_EFFORT = replace(QUICK, total_seconds=110.0)
+RANDOM_EFFORT = replace(QUICK, total_seconds=180.0)
 # The sections' processes start and end outside of their own plans.
 MARGIN = 30.0
 
@@ -34,7 +34,7 @@ class Section:
     ----------
     name, title : str
     seconds : float
-        After which it is ended: together 39 minutes.
+        After which it is ended: together 40 minutes.
     make : callable
         ``make(quick, folder)`` gives its text.
     """
@@ -71,11 +71,11 @@ def _stability(quick: bool, folder: Path) -> str:
 
 
 SECTIONS = (
-    Section("speed", "", 400.0, lambda quick, folder: speed_and_goals(quick)),
+    Section("speed", "", 380.0, lambda quick, folder: speed_and_goals(quick)),
     Section("standard", "The standard set", FULL.total_seconds + MARGIN, _standard),
     Section("random", "Twenty random walls", RANDOM_EFFORT.total_seconds + MARGIN, _random),
     Section("savings", "What the scenes leave out", 100.0, lambda quick, folder: savings_table(quick)),
-    Section("peers", "Peers", 240.0, lambda quick, folder: peer_table(folder / "peers")),
+    Section("peers", "Peers", 200.0, lambda quick, folder: peer_table(folder / "peers")),
     Section("stability", "", 400.0, _stability),
 )
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..geometry import Wall
 
 # Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
-# it has: some seconds. Who is not patient gives one row this share of them: longer ones have pieces without number.
+# it has: some seconds. Who may give up gives one row this share of them: longer ones have pieces without number.
 MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.05
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
@@ -47,10 +47,11 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# Rows of a wall that takes more than this share of the flights for a first look have pieces without number.
+# When this share of the flights is spent, the error tells whether the rest will do: not later, because errors fall by
+# jumps, when the last of the pieces that matter are seen. From there the error of nine walls fell like the flights to
+# a power of 1.6 to 2.2.
 FIRST_SHARE = 0.05
-# The order in the number of flights that they are trusted to have.
-PRESUMED_ORDER = 2.0
+PRESUMED_ORDER = 1.75
 # Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
 LEAST_CUT = 1e-7
 # Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error.
@@ -76,11 +77,12 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
 
 
 def row_matrix(
-    wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS, *, patient: bool = True
+    wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS, *, useless: float | None = None
 ) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
-    Who is not patient stops where the first rows already speak against meeting the tolerance with so many flights.
+    Where ``useless`` is given, it stops as soon as the first rows speak against an error below that with so many
+    flights.
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
     of that difference scaled by what dividing the panel showed where they are smooth; plus the errors of the rows;
@@ -88,13 +90,13 @@ def row_matrix(
     """
     small = isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS
     inner = Legendre(FEWEST_FUNCTIONS) if small else basis
-    matrix, error, rays = _Integrator(wall, inner, tolerance, most_flights, patient).run()
+    matrix, error, rays = _Integrator(wall, inner, tolerance, most_flights, useless).run()
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), error, rays
 
 
 def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS) -> tuple[Floats, float]:
     """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
-    integrator = _Integrator(wall, basis, tolerance, most_flights, patient=True)
+    integrator = _Integrator(wall, basis, tolerance, most_flights, None)
     _, error, _ = integrator.run()
     edges = np.union1d(integrator.panels.low, integrator.panels.high)
     return np.union1d(edges, np.pi - edges) if integrator.halved else edges, error
@@ -103,12 +105,12 @@ def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_flights: int = 
 class _Integrator:
     """One matrix in the making."""
 
-    def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_flights: int, patient: bool) -> None:
+    def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_flights: int, useless: float | None) -> None:
         self.basis = basis
         self.tolerance = max(tolerance, 8.0 * np.finfo(np.float64).eps * basis.size)
-        self.most_flights, self.patient = most_flights, patient
+        self.most_flights, self.useless = most_flights, useless
         self.rays, self.flights, self.row_count = 0, 0, 0
-        self.progress: list[tuple[int, float]] = []
+        self.judged, self.hopeless = useless is None, False
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
         if isinstance(basis, Legendre):
@@ -121,7 +123,9 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        self.rows = WallRows(wall, degree, inside, least, NO_LIMIT if patient else int(LARGEST_ROW * most_flights))
+        self.rows = WallRows(
+            wall, degree, inside, least, NO_LIMIT if useless is None else int(LARGEST_ROW * most_flights)
+        )
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
@@ -134,7 +138,7 @@ class _Integrator:
         """Divide panels until the error is small enough, or no flights are left: first for coarser tolerances."""
         for stage in range(self.stages, -1, -1):
             error = self._meet(self._begin(stage))
-            if self.flights >= self.most_flights or self._is_hopeless():
+            if self.flights >= self.most_flights or self.hopeless:
                 break
         return self._state()[0], error, self.rays
 
@@ -154,8 +158,7 @@ class _Integrator:
         goal = tolerance
         while True:
             _, known, hidden = self._state()
-            self.progress.append((self.flights, known + hidden))
-            if known + hidden <= tolerance or self.flights >= self.most_flights or self._is_hopeless():
+            if known + hidden <= tolerance or self.flights >= self.most_flights or self._is_hopeless(known + hidden):
                 return known + hidden
             # errors that only the asymmetry shows lie in panels whose rules agree by chance
             goal = min(goal, max(tolerance - hidden, 0.25 * known))
@@ -164,16 +167,13 @@ class _Integrator:
                 return known + hidden
             self._divide(chosen)
 
-    def _is_hopeless(self) -> bool:
-        """Whether the first rows alone took a good part of the flights, and left more than the others can make good.
-
-        Later progress is no guide: errors fall by jumps, when the last of the pieces that matter are seen.
-        """
-        if self.patient or len(self.progress) != 1:
-            return False
-        flights, error = self.progress[0]
-        needed = flights * max(error / self.tolerance, 1.0) ** (1.0 / PRESUMED_ORDER)
-        return flights > FIRST_SHARE * self.most_flights and needed > self.most_flights
+    def _is_hopeless(self, error: float) -> bool:
+        """Whether the error spoke against one that is of use with the flights that were left."""
+        if not self.judged and self.flights > FIRST_SHARE * self.most_flights:
+            assert self.useless is not None  # else there is nothing to judge
+            needed = self.flights * max(error / self.useless, 1.0) ** (1.0 / PRESUMED_ORDER)
+            self.judged, self.hopeless = True, needed > self.most_flights
+        return self.hopeless
 
     def _state(self) -> tuple[Floats, float, float]:
         """The matrix, the error that its panels and rows are known to have, and what its asymmetry adds."""

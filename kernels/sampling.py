@@ -17,6 +17,7 @@ from .counting import SampledArray, array_from_counts, array_from_sums, count_pa
 from .involution import InvolutionLaw
 from .law import BranchLaw, DrivenLaw, Law
 from .measure import SINE
+from .reflection import is_mirror_symmetric, reflection_matrix
 from .specular_frame import SpecularFrame
 from .stable_angles import flipped, kept_inside
 from .wall_law import LOST_TOLERANCE
@@ -43,6 +44,8 @@ def sampled_array(
 
     Rays come in chunks. A chunk's rays depend on a number drawn from ``rng``, the randomisation and the chunk's own
     index alone, and chunks are added as integers (as floats in a fixed order for bases without cells).
+    Nets of a mirror-symmetric law have theta < pi/2, in a basis with that symmetry: every ray counts with its mirror
+    image, and the net is twice as dense.
 
     Returns
     -------
@@ -61,6 +64,7 @@ def sampled_array(
     each = max(-(-samples // randomisations), 1)
     if method == "qmc":
         each = 1 << (each - 1).bit_length()
+    halved = method == "qmc" and law.mirror_symmetric is True and is_mirror_symmetric(basis)
     parts: list[Any] = []
     add: Callable[[Basis, Floats, Floats], Any] = count_pairs if basis.is_partition else sum_products
     chunk = max(SMALLEST_CHUNK, 1 << (basis.size**2 // 16).bit_length()) if basis.is_partition else SMALLEST_CHUNK
@@ -68,11 +72,11 @@ def sampled_array(
     with _progress(randomisations * each) as bar:
         for randomisation in range(randomisations):
             total = np.zeros((basis.size, basis.size), dtype=np.int64 if basis.is_partition else np.float64)
-            for incoming, outgoing, escaped in _rays(law, respond, each, chunk, [*root, randomisation]):
+            for incoming, outgoing, escaped in _rays(law, respond, each, chunk, [*root, randomisation], halved):
                 total += add(basis, incoming, outgoing)
                 lost += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
                 bar.update(incoming.size)
-            parts.append(total)
+            parts.append(total + _mirrored(basis, total) if halved else total)
     used = randomisations * each
     share = lost / used
     if share > LOST_TOLERANCE:
@@ -84,7 +88,7 @@ def sampled_array(
     if basis.is_partition:
         array = array_from_counts(parts, basis, symmetrise=symmetrise, independent=independent)
     else:
-        means = [part / each for part in parts]
+        means = [part / (2 * each if halved else each) for part in parts]
         array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=bool(law.reversible))
     if share > 0.0:
         extra = 2.0 * share * largest_square_sum(basis)
@@ -124,9 +128,14 @@ def _branch_taken(law: BranchLaw, x: Floats, theta: Floats) -> Floats:
 
 
 def _rays(
-    law: Law, respond: Callable[[Floats, Floats], Response] | None, number: int, chunk: int, key: list[int]
+    law: Law,
+    respond: Callable[[Floats, Floats], Response] | None,
+    number: int,
+    chunk: int,
+    key: list[int],
+    halved: bool,
 ) -> Iterator[tuple[Floats, Floats, NDArray[np.bool_] | None]]:
-    """Incoming angles, outgoing angles and escapes, chunk by chunk."""
+    """Incoming angles, outgoing angles and escapes, chunk by chunk; of nets only the half below pi/2 if ``halved``."""
     smallest, largest = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
     if respond is not None:
         from scipy.stats.qmc import Sobol
@@ -134,7 +143,7 @@ def _rays(
         engine = Sobol(2, scramble=True, bits=SOBOL_BITS, rng=np.random.default_rng(key))
         for start in range(0, number, chunk):
             points = engine.random(min(chunk, number - start))
-            theta = kept_inside(SINE.quantile(points[:, 1]))
+            theta = kept_inside(SINE.quantile(0.5 * points[:, 1] if halved else points[:, 1]))
             yield theta, *respond(np.clip(points[:, 0], smallest, largest), theta)
         return
     traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None
@@ -145,6 +154,14 @@ def _rays(
             yield theta, law.sample(theta, own), None
         else:
             yield theta, *traced(np.clip(own.random(theta.shape), smallest, largest), theta)
+
+
+def _mirrored(basis: Basis, total: Any) -> Any:
+    """Counts of pairs, or sums of products, of the mirror images (pi - theta, pi - theta')."""
+    if basis.is_partition:
+        return total[::-1, ::-1]
+    flip = reflection_matrix(basis)
+    return flip @ total @ flip.T
 
 
 def _progress(total: int) -> AbstractContextManager[Any]:

@@ -35,11 +35,12 @@ MOST_PIECES_KNOWN = 3
 # Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
 # error in total variation; above this it would show in a kernel estimated from a million rays.
 LOST_TOLERANCE = 1e-4
-# Polygonal walls are resolved into beams where that takes about a second (a few microseconds a beam, the table
-# included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
-MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 512, 100_000, 1e-6
-# Walls of more pieces are tried with a tenth of the beams first; where what that leaves is rounding, it does.
-FEW_PIECES, RESOLVED = 32, 1e-11
+# Polygonal walls are resolved into beams where that takes about a second (a few microseconds a beam, the table and the
+# triangles included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
+MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
+# Walls of more pieces are tried with fewer beams first; where what these leave is rounding, they do. Rough profiles of
+# 40 to 470 pieces resolved completely with 10 to 140 beams a piece; cavities and fractals never do.
+FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 100, 1e-11
 # `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 
@@ -120,8 +121,9 @@ class WallLaw(DrivenLaw):
         if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
             return None
         if len(wall.pieces) > FEW_PIECES:
-            # what a tenth of the beams leaves falls by a hundred at most with the rest
-            probe = PolygonLaw(wall, max_beams=MOST_BEAMS // 10)
+            # with the other beams what these leave falls by a hundred at most
+            few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.pieces))
+            probe = PolygonLaw(wall, max_beams=min(few, MOST_BEAMS))
             if float(probe.unresolved) > 100.0 * EXACT_ENOUGH:
                 return None
             if float(probe.unresolved) <= RESOLVED:

@@ -116,6 +116,13 @@ class WorkReport:
             return error
         return max(min(row.reported, error), min(floor, ROUNDED))
 
+    def kept_level(self, row: WorkRow) -> float:
+        """The largest `level` at this and all larger budgets of the row's method.
+
+        A rule that happens to hit, and misses again when it is refined, has not reached that error.
+        """
+        return max(self.level(other) for other in self._done(row.method) if other.budget >= row.budget)
+
     def order(self, method: str) -> FittedOrder | None:
         """The order in the budget, fitted to errors well above the reference's; None for fewer than three of them."""
         least = ABOVE_REFERENCE * self.methods[method].floor
@@ -136,16 +143,14 @@ class WorkReport:
     def choice(self) -> float | None:
         """Time of the method that chooses over that of the best other one at equal error, the worst of its rows.
 
-        Between the rows of a method its time is interpolated in the logarithms. Errors are those of
-        `level`. None without rows of both kinds.
+        Between the rows of a method its time is interpolated in the logarithms. Errors are those of `kept_level`. None
+        without rows of both kinds.
         """
         ratios = []
         for row in self._done(self.auto):
-            times = [
-                time
-                for name in self.methods
-                if name != self.auto and (time := self._time_to(name, self.level(row))) is not None
-            ]
+            error = self.kept_level(row)
+            others = (name for name in self.methods if name != self.auto)
+            times = [time for name in others if (time := self._time_to(name, error)) is not None]
             if times:
                 ratios.append(row.least / min(times))
         return max(ratios, default=None)
@@ -191,11 +196,12 @@ class WorkReport:
         return [row for row in self.rows if row.is_done and method in (None, row.method)]
 
     def _time_to(self, method: str, error: float) -> float | None:
-        """The time after which a method has an error, or None if it has not."""
+        """The time after which a method has an error and keeps it, or None if it has not."""
         best: list[tuple[float, float]] = []
         for row in sorted(self._done(method), key=lambda row: row.least):
-            if not best or self.level(row) < best[-1][1]:
-                best.append((row.least, self.level(row)))
+            level = self.kept_level(row)
+            if not best or level < best[-1][1]:
+                best.append((row.least, level))
         if not best or best[-1][1] > error:
             return None
         if best[0][1] <= error:

@@ -88,7 +88,8 @@ def test_rows_that_fall_short_are_kept_where_they_know_more_than_rays():
     law = ker.WallLaw(geo.dispersing_arcs(1 / 3))
     chosen, rays = (ker.discretise(law, ker.Legendre(24), method=how, tolerance=1e-9) for how in ("auto", "qmc"))
     assert chosen.method == "quadrature" and 1e-9 < float(chosen.error) < float(rays.error)
-    assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= float(chosen.error) + float(rays.error)
+    # the error of rays is a standard error
+    assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= float(chosen.error) + 2.0 * float(rays.error)
 
 
 def test_rows_of_channels_without_bottom_in_sight_are_those_of_the_closed_form():

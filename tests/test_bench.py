@@ -14,6 +14,7 @@ from benchmarks.__main__ import begin_or_go_on
 from benchmarks.exact_rows import ArcRow
 from benchmarks.sections import SECTIONS, section_text
 from click.testing import CliRunner
+from scipy.stats import norm, t
 
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -33,6 +34,7 @@ from asperity.bench.timing import side_by_side
 from asperity.cli import main
 from asperity.errors import InputError
 from asperity.kernels.directions import Directions
+from asperity.kernels.sampling import RANDOMISATIONS
 
 RAYS = 2**12
 
@@ -100,7 +102,9 @@ def test_a_law_that_is_kept_is_markov_symmetric_and_that_of_the_wall(name):
 def test_a_moment_that_is_kept_is_that_of_the_wall(name):
     moment = known_reference(f"{name}/moment")
     seen = ker.discretise(ker.WallLaw(wall_of(name)), ker.Legendre(2), "qmc", samples=2**16)
-    assert abs(seen.symmetric[1, 1] - float(moment.value)) <= 4.0 * seen.error.value + moment.error
+    beyond = max(abs(seen.symmetric[1, 1] - float(moment.value)) - moment.error, 0.0)
+    # a standard error from the spread of eight nets: its multiples follow Student's distribution
+    assert norm.isf(t.sf(beyond / seen.error.value, RANDOMISATIONS - 1)) < 4.0
     assert moment.error <= 5e-5
 
 

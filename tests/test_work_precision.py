@@ -124,6 +124,14 @@ def test_the_choice_is_compared_with_the_best_method_at_equal_error():
     assert synthetic_report(equal).choice() == pytest.approx(2.0)
 
 
+def test_an_error_that_a_larger_budget_loses_again_does_not_count():
+    lucky = [("other", 1, 1e-2, 1.0), ("other", 2, 1e-5, 2.0), ("other", 3, 1e-3, 4.0), ("auto", 1, 1e-3, 3.0)]
+    assert synthetic_report(lucky).choice() == pytest.approx(3.0 / 2.0)
+    # nor does it for the method that chooses
+    late = [("other", 1, 1e-2, 1.0), ("auto", 1, 1e-3, 3.0), ("auto", 2, 1e-2, 1.5)]
+    assert synthetic_report(late).choice() == pytest.approx(3.0)
+
+
 def test_a_method_is_measured_against_a_reference_that_it_did_not_make():
     first = spec.ReferenceValue(EXACT, 0.0, "closed form", made_by=("closed form",))
     second = spec.ReferenceValue(EXACT + 1e-3, 1e-3, "quadrature", made_by=("quadrature",))

@@ -13,7 +13,7 @@ from ..kernels import Bins, KernelMatrix, Legendre
 from ..kernels.directions import MEAN_SINE, SINE_NORM, Directions
 from ..spectral import WorkMethod
 from .quantity import Methods, Quantity
-from .routes import RANDOM_ORDER, Route, routes_for
+from .routes import RANDOM_ORDER, Route, declared_order, routes_for
 from .scenes import standard_names
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def _by_routes(basis: Basis, read: Callable[[KernelMatrix], Any], in_bins: bool 
 
     def method(wall: Wall, route: Route) -> WorkMethod:
         # strata and nets do better than 3/4 where the integrand does not jump: declared for bins alone
-        order = route.order if in_bins or route.order == RANDOM_ORDER else None
+        order = declared_order(route, wall) if in_bins or route.order == RANDOM_ORDER else None
         return WorkMethod(
             route.name, lambda budget, *rng: read(route.matrix(wall, basis, budget, *rng)), route.is_random, order
         )

@@ -21,6 +21,9 @@ MakeMatrix = Callable[..., KernelMatrix]
 # Sampled rays converge like the root of their number. Strata and scrambled nets in two dimensions gain the root of
 # their own side where the integrand jumps along curves, as indicators of bins and the laws of most walls do: 3/4.
 RANDOM_ORDER, JUMPING_ORDER = 0.5, 0.75
+# Where each piece of a wall is smaller than a stratum, rays of one stratum are as good as independent ones. A million
+# strata have a side of 1/1024: walls of more pieces than half of that do not see it made small.
+MANY_PIECES = 512
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,16 @@ def routes_for(wall: Wall) -> tuple[Route, ...]:
         found.append(BEAMS)
     found += [ROWS, QMC, STRATIFIED, MONTE_CARLO]
     return tuple(found)
+
+
+def declared_order(route: Route, wall: Wall) -> float | None:
+    """The order of a route for matrices in bins, at the numbers of rays of the ladders.
+
+    >>> from asperity.bench.scenes import wall_of
+    >>> [declared_order(STRATIFIED, wall_of(name)) for name in ("cusps", "profile")]
+    [0.75, 0.5]
+    """
+    return RANDOM_ORDER if route.order == JUMPING_ORDER and len(wall.pieces) > MANY_PIECES else route.order
 
 
 def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelMatrix:

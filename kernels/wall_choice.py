@@ -1,0 +1,77 @@
+"""Which way `auto` takes to the matrix of a wall's law that has no closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..errors import AccuracyError
+from .row_quadrature import is_affordable
+from .wall_law import FEW_PIECES
+
+if TYPE_CHECKING:
+    from .matrix import KernelMatrix
+    from .matrix_maker import MatrixMaker
+    from .wall_law import WallLaw
+
+# So many rays tell how many the tolerance needs: the error of scrambled nets falls like their number to a power of
+# about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
+FIRST_RAYS, NET_ORDER, NET_MARGIN = 2**14, 0.75, 2.0
+
+
+def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
+    """The matrix by the way that promises the tolerance soonest, or else the least error in a second or two.
+
+    Isometries of few pieces; as many rays as the tolerance needs; isometries of many pieces; adaptive rows, as long as
+    they promise more than all the rays; all the rays. The more exact matrix is returned.
+    """
+    # found in less time than a few rays
+    if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
+        return maker.make(law.exact_law, "auto")
+    affordable = is_affordable(law.wall, maker.basis)
+    found, promised = _few_rays(maker, law) if affordable or _is_within_reach(maker) else (None, float("inf"))
+    if found is not None:
+        return found
+    if law.exact_law is not None:
+        return maker.make(law.exact_law, "auto")
+    rays = None
+    if not affordable or promised <= maker.tolerance:
+        rays = maker.sampled(law, "qmc")
+        promised = float(rays.error)
+        if not affordable or promised <= maker.tolerance:
+            return rays
+    rows = maker.rows(law, useless=max(promised, maker.tolerance))
+    if float(rows.error) <= max(promised, maker.tolerance):
+        return rows
+    try:
+        rays = maker.sampled(law, "qmc") if rays is None else rays
+    except AccuracyError:
+        # too many rays do not escape; the rows have counted theirs in their error
+        return rows
+    return min(rows, rays, key=lambda matrix: float(matrix.error))
+
+
+def _is_within_reach(maker: MatrixMaker) -> bool:
+    """Whether an order of 1 in the number of rays would meet the tolerance: if not, a look at a few is in vain."""
+    return maker.tolerance * maker.samples >= 1.0
+
+
+def _few_rays(maker: MatrixMaker, law: WallLaw) -> tuple[KernelMatrix | None, float]:
+    """A matrix of fewer rays than asked for, if these are enough for the tolerance; and what all rays promise."""
+    # another stream, so that a look that finds them too few changes no result
+    source, number, promised = maker.rng.spawn(1)[0], FIRST_RAYS, float("inf")
+    while number < maker.samples:
+        try:
+            found = replace(maker, samples=number, rng=source).sampled(law, "qmc")
+        except AccuracyError:
+            # a bin without rays, or rays that do not escape: these few are no measure
+            break
+        error = float(found.error)
+        if error <= maker.tolerance:
+            return found, error
+        promised = error * (number / maker.samples) ** NET_ORDER
+        needed = NET_MARGIN * number * (error / maker.tolerance) ** (1.0 / NET_ORDER)
+        if needed > maker.samples:
+            break
+        number = max(2 * number, int(needed))
+    return None, promised

@@ -1,0 +1,61 @@
+"""Which way `auto` takes to the matrix of a wall: as many rays as the tolerance needs, isometries, rows, all rays."""
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+
+# A rough profile of 200 pieces, whose beams resolve completely, and a curve whose beams never do.
+PROFILE = geo.Wall.from_vertices(
+    np.column_stack([np.linspace(0.0, 1.0, 201), [0.0, *-0.02 * np.random.default_rng(5).random(199), 0.0]])
+)
+KOCH = geo.koch(4)
+MUSHROOMS = ker.WallLaw(geo.mushrooms(0.3, 0.5))
+
+
+@pytest.mark.parametrize("basis", [ker.Legendre(2), ker.Bins(16)], ids=repr)
+def test_a_rough_matrix_takes_few_rays_and_keeps_its_tolerance(basis):
+    rough = ker.discretise(MUSHROOMS, basis, tolerance=1e-2)
+    fine = ker.discretise(MUSHROOMS, basis, method="qmc")
+    assert rough.samples < fine.samples and float(rough.error) <= 1e-2
+    assert np.linalg.norm(rough.symmetric - fine.symmetric) <= 3.0 * (float(rough.error) + float(fine.error))
+
+
+def test_a_look_that_finds_rays_too_few_changes_no_result():
+    basis, generators = ker.Legendre(2), [np.random.default_rng(5) for _ in range(2)]
+    looked = ker.discretise(MUSHROOMS, basis, tolerance=1e-8, rng=generators[0])
+    asked = ker.discretise(MUSHROOMS, basis, method="qmc", rng=generators[1])
+    assert looked.method == "qmc" and np.array_equal(looked.symmetric, asked.symmetric)
+
+
+def test_a_profile_of_many_pieces_takes_rays_for_a_rough_answer_and_isometries_for_an_exact_one():
+    law, basis = ker.WallLaw(PROFILE), ker.Legendre(2)
+    rough, exact = (ker.discretise(law, basis, tolerance=tolerance) for tolerance in (1e-2, 1e-9))
+    assert (rough.method, exact.method) == ("qmc", "exact") and "exact_law" in vars(law)
+    assert float(rough.error) <= 1e-2 and float(exact.error) <= 1e-9
+    # Student's distribution with 7 degrees of freedom has 6 standard errors in 2000
+    assert abs(rough.symmetric[1, 1] - exact.symmetric[1, 1]) <= 6.0 * float(rough.error)
+
+
+@pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
+def test_rays_that_are_asked_for_do_not_look_for_isometries(method):
+    law = ker.WallLaw(KOCH)
+    assert ker.discretise(law, ker.Legendre(2), method, samples=1024).method == method
+    assert "exact_law" not in vars(law)
+
+
+def test_isometries_that_leave_too_much_give_way_to_rays():
+    found = ker.discretise(ker.WallLaw(KOCH), ker.Legendre(2), samples=2**14)
+    assert found.method == "qmc" and found.samples == 2**14
+
+
+def test_few_pieces_are_done_by_isometries_whatever_the_tolerance():
+    wall = geo.Wall.from_vertices([(0, 0), (0.3, -0.2), (0.6, -0.1), (1, 0)])
+    assert ker.discretise(ker.WallLaw(wall), ker.Bins(8), tolerance=0.1).method == "exact"
+
+
+def test_a_tighter_tolerance_that_is_out_of_reach_gives_no_worse_a_matrix():
+    law, basis = ker.WallLaw(geo.focusing_arcs(1.2).foreshorten(geo.Disk(1.0, 0.5))), ker.Legendre(2)
+    loose, tight = (float(ker.discretise(law, basis, tolerance=tolerance).error) for tolerance in (1e-4, 1e-10))
+    assert loose <= 1e-4 and tight <= loose
