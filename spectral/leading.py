@@ -13,7 +13,7 @@ from ..errors import AccuracyError, InputError
 from ..kernels import KernelMatrix
 from .deflation import symmetric_half
 from .extremes import Extremes, outermost
-from .parity import Parity, outermost_by_parity
+from .parity import Parity, halves, outermost_by_parity
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -118,7 +118,7 @@ def leading_eigenvalues(
     whole_number("k", k, 1)
     source = np.random.default_rng(0) if rng is None else rng
     if isinstance(matrix, KernelMatrix):
-        found, parity = outermost_by_parity(matrix, None, k, "largest")
+        found, parity = outermost_by_parity(matrix.symmetric, halves(matrix.basis, matrix), None, k, "largest")
         return _listed(found, parity if "none" not in parity else ())
     if isinstance(matrix, LinearOperator):
         return _matrix_free(matrix, k, source)
