@@ -11,6 +11,7 @@ from ..checks import Floats
 from .arc_lines import outgoing_lines
 from .measure import gauss_on_intervals, gauss_rule
 from .panels import Panels
+from .polynomial_moments import legendre_moments
 
 if TYPE_CHECKING:
     from .circular import CircularArcLaw
@@ -109,12 +110,7 @@ class ArcMeans:
         return np.clip(np.searchsorted(self.edges, angle, side="right") - 1, 0, len(self.edges) - 2)
 
     def _moments(self, angle: Floats, cell: NDArray[np.intp], weight: Floats) -> Floats:
-        """Sums over the nodes, shape (cells, nodes), of the weights times the Legendre polynomials of these cells."""
+        """Of nodes of shape (cells, nodes) with their weights: of these cells' polynomials, (cells, degree + 1)."""
         low, high = self.edges[cell, None], self.edges[cell + 1, None]
         local = (2.0 * angle - low - high) / (high - low)
-        before, current = np.ones_like(local), local
-        found = np.empty((len(local), self._polynomials.shape[1]))
-        for k in range(found.shape[1]):
-            found[:, k] = np.einsum("pq,pq->p", weight, before)
-            before, current = current, ((2 * k + 3) * local * current - (k + 1) * before) / (k + 2)
-        return found
+        return legendre_moments(local, weight, self._polynomials.shape[1] - 1).T

@@ -10,6 +10,7 @@ from ..checks import Floats
 from .arc_lines import outgoing_lines
 from .measure import SINE, gauss_on_intervals
 from .panels import Panels
+from .polynomial_moments import legendre_moments
 from .ragged_lists import ragged
 
 if TYPE_CHECKING:
@@ -47,11 +48,9 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
         _add_moments(gathered, near, far, scale, shift, ray[own] * (len(panels.edges) - 1) + panel, panels.degree)
     angle = lines.angle[single]
     panel = np.clip(np.searchsorted(panels.edges, angle, side="right") - 1, 0, len(panels.edges) - 2)
-    low, high = panels.edges[panel], panels.edges[panel + 1]
-    local = np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), panels.degree)
     cell = ray[single] * (len(panels.edges) - 1) + panel
-    for moment, values in zip(gathered, local.T, strict=True):
-        moment += np.bincount(cell, weights=lines.mass[single] * values, minlength=moment.size)
+    for column, values in zip(gathered, panels.legendre(angle, panel).T, strict=True):
+        column += np.bincount(cell, weights=lines.mass[single] * values, minlength=column.size)
     total = lines.of_rows(lines.mass, theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
     left = lines.of_rows(np.where(lines.rest, lines.mass, 0.0), theta.size)
@@ -71,8 +70,5 @@ def _add_moments(
         delta, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(near[chosen], far[chosen], nodes))
         weight = weight * SINE.density(delta)
         local = scale[chosen, None] * delta + shift[chosen, None]
-        before, current = np.ones_like(local), local
-        for k in range(degree + 1):
-            moment = np.einsum("ij,ij->i", weight, before)
-            gathered[k] += np.bincount(cell[chosen], weights=moment, minlength=gathered.shape[1])
-            before, current = current, ((2 * k + 3) * local * current - (k + 1) * before) / (k + 2)
+        for column, moment in zip(gathered, legendre_moments(local, weight, degree), strict=True):
+            column += np.bincount(cell[chosen], weights=moment, minlength=column.size)
