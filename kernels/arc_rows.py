@@ -12,6 +12,7 @@ from .measure import SINE, gauss_on_intervals
 from .panels import Panels
 from .polynomial_moments import legendre_moments
 from .ragged_lists import ragged
+from .sorted_edges import cell_among
 
 if TYPE_CHECKING:
     from .circular import CircularArcLaw
@@ -35,7 +36,7 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
     ray, slope, offset, lower, upper = lines[:5]
     single = lines.single
     ends = np.sort(np.stack([offset + slope * lower, offset + slope * upper]), axis=0)
-    first = np.clip(np.searchsorted(panels.edges, ends[0], side="right") - 1, 0, len(panels.edges) - 2)
+    first = cell_among(panels.edges, ends[0])
     last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
     gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
     owner, place = ragged(np.where(single, 0, last - first + 1))
@@ -47,7 +48,7 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
         scale, shift = 2.0 * slope[own] / (high - low), (2.0 * offset[own] - low - high) / (high - low)
         _add_moments(gathered, near, far, scale, shift, ray[own] * (len(panels.edges) - 1) + panel, panels.degree)
     angle = lines.angle[single]
-    panel = np.clip(np.searchsorted(panels.edges, angle, side="right") - 1, 0, len(panels.edges) - 2)
+    panel = cell_among(panels.edges, angle)
     cell = ray[single] * (len(panels.edges) - 1) + panel
     for column, values in zip(gathered, panels.legendre(angle, panel).T, strict=True):
         column += np.bincount(cell, weights=lines.mass[single] * values, minlength=column.size)
