@@ -51,11 +51,6 @@ class Residuals:
     norms: Floats
     rows: int
 
-    @property
-    def joint_norm(self) -> float:
-        """A bound for the norm of P V - V diag(rho): each of the k values has an eigenvalue of its own this near."""
-        return float(np.linalg.norm(self.norms))
-
 
 def residuals(
     law: Law,
