@@ -13,6 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
+from ..rounding import EPS
 from .angle_engine import PI
 from .beam_tables import (
     BOUNCES,
@@ -36,7 +37,6 @@ from .beam_tables import (
 )
 from .double_double import add
 from .growing_tables import larger, longer, taller
-from .resolution import EPS
 from .triangulation import FIRST_WALL, OPENING
 from .unfolding_engine import offset_of, reduced, wall_lines
 

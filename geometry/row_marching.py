@@ -10,9 +10,9 @@ import math
 import numpy as np
 from numba import njit
 
+from ..rounding import EPS
 from .growing_tables import longer
 from .itineraries import (
-    EPS,
     FIRST_LABEL,
     MOST_SAMPLES,
     add_change,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, finite_array, frozen
 from ..errors import InputError, WallError
+from ..rounding import UNIT_ROUNDOFF
 
 Integers = NDArray[np.int64]
 
@@ -20,9 +21,8 @@ OPENING = -1
 FIRST_WALL = -2
 # Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ULPS = 3.0 + 16.0 * 2.0**-52
-EPS = 2.0**-53
-# Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 8 EPS.
-PARALLEL = 32.0 * EPS
+# Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 2^-51.
+PARALLEL = 32.0 * UNIT_ROUNDOFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def _signs(a: Floats, b: Floats, points: Floats) -> NDArray[np.int8]:
     second = (b[1] - a[1]) * (points[:, 0] - a[0])
     cross = first - second
     signs: NDArray[np.int8] = np.sign(cross).astype(np.int8)
-    doubtful = np.abs(cross) <= CROSS_ULPS * EPS * (np.abs(first) + np.abs(second))
+    doubtful = np.abs(cross) <= CROSS_ULPS * UNIT_ROUNDOFF * (np.abs(first) + np.abs(second))
     # products of exact zeros are zero, for all others the sign is not certain
     doubtful &= (first != 0.0) | (second != 0.0)
     for i in doubtful.nonzero()[0]:

@@ -15,11 +15,12 @@ from ..estimates import ErrorKind
 from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
 from ..kernels.measure import SINE
 from ..kernels.panel_rows import integrates_panels, traces_rows
+from ..rounding import EPS
 from .adapted_panels import adapted_trials
 from .eigenvalues import check_reversible
 from .parity import Parity, halves, outermost_by_parity
 from .separation import Separation, rest_of_spectrum
-from .trials import EPS, Residuals, images, residuals
+from .trials import Residuals, images, residuals
 
 Label = Literal["indexed", "contains-spectrum"]
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..checks import Floats, finite_array, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..kernels import KernelMatrix
+from ..rounding import EPS
 from .deflation import symmetric_half
 from .extremes import Extremes, outermost
 from .parity import Parity, halves, outermost_by_parity
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import LinearOperator, SuperLU
 
-EPS = float(np.finfo(np.float64).eps)
 # Vectors carried beyond those asked for: the block converges as fast as the first value beyond it is far away.
 GUARD = 12
 # Of the shift beyond the largest eigenvalue that a matrix of norm 1 can have: a solve then loses half of the digits
