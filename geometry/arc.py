@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats
 from ..errors import WallError
-from .curve import EPS, Curve, Point, as_point, stretch_factors, uniform_parameters
+from ..rounding import EPS
+from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
 # Up to this span (radians) an arc is placed by its chord and its semi-axes: the difference of two angles near pi/2
 # has an error of eps, so a span of 1e-8 read from the angles would keep 8 digits only; the chord keeps 16.

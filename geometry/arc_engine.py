@@ -13,7 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
-from .resolution import EPS, TANGENT_ULPS
+from ..rounding import EPS
+from .resolution import TANGENT_ULPS
 
 _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 

@@ -1,17 +1,9 @@
-"""The compiled loop that splits beams. Only `beams` and `marching` import this file, because it loads numba.
+"""The compiled loop that splits beams. Only `beams` imports this file, because it loads numba.
 
 A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0, and an
 unfolded vertex (X, Y) is the functional f = X s - Y c - p, positive where it lies right of the line. A beam is a convex
 polygon of such vectors. The generators have p, s and abs(c) of one sign, and cutting only mixes them with positive
-weights: every component keeps its relative accuracy down to grazing.
-
-A slot of the tables is one beam:
-
-* ``corners[slot, i]``: p, s, c of vertex i, counterclockwise in (theta, p), then the X, Y whose functional vanishes on
-  the edge to vertex i + 1.
-* ``whole[slot]``: number of vertices, the triangle's edge by which the beam comes in, sign, bounces, 1 for a leaf.
-* ``real[slot]``: flux, then the unfolding isometry V -> R V + T: turn (high, low), T_x (high, low), T_y (high, low),
-  and the rounding errors of T_x and T_y.
+weights: every component keeps its relative accuracy down to grazing. `beam_tables` says where a beam's numbers stand.
 """
 
 from __future__ import annotations
@@ -21,18 +13,37 @@ import math
 import numpy as np
 from numba import njit
 
+from ..rounding import EPS
+from .angle_engine import PI
+from .beam_tables import (
+    BOUNCES,
+    COUNT,
+    EDGE,
+    ERROR_X,
+    ERROR_Y,
+    FLUX,
+    LEAF,
+    SIGN,
+    T_X,
+    T_X_LOW,
+    T_Y,
+    T_Y_LOW,
+    TURN,
+    TURN_LOW,
+    copied,
+    pop,
+    push,
+    put,
+)
 from .double_double import add
+from .growing_tables import larger, longer, taller
+from .triangulation import FIRST_WALL, OPENING
+from .unfolding_engine import offset_of, reduced, wall_lines
 
-EPS = 2.0**-52
 # f is a sum of five products of numbers with one to three rounding errors each; every term is counted in `f`'s size.
 FUNCTIONAL_ULPS = 8.0
 # T gains 2 d R n at a reflection: d, n, R and the two products have one rounding error each.
 STEP_ULPS = 4.0
-# Pi to 106 bits.
-PI_HIGH, PI_LOW = 3.141592653589793, 1.2246467991473532e-16
-OPENING, FIRST_WALL = -1, -2
-COUNT, EDGE, SIGN, BOUNCES, LEAF = 0, 1, 2, 3, 4
-FLUX, TURN, TURN_LOW, T_X, T_X_LOW, T_Y, T_Y_LOW, ERROR_X, ERROR_Y = 0, 1, 2, 3, 4, 5, 6, 7, 8
 DONE, BUDGET = 0, 1
 # The open flux is a running sum; it is added up anew this often.
 RECOUNT = 4096
@@ -40,35 +51,6 @@ RECOUNT = 4096
 STEPS_A_BEAM = 64
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
-
-
-@_compile
-def reduced(high, low):
-    """An angle in two doubles, modulo 2 pi, in [-pi, pi] within rounding."""
-    turns = np.rint(high / (2.0 * PI_HIGH))
-    if turns != 0.0:
-        # turns is 1 or 2 at most, so its products are exact
-        high, low = add((high, low), (-2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW))
-    return high, low
-
-
-@_compile
-def offset_of(sign, turn, turn_low, middle):
-    """The offset of theta' = sign (theta + pi - turn), modulo 2 pi, for which the angle ``middle`` leaves upwards."""
-    offset = add((sign * PI_HIGH, sign * PI_LOW), (-sign * turn, -sign * turn_low))
-    turns = np.rint((sign * middle + offset[0] - 0.5 * PI_HIGH) / (2.0 * PI_HIGH))
-    return add(offset, (-2.0 * turns * PI_HIGH, -2.0 * turns * PI_LOW))[0]
-
-
-@_compile
-def wall_lines(x, y, turn_high):
-    """The lines of a hollow's walls, one a row: unit normal and distance from the origin, from the nearer end."""
-    lines = np.empty((turn_high.shape[0], 3))
-    for e in range(turn_high.shape[0]):
-        lines[e, 0], lines[e, 1] = -math.sin(turn_high[e]), math.cos(turn_high[e])
-        k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
-        lines[e, 2] = lines[e, 0] * x[k] + lines[e, 1] * y[k]
-    return lines
 
 
 @_compile
@@ -119,46 +101,6 @@ def clip(polygon, count, values, wanted, edge_x, edge_y, out):
 
 
 @_compile
-def push(heap, size, real, slot):
-    i = size
-    heap[i] = slot
-    while i > 0:
-        parent = (i - 1) // 2
-        if real[heap[parent], FLUX] >= real[heap[i], FLUX]:
-            break
-        heap[parent], heap[i] = heap[i], heap[parent]
-        i = parent
-    return size + 1
-
-
-@_compile
-def pop(heap, size, real):
-    top = heap[0]
-    size -= 1
-    heap[0] = heap[size]
-    i = 0
-    while True:
-        child = 2 * i + 1
-        if child >= size:
-            break
-        if child + 1 < size and real[heap[child + 1], FLUX] > real[heap[child], FLUX]:
-            child += 1
-        if real[heap[i], FLUX] >= real[heap[child], FLUX]:
-            break
-        heap[i], heap[child] = heap[child], heap[i]
-        i = child
-    return top, size
-
-
-@_compile
-def copied(slot, real, whole, new):
-    for k in range(real.shape[1]):
-        real[new, k] = real[slot, k]
-    for k in range(whole.shape[1]):
-        whole[new, k] = whole[slot, k]
-
-
-@_compile
 def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
     """Take a beam through an edge of its triangle: on to the next one, back from a wall, or out (then True)."""
     code = beyond[edge]
@@ -187,41 +129,6 @@ def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
     whole[slot, EDGE] = edge
     whole[slot, BOUNCES] += 1
     return False
-
-
-@_compile
-def longer(array):
-    """Twice as many slots; plain loops, because numba takes seconds to compile a concatenation."""
-    new = np.empty(2 * array.shape[0], array.dtype)
-    for i in range(array.shape[0]):
-        new[i] = array[i]
-    return new
-
-
-@_compile
-def taller(array):
-    new = np.zeros((2 * array.shape[0], array.shape[1]), array.dtype)
-    for i in range(array.shape[0]):
-        for j in range(array.shape[1]):
-            new[i, j] = array[i, j]
-    return new
-
-
-@_compile
-def larger(corners, room, wide):
-    new = np.empty((room, wide, 5))
-    for i in range(corners.shape[0]):
-        for j in range(corners.shape[1]):
-            for k in range(5):
-                new[i, j, k] = corners[i, j, k]
-    return new
-
-
-@_compile
-def put(polygon, count, corners, slot):
-    for j in range(count):
-        for k in range(5):
-            corners[slot, j, k] = polygon[j, k]
 
 
 @_compile
@@ -334,13 +241,13 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
         if used == room:
             room *= 2
             corners = larger(corners, room, wide)
-            real, whole, heap = taller(real), taller(whole), longer(heap)
+            real, whole, heap = taller(real, room), taller(whole, room), longer(heap, room)
             polygon = corners[slot]
         if count + 1 >= wide:
             wide *= 2
             corners = larger(corners, room, wide)
             polygon = corners[slot]
-            values = longer(values)
+            values = longer(values, wide)
             first, second = np.empty((wide, 5)), np.empty((wide, 5))
         count_first = clip(polygon, count, values, 1.0, vx, vy, first)
         count_second = clip(polygon, count, values, -1.0, vx, vy, second)
@@ -392,7 +299,7 @@ def pieces_of(corners, real, whole, used, width):
         sign = float(whole[slot, SIGN])
         middle = 0.5 * (cuts[0] + cuts[count - 1])
         offset = offset_of(sign, real[slot, TURN], real[slot, TURN_LOW], middle)
-        if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + offset <= PI_HIGH:
+        if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + offset <= PI:
             # no ray can leave downwards: a sliver within rounding of a corner
             whole[slot, LEAF] = 0
         for k in range(count - 1):

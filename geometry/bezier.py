@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats
 from ..errors import WallError
-from .curve import EPS, Curve, Point, as_point, stretch_factors, uniform_parameters
+from ..rounding import EPS
+from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
 # Beyond this distance (in the parameter) between the speed's minimum and [0, 1] the closed formula of a quadratic's
 # length cancels, while 24 Gauss nodes are exact to rounding: the integrand's branch points are that far away too.

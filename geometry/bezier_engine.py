@@ -11,7 +11,8 @@ import math
 import numpy as np
 from numba import njit
 
-from .resolution import EPS, JOINT_ULPS, TANGENT_ULPS
+from ..rounding import EPS
+from .resolution import JOINT_ULPS, TANGENT_ULPS
 
 ROOT_STEPS = 80
 

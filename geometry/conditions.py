@@ -12,8 +12,9 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import WallError
+from ..rounding import EPS
 from .crossings import find_crossing
-from .curve import EPS, Curve
+from .curve import Curve
 from .segment import Segment
 
 # Two pieces join if their ends are this close, relative to the wall's size: what ten digits typed by hand allow.

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .itineraries import EPS, inner, probe
+from ..rounding import EPS
+from .itineraries import inner, probe
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 

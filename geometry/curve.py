@@ -15,8 +15,6 @@ from ..errors import WallError
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
-EPS = float(np.finfo(np.float64).eps)
-
 
 class Curve(ABC):
     """A smooth directed curve in the plane, parametrised over [0, 1]; a value that never changes.

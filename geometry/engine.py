@@ -18,11 +18,12 @@ import math
 import numpy as np
 from numba import njit
 
+from ..rounding import EPS
 from .angle_engine import direction_angle, sine_cosine
 from .arc_engine import arc_incidence, arc_reflect, arc_time, on_arc
 from .bezier_engine import bend_number, bezier_hit, bezier_value
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
-from .resolution import EPS, JOINT_ULPS
+from .resolution import JOINT_ULPS
 from .skips import skip_crossings, skip_hops
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..rounding import UNIT_ROUNDOFF
 
 # Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ULPS = 3.0 + 16.0 * 2.0**-52
-EPS = 2.0**-53
 
 Vector = tuple[int, int]
 
@@ -57,7 +57,7 @@ class ExactPoints:
         first, second = along * place[:, 1], up * place[:, 0]
         cross = first - second
         signs: NDArray[np.int8] = np.sign(cross).astype(np.int8)
-        doubtful = np.abs(cross) <= CROSS_ULPS * EPS * (np.abs(first) + np.abs(second))
+        doubtful = np.abs(cross) <= CROSS_ULPS * UNIT_ROUNDOFF * (np.abs(first) + np.abs(second))
         # products of exact zeros are zero, for all others the sign is not certain
         doubtful &= (first != 0.0) | (second != 0.0)
         for i in doubtful.nonzero()[0].tolist():

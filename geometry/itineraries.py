@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from ..rounding import EPS
 from .engine import ESCAPED, HASH_FACTOR, trace_ray
 
 # Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers
@@ -29,7 +30,6 @@ inner = njit(cache=True, nogil=True, error_model="numpy", **_NO_WRAPPERS)
 # Samples of one row at most; what is then still undecided counts as error.
 MOST_SAMPLES = 1 << 13
 MOST_ROUNDS = 200
-EPS = 2.0**-52
 # Gaps that matter less than this share of the worst one wait for a later round.
 WORST_SHARE = 0.1
 # Labels below this are statuses of rays that did not escape.

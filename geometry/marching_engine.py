@@ -13,8 +13,10 @@ import math
 import numpy as np
 from numba import njit
 
-from .beam_engine import FIRST_WALL, OPENING, longer, offset_of, reduced, taller, wall_lines
 from .double_double import add
+from .growing_tables import longer, taller
+from .triangulation import FIRST_WALL, OPENING
+from .unfolding_engine import offset_of, reduced, wall_lines
 
 # Triangles that a ray may pass for every bounce that it is allowed.
 STEPS_A_BOUNCE = 64
@@ -76,8 +78,8 @@ def march(x, y, triangles, beyond, turn_high, turn_low, entrance, theta, max_int
             if count + 1 >= max_intervals:
                 high = stop
             if used == room:
-                ends, offsets, tags = longer(ends), longer(offsets), taller(tags)
                 room *= 2
+                ends, offsets, tags = longer(ends, room), longer(offsets, room), taller(tags, room)
             offset = offset_of(float(sign), turn, rest, theta[row]) if out else 0.0
             ends[used] = high / stop
             offsets[used] = offset

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..checks import Floats
+from ..rounding import EPS
 from .arc import Arc
-from .curve import EPS, Curve
+from .curve import Curve
 from .segment import Segment
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from itertools import pairwise
 
 from ..checks import finite_number, number_between, whole_number
 from ..errors import InputError
+from ..rounding import EPS
 from .arc import Arc
-from .curve import EPS, Curve
+from .curve import Curve
 from .segment import Segment
 from .wall import Wall
 

@@ -10,7 +10,8 @@ import math
 
 import numpy as np
 
-from .itineraries import EPS, FIRST_LABEL, inner, is_spent, probe
+from ..rounding import EPS
+from .itineraries import FIRST_LABEL, inner, is_spent, probe
 
 ORDERS = (4, 7, 12, 20, 32)
 # Nodes of one row at most.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-EPS = 2.0**-52
 # A joint that a ray meets, or a hit that a joint meets, within this share of the hollow's size is not resolved in
 # double precision: positions carry a few rounding errors of one ulp of the size each.
 JOINT_ULPS = 16.0

@@ -10,8 +10,9 @@ import math
 import numpy as np
 from numba import njit
 
+from ..rounding import EPS
+from .growing_tables import longer
 from .itineraries import (
-    EPS,
     FIRST_LABEL,
     MOST_SAMPLES,
     add_change,
@@ -116,14 +117,6 @@ def march_row(task, goal, rules, least, places, chain, nodes, pieces):
 def room_for_pieces(count):
     """First places, last places and labels."""
     return np.empty(count), np.empty(count), np.empty(count, np.uint64)
-
-
-@inner
-def longer(array, size):
-    """The array with room for so many entries."""
-    bigger = np.empty(size, array.dtype)
-    bigger[: array.shape[0]] = array
-    return bigger
 
 
 @_compile

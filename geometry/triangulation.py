@@ -11,15 +11,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, finite_array, frozen
 from ..errors import InputError, WallError
-from .exact_points import EPS, ExactPoints
+from ..rounding import UNIT_ROUNDOFF
+from .exact_points import ExactPoints
 
 Integers = NDArray[np.int64]
 
 # Codes in `Triangulation.beyond`: at least 0 another triangle's edge; else the opening, or `FIRST_WALL - edge`.
 OPENING = -1
 FIRST_WALL = -2
-# Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 8 EPS.
-PARALLEL = 32.0 * EPS
+# Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 2^-51.
+PARALLEL = 32.0 * UNIT_ROUNDOFF
 
 
 @dataclass(frozen=True, eq=False)

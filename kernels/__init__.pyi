@@ -24,18 +24,10 @@ from .functional import air_resistance as air_resistance
 from .functional import resistance as resistance
 from .hollow_search import BestHollow as BestHollow
 from .hollow_search import best_hollow as best_hollow
-from .ideal import (
-    lambertian as lambertian,
-)
-from .ideal import (
-    maxwell as maxwell,
-)
-from .ideal import (
-    retroreflection as retroreflection,
-)
-from .ideal import (
-    specular as specular,
-)
+from .ideal import lambertian as lambertian
+from .ideal import maxwell as maxwell
+from .ideal import retroreflection as retroreflection
+from .ideal import specular as specular
 from .interval_exchange import IntervalExchangeLaw as IntervalExchangeLaw
 from .involution import InvolutionLaw as InvolutionLaw
 from .law import BranchLaw as BranchLaw
@@ -63,15 +55,9 @@ from .tensor import TensorBasis as TensorBasis
 from .triangular import TriangularTeethLaw as TriangularTeethLaw
 from .two_mirror_hollow import TwoMirrorHollow as TwoMirrorHollow
 from .two_mirror_hollow import two_mirrors as two_mirrors
-from .wall_convergence import (
-    Convergence as Convergence,
-)
-from .wall_convergence import (
-    ConvergenceStep as ConvergenceStep,
-)
-from .wall_convergence import (
-    study_convergence as study_convergence,
-)
+from .wall_convergence import Convergence as Convergence
+from .wall_convergence import ConvergenceStep as ConvergenceStep
+from .wall_convergence import study_convergence as study_convergence
 from .wall_law import WallLaw as WallLaw
 from .weighted_sum import Combination as Combination
 from .weighted_sum import mixture as mixture

@@ -11,6 +11,8 @@ from ..checks import Floats
 from .arc_lines import outgoing_lines
 from .measure import gauss_on_intervals, gauss_rule
 from .panels import Panels
+from .polynomial_moments import legendre_moments
+from .sorted_edges import cell_among
 
 if TYPE_CHECKING:
     from .circular import CircularArcLaw
@@ -59,8 +61,8 @@ class ArcMeans:
             found[part] = self._integrals(lines.offset[part], lines.slope[part], lines.lower[part], lines.upper[part])
         known = np.flatnonzero(single)
         angle = lines.angle[known]
-        here = self._moments(angle[:, None], self._cell(angle), share[known, None])
-        found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[self._cell(angle)])
+        here = self._moments(angle[:, None], cell_among(self.edges, angle), share[known, None])
+        found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[cell_among(self.edges, angle)])
         total = np.stack([lines.of_rows(column, theta.size) for column in found.T], axis=1)
         left = lines.of_rows(np.where(lines.rest, share, 0.0), theta.size)
         return total / whole[:, None], left / whole * self._spread(most_hits)
@@ -71,7 +73,7 @@ class ArcMeans:
         near = xi + 2.0 * xi / most_hits * np.linspace(-1.0, 1.0, SPREAD_PROBES)
         values = []
         for angle in (near, np.pi - near):
-            cell = self._cell(angle)
+            cell = cell_among(self.edges, angle)
             moments = self._moments(angle[:, None], cell, np.ones((angle.size, 1)))
             values.append(np.einsum("pd,pdk->pk", moments, self._polynomials[cell]))
         return float(max(np.abs(value - value[SPREAD_PROBES // 2]).max() for value in values))
@@ -79,7 +81,7 @@ class ArcMeans:
     def _integrals(self, offset: Floats, slope: Floats, lower: Floats, upper: Floats) -> Floats:
         """The integrals of v(offset + slope delta) sin(delta)/2 over (lower, upper), shape (pieces, k)."""
         ends = np.clip(np.stack([offset + slope * lower, offset + slope * upper]), 0.0, np.pi)
-        cell = self._cell(ends)
+        cell = cell_among(self.edges, ends)
         hits = np.abs(0.5 * slope).astype(np.intp)
         table = self._up_to(int(hits.max(initial=1)))[hits - 1, cell]
         angle, weight = gauss_on_intervals(self.edges[cell].ravel(), ends.ravel(), self._orders)
@@ -105,16 +107,8 @@ class ArcMeans:
             self._tables[most] = np.concatenate([empty, np.cumsum(whole, axis=1)], axis=1)
         return self._tables[most]
 
-    def _cell(self, angle: Floats) -> NDArray[np.intp]:
-        return np.clip(np.searchsorted(self.edges, angle, side="right") - 1, 0, len(self.edges) - 2)
-
     def _moments(self, angle: Floats, cell: NDArray[np.intp], weight: Floats) -> Floats:
-        """Sums over the nodes, shape (cells, nodes), of the weights times the Legendre polynomials of these cells."""
+        """Of nodes of shape (cells, nodes) with their weights: of these cells' polynomials, (cells, degree + 1)."""
         low, high = self.edges[cell, None], self.edges[cell + 1, None]
         local = (2.0 * angle - low - high) / (high - low)
-        before, current = np.ones_like(local), local
-        found = np.empty((len(local), self._polynomials.shape[1]))
-        for k in range(found.shape[1]):
-            found[:, k] = np.einsum("pq,pq->p", weight, before)
-            before, current = current, ((2 * k + 3) * local * current - (k + 1) * before) / (k + 2)
-        return found
+        return legendre_moments(local, weight, self._polynomials.shape[1] - 1).T

@@ -14,6 +14,7 @@ from .panels import Panels
 from .products import add_blocks, cell_index
 from .ragged_lists import ragged
 from .reflection import is_mirror_symmetric, reflection_matrix
+from .sorted_edges import edges_inside
 from .stable_angles import flipped, kept_inside
 
 # Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
@@ -80,11 +81,9 @@ def _strips(half_angle: float, edges: Floats) -> _Strips:
         along.append(np.stack((1.0 - 2.0 * whole.hits * side[0], np.pi - 2.0 * whole.hits * side[1])))
     for slope, offset in along:
         ends = slope * whole.low + offset, slope * whole.high + offset
-        first = np.searchsorted(edges, np.minimum(*ends), side="right")
-        number = np.maximum(np.searchsorted(edges, np.maximum(*ends), side="left") - first, 0)
-        owner, place = ragged(number)
+        owner, edge = edges_inside(edges, np.minimum(*ends), np.maximum(*ends))
         with np.errstate(divide="ignore", invalid="ignore"):
-            met = (edges[first[owner] + place] - offset[owner]) / slope[owner]
+            met = (edge - offset[owner]) / slope[owner]
         inside = (met > whole.low[owner]) & (met < whole.high[owner])
         owners.append(owner[inside])
         angles.append(met[inside])

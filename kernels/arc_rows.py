@@ -10,7 +10,9 @@ from ..checks import Floats
 from .arc_lines import outgoing_lines
 from .measure import SINE, gauss_on_intervals
 from .panels import Panels
+from .polynomial_moments import legendre_moments
 from .ragged_lists import ragged
+from .sorted_edges import cell_among
 
 if TYPE_CHECKING:
     from .circular import CircularArcLaw
@@ -34,7 +36,7 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
     ray, slope, offset, lower, upper = lines[:5]
     single = lines.single
     ends = np.sort(np.stack([offset + slope * lower, offset + slope * upper]), axis=0)
-    first = np.clip(np.searchsorted(panels.edges, ends[0], side="right") - 1, 0, len(panels.edges) - 2)
+    first = cell_among(panels.edges, ends[0])
     last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
     gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
     owner, place = ragged(np.where(single, 0, last - first + 1))
@@ -46,12 +48,10 @@ def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: in
         scale, shift = 2.0 * slope[own] / (high - low), (2.0 * offset[own] - low - high) / (high - low)
         _add_moments(gathered, near, far, scale, shift, ray[own] * (len(panels.edges) - 1) + panel, panels.degree)
     angle = lines.angle[single]
-    panel = np.clip(np.searchsorted(panels.edges, angle, side="right") - 1, 0, len(panels.edges) - 2)
-    low, high = panels.edges[panel], panels.edges[panel + 1]
-    local = np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), panels.degree)
+    panel = cell_among(panels.edges, angle)
     cell = ray[single] * (len(panels.edges) - 1) + panel
-    for moment, values in zip(gathered, local.T, strict=True):
-        moment += np.bincount(cell, weights=lines.mass[single] * values, minlength=moment.size)
+    for column, values in zip(gathered, panels.legendre(angle, panel).T, strict=True):
+        column += np.bincount(cell, weights=lines.mass[single] * values, minlength=column.size)
     total = lines.of_rows(lines.mass, theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
     left = lines.of_rows(np.where(lines.rest, lines.mass, 0.0), theta.size)
@@ -71,8 +71,5 @@ def _add_moments(
         delta, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(near[chosen], far[chosen], nodes))
         weight = weight * SINE.density(delta)
         local = scale[chosen, None] * delta + shift[chosen, None]
-        before, current = np.ones_like(local), local
-        for k in range(degree + 1):
-            moment = np.einsum("ij,ij->i", weight, before)
-            gathered[k] += np.bincount(cell[chosen], weights=moment, minlength=gathered.shape[1])
-            before, current = current, ((2 * k + 3) * local * current - (k + 1) * before) / (k + 2)
+        for column, moment in zip(gathered, legendre_moments(local, weight, degree), strict=True):
+            column += np.bincount(cell[chosen], weights=moment, minlength=column.size)

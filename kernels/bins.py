@@ -12,6 +12,7 @@ from ..checks import Floats, finite_array, frozen, whole_number
 from ..errors import InputError
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
+from .sorted_edges import cell_among
 
 # Smooth functions times the weight are integrated to rounding by this many Gauss nodes on a cell: the error is about
 # (width / 4)^(2 nodes) / (2 nodes)!, below 1e-17 for widths up to 1 and up to pi.
@@ -102,8 +103,7 @@ class Bins(Basis):
         """Number of the bin that holds each angle; bins contain their left edges, and the last one pi."""
         angle = np.asarray(angle, dtype=np.float64)
         if not self._equal or self._measure != SINE:
-            found = np.searchsorted(self._edges, angle, side="right") - 1
-            return np.asarray(np.clip(found, 0, self.size - 1), dtype=np.int64)
+            return cell_among(self._edges, angle)
         # Equal measure: the bin is known up to rounding from the measure; compare with its edges, which decide.
         guess = (np.sin(0.5 * angle) ** 2 * self.size).astype(np.int64)
         guess = np.minimum(guess, self.size - 1)

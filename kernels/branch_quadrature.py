@@ -12,6 +12,7 @@ from .basis import Basis
 from .composition import Composition, Power
 from .measure import gauss_on_intervals, gauss_rule
 from .products import add_products
+from .sorted_edges import edges_inside
 from .specular_frame import SpecularFrame
 from .weighted_sum import Combination
 
@@ -107,11 +108,7 @@ def _preimages(law: Branching, kinks: Floats, edges: Floats) -> Floats:
     piece, slot = np.nonzero(used)
     sign, offset = sign[piece, slot], offset[piece, slot]
     ends = sign * low[piece] + offset, sign * high[piece] + offset
-    first = np.searchsorted(edges, np.minimum(*ends), side="right")
-    last = np.searchsorted(edges, np.maximum(*ends), side="left")
-    number = np.maximum(last - first, 0)
-    owner = np.repeat(np.arange(piece.size), number)
-    edge = edges[first[owner] + np.arange(owner.size) - np.repeat(np.cumsum(number) - number, number)]
+    owner, edge = edges_inside(edges, np.minimum(*ends), np.maximum(*ends))
     source = sign[owner] * (edge - offset[owner])
     return np.asarray(source[(source > low[piece][owner]) & (source < high[piece][owner])])
 

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats, angles, number_between
 from .law import AngleFunction, DrivenLaw, entry_points
 from .measure import SINE, gauss_on_intervals
+from .ragged_lists import ragged
 from .stable_angles import flipped, kept_inside, mixed_arccos
 
 # Rows jump where the number of hits N changes. Each of the first intervals gets its own Gauss rule; beyond MOST_HITS
@@ -177,8 +178,7 @@ class CircularArcLaw(DrivenLaw):
             most = np.minimum(np.ceil((total - low) / (2.0 * low)), most_hits)
         most = np.maximum(most, fewest)
         pieces = np.where((high > low) | alone, most - fewest + 2.0, 0.0).astype(np.intp)
-        owner = np.repeat(np.arange(base.size), pieces)
-        order = np.arange(owner.size) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+        owner, order = ragged(pieces)
         hits = np.asarray(fewest[owner] + order, dtype=np.float64)
         # The last piece of every row holds all the rays with more hits, at the mean of their outgoing angles.
         rest = order == pieces[owner] - 1

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats, angles, frozen
 from ..errors import InputError
 from .measure import SINE
+from .ragged_lists import ragged
 from .stable_angles import kept_inside
 
 Whole = NDArray[np.int64]
@@ -219,7 +220,7 @@ class IsometryTable:
         whole = np.bincount(query, weights=total, minlength=flat.size)
         share = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
         count = np.bincount(query, minlength=flat.size)
-        slot = np.arange(key.size) - np.repeat(np.cumsum(count) - count, count)
+        _, slot = ragged(count)
         slots = int(count.max(initial=1))
         filled = np.zeros((flat.size, slots))
         which = np.zeros((flat.size, slots), dtype=np.int64)
@@ -245,8 +246,8 @@ class IsometryTable:
         step = max(CHUNK // max(int(size.max(initial=1)), 1), 1)
         for begin in range(0, theta.size, step):
             part = slice(begin, begin + step)
-            query = np.repeat(np.arange(begin, min(begin + step, theta.size)), size[part])
-            place = np.arange(query.size) - np.repeat(np.cumsum(size[part]) - size[part], size[part])
+            owner, place = ragged(size[part])
+            query = begin + owner
             piece = members[first[bucket[query]] + place]
             at = theta[query]
             # a kink belongs to the piece on its right
@@ -271,9 +272,8 @@ class IsometryTable:
         buckets = int(np.clip(ENTRIES_PER_PIECE * self.low.size * np.pi / max(width, 1e-300), 1, 2**20))
         left = np.clip((self.low * (buckets / np.pi)).astype(np.int64) - 1, 0, buckets - 1)
         right = np.clip((self.high * (buckets / np.pi)).astype(np.int64) + 1, 0, buckets - 1)
-        count = right - left + 1
-        piece = np.repeat(np.arange(left.size), count)
-        bucket = left[piece] + np.arange(piece.size) - np.repeat(np.cumsum(count) - count, count)
+        piece, place = ragged(right - left + 1)
+        bucket = left[piece] + place
         order = np.argsort(bucket, kind="stable")
         first = np.concatenate([[0], np.cumsum(np.bincount(bucket, minlength=buckets))])
         return np.asarray(first, dtype=np.int64), np.asarray(piece[order], dtype=np.int64)

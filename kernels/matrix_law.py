@@ -12,6 +12,7 @@ from ..errors import InputError
 from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw
 from .law import AngleFunction, Frame, set_facts
 from .measure import SINE
+from .sorted_edges import cell_among
 from .stable_angles import kept_inside
 
 # Rows that were divided by their sum add up to 1 within a few roundings; rows of a matrix whose flux was symmetrised
@@ -98,8 +99,8 @@ class MatrixLaw(DensityLaw):
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
-        target = self._bin(theta_out)
-        return np.asarray(self.array[self._bin(theta), target] * SINE.density(theta_out) / self._masses[target])
+        source, target = cell_among(self.edges, theta), cell_among(self.edges, theta_out)
+        return np.asarray(self.array[source, target] * SINE.density(theta_out) / self._masses[target])
 
     def panels(self, theta: Floats) -> Floats:
         """The edges of the bins."""
@@ -117,22 +118,18 @@ class MatrixLaw(DensityLaw):
             )
         return MatrixLaw(_OnBins(reverse, self.edges, self.frame))
 
-    def _bin(self, theta: ArrayLike) -> np.ndarray[tuple[int, ...], np.dtype[np.intp]]:
-        place = np.searchsorted(self.edges, np.asarray(theta, dtype=np.float64), side="right") - 1
-        return np.clip(place, 0, self._masses.size - 1)
-
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         angle, weight = SINE.quadrature(self.edges, GAUSS_NODES)
         value = np.asarray(function(angle), dtype=np.float64)
         shape = (self._masses.size, GAUSS_NODES)
         weight = weight.reshape(shape) / weight.reshape(shape).sum(axis=1, keepdims=True)
         means = np.einsum("ij,ij...->i...", weight, value.reshape(shape + value.shape[1:]))
-        return np.asarray(np.tensordot(self.array, means, axes=1)[self._bin(theta)])
+        return np.asarray(np.tensordot(self.array, means, axes=1)[cell_among(self.edges, theta)])
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         cumulative = np.cumsum(self.array, axis=1)
         cumulative /= cumulative[:, -1:]
-        start, size = self._bin(theta), self._masses.size
+        start, size = cell_among(self.edges, theta), self._masses.size
         # One search in all rows at once: row i occupies the values from i to i + 1, which costs log2(n) of 53 bits.
         rows = cumulative + np.arange(size)[:, None]
         place = np.searchsorted(rows.ravel(), start + rng.random(theta.shape), side="right") - size * start

@@ -19,6 +19,7 @@ from .law import BranchLaw, DrivenLaw, Law
 from .least_resistance import LeastResistanceLaw
 from .measure import gauss_on_intervals, gauss_rule
 from .row_transport import Distributions
+from .sorted_edges import cell_among
 from .specular_frame import SpecularFrame
 from .stable_angles import kept_inside
 from .wall_law import WallLaw
@@ -156,7 +157,7 @@ def _density_rows(law: DensityLaw, theta: Floats, edges: Floats) -> Floats:
         row, low, high, _ = row_intervals(law, edges, theta)
         angle, weight = (part.reshape(-1, NODES) for part in gauss_on_intervals(low, high, NODES))
         mass = (law.density(theta[row, None], angle) * weight).sum(axis=1)
-        cell = np.clip(np.searchsorted(edges, 0.5 * (low + high), side="right") - 1, 0, cells - 1)
+        cell = cell_among(edges, 0.5 * (low + high))
         masses = np.bincount(row * cells + cell, weights=mass, minlength=theta.size * cells).reshape(-1, cells)
     below = _summed(masses)
     return np.asarray(below / below[:, -1:])
@@ -167,7 +168,7 @@ def _traced_rows(wall: object, theta: Floats, edges: Floats) -> Parts:
     rows = WallRows(wall, 0, edges[1:-1])(theta, ROW_TOLERANCE)  # type: ignore[arg-type]
     owner = np.repeat(np.arange(theta.size), np.diff(rows.starts))
     level = rows.nodes == (np.pi - theta)[owner]
-    cell = np.clip(np.searchsorted(edges, rows.nodes, side="right") - 1, 0, edges.size - 2)
+    cell = cell_among(edges, rows.nodes)
     count = edges.size - 1
     scattered = np.where(level, 0.0, rows.weights)
     masses = np.bincount(owner * count + cell, weights=scattered, minlength=theta.size * count).astype(np.float64)

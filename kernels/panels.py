@@ -130,7 +130,12 @@ class Panels(Basis):
         """The panel of each angle and the values of its own functions there, shape ``angle.shape + (degree + 1,)``."""
         angle = np.asarray(angle, dtype=np.float64)
         panel = self._cells.index(angle)
-        return panel, np.einsum("...k,...ki->...i", self._local_legendre(angle, panel), self._coefficients[panel])
+        return panel, np.einsum("...k,...ki->...i", self.legendre(angle, panel), self._coefficients[panel])
+
+    def legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
+        """The Legendre polynomials of the given panels at the angles, shape ``angle.shape + (degree + 1,)``."""
+        low, high = self.edges[panel], self.edges[panel + 1]
+        return np.asarray(np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), self.degree))
 
     def of_legendre(self, moments: Floats) -> Floats:
         """Integrals of the functions, shape (..., size), from those of the panels' Legendre polynomials.
@@ -159,17 +164,13 @@ class Panels(Basis):
         merged = self._cells.coarsened()
         return None if merged is None else (Panels(merged[0].edges, 0, self.measure.name), merged[1])
 
-    def _local_legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
-        low, high = self.edges[panel], self.edges[panel + 1]
-        return np.asarray(np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), self.degree))
-
     def _orthonormalise(self) -> Floats:
         """Per panel the upper triangular matrix that turns Legendre polynomials into orthonormal functions."""
         angle, weight = gauss_rule(self.edges, self.nodes_per_interval)
         shape = (self._cells.size, self.nodes_per_interval)
         panel = np.repeat(np.arange(shape[0]), shape[1])
         root = np.sqrt(weight * self.measure.density(angle))
-        table = (root[:, None] * self._local_legendre(angle, panel)).reshape((*shape, self.degree + 1))
+        table = (root[:, None] * self.legendre(angle, panel)).reshape((*shape, self.degree + 1))
         triangle = np.linalg.qr(table, mode="r")
         inverse = np.linalg.inv(triangle)
         signs = np.sign(np.diagonal(triangle, axis1=-2, axis2=-1))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..checks import Floats
 from .basis import Basis
 from .panels import Panels
+from .sorted_edges import cell_among
 
 # Values of basis functions held at a time.
 CHUNK = 2**21
@@ -32,10 +33,7 @@ def _blas() -> Any:
 def cell_index(basis: Basis, angle: Floats) -> NDArray[np.int64]:
     """The cell of each angle in a partition of (0, pi)."""
     index = getattr(basis, "index", None)
-    if index is not None:
-        return np.asarray(index(angle), dtype=np.int64)
-    found = np.searchsorted(basis.edges, angle, side="right") - 1
-    return np.asarray(np.clip(found, 0, basis.size - 1), dtype=np.int64)
+    return cell_among(basis.edges, angle) if index is None else np.asarray(index(angle), dtype=np.int64)
 
 
 def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats) -> None:

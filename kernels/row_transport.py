@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..checks import Floats
+from .sorted_edges import cell_among
 
 # Ends of a piece that agree to this share are integrated by the value in the middle: the divided difference below
 # would lose the other digits, and the neglected term is of the order of the square.
@@ -47,7 +48,7 @@ class Distributions:
             corners = np.broadcast_to(edges, cumulative.shape)
             return cls(corners, cumulative / cumulative[:, -1:])
         rows, count = cumulative.shape
-        cell = np.clip(np.searchsorted(edges, position, side="right") - 1, 0, count - 2)
+        cell = cell_among(edges, position)
         share = (position - edges[cell]) / (edges[cell + 1] - edges[cell])
         low = np.take_along_axis(cumulative, cell, axis=1)
         at_atom = low + share * (np.take_along_axis(cumulative, cell + 1, axis=1) - low)

@@ -15,6 +15,7 @@ from .panels import Panels
 from .periodic_tail import crevice_nodes, first_crossing
 from .products import add_products, cell_index
 from .rectangular import crevice_pieces
+from .sorted_edges import edges_inside
 from .stable_angles import kept_inside
 
 # Products of two functions of a basis times a sinusoid, on a piece of width w, vary like exp(n w) with n the
@@ -77,10 +78,7 @@ def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[
         ends = sign * low + offset, sign * high + offset
         bounds.append((np.minimum(*ends), np.maximum(*ends), sign, offset))
     for left, right, sign, offset in bounds:
-        first = np.searchsorted(edges, left, side="right")
-        number = np.maximum(np.searchsorted(edges, right, side="left") - first, 0)
-        place = np.repeat(np.arange(piece.size), number)
-        edge = edges[first[place] + np.arange(place.size) - np.repeat(np.cumsum(number) - number, number)]
+        place, edge = edges_inside(edges, left, right)
         at = sign[place] * (edge - offset[place])
         owner.append(piece[place])
         cut.append(np.clip(at, low[place], high[place]))

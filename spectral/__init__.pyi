@@ -15,24 +15,12 @@ from .essential import EssentialEdge as EssentialEdge
 from .essential import essential_edge as essential_edge
 from .fitted_order import FittedOrder as FittedOrder
 from .fitted_order import fit_order as fit_order
-from .gap import (
-    SpectralGap as SpectralGap,
-)
-from .gap import (
-    gaps_in_both_conventions as gaps_in_both_conventions,
-)
-from .gap import (
-    spectral_gap as spectral_gap,
-)
-from .laplacian import (
-    LaplacianComparison as LaplacianComparison,
-)
-from .laplacian import (
-    laplacian_comparison as laplacian_comparison,
-)
-from .laplacian import (
-    mean_squared_slope as mean_squared_slope,
-)
+from .gap import SpectralGap as SpectralGap
+from .gap import gaps_in_both_conventions as gaps_in_both_conventions
+from .gap import spectral_gap as spectral_gap
+from .laplacian import LaplacianComparison as LaplacianComparison
+from .laplacian import laplacian_comparison as laplacian_comparison
+from .laplacian import mean_squared_slope as mean_squared_slope
 from .leading import LeadingEigenvalues as LeadingEigenvalues
 from .leading import leading_eigenvalues as leading_eigenvalues
 from .machine import Machine as Machine

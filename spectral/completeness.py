@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..checks import Floats
+from ..rounding import UNIT_ROUNDOFF
 
-UNIT_ROUNDOFF = 0.5 * float(np.finfo(np.float64).eps)
 # Roundings of an entry of the shifted matrix, beside one for each vector that is moved: its product with the sign, the
 # shift, and two products and sums of the deflation.
 ENTRY_ROUNDINGS = 6

@@ -12,7 +12,7 @@ from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..estimates import Estimate
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
-from .parity import Parity, outermost_by_parity
+from .parity import Parity, halves, outermost_by_parity
 from .sampling import NORMAL_95, sampling_errors, sampling_quantile
 from .two_grids import two_grid_changes
 
@@ -199,7 +199,7 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
     matrix = matrix_of(kernel, **discretisation)
     check_reversible(matrix)
     constant = np.asarray(matrix.basis.constant)
-    rest, names = outermost_by_parity(matrix, constant, max(k - 1, 1))
+    rest, names = outermost_by_parity(matrix.symmetric, halves(matrix.basis, matrix), constant, max(k - 1, 1))
     chosen = np.sort(np.argsort(-np.abs(rest.values), kind="stable")[: k - 1])
     image = 0.5 * (matrix.symmetric @ constant + constant @ matrix.symmetric)
     first = float(constant @ image)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,12 @@ from ..estimates import ErrorKind
 from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
 from ..kernels.measure import SINE
 from ..kernels.panel_rows import integrates_panels, traces_rows
+from ..rounding import EPS
 from .adapted_panels import adapted_trials
-from .deflation import off_constants
 from .eigenvalues import check_reversible
-from .parity import Parity, halves_of
+from .parity import Parity, halves, outermost_by_parity
 from .separation import Separation, rest_of_spectrum
-from .trials import EPS, Residuals, images, residuals
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
+from .trials import Residuals, images, residuals
 
 Label = Literal["indexed", "contains-spectrum"]
 
@@ -217,9 +214,10 @@ def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Fl
     """Pairs of largest modulus, descending, constants first, with their parities; what comes next with its residual."""
     symmetric = _galerkin(law, basis, tolerance)
     constant = np.asarray(basis.constant)
-    rest, inner, names = _off_constants(symmetric, constant, halves_of(basis) if law.mirror_symmetric else None)
+    found, names = outermost_by_parity(symmetric, halves(basis, law), constant, len(symmetric), "largest")
+    rest, inner = found.values, found.vectors
     order = np.argsort(-np.abs(rest), kind="stable")
-    chosen = np.sort(order[: k - 1])[::-1]
+    chosen = np.sort(order[: k - 1])
     values, vectors = np.append(1.0, rest[chosen]), np.column_stack([constant, inner[:, chosen]])
     first: Parity = "even" if law.mirror_symmetric and "none" not in names else "none"
     listed = (first, *(names[place] for place in chosen))
@@ -233,23 +231,6 @@ def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Fl
 def _reach(after: Residuals) -> float:
     """Up to what modulus the intervals of these functions reach."""
     return float(np.max(np.abs(after.quotients) + after.norms))
-
-
-def _off_constants(
-    symmetric: Floats, constant: Floats, split: tuple[csr_array[Any], csr_array[Any]] | None
-) -> tuple[Floats, Floats, list[Parity]]:
-    """Eigenvalues, ascending, and vectors off the constants; of each parity by themselves where there are parities."""
-    if split is None:
-        values, vectors = off_constants(symmetric, constant)
-        unknown: Parity = "none"
-        return values, vectors, [unknown] * len(values)
-    even, odd = split
-    values, vectors = off_constants(np.asarray(even.T @ symmetric @ even), np.asarray(even.T @ constant))
-    odd_values, odd_vectors = np.linalg.eigh(np.asarray(odd.T @ symmetric @ odd))
-    order = np.argsort(np.concatenate([values, odd_values]), kind="stable")
-    names: list[Parity] = ["even" if place < len(values) else "odd" for place in order]
-    everything = np.concatenate([even @ vectors, odd @ odd_vectors], axis=1)
-    return np.concatenate([values, odd_values])[order], everything[:, order], names
 
 
 def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..rounding import EPS
 from .completeness import Deflated, margin_below, norm_beyond
 from .deflation import off_constants
 
 Which = Literal["largest", "moduli"]
 _Pairs = tuple[Floats, Floats]
 
-EPS = float(np.finfo(np.float64).eps)
 # Below this size, and for more than this share of the spectrum, LAPACK's complete solver takes no longer.
 SMALL, LARGEST_SHARE = 512, 1.0 / 24.0
 # Relative accuracy that is asked of Lanczos; and the vectors and restarts that it may take: some hundred products,

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from ..kernels import Law
 from ..kernels.algebra import Rules, fold
 from ..kernels.ideal import IsometryLaw, LambertianLaw
-
-EPS = float(np.finfo(np.float64).eps)
+from ..rounding import EPS
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,15 @@ import numpy as np
 from ..checks import Floats, finite_array, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..kernels import KernelMatrix
+from ..rounding import EPS
 from .deflation import symmetric_half
 from .extremes import Extremes, outermost
-from .parity import Parity, outermost_by_parity
+from .parity import Parity, halves, outermost_by_parity
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import LinearOperator, SuperLU
 
-EPS = float(np.finfo(np.float64).eps)
 # Vectors carried beyond those asked for: the block converges as fast as the first value beyond it is far away.
 GUARD = 12
 # Of the shift beyond the largest eigenvalue that a matrix of norm 1 can have: a solve then loses half of the digits
@@ -118,7 +118,7 @@ def leading_eigenvalues(
     whole_number("k", k, 1)
     source = np.random.default_rng(0) if rng is None else rng
     if isinstance(matrix, KernelMatrix):
-        found, parity = outermost_by_parity(matrix, None, k, "largest")
+        found, parity = outermost_by_parity(matrix.symmetric, halves(matrix.basis, matrix), None, k, "largest")
         return _listed(found, parity if "none" not in parity else ())
     if isinstance(matrix, LinearOperator):
         return _matrix_free(matrix, k, source)

@@ -16,7 +16,9 @@ from .extremes import Extremes, Which, counted_from_above, outermost, wanted
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-    from ..kernels import Basis, KernelMatrix
+    from ..kernels import Basis, KernelMatrix, Law
+
+    Halves = tuple[csr_array[Any], csr_array[Any]]
 
 Parity = Literal["even", "odd", "none"]
 
@@ -24,64 +26,18 @@ Parity = Literal["even", "odd", "none"]
 ENTRY = 0.5
 
 
-def halves(matrix: KernelMatrix) -> tuple[csr_array[Any], csr_array[Any]] | None:
-    """Orthonormal even and odd functions, sparse of shapes (n, even) and (n, odd), of a mirror-symmetric law's basis.
+def halves(basis: Basis, law: Law | KernelMatrix) -> Halves | None:
+    """Orthonormal even and odd functions of a mirror-symmetric law's basis: sparse, shapes (n, even) and (n, odd).
 
-    None where the law is not known to be symmetric, or the basis is not.
+    None where the law is not known to be mirror-symmetric, or where the flip does not keep the basis.
 
     Examples
     --------
-    >>> from asperity.kernels import Legendre, discretise, lambertian
-    >>> [half.shape for half in halves(discretise(lambertian(), Legendre(5)))]
+    >>> from asperity.kernels import Legendre, lambertian
+    >>> [half.shape for half in halves(Legendre(5), lambertian())]
     [(5, 3), (5, 2)]
     """
-    return halves_of(matrix.basis) if matrix.mirror_symmetric else None
-
-
-def outermost_by_parity(
-    matrix: KernelMatrix, constant: Floats | None, k: int, which: Which = "moduli"
-) -> tuple[Extremes, tuple[Parity, ...]]:
-    """`outermost` of the symmetric half of a matrix, with the parities of the eigenvectors.
-
-    Of a mirror-symmetric law, even and odd functions do not mix: two matrices of half the size take a quarter of the
-    work, and what a sampled matrix mixes is left out as the noise that it is.
-    """
-    split = halves(matrix)
-    if split is None:
-        found = outermost(symmetric_half(matrix.symmetric), constant, k, which)
-        nothing: Parity = "none"
-        return found, (nothing,) * len(found.values)
-    parts: list[tuple[Extremes, csr_array[Any], Parity]] = []
-    names: tuple[Parity, Parity] = ("even", "odd")
-    for half, name in zip(split, names, strict=True):
-        if half.shape[1]:
-            inside = None if constant is None or name == "odd" else np.asarray(half.T @ constant)
-            array = compressed(matrix.symmetric, half.T.tocsr())
-            parts.append((outermost(array, inside, k, which), half, name))
-    return _merged(parts, k, which)
-
-
-def _merged(
-    parts: list[tuple[Extremes, csr_array[Any], Parity]], k: int, which: Which
-) -> tuple[Extremes, tuple[Parity, ...]]:
-    """The k wanted ones of both halves: each of these lists as many of its own."""
-    values = np.concatenate([part.values for part, _, _ in parts])
-    vectors = np.concatenate([half @ part.vectors for part, half, _ in parts], axis=1)
-    residuals = np.concatenate([part.residuals for part, _, _ in parts])
-    errors = np.concatenate([part.errors for part, _, _ in parts])
-    names = np.repeat([name for _, _, name in parts], [len(part.values) for part, _, _ in parts])
-    order = np.argsort(-values, kind="stable")
-    order = order[wanted(values[order], k, which)]
-    methods = dict.fromkeys(part.method for part, _, _ in parts)
-    values = values[order]
-    top = counted_from_above(values, which)
-    found = Extremes(values, vectors[:, order], top, residuals[order], errors[order], "; ".join(methods))
-    return found, tuple(names[order].tolist())
-
-
-def halves_of(basis: Basis) -> tuple[csr_array[Any], csr_array[Any]] | None:
-    """The even and the odd functions of a basis; None where the flip does not keep it."""
-    if not is_mirror_symmetric(basis):
+    if not law.mirror_symmetric or not is_mirror_symmetric(basis):
         return None
     here = np.arange(basis.size)
     if isinstance(basis, Bins):
@@ -106,3 +62,42 @@ def halves_of(basis: Basis) -> tuple[csr_array[Any], csr_array[Any]] | None:
         return csr_array((entries, (rows, where)), shape=(basis.size, len(single) + len(first)))
 
     return columns((image == here) & (sign > 0.0), 1.0), columns((image == here) & (sign < 0.0), -1.0)
+
+
+def outermost_by_parity(
+    array: Floats, split: Halves | None, constant: Floats | None, k: int, which: Which = "moduli"
+) -> tuple[Extremes, tuple[Parity, ...]]:
+    """`outermost` of the symmetric half of a matrix, with the parities of the eigenvectors.
+
+    Of a mirror-symmetric law, even and odd functions do not mix: two matrices of half the size take a quarter of the
+    work, and what a sampled matrix mixes is left out as the noise that it is. ``split`` is what `halves` gives.
+    """
+    if split is None:
+        found = outermost(symmetric_half(array), constant, k, which)
+        nothing: Parity = "none"
+        return found, (nothing,) * len(found.values)
+    parts: list[tuple[Extremes, csr_array[Any], Parity]] = []
+    names: tuple[Parity, Parity] = ("even", "odd")
+    for half, name in zip(split, names, strict=True):
+        if half.shape[1]:
+            inside = None if constant is None or name == "odd" else np.asarray(half.T @ constant)
+            parts.append((outermost(compressed(array, half.T.tocsr()), inside, k, which), half, name))
+    return _merged(parts, k, which)
+
+
+def _merged(
+    parts: list[tuple[Extremes, csr_array[Any], Parity]], k: int, which: Which
+) -> tuple[Extremes, tuple[Parity, ...]]:
+    """The k wanted ones of both halves: each of these lists as many of its own."""
+    values = np.concatenate([part.values for part, _, _ in parts])
+    vectors = np.concatenate([half @ part.vectors for part, half, _ in parts], axis=1)
+    residuals = np.concatenate([part.residuals for part, _, _ in parts])
+    errors = np.concatenate([part.errors for part, _, _ in parts])
+    names = np.repeat([name for _, _, name in parts], [len(part.values) for part, _, _ in parts])
+    order = np.argsort(-values, kind="stable")
+    order = order[wanted(values[order], k, which)]
+    methods = dict.fromkeys(part.method for part, _, _ in parts)
+    values = values[order]
+    top = counted_from_above(values, which)
+    found = Extremes(values, vectors[:, order], top, residuals[order], errors[order], "; ".join(methods))
+    return found, tuple(names[order].tolist())

@@ -14,7 +14,7 @@ from .essential import EssentialEdge
 
 # Eigenvalues that a gap carries along in its spectrum.
 EIGENVALUES = 4
-DEGREES, SAMPLED_DEGREE = (12, 24, 48, 96), 48
+DEGREES = (12, 24, 48, 96)
 # Panels for one circular arc, whose matrices need no sampling: degree, and the smallest panel at grazing.
 ARC_PANELS = ((1, 1e-1), (2, 1e-2), (3, 1e-3), (4, 1e-3), (6, 1e-4))
 # Up to this half angle the eigenfunctions of arcs are close enough to Legendre polynomials.

@@ -13,8 +13,8 @@ from ..kernels.algebra import Rules, fold
 from ..kernels.ideal import LambertianLaw
 from ..kernels.measure import gauss_rule
 from ..kernels.phase_function import HenyeyGreensteinLaw
+from ..rounding import EPS
 from .essential import essential_edge
-from .trials import EPS
 
 # The power P^p of a law with eigenvalues g^l is chosen so that g^p is about this: the sum of the squares that are left
 # out, x^(2 m)/(1 - x^2), is then below the last square that is kept, x^(2 m - 2), and rounding is not yet.

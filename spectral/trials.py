@@ -14,6 +14,7 @@ from ..kernels.kernel_quadrature import GRAZING_EDGES
 from ..kernels.law import AngleFunction
 from ..kernels.measure import SINE, gauss_on_intervals
 from ..kernels.panel_rows import function_rows
+from ..rounding import EPS
 
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
 SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
@@ -27,7 +28,6 @@ ROW_TOLERANCE = 1e-8
 NODES_PER_DEGREE = 1.2
 # Nodes beyond those that the basis asks for, of the two rules that are compared.
 MORE_NODES = (0, 8)
-EPS = float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,6 @@ class Residuals:
     quotient_errors: Floats
     norms: Floats
     rows: int
-
-    @property
-    def joint_norm(self) -> float:
-        """A bound for the norm of P V - V diag(rho): each of the k values has an eigenvalue of its own this near."""
-        return float(np.linalg.norm(self.norms))
 
 
 def residuals(

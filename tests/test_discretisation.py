@@ -1,4 +1,4 @@
-"""Matrices of laws: exact, by quadrature, by sampling; the numbers of closed forms, orders, and errors that hold."""
+"""Matrices of laws of isometries, of involutions and of arcs: the numbers of closed forms; frames and arguments."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.errors import AccuracyError, InputError
-from asperity.kernels.sampling import RANDOMISATIONS
+from asperity.errors import InputError
 
 # <u, P u>/<u, u> with u = cos theta, from independent tracers and high-precision quadrature.
 TRIANGULAR_07 = 0.134541971359171
@@ -22,10 +21,6 @@ def rayleigh(matrix: ker.KernelMatrix) -> float:
     """<u, P u>/<u, u> with the projection of u = cos theta on the basis."""
     u = matrix.basis.project(np.cos)
     return float(u @ matrix.symmetric @ u / (u @ u))
-
-
-def eigenvalues(matrix: ker.KernelMatrix) -> np.ndarray:
-    return np.linalg.eigvalsh(0.5 * (matrix.symmetric + matrix.symmetric.T))[::-1]
 
 
 # ---- laws of isometries ------------------------------------------------------------------------------------------
@@ -119,115 +114,6 @@ def test_sums_are_done_term_by_term() -> None:
     assert np.abs(matrix.symmetric - expected).max() < 1e-13
 
 
-# ---- densities ---------------------------------------------------------------------------------------------------
-def test_lambertian_matrices_have_rank_one_to_rounding() -> None:
-    for basis in (ker.Bins(60), ker.Legendre(12), ker.Panels([0.0, 0.5, np.pi], 3)):
-        matrix = ker.discretise(ker.lambertian(), basis)
-        assert np.abs(matrix.symmetric - np.outer(basis.constant, basis.constant)).max() < 1e-14
-
-
-@pytest.mark.parametrize("g", [0.5, -0.7, 0.9])
-def test_legendre_has_the_eigenvalues_of_henyey_greenstein_to_rounding(g: float) -> None:
-    matrix = ker.discretise(ker.henyey_greenstein(g), ker.Legendre(64))
-    assert np.abs(matrix.symmetric - np.diag(g ** np.arange(64.0))).max() < 1e-12
-    assert matrix.tolerance_met
-
-
-def henyey_greenstein_on(basis: ker.Bins, g: float) -> np.ndarray:
-    """The Galerkin matrix from sum (2 l + 1)/2 g^l P_l P_l, with the integral of P_l (P_{l+1} - P_{l-1})/(2 l + 1)."""
-    u = np.cos(basis.edges)
-    before, legendre = np.ones_like(u), u.copy()
-    mass = -np.diff(u)
-    flux = 0.5 * np.outer(mass, mass)
-    for degree in range(1, int(np.log(1e-17) / np.log(abs(g)))):
-        after = ((2 * degree + 1) * u * legendre - degree * before) / (degree + 1)
-        integral = -np.diff(after - before) / (2 * degree + 1)
-        flux += 0.5 * (2 * degree + 1) * g**degree * np.outer(integral, integral)
-        before, legendre = legendre, after
-    return flux / np.sqrt(np.outer(mass, mass))
-
-
-UNEVEN = ker.Bins([0.0, 0.01, 0.3, 0.32, 1.0, 1.7, 2.5, 3.0, np.pi])
-
-
-@pytest.mark.parametrize("basis", [ker.Bins(64), ker.Bins(256), ker.Bins(7), UNEVEN], ids=repr)
-@pytest.mark.parametrize("g", [0.5, 0.95, 0.99, -0.9])
-def test_peaked_densities_have_their_exact_masses_between_bins(g: float, basis: ker.Bins) -> None:
-    matrix = ker.discretise(ker.henyey_greenstein(g), basis)
-    assert np.linalg.norm(matrix.symmetric - henyey_greenstein_on(basis, g)) <= float(matrix.error)
-    assert float(matrix.error) < 1e-7
-    assert matrix.stochastic_defect() < 1e-10
-    assert matrix.symmetry_defect() < 1e-9
-
-
-def test_a_peak_much_narrower_than_the_bins_is_seen() -> None:
-    matrix = ker.discretise(ker.henyey_greenstein(1.0 - 1e-5), ker.Bins(16))
-    assert matrix.stochastic_defect() < 1e-10 and eigenvalues(matrix)[0] == pytest.approx(1.0, abs=1e-10)
-    # a Galerkin eigenvalue of a reversible law lies below its own, g
-    assert 0.999 < eigenvalues(matrix)[1] < 1.0 - 1e-5
-
-
-@pytest.mark.parametrize(
-    "law",
-    [
-        ker.lambertian(),
-        ker.henyey_greenstein(0.5),
-        ker.MatrixLaw([[0.5, 0.5], [0.5, 0.5]]),
-        ker.DensityLaw(lambda theta, theta_out: 0.5 * np.sin(theta_out) + 0.0 * theta),
-        ker.maxwell(0.5),
-    ],
-    ids=repr,
-)
-def test_no_angles_have_no_images(law: ker.Law) -> None:
-    assert law.apply(np.cos, []).shape == (0,)
-    assert law.apply(np.cos, np.empty((3, 0))).shape == (3, 0)
-    assert law.apply(ker.Legendre(4).evaluate, np.empty((2, 0))).shape == (2, 0, 4)
-    assert law.sample([], np.random.default_rng(1)).shape == (0,)
-
-
-@pytest.mark.parametrize(
-    ("make", "sizes", "order"),
-    [
-        (ker.Bins, (16, 32, 64), ker.Bins.order),
-        (lambda n: ker.Panels(np.linspace(0, np.pi, n + 1), 1), (12, 16, 24), 4),
-        (lambda n: ker.Panels(np.linspace(0, np.pi, n + 1), 2), (8, 12, 16), 6),
-    ],
-    ids=["bins", "linear panels", "quadratic panels"],
-)
-def test_eigenvalues_converge_with_the_declared_order(make: object, sizes: tuple[int, ...], order: int) -> None:
-    law, g = ker.henyey_greenstein(0.5), 0.5
-    bases = [make(n) for n in sizes]  # type: ignore[operator]
-    assert all(basis.order == order for basis in bases)
-    errors = [g - eigenvalues(ker.discretise(law, basis, tolerance=1e-13))[1] for basis in bases]
-    # Galerkin eigenvalues of a compact law approach from below
-    assert min(errors) > 0.0
-    slope = -np.polyfit(np.log(sizes), np.log(errors), 1)[0]
-    assert slope == pytest.approx(order, abs=0.15)
-
-
-def test_a_matrix_law_gives_its_matrix_back() -> None:
-    array = [[0.5, 0.3, 0.2], [0.3, 0.4, 0.3], [0.2, 0.3, 0.5]]
-    assert np.abs(ker.discretise(ker.MatrixLaw(array), ker.Bins(3)).array - array).max() < 1e-9
-
-
-def test_products_of_densities_are_the_galerkin_matrices_of_the_product() -> None:
-    product = ker.henyey_greenstein(0.5) @ ker.henyey_greenstein(0.8)
-    smooth = ker.discretise(product, ker.Legendre(12))
-    assert np.abs(smooth.symmetric - np.diag(0.4 ** np.arange(12.0))).max() < 1e-11
-    bins = ker.discretise(product, ker.Bins(12))
-    exact = ker.discretise(ker.henyey_greenstein(0.4), ker.Bins(12))
-    assert np.linalg.norm(bins.symmetric - exact.symmetric) <= float(bins.error)
-    # which the product of the two Galerkin matrices is not
-    factors = [ker.discretise(ker.henyey_greenstein(g), ker.Bins(12)) for g in (0.5, 0.8)]
-    assert np.linalg.norm((factors[0] @ factors[1]).symmetric - exact.symmetric) > float(bins.error)
-
-
-def test_the_zeroth_power_is_the_identity() -> None:
-    for basis in (ker.Bins(5), ker.Legendre(5)):
-        matrix = ker.discretise(ker.henyey_greenstein(0.5) ** 0, basis)
-        assert np.abs(matrix.symmetric - np.eye(5)).max() < 1e-13
-
-
 # ---- deterministic laws ------------------------------------------------------------------------------------------
 def shuffled(theta: np.ndarray) -> np.ndarray:
     """Swaps the quarters [0, 1/4] and [1/2, 3/4] of the measure and reverses the last quarter."""
@@ -285,172 +171,9 @@ def test_unsymmetric_bases_see_the_same_arcs() -> None:
 def test_graded_panels_have_the_second_eigenvalue_of_the_arc() -> None:
     basis = ker.Panels.for_wall(geo.focusing_arcs(1.2), degree=3)
     matrix = ker.discretise(ker.WallLaw(geo.focusing_arcs(1.2)), basis)
-    second = eigenvalues(matrix)[1]
+    second = np.linalg.eigvalsh(matrix.symmetric)[-2]
     # from below, and by about WIDEST^6 at this degree
     assert -2e-7 < second - ARC_12_SECOND < 1e-9
-
-
-# ---- traced walls and sampling -----------------------------------------------------------------------------------
-@dataclass(frozen=True)
-class Bounce(ker.DrivenLaw):
-    """Triangular teeth, known only by their rays."""
-
-    closed: ker.TriangularTeethLaw = ker.TriangularTeethLaw(1.1)  # noqa: RUF009
-    reversible = True
-
-    def respond(self, x: object, theta: object) -> np.ndarray:
-        return self.closed.respond(x, theta)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("method", ["auto", "qmc", "monte-carlo", "quadrature"])
-@pytest.mark.parametrize("basis", [ker.Bins(24), ker.Legendre(10)], ids=repr)
-def test_sampled_matrices_lie_within_their_errors(method: str, basis: ker.Basis) -> None:
-    exact = ker.discretise(ker.TriangularTeethLaw(1.1), basis)
-    found = ker.discretise(Bounce(), basis, method=method, samples=2**16)  # type: ignore[arg-type]
-    assert found.method == ("qmc" if method == "auto" else method)
-    assert found.error.kind == "estimate" and not found.tolerance_met
-    assert np.linalg.norm(found.symmetric - exact.symmetric) < 2.0 * float(found.error)
-    assert found.stochastic_defect() < 1e-13
-    if found.method != "quadrature":
-        assert abs(found.symmetry_defect().z_score) < 5.0
-        assert found.samples == 2**16
-
-
-@pytest.mark.parametrize("symmetrise", [False, True])
-@pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
-@pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(6)], ids=repr)
-def test_reported_errors_are_calibrated(basis: ker.Basis, method: str, symmetrise: bool) -> None:
-    exact = ker.discretise(ker.TriangularTeethLaw(1.1), basis).symmetric
-    ratios = []
-    for seed in range(24):
-        found = ker.discretise(
-            Bounce(),
-            basis,
-            method=method,
-            samples=4096,
-            rng=np.random.default_rng(seed),
-            symmetrise=symmetrise,  # type: ignore[arg-type]
-        )
-        ratios.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
-    # mean of squares over 24 matrices of dozens of entries each; errors from 8 replicates scatter by a quarter
-    assert 0.75 < np.mean(ratios) < 1.35
-
-
-def test_z_scores_of_sampled_matrices_are_those_of_noise() -> None:
-    scores = {
-        (method, basis): [
-            ker.discretise(Bounce(), basis, method=method, samples=4096, rng=np.random.default_rng(seed))  # type: ignore[arg-type]
-            .symmetry_defect()
-            .z_score
-            for seed in range(40)
-        ]
-        for method in ("qmc", "monte-carlo")
-        for basis in (ker.Bins(12), ker.Legendre(6))
-    }
-    for found in scores.values():
-        assert abs(np.mean(found)) < 0.65 and 0.6 < np.std(found) < 1.5
-
-
-def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand() -> None:
-    @dataclass(frozen=True)
-    class Drift(ker.DrivenLaw):
-        """Keeps the measure and moves shares of it by a tenth and a bit: not reversible."""
-
-        def respond(self, x: object, theta: object) -> np.ndarray:
-            share = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * np.asarray(x), 1.0)
-            return ker.SINE.quantile(np.clip(share, 1e-12, 1 - 1e-12))
-
-    for method in ("qmc", "monte-carlo"):
-        found = ker.discretise(Drift(), ker.Bins(16), method=method, samples=2**14)  # type: ignore[arg-type]
-        assert found.symmetry_defect().z_score > 10.0
-        assert found.reversible is None
-    with pytest.raises(InputError, match="not known to be reversible"):
-        ker.discretise(Drift(), ker.Bins(16), symmetrise=True)
-
-
-def test_symmetrised_matrices_keep_the_defect_of_the_raw_counts() -> None:
-    plain, both = (
-        ker.discretise(Bounce(), ker.Bins(16), "monte-carlo", samples=20_000, symmetrise=symmetrise)
-        for symmetrise in (False, True)
-    )
-    assert np.array_equal(plain.counts, both.counts)
-    assert both.symmetry_defect() == plain.symmetry_defect() > 0.01
-    assert both.symmetry_defect().z_score == plain.symmetry_defect().z_score
-    assert np.abs(both.flux - both.flux.T).max() == 0.0 or np.abs(both.flux - both.flux.T).max() < 1e-18
-    assert np.allclose(both.flux, (plain.counts + plain.counts.T) / 40_000, rtol=1e-13, atol=0.0)
-    assert 1e-4 < both.stochastic_defect() < 0.2
-    assert plain.stochastic_defect() < 1e-14
-    assert both.symmetrised and not plain.symmetrised
-
-
-@pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
-def test_the_same_generator_gives_the_same_bits(method: str) -> None:
-    def run(seed: int) -> ker.KernelMatrix:
-        rng = np.random.default_rng(seed)
-        return ker.discretise(Bounce(), ker.Bins(8), method=method, samples=2**12, rng=rng)  # type: ignore[arg-type]
-
-    assert np.array_equal(run(1).counts, run(1).counts)
-    assert not np.array_equal(run(1).counts, run(2).counts)
-    without = [ker.discretise(Bounce(), ker.Bins(8), method=method, samples=2**12).counts for _ in range(2)]  # type: ignore[arg-type]
-    assert np.array_equal(*without)
-
-
-def test_replicates_average_to_the_matrix_and_number_eight() -> None:
-    for basis in (ker.Bins(12), ker.Bins(300), ker.Legendre(6)):
-        found = ker.discretise(Bounce(), basis, "qmc", samples=2**15)
-        assert len(found.replicates) == RANDOMISATIONS
-        mean = sum(np.asarray(part.todense() if hasattr(part, "todense") else part) for part in found.replicates) / 8
-        assert np.abs(mean - found.symmetric).max() < 1e-12
-
-
-def test_quasi_monte_carlo_rounds_up_and_beats_monte_carlo() -> None:
-    quasi = ker.discretise(Bounce(), ker.Bins(16), "qmc", samples=50_000)
-    plain = ker.discretise(Bounce(), ker.Bins(16), "monte-carlo", samples=65_536)
-    assert quasi.samples == 65_536
-    assert float(quasi.error) < 0.35 * float(plain.error)
-
-
-def test_traced_walls_agree_with_the_closed_form() -> None:
-    law = ker.WallLaw(geo.triangular_teeth(0.7))
-    exact, traced = (ker.discretise(law, ker.Bins(16), method=method, samples=2**15) for method in ("exact", "qmc"))
-    assert exact.method == "exact" and traced.method == "qmc" and traced.unresolved <= 1e-4
-    assert np.linalg.norm(exact.symmetric - traced.symmetric) < 2.0 * float(traced.error)
-
-
-def test_a_wall_without_closed_form_is_sampled_and_says_so() -> None:
-    law = ker.WallLaw(geo.dispersing_arcs(0.5))
-    found = ker.discretise(law, ker.Bins(16), method="qmc", samples=2**14)
-    assert found.method == "qmc" and "tolerance" in repr(found)
-    with pytest.raises(InputError, match=r"it has .*quadrature.*monte-carlo"):
-        ker.discretise(law, ker.Bins(16), method="exact")
-    driven = Bounce()
-    alone = ker.discretise(driven, ker.Bins(16), samples=2**14)
-    mixed = ker.discretise(0.5 * driven + 0.5 * ker.lambertian(), ker.Bins(16), samples=2**14)
-    assert mixed.method == "qmc + quadrature"
-    assert mixed.symmetry_defect().z_score == alone.symmetry_defect().z_score
-    chained = ker.discretise(driven @ driven, ker.Bins(16), samples=2**14)
-    assert chained.method == "monte-carlo"
-
-
-def test_rays_that_never_escape_are_counted_bounded_and_finally_refused() -> None:
-    @dataclass(frozen=True)
-    class Leaky(Bounce):
-        lost: float = 0.0
-
-        def outcomes(self, x: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self.respond(x, theta), x > self.lost
-
-    whole, few = (ker.discretise(Leaky(lost=lost), ker.Bins(8), samples=2**16) for lost in (0.0, 5e-5))
-    assert whole.unresolved == 0.0 < few.unresolved < 1e-4
-    assert float(few.error) >= 2.0 * few.unresolved * 8
-    with pytest.raises(AccuracyError, match="did not escape") as caught:
-        ker.discretise(Leaky(lost=0.01), ker.Bins(8), samples=2**14)
-    assert caught.value.defect == pytest.approx(0.01, rel=0.2)
-
-
-def test_bins_without_rays_are_named() -> None:
-    with pytest.raises(AccuracyError, match="bins have no incoming pair"):
-        ker.discretise(Bounce(), ker.Bins(64), "monte-carlo", samples=64)
 
 
 # ---- frames ------------------------------------------------------------------------------------------------------

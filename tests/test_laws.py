@@ -1,4 +1,4 @@
-"""Ideal laws, Henyey-Greenstein, laws with a density, involutions, laws of matrices and laws of walls."""
+"""Ideal laws, Henyey-Greenstein, laws with a density, involutions and laws of matrices."""
 
 from __future__ import annotations
 
@@ -12,22 +12,15 @@ from hypothesis import strategies as st
 from numpy.polynomial import legendre
 from scipy.special import ellipe
 
-from asperity import geometry as geo
 from asperity.errors import AccuracyError, InputError
-from asperity.kernels import Combination
 from asperity.kernels.bins import Bins
-from asperity.kernels.circular import CircularArcLaw
 from asperity.kernels.density import DensityLaw
 from asperity.kernels.ideal import lambertian, maxwell, retroreflection, specular
 from asperity.kernels.involution import InvolutionLaw
-from asperity.kernels.law import Law
 from asperity.kernels.legendre import Legendre
 from asperity.kernels.matrix_law import MatrixLaw
 from asperity.kernels.measure import SINE
 from asperity.kernels.phase_function import HenyeyGreensteinLaw, henyey_greenstein
-from asperity.kernels.rectangular import RectangularTeethLaw
-from asperity.kernels.triangular import TriangularTeethLaw
-from asperity.kernels.wall_law import LOST_TOLERANCE, WallLaw
 
 THETA = np.array([1e-12, 1e-4, 0.2, 0.9, math.pi / 2, 2.2, 3.0, math.pi - 1e-4, math.pi - 1e-12])
 
@@ -38,9 +31,9 @@ def polynomial(degree: int):
     return lambda theta: legendre.legval(np.cos(theta), coefficients)
 
 
-def assert_z(value: np.ndarray, mean: float, largest: float = 4.5) -> None:
+def assert_z(value: np.ndarray, mean: float) -> None:
     spread = value.std() / math.sqrt(value.size)
-    assert abs(value.mean() - mean) < largest * spread + 1e-12
+    assert abs(value.mean() - mean) < 4.5 * spread + 1e-12
 
 
 # ---- ideal laws -------------------------------------------------------------------------------------------------
@@ -301,106 +294,3 @@ def test_matrices_that_are_no_laws_are_refused_by_row() -> None:
 
     with pytest.raises(InputError, match="on Bins in theta"):
         MatrixLaw(InPsi())
-
-
-# ---- walls ----------------------------------------------------------------------------------------------------------
-def same(law: Law | None, expected: Law) -> bool:
-    theta = np.linspace(0.1, 3.0, 20)
-    return law is not None and bool(np.allclose(law.apply(np.cos, theta), expected.apply(np.cos, theta), atol=1e-12))
-
-
-def test_walls_with_a_closed_form_are_recognised_by_their_shape() -> None:
-    assert WallLaw(geo.flat()).closed_form == specular()
-    assert WallLaw(geo.rectangular_teeth(1.5)).closed_form == RectangularTeethLaw(1.5)
-    for wall, expected in (
-        (geo.triangular_teeth(0.7), TriangularTeethLaw(0.7)),
-        (geo.Wall.from_vertices([(0, 0), (3, -4), (6, 0)]), TriangularTeethLaw(2.0 * math.atan(0.75))),
-        (geo.focusing_arcs(1.2), CircularArcLaw(1.2)),
-        (geo.focusing_arcs(math.pi / 2).scaled(7.0), CircularArcLaw(math.pi / 2)),
-        (geo.focusing_arcs(1e-6), CircularArcLaw(1e-6)),
-        (geo.elliptical_arcs(0.9, geo.Disk()).foreshorten(geo.Disk()), CircularArcLaw(0.9)),
-        (geo.rectangular_teeth(0.8).mirrored(), RectangularTeethLaw(0.8)),
-    ):
-        assert same(WallLaw(wall).closed_form, expected), wall
-
-
-def test_foreshortened_teeth_have_the_corrected_parameters() -> None:
-    disk = geo.Disk(mass=1.3, inertia=0.5)
-    stretch = math.sqrt(1.0 + 1.3 / 0.5)
-    rectangles = WallLaw(geo.rectangular_teeth(0.8).foreshorten(disk)).closed_form
-    assert isinstance(rectangles, RectangularTeethLaw)
-    assert rectangles.height_to_width == pytest.approx(stretch * 0.8, rel=1e-14)
-    triangles = WallLaw(geo.triangular_teeth(0.8).foreshorten(disk)).closed_form
-    assert isinstance(triangles, TriangularTeethLaw)
-    assert triangles.angle == pytest.approx(2.0 * math.atan(math.tan(0.4) / stretch), rel=1e-14)
-
-
-def test_several_hollows_make_a_combination_by_their_widths() -> None:
-    wall = geo.Wall.from_vertices([(0, 0), (1, -1), (2, 0), (3, 0), (3, -2), (3.5, -2), (3.5, 0), (4, 0)])
-    law = WallLaw(wall).closed_form
-    assert isinstance(law, Combination)
-    expected = 0.5 * TriangularTeethLaw(math.pi / 2) + 0.25 * RectangularTeethLaw(4.0) + 0.25 * specular()
-    assert same(law, expected)
-    assert np.allclose(WallLaw(wall).branches(1.0)[0].sum(), 1.0)
-
-
-@pytest.mark.parametrize(
-    "wall",
-    [
-        geo.dispersing_arcs(1.0),
-        geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)]),
-        geo.Wall.from_vertices([(0, 0), (0.2, 0), (0.2, -0.5), (1, -0.5), (1, 0)]),
-        geo.Wall([geo.Arc((0.5, 0.0), (0.5, 0.3), -math.pi, 0.0)]),
-        geo.double_parabola(),
-    ],
-    ids=["bumps", "skew", "wide crevice", "ellipse", "parabolas"],
-)
-def test_other_walls_have_no_closed_form(wall: geo.Wall) -> None:
-    law = WallLaw(wall)
-    assert law.closed_form is None
-    assert law.is_polygonal is wall.is_polygonal
-    if wall.is_polygonal:
-        assert law.branches(1.0)[0].sum() == pytest.approx(1.0, abs=1e-14)
-    else:
-        with pytest.raises(InputError, match="no branches"):
-            law.branches(1.0)
-
-
-@pytest.mark.parametrize(
-    "wall", [geo.triangular_teeth(0.7), geo.rectangular_teeth(1.1), geo.focusing_arcs(1.2)], ids=repr
-)
-def test_traced_rays_go_where_the_closed_form_says(wall: geo.Wall) -> None:
-    law = WallLaw(wall)
-    rng = np.random.default_rng(8)
-    x, theta = rng.uniform(0.001, 0.999, 20_000), SINE.sample(20_000, rng)
-    outgoing, escaped = law.outcomes(x, theta)
-    assert escaped.mean() > 1.0 - LOST_TOLERANCE
-    error = np.abs(outgoing - law.closed_form.respond(x, theta))
-    assert np.median(error) < 1e-15
-    # a ray within rounding of a corner or of a change of its hits may go the other way
-    assert np.mean(error[escaped] > 1e-9) < 1e-4
-
-
-def test_a_traced_law_applies_and_samples_alike() -> None:
-    law = WallLaw(geo.dispersing_arcs(1.0))
-    assert law.reversible and law.mirror_symmetric
-    drawn = law.sample(np.full(20_000, 1.1), np.random.default_rng(9))
-    assert_z(np.cos(drawn), float(law.apply(np.cos, 1.1)), largest=5.0)
-    skew = WallLaw(geo.Wall.from_vertices([(0, 0), (0.3, -0.5), (1, 0)]))
-    assert skew.mirror_symmetric is None
-
-
-def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
-    law = WallLaw(geo.triangular_teeth(math.pi / 2))
-    # straight into the bottom, and beside it
-    outgoing, escaped = law.outcomes([0.5, 0.6], math.pi / 2)
-    assert escaped.tolist() == [False, True]
-    assert np.allclose(outgoing, math.pi / 2)
-    with pytest.raises(AccuracyError, match=r"0\.5 of 2 rays did not escape") as info:
-        law.respond([0.5, 0.6], math.pi / 2)
-    assert info.value.defect == 0.5
-
-
-def test_a_wall_law_wants_a_wall() -> None:
-    with pytest.raises(InputError, match="expected a Wall"):
-        WallLaw("koch")  # type: ignore[arg-type]

@@ -1,0 +1,41 @@
+"""Arrays that grow while a compiled loop fills them: copies with more room. Loads numba.
+
+Plain loops, because numba takes seconds to compile a concatenation.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def longer(array, size):
+    """The array with room for so many entries."""
+    new = np.empty(size, array.dtype)
+    for i in range(array.shape[0]):
+        new[i] = array[i]
+    return new
+
+
+@_compile
+def taller(array, rows):
+    """The array with so many rows; the new ones are zero."""
+    new = np.zeros((rows, array.shape[1]), array.dtype)
+    for i in range(array.shape[0]):
+        for j in range(array.shape[1]):
+            new[i, j] = array[i, j]
+    return new
+
+
+@_compile
+def larger(array, rows, columns):
+    """The array with so many rows of so many columns."""
+    new = np.empty((rows, columns, array.shape[2]))
+    for i in range(array.shape[0]):
+        for j in range(array.shape[1]):
+            for k in range(array.shape[2]):
+                new[i, j, k] = array[i, j, k]
+    return new

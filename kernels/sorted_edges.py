@@ -1,0 +1,33 @@
+"""Where many numbers, or many intervals, lie among sorted edges."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..checks import Floats
+from .ragged_lists import ragged
+
+
+def cell_among(edges: Floats, position: ArrayLike) -> NDArray[np.intp]:
+    """The cell [edges[i], edges[i + 1]) that holds each position; what is beyond an end is in the cell next to it.
+
+    Examples
+    --------
+    >>> cell_among(np.array([0.0, 1.0, 3.0]), np.array([-1.0, 0.0, 1.0, 3.0])).tolist()
+    [0, 0, 1, 1]
+    """
+    return np.asarray(np.clip(np.searchsorted(edges, position, side="right") - 1, 0, len(edges) - 2))
+
+
+def edges_inside(edges: Floats, low: Floats, high: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """All edges strictly between low[i] and high[i], of all i end to end: the number i of each, and the edge.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in edges_inside(np.arange(4.0), np.array([0.5, 2.0, 3.0]), np.array([2.5, 3.0, 1.0]))]
+    [[0, 0], [1.0, 2.0]]
+    """
+    first = np.searchsorted(edges, low, side="right")
+    owner, place = ragged(np.maximum(np.searchsorted(edges, high, side="left") - first, 0))
+    return owner, edges[first[owner] + place]

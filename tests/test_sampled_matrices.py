@@ -1,0 +1,175 @@
+"""Matrices by sampling: errors that are calibrated, z-scores that are those of noise, defects that are found out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import AccuracyError, InputError
+from asperity.kernels.sampling import RANDOMISATIONS
+
+
+@dataclass(frozen=True)
+class Bounce(ker.DrivenLaw):
+    """Triangular teeth, known only by their rays."""
+
+    closed: ker.TriangularTeethLaw = ker.TriangularTeethLaw(1.1)  # noqa: RUF009
+    reversible = True
+
+    def respond(self, x: object, theta: object) -> np.ndarray:
+        return self.closed.respond(x, theta)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("method", ["auto", "qmc", "monte-carlo", "quadrature"])
+@pytest.mark.parametrize("basis", [ker.Bins(24), ker.Legendre(10)], ids=repr)
+def test_sampled_matrices_lie_within_their_errors(method: str, basis: ker.Basis) -> None:
+    exact = ker.discretise(ker.TriangularTeethLaw(1.1), basis)
+    found = ker.discretise(Bounce(), basis, method=method, samples=2**16)  # type: ignore[arg-type]
+    assert found.method == ("qmc" if method == "auto" else method)
+    assert found.error.kind == "estimate" and not found.tolerance_met
+    assert np.linalg.norm(found.symmetric - exact.symmetric) < 2.0 * float(found.error)
+    assert found.stochastic_defect() < 1e-13
+    if found.method != "quadrature":
+        assert abs(found.symmetry_defect().z_score) < 5.0
+        assert found.samples == 2**16
+
+
+@pytest.mark.parametrize("symmetrise", [False, True])
+@pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
+@pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(6)], ids=repr)
+def test_reported_errors_are_calibrated(basis: ker.Basis, method: str, symmetrise: bool) -> None:
+    exact = ker.discretise(ker.TriangularTeethLaw(1.1), basis).symmetric
+    ratios = []
+    for seed in range(24):
+        found = ker.discretise(
+            Bounce(),
+            basis,
+            method=method,
+            samples=4096,
+            rng=np.random.default_rng(seed),
+            symmetrise=symmetrise,  # type: ignore[arg-type]
+        )
+        ratios.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
+    # mean of squares over 24 matrices of dozens of entries each; errors from 8 replicates scatter by a quarter
+    assert 0.75 < np.mean(ratios) < 1.35
+
+
+def test_z_scores_of_sampled_matrices_are_those_of_noise() -> None:
+    scores = {
+        (method, basis): [
+            ker.discretise(Bounce(), basis, method=method, samples=4096, rng=np.random.default_rng(seed))  # type: ignore[arg-type]
+            .symmetry_defect()
+            .z_score
+            for seed in range(40)
+        ]
+        for method in ("qmc", "monte-carlo")
+        for basis in (ker.Bins(12), ker.Legendre(6))
+    }
+    for found in scores.values():
+        assert abs(np.mean(found)) < 0.65 and 0.6 < np.std(found) < 1.5
+
+
+def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand() -> None:
+    @dataclass(frozen=True)
+    class Drift(ker.DrivenLaw):
+        """Keeps the measure and moves shares of it by a tenth and a bit: not reversible."""
+
+        def respond(self, x: object, theta: object) -> np.ndarray:
+            share = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * np.asarray(x), 1.0)
+            return ker.SINE.quantile(np.clip(share, 1e-12, 1 - 1e-12))
+
+    for method in ("qmc", "monte-carlo"):
+        found = ker.discretise(Drift(), ker.Bins(16), method=method, samples=2**14)  # type: ignore[arg-type]
+        assert found.symmetry_defect().z_score > 10.0
+        assert found.reversible is None
+    with pytest.raises(InputError, match="not known to be reversible"):
+        ker.discretise(Drift(), ker.Bins(16), symmetrise=True)
+
+
+def test_symmetrised_matrices_keep_the_defect_of_the_raw_counts() -> None:
+    plain, both = (
+        ker.discretise(Bounce(), ker.Bins(16), "monte-carlo", samples=20_000, symmetrise=symmetrise)
+        for symmetrise in (False, True)
+    )
+    assert np.array_equal(plain.counts, both.counts)
+    assert both.symmetry_defect() == plain.symmetry_defect() > 0.01
+    assert both.symmetry_defect().z_score == plain.symmetry_defect().z_score
+    assert np.abs(both.flux - both.flux.T).max() == 0.0 or np.abs(both.flux - both.flux.T).max() < 1e-18
+    assert np.allclose(both.flux, (plain.counts + plain.counts.T) / 40_000, rtol=1e-13, atol=0.0)
+    assert 1e-4 < both.stochastic_defect() < 0.2
+    assert plain.stochastic_defect() < 1e-14
+    assert both.symmetrised and not plain.symmetrised
+
+
+@pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
+def test_the_same_generator_gives_the_same_bits(method: str) -> None:
+    def run(seed: int) -> ker.KernelMatrix:
+        rng = np.random.default_rng(seed)
+        return ker.discretise(Bounce(), ker.Bins(8), method=method, samples=2**12, rng=rng)  # type: ignore[arg-type]
+
+    assert np.array_equal(run(1).counts, run(1).counts)
+    assert not np.array_equal(run(1).counts, run(2).counts)
+    without = [ker.discretise(Bounce(), ker.Bins(8), method=method, samples=2**12).counts for _ in range(2)]  # type: ignore[arg-type]
+    assert np.array_equal(*without)
+
+
+def test_replicates_average_to_the_matrix_and_number_eight() -> None:
+    for basis in (ker.Bins(12), ker.Bins(300), ker.Legendre(6)):
+        found = ker.discretise(Bounce(), basis, "qmc", samples=2**15)
+        assert len(found.replicates) == RANDOMISATIONS
+        mean = sum(np.asarray(part.todense() if hasattr(part, "todense") else part) for part in found.replicates) / 8
+        assert np.abs(mean - found.symmetric).max() < 1e-12
+
+
+def test_quasi_monte_carlo_rounds_up_and_beats_monte_carlo() -> None:
+    quasi = ker.discretise(Bounce(), ker.Bins(16), "qmc", samples=50_000)
+    plain = ker.discretise(Bounce(), ker.Bins(16), "monte-carlo", samples=65_536)
+    assert quasi.samples == 65_536
+    assert float(quasi.error) < 0.35 * float(plain.error)
+
+
+def test_traced_walls_agree_with_the_closed_form() -> None:
+    law = ker.WallLaw(geo.triangular_teeth(0.7))
+    exact, traced = (ker.discretise(law, ker.Bins(16), method=method, samples=2**15) for method in ("exact", "qmc"))
+    assert exact.method == "exact" and traced.method == "qmc" and traced.unresolved <= 1e-4
+    assert np.linalg.norm(exact.symmetric - traced.symmetric) < 2.0 * float(traced.error)
+
+
+def test_a_wall_without_closed_form_is_sampled_and_says_so() -> None:
+    law = ker.WallLaw(geo.dispersing_arcs(0.5))
+    found = ker.discretise(law, ker.Bins(16), method="qmc", samples=2**14)
+    assert found.method == "qmc" and "tolerance" in repr(found)
+    with pytest.raises(InputError, match=r"it has .*quadrature.*monte-carlo"):
+        ker.discretise(law, ker.Bins(16), method="exact")
+    driven = Bounce()
+    alone = ker.discretise(driven, ker.Bins(16), samples=2**14)
+    mixed = ker.discretise(0.5 * driven + 0.5 * ker.lambertian(), ker.Bins(16), samples=2**14)
+    assert mixed.method == "qmc + quadrature"
+    assert mixed.symmetry_defect().z_score == alone.symmetry_defect().z_score
+    chained = ker.discretise(driven @ driven, ker.Bins(16), samples=2**14)
+    assert chained.method == "monte-carlo"
+
+
+def test_rays_that_never_escape_are_counted_bounded_and_finally_refused() -> None:
+    @dataclass(frozen=True)
+    class Leaky(Bounce):
+        lost: float = 0.0
+
+        def outcomes(self, x: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return self.respond(x, theta), x > self.lost
+
+    whole, few = (ker.discretise(Leaky(lost=lost), ker.Bins(8), samples=2**16) for lost in (0.0, 5e-5))
+    assert whole.unresolved == 0.0 < few.unresolved < 1e-4
+    assert float(few.error) >= 2.0 * few.unresolved * 8
+    with pytest.raises(AccuracyError, match="did not escape") as caught:
+        ker.discretise(Leaky(lost=0.01), ker.Bins(8), samples=2**14)
+    assert caught.value.defect == pytest.approx(0.01, rel=0.2)
+
+
+def test_bins_without_rays_are_named() -> None:
+    with pytest.raises(AccuracyError, match="bins have no incoming pair"):
+        ker.discretise(Bounce(), ker.Bins(64), "monte-carlo", samples=64)
