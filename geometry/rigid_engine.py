@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from .contact_engine import CLEAR, NO, NOTHING, ZERO, first_in_hollow, next_root, satellite_after
+from .contact_engine import CLEAR, NO, NOTHING, ZERO, compiled, first_in_hollow, inlined, next_root, satellite_after
 from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
 from .opening_engine import last_hollow
 
@@ -21,19 +20,15 @@ MOST_CELLS = 1_000_000
 # A time that no flight takes, but that is not infinite: bounds are multiplied by it.
 FOREVER = 1e30
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
-# an array that is passed costs ten arguments: small functions are inlined
-_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
-
-@_inline
+@inlined
 def hollow_at(hollows, place):
     """The hollow over which a place of the cell lies, or -1 over a flat top."""
     h = last_hollow(place, hollows)
     return h if h >= 0 and place < hollows[h, 1] else -1
 
 
-@_inline
+@inlined
 def near_edge(hollows, place, slack):
     """Whether a place at height 0 is within the slack of an end of a hollow that is a corner."""
     for h in range(hollows.shape[0]):
@@ -44,7 +39,7 @@ def near_edge(hollows, place, slack):
     return False
 
 
-@_compile
+@compiled
 def dive(x, y, t, end, state, turn, motion, fastest, slack, cell, is_open, hollows):
     """When and where a satellite comes below the tops in [t, end).
 
@@ -66,7 +61,7 @@ def dive(x, y, t, end, state, turn, motion, fastest, slack, cell, is_open, hollo
     return t, state, hollow_at(hollows, place), base, CORNER if near or rising >= 0.0 else CLEAR
 
 
-@_compile
+@compiled
 def first_contact(
     own_kind, own_index, h, base, x, y, t, end, turn, motion, slack, cell, is_open, hollows, joints, lines, arcs
 ):
@@ -104,7 +99,7 @@ def first_contact(
     return t, NO_PIECE, -1, h, base, state, BOUNCE_LIMIT
 
 
-@_inline
+@inlined
 def surface(kind, index, x, y, joints, lines, arcs):
     """The point (x, y) put back on the piece that it hit, and the unit normal there, towards the free side."""
     if kind == LINE:
@@ -127,14 +122,14 @@ def surface(kind, index, x, y, joints, lines, arcs):
     return arcs[index, 0] + qx, arcs[index, 1] + qy / stretch, n1 * norm, n2 * norm
 
 
-@_inline
+@inlined
 def satellite_at(x, y, angle, j, spacing, scale):
     """Where the j-th satellite after the one at (x, y) and ``angle`` is, without cancellation."""
     middle, chord = angle + 0.5 * j * spacing, 2.0 * math.sin(0.5 * j * spacing) / scale
     return x + chord * math.cos(middle), y + chord * math.sin(middle)
 
 
-@_inline
+@inlined
 def within_reach(other, rate, reach):
     """When a satellite at the angle ``other`` first comes within reach of the wall: 0 if it is, inf if it leaves."""
     if abs(other) <= reach:
@@ -142,7 +137,7 @@ def within_reach(other, rate, reach):
     return (abs(other) - reach) / abs(rate) if other * rate < 0.0 else np.inf
 
 
-@_inline
+@inlined
 def first_of_all(own, below, x, y, angle, turn, motion, end, ring, cell, is_open, hollows, joints, lines, arcs):
     """First contact of any satellite before ``end``.
 
@@ -183,7 +178,7 @@ def first_of_all(own, below, x, y, angle, turn, motion, end, ring, cell, is_open
     return time, hit, base, chosen, place, code
 
 
-@_compile
+@compiled
 def left_below(own, below, x, y, angle, time, chosen, place, motion, ring, cell, is_open, hollows):
     """The neighbour of the satellite ``chosen`` that is below the tops when that one touches the wall, as ``below``.
 
@@ -217,7 +212,7 @@ def left_below(own, below, x, y, angle, time, chosen, place, motion, ring, cell,
     return ZERO, NOTHING, 0.0
 
 
-@_inline
+@inlined
 def reflect(v1, v2, omega, n1, n2, turn, disk):
     """Velocities after an impulse along the wall's normal n at a satellite: specular in the kinetic metric."""
     mass, inertia = disk
@@ -233,7 +228,7 @@ def reflect(v1, v2, omega, n1, n2, turn, disk):
     return scale * v1, scale * v2, scale * omega
 
 
-@_inline
+@inlined
 def angle_data(angle):
     """(sine, cosine) of an angle, and 1 - cosine without cancellation."""
     half = math.sin(0.5 * angle)
@@ -241,7 +236,7 @@ def angle_data(angle):
     return (2.0 * half * math.cos(0.5 * angle), 1.0 - versed), versed
 
 
-@_inline
+@inlined
 def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, hollows, joints, lines, arcs):
     """One collision of a disk that comes down at height 0, its lowest satellite at ``angle`` from the lowest point.
 
@@ -293,7 +288,7 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, 
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, turn, disk)
 
 
-@_compile
+@compiled
 def collide_disks(
     position, velocity, disk, ring, limit, cell, is_open, hollows, joints, lines, arcs, out_position,
     out_velocity, times, contacts, two_satellites, status,
@@ -316,7 +311,7 @@ def collide_disks(
         times[i] = scale * time / norm
 
 
-@_inline
+@inlined
 def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs):
     """One collision on the cylinder: the contact moves on a straight line with the velocity (v1 + omega, v2).
 
@@ -357,7 +352,7 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, cell, is_open, 
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (0.0, 1.0), disk)
 
 
-@_compile
+@compiled
 def roll_disks(
     position, velocity, disk, scale, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs, out_position,
     out_velocity, times, contacts, status,
