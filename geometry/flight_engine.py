@@ -55,8 +55,10 @@ def turning(angle):
     """Sine of an angle and 1 - its cosine, without cancellation and quickly where it is small."""
     if abs(angle) < SMALL_TURN:
         z = angle * angle
-        sine = angle + angle * z * (S3 + z * (S5 + z * (S7 + z * S9)))
-        return sine, z * (V2 + z * (V4 + z * (V6 + z * (V8 + z * V10))))
+        z2 = z * z
+        # in pairs, so that no product waits for more than four others
+        sine = angle + angle * z * (S3 + z * S5 + z2 * (S7 + z * S9))
+        return sine, z * (V2 + z * V4 + z2 * (V6 + z * V8 + z2 * V10))
     half = math.sin(0.5 * angle)
     return 2.0 * half * math.cos(0.5 * angle), 2.0 * half * half
 

@@ -73,7 +73,7 @@ def first_contact(own_kind, own_index, h, base, x, y, t, end, turn, motion, slac
     in the hollow ``h`` of the cell that begins at ``base``, or above the tops if h is -1. Returns time (inf if none),
     kind, index, hollow, its cell's left end, state and code.
     """
-    turned = turning(motion.spin * t)
+    turned = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
     state = satellite_after(t, turned, turn, motion)
     if own_kind == TOP:
         # it rises, and its path bends upward
@@ -228,12 +228,13 @@ def left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, rin
 def reflect(v1, v2, omega, n1, n2, turn, disk):
     """Velocities after an impulse along the wall's normal n at a satellite: specular in the kinetic metric."""
     mass, inertia = disk
+    by_mass, by_inertia = 1.0 / mass, 1.0 / inertia
     arm = n1 * turn[1] + n2 * turn[0]
     inward = (v1 + omega * turn[1]) * n1 + (v2 + omega * turn[0]) * n2
-    impulse = -2.0 * inward / (1.0 / mass + arm * arm / inertia)
-    v1 += impulse * n1 / mass
-    v2 += impulse * n2 / mass
-    omega += impulse * arm / inertia
+    impulse = -2.0 * inward / (by_mass + arm * arm * by_inertia)
+    v1 += impulse * n1 * by_mass
+    v2 += impulse * n2 * by_mass
+    omega += impulse * arm * by_inertia
     # one Newton step on the kinetic norm keeps rounding errors from adding up
     energy = mass * (v1 * v1 + v2 * v2) + inertia * omega * omega
     scale = 1.5 - 0.5 * energy
