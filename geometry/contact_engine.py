@@ -1,16 +1,6 @@
 """Compiled: when a satellite of the flying disk first meets a piece of the wall. Only `rigid_engine` imports this file.
 
-Lengths are in units of the wall, so the disk's radius is 1/scale and the wall's tops are at height 0. In the time t a
-disk with velocities (v1, v2) and spin omega moves a satellite at the angle a from the lowest point by
-
-    D(t) = (v1 t + (sin(a + d) - sin a)/scale, v2 t + (cos a - cos(a + d))/scale),   d = scale omega t,
-
-which is evaluated by products, without cancellation. A line or an upright conic is F = 0 with
-
-    F(D) = f + g.D - curvature |D|^2/2     (y multiplied by the arc's stretch; curvature 0 for lines),
-
-where f and g belong to the start of the flight: the rows of the planar tracer's tables, see `scene`, with circles and
-ellipses in one table ``arcs``.
+A satellite meets a line or an upright conic where F = 0, see `flight_engine`.
 
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
 bounds the third one. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is a
@@ -23,23 +13,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from .arc_engine import on_arc
 from .engine import CORNER, ESCAPED, GRAZING, LINE, NO_PIECE, SIDE, near_end
-
-_compile = njit(cache=True, nogil=True, error_model="numpy")
-# an array that is passed costs ten arguments: small functions are inlined
-_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+from .flight_engine import compiled, conic_after, inlined, line_after, satellite_after, towards_line, turning
 
 # A contact is clear, or double precision does not settle it; the codes are those of the statuses of rays.
 CLEAR = ESCAPED
 # numba compiles a function again for every literal that it is called with, but not for constants of these types
 NOTHING, ZERO, NO = np.int64(-1), np.int64(0), np.bool_(False)
-# The series of `half_turn` are cut after the tenth power: below this angle the rest is less than 2e-18.
-SMALL_TURN = 0.1
-S3, S5, S7, S9 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362880.0
-C2, C4, C6, C8, C10 = -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40320.0, -1.0 / 3628800.0
 # Of the slack, 16 rounding errors, a root's own error may be this share.
 ROOT_SHARE = 1.0 / 16.0
 # Incidences below 1e-6 radians are treated as that one, so that the slack stays far below the pieces' lengths.
@@ -51,34 +33,7 @@ ROOT_STEPS = 400
 ARC = 8
 
 
-@_inline
-def half_turn(h):
-    """Sine and cosine of h, quickly where h is small."""
-    if abs(h) < SMALL_TURN:
-        z = h * h
-        sine = h + h * z * (S3 + z * (S5 + z * (S7 + z * S9)))
-        return sine, 1.0 + z * (C2 + z * (C4 + z * (C6 + z * (C8 + z * C10))))
-    return math.sin(h), math.cos(h)
-
-
-@_inline
-def satellite_after(t, turn, motion):
-    """Displacement (2) of a satellite after the time t, and the sine and cosine of its angle then.
-
-    ``turn`` is (sin a, cos a) at the start, ``motion`` is (v1, v2, omega, scale).
-    """
-    sine, cosine = turn
-    if t == 0.0:
-        return 0.0, 0.0, sine, cosine
-    v1, v2, omega, scale = motion
-    half_sine, half_cosine = half_turn(0.5 * scale * omega * t)
-    sin_d, versed_d = 2.0 * half_sine * half_cosine, 2.0 * half_sine * half_sine
-    d_sine, fall = cosine * sin_d - sine * versed_d, sine * sin_d + cosine * versed_d
-    radius = 1.0 / scale
-    return v1 * t + d_sine * radius, v2 * t + fall * radius, sine + d_sine, cosine - fall
-
-
-@_inline
+@inlined
 def safe_step(f, f1, c):
     """First positive root of the parabola f + f1 t + c t^2/2 with f >= 0, or inf; 0 only where f = 0 > f1."""
     disc = f1 * f1 - 2.0 * c * f
@@ -87,59 +42,55 @@ def safe_step(f, f1, c):
     return (f1 + math.sqrt(disc)) / -c if c < 0.0 else np.inf
 
 
-@_compile
-def next_root(sign, leaving, piece, t, end, state, turn, motion, fastest, patience, slack):
-    """First time in [t, end) at which sign F falls through 0 (inf if none), the satellite's state there, and a code.
+@compiled
+def next_root(sign, leaving, line, conic, t, end, turned, turn, motion, patience, slack):
+    """First time in [t, end) at which sign F falls through 0 (inf if none), the turning until then, and a code.
 
-    ``piece`` is (f, g1, g2, curvature, stretch) and ``state`` what `satellite_after` gives at t. ``leaving`` says that
-    F(t) = 0 to rounding, a root that is not to be found again. ``fastest`` bounds the satellite's speed and
-    ``patience`` is the longest time for which the bounds are worth having.
+    F is that of a ``line``, see `towards_line`, or of a ``conic`` (f, g1, g2, curvature, stretch); the other one is
+    None. ``turned`` is the `turning` until t. ``leaving`` says that F(t) = 0 to rounding, a root that is not to be
+    found again, and ``patience`` is the longest time for which the bounds are worth having.
     """
-    f0, g1, g2, curvature, stretch = piece
-    v1, v2, omega, scale = motion
-    widest = max(1.0, stretch)
-    bend = scale * omega * omega
-    swing = bend * scale * abs(omega)
+    third, growth = motion.spin * motion.spin * abs(motion.omega), 0.0
     for number in range(ROOT_STEPS):
-        dx, dy = state[0], stretch * state[1]
-        n1, n2 = g1 - curvature * dx, g2 - curvature * dy
-        u1, u2 = v1 + omega * state[3], stretch * (v2 + omega * state[2])
-        f = sign * (f0 + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy))
-        f1 = sign * (n1 * u1 + n2 * u2)
-        f2 = sign * (bend * (stretch * n2 * state[3] - n1 * state[2]) - curvature * (u1 * u1 + u2 * u2))
+        if conic is not None:
+            f, f1, f2, third, growth = conic_after(conic, t, turned, turn, motion)
+        if line is not None:
+            f, f1, f2 = line_after(line, t, turned, motion)
+        f, f1, f2 = sign * f, sign * f1, sign * f2
         if number == 0 and leaving:
             if f1 <= 0.0:
-                return t, state, GRAZING
+                return t, turned, GRAZING
             f = 0.0
         elif f <= 0.0:
             # at the start: behind the piece by a rounding error
-            return t, state, CLEAR if number > 0 else CORNER
+            return t, turned, CLEAR if number > 0 else CORNER
         ahead = min(end - t, patience)
-        third = widest * swing
-        if curvature != 0.0:
-            speed = widest * fastest
-            third *= math.sqrt(n1 * n1 + n2 * n2) + abs(curvature) * speed * ahead
-            third += 3.0 * abs(curvature) * speed * widest * bend
-        c = f2 - third * ahead
-        step = safe_step(f, f1, c)
+        # the first root of a parabola is at most twice as far as that of its tangent: if this parabola has one, no
+        # bound farther on is wanted
+        near = min(ahead, -2.0 * f / f1) if f1 < 0.0 else ahead
+        doubt = (third + growth * near) * near
+        step = safe_step(f, f1, f2 - doubt)
+        if step == np.inf and near < ahead:
+            doubt = (third + growth * ahead) * ahead
+            step = safe_step(f, f1, f2 - doubt)
         if step >= ahead:
-            if c > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
+            if f2 - doubt > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
                 # so near a tangency that rounding decides between two roots and none
                 t -= f1 / f2
-                return t, satellite_after(t, turn, motion), GRAZING
+                return t, turning(motion.spin * t), GRAZING
             if end - t <= patience:
                 break
             step = ahead
         before = t
         t += step
-        state = satellite_after(t, turn, motion)
+        turned = turning(motion.spin * t)
         # what F may still be there is its gap to the parabola; far below the slack it counts as 0
-        if step < ahead and (third * ahead * step * step <= ROOT_SHARE * slack or t == before):
-            return t, state, CLEAR
-    return np.inf, state, CLEAR
+        if step < ahead and (doubt * step * step <= ROOT_SHARE * slack or t == before):
+            return t, turned, CLEAR
+    return np.inf, turned, CLEAR
 
 
-@_inline
+@inlined
 def where_on_line(joints, lines, j, x, y, slack):
     """How a point of the line through segment j lies to the segment: inside, and within the slack of a corner."""
     along = (x - joints[j, 0]) * lines[j, 0] + (y - joints[j, 1]) * lines[j, 1]
@@ -149,83 +100,96 @@ def where_on_line(joints, lines, j, x, y, slack):
     return from_start >= -slack and from_end >= -slack, corner
 
 
-@_inline
-def first_on_piece(kind, index, own, x, y, t, end, state, turn, motion, fastest, size, slack, joints, lines, arcs):
-    """First contact in [t, end) of one satellite with the front of one piece, the state there, and a code.
+@inlined
+def first_on_piece(kind, index, own, x, y, t, end, turned, turn, motion, size, slack, ground):
+    """First contact in [t, end) of one satellite with the front of one piece, its state there, and a code.
 
-    (x, y) is where the satellite was at the start of the flight, and ``own`` whether that is on this piece.
+    (x, y) is where the satellite was at the start of the flight, and ``own`` whether that is on this piece. ``turned``
+    is its `turning` until t, and its state is what `satellite_after` gives.
     """
-    patience = np.inf
+    joints, lines, arcs = ground.joints, ground.lines, ground.arcs
+    line, conic = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0)
+    stretch, patience = 1.0, np.inf
+    leaving = own and t == 0.0
     if kind == LINE:
-        g1, g2, curvature, stretch = lines[index, 2], lines[index, 3], 0.0, 1.0
-        f0 = 0.0 if own else g1 * (x - joints[index, 0]) + g2 * (y - joints[index, 1])
+        g1, g2 = lines[index, 2], lines[index, 3]
+        level = 0.0 if own else g1 * (x - joints[index, 0]) + g2 * (y - joints[index, 1])
+        line = towards_line(level, g1, g2, turn, motion)
+        here, rate, bend = line_after(line, t, turned, motion)
+        ahead = end - t
+        # F lies above a parabola that is not convex, and so above the lower one of its ends
+        doubt = motion.spin * motion.spin * abs(motion.omega) * ahead
+        lowest = here + (rate + 0.5 * min(bend - doubt, 0.0) * ahead) * ahead
+        if lowest > slack and (here > slack or (leaving and rate > 0.0)):
+            return np.inf, satellite_after(t, turned, turn, motion), CLEAR
     else:
         curvature, stretch = arcs[index, 4], arcs[index, 12]
         rx, ry = x - arcs[index, 0], stretch * (y - arcs[index, 1])
         g1, g2 = arcs[index, 2] - curvature * rx, arcs[index, 3] - curvature * ry
-        f0 = 0.0 if own else 0.5 * ((arcs[index, 2] + g1) * rx + (arcs[index, 3] + g2) * ry)
-        patience = 2.0 * size / fastest
-    piece = (f0, g1, g2, curvature, stretch)
-    dx, dy = state[0], stretch * state[1]
-    n1, n2 = g1 - curvature * dx, g2 - curvature * dy
-    here = f0 + 0.5 * ((g1 + n1) * dx + (g2 + n2) * dy)
-    leaving = own and t == 0.0
-    falling = n1 * (motion[0] + motion[2] * state[3]) + stretch * n2 * (motion[1] + motion[2] * state[2]) < 0.0
-    sign = 1.0 if leaving or here >= 0.0 or (here >= -slack and falling) else -1.0
+        level = 0.0 if own else 0.5 * ((arcs[index, 2] + g1) * rx + (arcs[index, 3] + g2) * ry)
+        conic = (level, g1, g2, curvature, stretch)
+        here, rate, _, _, _ = conic_after(conic, t, turned, turn, motion)
+        patience = 2.0 * size / motion.fastest
+    sign = 1.0 if leaving or here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
     while True:
-        t, state, code = next_root(sign, leaving, piece, t, end, state, turn, motion, fastest, patience, slack)
+        if kind == LINE:
+            t, turned, code = next_root(sign, leaving, line, None, t, end, turned, turn, motion, patience, slack)
+        else:
+            t, turned, code = next_root(sign, leaving, None, conic, t, end, turned, turn, motion, patience, slack)
+        state, inward = satellite_after(t, turned, turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR
         if sign > 0.0:
             px, py = x + state[0], y + state[1]
             # at a shallow incidence a rounding error across the piece is a longer way along it
-            dx, dy = state[0], stretch * state[1]
-            n1, n2 = g1 - curvature * dx, g2 - curvature * dy
-            inward = n1 * (motion[0] + motion[2] * state[3]) + stretch * n2 * (motion[1] + motion[2] * state[2])
-            wide = slack * max(1.0, min(fastest / abs(inward), WIDEST_SLACK))
             if kind == LINE:
+                _, inward, _ = line_after(line, t, turned, motion)
+                wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
                 inside, corner = where_on_line(joints, lines, index, px, py, wide)
             else:
+                _, inward, _, _, _ = conic_after(conic, t, turned, turn, motion)
+                wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
                 ax, ay = px - arcs[index, 0], stretch * (py - arcs[index, 1])
                 inside = on_arc(arcs[index], ax, ay, wide * max(1.0, stretch))
                 corner = near_end(arcs[index], px, py, wide)
             if inside:
                 return t, state, CORNER if corner else code
-        if code != CLEAR:
+        if code == GRAZING:
             # a tangency beside the piece: of a line it is the only one, and of a circle the way leads on outside
             return np.inf, state, CLEAR
-        sign = -sign
+        if code == CLEAR or inward < 0.0:
+            sign = -sign
         leaving = True
 
 
-@_inline
-def first_in_hollow(
-    hollows, h, own_kind, own_index, came_from, x, y, t, end, state, turn, motion, fastest, slack, is_open, joints,
-    lines, arcs,
-):  # fmt: skip
+@inlined
+def first_in_hollow(h, own_kind, own_index, came_from, x, y, t, end, turned, turn, motion, slack, ground):
     """First contact of one satellite with the pieces of the hollow h: time (inf), kind, index, state and code.
 
     For an open wall the sides of the cell count as pieces; ``came_from`` is -1 or 1 for a satellite that has just come
     in through the left or the right one.
     """
-    kind, index, code, where, size = NO_PIECE, -1, CLEAR, state, hollows[h, 2]
+    hollows, joints = ground.hollows, ground.joints
+    kind, index, code, size = NO_PIECE, -1, CLEAR, hollows[h, 2]
+    where = satellite_after(t, turned, turn, motion)
     for part in (3, 5, 7):
         tried = LINE if part == 3 else ARC
         for k in range(int(hollows[h, part]), int(hollows[h, part + 1])):
             if tried == ARC or joints[k, 3] > 0.0:
                 own = own_kind == tried and own_index == k
                 hit, place, unclear = first_on_piece(
-                    tried, k, own, x, y, t, end, state, turn, motion, fastest, size, slack, joints, lines, arcs
+                    tried, k, own, x, y, t, end, turned, turn, motion, size, slack, ground
                 )
                 if hit < end:
                     end, kind, index, code, where = hit, tried, k, unclear, place
-    if is_open:
+    if ground.is_open:
         for side in (-1, 1):
             edge = hollows[h, 0] if side < 0 else hollows[h, 1]
-            piece = (side * (edge - x), -float(side), 0.0, 0.0, 1.0)
-            hit, place, unclear = next_root(
-                1.0, came_from == side, piece, t, end, state, turn, motion, fastest, np.inf, slack
+            line = towards_line(side * (edge - x), -float(side), 0.0, turn, motion)
+            hit, then, unclear = next_root(
+                1.0, came_from == side, line, None, t, end, turned, turn, motion, np.inf, slack
             )
             if hit < end:
-                end, kind, index, code, where = hit, SIDE, side, unclear, place
+                end, kind, index, code = hit, SIDE, side, unclear
+                where = satellite_after(hit, then, turn, motion)
     return end if kind != NO_PIECE else np.inf, kind, index, where, code

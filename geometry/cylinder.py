@@ -12,7 +12,8 @@ from . import rolling
 from .blocks import in_blocks
 from .charts import RollingCharts
 from .disk import Disk
-from .rigid import check_kinds, checked_states, rigid_tables, rounding_of_places, shares
+from .rigid import check_kinds, checked_states
+from .rigid_tables import ground_of, rounding_of_places, shares
 from .tracing import MAX_COLLISIONS, Outcomes
 from .wall import Wall
 
@@ -104,17 +105,16 @@ def collide_cylinder(
     n = len(at)
     out_position, out_velocity, time = np.empty_like(at), np.empty_like(moving), np.empty(n)
     contacts, status = np.empty(n, np.int64), np.empty(n, np.uint8)
-    scene = wall.scene
-    tables, masses, slack = rigid_tables(scene), shares(disk), rounding_of_places(scene, 0.0)
+    results = (out_position, out_velocity, time, contacts, status)
+    ground, masses, slack = ground_of(wall.scene), shares(disk), rounding_of_places(wall.scene, 0.0)
 
     def run(part: slice) -> None:
         roll_disks(
-            at[part], moving[part], masses, eps, wall.depth, slack, max_contacts, scene.cell, scene.is_open, *tables,
-            out_position[part], out_velocity[part], time[part], contacts[part], status[part],
+            at[part], moving[part], masses, eps, wall.depth, slack, max_contacts, ground,
+            *(array[part] for array in results),
         )  # fmt: skip
 
     in_blocks(run, n, threads)
-    results = (out_position, out_velocity, time, contacts, status)
     for array in results:
         array.setflags(write=False)
     return CylinderCollision(*results)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,18 +12,10 @@ from ..errors import InputError
 from .bezier import Bezier
 from .blocks import in_blocks
 from .disk import Disk
+from .rigid_tables import ground_of, ring_of, shares
 from .satellites import Satellites
 from .tracing import MAX_COLLISIONS, Outcomes
 from .wall import Wall
-
-if TYPE_CHECKING:
-    from .scene import Scene
-
-# A bound that is attained only by a satellite on the deepest point of the wall half-way between two others; the room
-# is for rounding.
-ROOM = 1e-9
-# Positions carry a few rounding errors of their size each, as those of rays do (engine.JOINT_ULPS).
-SLACK = 16.0 * float(np.finfo(np.float64).eps)
 
 
 @dataclass(frozen=True)
@@ -109,8 +99,8 @@ def collide(
     -----
     Positions are kept in units of the wall, relative to its cell, so that nothing is lost at small scales except what
     the rounding of x1 and alpha themselves means there. The first contact is found by steps that provably pass no root
-    (see `contact_engine`). Cost: below a microsecond a collision on a wall of few pieces; every piece of a hollow is
-    tested.
+    (see `contact_engine`). Cost: about half a microsecond a contact on a wall of few pieces; every piece of a hollow
+    is tested.
 
     Source: Rudzis 2022, sections 1.3.1 to 1.3.5, and Proposition 3.2 with the angle alpha + j rho (eq. 3.26 prints
     alpha - j rho).
@@ -128,25 +118,19 @@ def collide(
 
     check_kinds(disk, wall)
     eps = positive_number("scale", scale)
-    ring = Satellites.around(eps, eps * wall.depth, spacing)
+    ring = ring_of(Satellites.around(eps, eps * wall.depth, spacing), eps, wall.scene)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
     n = len(at)
     out_position, out_velocity, time = np.empty_like(at), np.empty_like(moving), np.empty(n)
     contacts, two, status = np.empty(n, np.int64), np.empty(n, np.bool_), np.empty(n, np.uint8)
-    scene = wall.scene
-    tables, masses = rigid_tables(scene), shares(disk)
-    slack = rounding_of_places(scene, math.sin(ring.reach) / eps)
-    numbers = (eps, ring.spacing, ring.reach * (1.0 + ROOM), ring.lowest / eps * (1.0 + ROOM), slack)
+    results = (out_position, out_velocity, time, contacts, two, status)
+    ground, masses = ground_of(wall.scene), shares(disk)
 
     def run(part: slice) -> None:
-        collide_disks(
-            at[part], moving[part], masses, numbers, max_contacts, scene.cell, scene.is_open, *tables,
-            out_position[part], out_velocity[part], time[part], contacts[part], two[part], status[part],
-        )  # fmt: skip
+        collide_disks(at[part], moving[part], masses, ring, max_contacts, ground, *(array[part] for array in results))
 
     in_blocks(run, n, threads)
-    results = (out_position, out_velocity, time, contacts, two, status)
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)
@@ -185,26 +169,3 @@ def checked_states(position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Fl
     n = max(len(at), len(moving))
     rows = np.broadcast_to(at, (n, 2)), np.broadcast_to(moving, (n, 3))
     return np.ascontiguousarray(rows[0]), np.ascontiguousarray(rows[1])
-
-
-def rigid_tables(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
-    """Hollows, joints, lines and arcs: circles and ellipses have the same columns and become one table."""
-    none = np.empty((0, 0))
-    circles, ellipses = (none if table is None else table for table in (scene.circles, scene.ellipses))
-    hollows = scene.hollows.copy()
-    hollows[:, 7:9] += len(circles)
-    lines = np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines
-    arcs = [table for table in (circles, ellipses) if len(table)]
-    return hollows, scene.joints, lines, np.concatenate(arcs) if arcs else none
-
-
-def shares(disk: Disk) -> tuple[float, float]:
-    """Mass and inertia in the unit m + J: laws know only their ratio."""
-    total = disk.mass + disk.inertia
-    return disk.mass / total, disk.inertia / total
-
-
-def rounding_of_places(scene: Scene, farthest: float) -> float:
-    """How far off a satellite may be by rounding: of the wall's size and of its distance from the disk's centre."""
-    size = float(scene.hollows[:, 2].max()) if len(scene.hollows) else 0.0
-    return SLACK * (size + scene.cell + farthest)

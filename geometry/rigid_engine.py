@@ -1,6 +1,6 @@
 """The compiled collision of the disk with satellites: flights and reflections until it is back at height 0.
 
-Only `rigid` imports this file, because it loads numba. Lengths are in units of the wall, see `contact_engine`.
+Only `rigid` imports this file, because it loads numba. Lengths are in units of the wall, see `flight_engine`.
 """
 
 from __future__ import annotations
@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from .contact_engine import CLEAR, NO, NOTHING, ZERO, first_in_hollow, next_root, satellite_after
+from .contact_engine import CLEAR, NO, NOTHING, ZERO, first_in_hollow, next_root
 from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
+from .flight_engine import compiled, flight, inlined, satellite_after, towards_line, turning
 from .opening_engine import last_hollow
 
 TOP = 7
@@ -21,19 +21,15 @@ MOST_CELLS = 1_000_000
 # A time that no flight takes, but that is not infinite: bounds are multiplied by it.
 FOREVER = 1e30
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
-# an array that is passed costs ten arguments: small functions are inlined
-_inline = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
-
-@_inline
+@inlined
 def hollow_at(hollows, place):
     """The hollow over which a place of the cell lies, or -1 over a flat top."""
     h = last_hollow(place, hollows)
     return h if h >= 0 and place < hollows[h, 1] else -1
 
 
-@_inline
+@inlined
 def near_edge(hollows, place, slack):
     """Whether a place at height 0 is within the slack of an end of a hollow that is a corner."""
     for h in range(hollows.shape[0]):
@@ -44,46 +40,47 @@ def near_edge(hollows, place, slack):
     return False
 
 
-@_compile
-def dive(x, y, t, end, state, turn, motion, fastest, slack, cell, is_open, hollows):
+@compiled
+def dive(x, y, t, end, turned, turn, motion, slack, ground):
     """When and where a satellite comes below the tops in [t, end).
 
-    Returns the time (inf if it does not), state, hollow (-1 where it meets a flat top), its cell's left end and code.
+    Returns the time (inf if it does not), the turning until then, hollow (-1 where it meets a flat top), its cell's
+    left end and code.
     """
-    if y + state[1] > 0.0:
-        lid = (y, 0.0, 1.0, 0.0, 1.0)
-        t, state, code = next_root(1.0, NO, lid, t, end, state, turn, motion, fastest, np.inf, slack)
+    dx, dy, sine, _ = satellite_after(t, turned, turn, motion)
+    if y + dy > 0.0:
+        lid = towards_line(y, 0.0, 1.0, turn, motion)
+        t, turned, code = next_root(1.0, NO, lid, None, t, end, turned, turn, motion, np.inf, slack)
         if t >= end or code != CLEAR:
-            return np.inf, state, -1, 0.0, CLEAR
-    base = math.floor((x + state[0]) / cell) * cell
-    if is_open:
-        return t, state, 0, base, CLEAR
-    place = x + state[0] - base
-    rising = motion[1] + motion[2] * state[2]
+            return np.inf, turned, -1, 0.0, CLEAR
+        dx, dy, sine, _ = satellite_after(t, turned, turn, motion)
+    base = math.floor((x + dx) / ground.cell) * ground.cell
+    if ground.is_open:
+        return t, turned, 0, base, CLEAR
+    place = x + dx - base
+    rising = motion.v2 + motion.omega * sine
     # at a shallow incidence a rounding error of the height is a longer way along the tops
-    near = near_edge(hollows, place, slack * max(1.0, fastest / abs(rising)))
+    near = near_edge(ground.hollows, place, slack * max(1.0, motion.fastest / abs(rising)))
     # one that rises from below the tops has not come in by a known way: it touches them together with another one
-    return t, state, hollow_at(hollows, place), base, CORNER if near or rising >= 0.0 else CLEAR
+    return t, turned, hollow_at(ground.hollows, place), base, CORNER if near or rising >= 0.0 else CLEAR
 
 
-@_compile
-def first_contact(
-    own_kind, own_index, h, base, x, y, t, end, turn, motion, slack, cell, is_open, hollows, joints, lines, arcs
-):
+@compiled
+def first_contact(own_kind, own_index, h, base, x, y, t, end, turn, motion, slack, ground):
     """First contact in [t, end) of one satellite with the wall.
 
     (x, y) is where it was at the start of the flight: on the piece ``own_kind``, ``own_index`` (or NO_PIECE), and
     in the hollow ``h`` of the cell that begins at ``base``, or above the tops if h is -1. Returns time (inf if none),
     kind, index, hollow, its cell's left end, state and code.
     """
-    v1, v2, omega, _ = motion
-    fastest = math.sqrt(v1 * v1 + v2 * v2) + abs(omega)
-    state = satellite_after(t, turn, motion)
+    turned = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
+    state = satellite_after(t, turned, turn, motion)
     if own_kind == TOP:
         # it rises, and its path bends upward
         return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
     if h < 0:
-        t, state, h, base, code = dive(x, y, t, end, state, turn, motion, fastest, slack, cell, is_open, hollows)
+        t, turned, h, base, code = dive(x, y, t, end, turned, turn, motion, slack, ground)
+        state = satellite_after(t, turned, turn, motion)
         if t >= end:
             return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
         if h < 0 or code != CLEAR:
@@ -91,22 +88,23 @@ def first_contact(
     came_from = ZERO
     for _ in range(MOST_CELLS):
         t, kind, index, state, code = first_in_hollow(
-            hollows, h, own_kind, own_index, came_from, x - base, y, t, end, state, turn, motion, fastest, slack,
-            is_open, joints, lines, arcs,
-        )  # fmt: skip
+            h, own_kind, own_index, came_from, x - base, y, t, end, turned, turn, motion, slack, ground
+        )
         if kind != SIDE:
             return t, kind, index, h, base, state, code
-        if y + state[1] > 0.0 and v2 + omega * state[2] > 0.0:
+        if y + state[1] > 0.0 and motion.v2 + motion.omega * state[2] > 0.0:
             return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
-        base += index * cell
+        turned = turning(motion.spin * t)
+        base += index * ground.cell
         came_from = -index
         own_kind = ZERO
     return t, NO_PIECE, -1, h, base, state, BOUNCE_LIMIT
 
 
-@_inline
-def surface(kind, index, x, y, joints, lines, arcs):
+@inlined
+def surface(kind, index, x, y, ground):
     """The point (x, y) put back on the piece that it hit, and the unit normal there, towards the free side."""
+    joints, lines, arcs = ground.joints, ground.lines, ground.arcs
     if kind == LINE:
         n1, n2 = lines[index, 2], lines[index, 3]
         share = ((x - joints[index, 0]) * lines[index, 0] + (y - joints[index, 1]) * lines[index, 1]) / (
@@ -127,150 +125,150 @@ def surface(kind, index, x, y, joints, lines, arcs):
     return arcs[index, 0] + qx, arcs[index, 1] + qy / stretch, n1 * norm, n2 * norm
 
 
-@_inline
-def satellite_at(x, y, angle, j, spacing, scale):
-    """Where the j-th satellite after the one at (x, y) and ``angle`` is, without cancellation."""
-    middle, chord = angle + 0.5 * j * spacing, 2.0 * math.sin(0.5 * j * spacing) / scale
-    return x + chord * math.cos(middle), y + chord * math.sin(middle)
+@inlined
+def satellite_at(x, y, turn, j, ring):
+    """Where the j-th satellite after the one at (x, y) and the angle (sine, cosine) is, and its angle alike.
+
+    One moves along the chord between them, and every product is as exact as its factors: nothing cancels.
+    """
+    half_sine, half_cosine = j * ring.half_sine, ring.half_cosine
+    if abs(j) != 1:
+        half = 0.5 * j * ring.spacing
+        half_sine, half_cosine = math.sin(half), math.cos(half)
+    sine, cosine = turn
+    across = 2.0 * half_sine * (cosine * half_cosine - sine * half_sine)
+    upward = 2.0 * half_sine * (sine * half_cosine + cosine * half_sine)
+    return x + across / ring.scale, y + upward / ring.scale, (sine + across, cosine - upward)
 
 
-@_inline
-def within_reach(other, rate, reach):
-    """When a satellite at the angle ``other`` first comes within reach of the wall: 0 if it is, inf if it leaves."""
-    if abs(other) <= reach:
-        return 0.0
-    return (abs(other) - reach) / abs(rate) if other * rate < 0.0 else np.inf
+@inlined
+def least_rise(angle):
+    """A bound from below of 1 - cos(angle)."""
+    square = angle * angle
+    return square * (0.5 - square / 24.0)
 
 
-@_inline
-def first_of_all(own, below, x, y, angle, turn, motion, end, ring, cell, is_open, hollows, joints, lines, arcs):
+@inlined
+def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, ground):
     """First contact of any satellite before ``end``.
 
-    The satellite 0 is at (x, y), and ``own`` is its (kind, index, hollow); ``below`` is the (number, hollow, base) of
-    another one that is below the tops, with hollow -1 for none. Returns the time, which is ``end`` if there is none,
-    (kind, index, hollow), base, the satellite's number, place and code.
+    The satellite 0 is at (x, y), the disk at ``height``, and ``own`` is its (kind, index, hollow); ``below`` is the
+    (number, hollow, base) of another one that is below the tops, with hollow -1 for none. Returns the time, which is
+    ``end`` if there is none, (kind, index, hollow), base, the satellite's number, its place with the sine and cosine
+    of its angle, and code.
     """
-    scale, spacing, reach, _, slack = ring
+    reach, slack, rate = ring.reach, ring.slack, abs(motion.spin)
     time, kind, index, hollow, base, state, code = first_contact(
-        own[0], own[1], own[2], 0.0, x, y, 0.0, end, turn, motion, slack, cell, is_open, hollows, joints, lines, arcs
+        own[0], own[1], own[2], 0.0, x, y, 0.0, end, turn, motion, slack, ground
     )
-    hit, chosen, place = (kind, index, hollow), 0, (x + state[0], y + state[1])
+    hit, chosen, touched = (kind, index, hollow), 0, (x + state[0], y + state[1], state[2], state[3])
     time = min(time, end)
     # the others in the order in which they come within reach of the wall
-    rate = scale * motion[2]
-    step = -1 if rate > 0.0 else 1
+    step = -1 if motion.spin > 0.0 else 1
     # numba's floor is a float
-    j = -step * int(math.floor((reach + step * angle) / spacing))  # noqa: RUF046
+    j = -step * int(math.floor((reach + step * angle) / ring.spacing))  # noqa: RUF046
     for _ in range(MOST_CELLS):
-        other = angle + j * spacing
-        start = within_reach(other, rate, reach)
-        if start >= time:
+        other = angle + j * ring.spacing
+        approach = rate if other * motion.spin < 0.0 else 0.0
+        beyond = abs(other) - reach
+        if beyond > 0.0 and beyond >= approach * time:
             break
-        if j != 0:
-            x_other, y_other = satellite_at(x, y, angle, j, spacing, scale)
-            sine = math.sin(other)
+        lowest = height + min(motion.v2, 0.0) * time
+        lowest += motion.radius * least_rise(max(abs(other) - approach * time, 0.0))
+        if j != 0 and lowest <= slack:
+            start = beyond / approach if beyond > 0.0 else 0.0
+            x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
             # the path bends upward, so that it stays above its first tangent
-            if start > 0.0 or y_other <= 0.0 or y_other + (motion[1] + motion[2] * sine) * time < 0.0:
+            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * turn_other[0]) * time < 0.0:
                 inside, left = (below[1], below[2]) if j == below[0] else (NOTHING, 0.0)
                 t, kind, index, hollow, left, state, unclear = first_contact(
-                    ZERO, NOTHING, inside, left, x_other, y_other, start, time, (sine, math.cos(other)), motion, slack,
-                    cell, is_open, hollows, joints, lines, arcs,
-                )  # fmt: skip
+                    ZERO, NOTHING, inside, left, x_other, y_other, start, time, turn_other, motion, slack, ground
+                )
                 if t < time:
                     time, hit, base, code, chosen = t, (kind, index, hollow), left, unclear, j
-                    place = (x_other + state[0], y_other + state[1])
+                    touched = (x_other + state[0], y_other + state[1], state[2], state[3])
         j += step
-    return time, hit, base, chosen, place, code
+    return time, hit, base, chosen, touched, code
 
 
-@_compile
-def left_below(own, below, x, y, angle, time, chosen, place, motion, ring, cell, is_open, hollows):
+@compiled
+def left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, ring, ground):
     """The neighbour of the satellite ``chosen`` that is below the tops when that one touches the wall, as ``below``.
 
     Under an overhang its place does not tell its hollow; where it came in does. At most one satellite is below the
     tops beside the one that touches.
     """
-    scale, spacing, reach, _, slack = ring
-    if is_open:
+    if ground.is_open:
         return ZERO, NOTHING, 0.0
-    later = angle + scale * motion[2] * time + chosen * spacing
+    later = angle + motion.spin * time + chosen * ring.spacing
     for side in (-1, 1):
-        if abs(later + side * spacing) <= reach:
-            _, height = satellite_at(place[0], place[1], later, side, spacing, scale)
+        if abs(later + side * ring.spacing) <= ring.reach:
+            _, height, _ = satellite_at(touched[0], touched[1], (touched[2], touched[3]), side, ring)
             if height <= 0.0:
                 j = chosen + side
                 if j == 0 and own[2] >= 0:
                     return j, own[2], 0.0
                 if j == below[0] and below[1] >= 0:
                     return below
-                other = angle + j * spacing
-                turn = (math.sin(other), math.cos(other))
-                x_other, y_other = satellite_at(x, y, angle, j, spacing, scale)
-                start = within_reach(other, scale * motion[2], reach)
-                fastest = math.sqrt(motion[0] * motion[0] + motion[1] * motion[1]) + abs(motion[2])
-                state = satellite_after(start, turn, motion)
-                t, state, h, base, _ = dive(
-                    x_other, y_other, start, time, state, turn, motion, fastest, slack, cell, is_open, hollows
+                other = angle + j * ring.spacing
+                x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
+                start = 0.0
+                if abs(other) > ring.reach:
+                    # it came within reach on the way
+                    start = (abs(other) - ring.reach) / abs(motion.spin)
+                t, _, h, base, _ = dive(
+                    x_other, y_other, start, time, turning(motion.spin * start), turn_other, motion, ring.slack, ground
                 )
                 if t < time:
                     return j, h, base
     return ZERO, NOTHING, 0.0
 
 
-@_inline
+@inlined
 def reflect(v1, v2, omega, n1, n2, turn, disk):
     """Velocities after an impulse along the wall's normal n at a satellite: specular in the kinetic metric."""
     mass, inertia = disk
+    by_mass, by_inertia = 1.0 / mass, 1.0 / inertia
     arm = n1 * turn[1] + n2 * turn[0]
     inward = (v1 + omega * turn[1]) * n1 + (v2 + omega * turn[0]) * n2
-    impulse = -2.0 * inward / (1.0 / mass + arm * arm / inertia)
-    v1 += impulse * n1 / mass
-    v2 += impulse * n2 / mass
-    omega += impulse * arm / inertia
+    impulse = -2.0 * inward / (by_mass + arm * arm * by_inertia)
+    v1 += impulse * n1 * by_mass
+    v2 += impulse * n2 * by_mass
+    omega += impulse * arm * by_inertia
     # one Newton step on the kinetic norm keeps rounding errors from adding up
     energy = mass * (v1 * v1 + v2 * v2) + inertia * omega * omega
     scale = 1.5 - 0.5 * energy
     return scale * v1, scale * v2, scale * omega
 
 
-@_inline
-def angle_data(angle):
-    """(sine, cosine) of an angle, and 1 - cosine without cancellation."""
-    half = math.sin(0.5 * angle)
-    versed = 2.0 * half * half
-    return (2.0 * half * math.cos(0.5 * angle), 1.0 - versed), versed
-
-
-@_inline
-def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, hollows, joints, lines, arcs):
+@inlined
+def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, ground):
     """One collision of a disk that comes down at height 0, its lowest satellite at ``angle`` from the lowest point.
 
-    ``disk`` is (m, J) with m + J = 1, ``ring`` is (scale, spacing, reach, floor, slack): satellites farther than
-    ``reach`` from the lowest point are above the wall, and ``-floor`` is as low as the disk can be. The velocities
-    have kinetic norm 1. Returns the disk's displacement, its turn, the time, the velocities, contacts, whether two
-    satellites took part, and the status.
+    ``disk`` is (m, J) with m + J = 1. The velocities have kinetic norm 1. Returns the disk's displacement, its turn,
+    the time, the velocities, contacts, whether two satellites took part, and the status.
     """
-    scale, spacing, _, floor, _ = ring
+    scale, spacing = ring.scale, ring.spacing
     travel, turned, passed, contacts, two = 0.0, 0.0, 0.0, 0, False
-    turn, versed = angle_data(angle)
-    x, y, height = place + turn[0] / scale, versed / scale, 0.0
+    sine, versed = turning(angle)
+    x, y, height = place + sine / scale, versed / scale, 0.0
     own, below = (ZERO, NOTHING, NOTHING), (ZERO, NOTHING, 0.0)
     while True:
-        motion = (v1, v2, omega, scale)
+        turn, motion = (sine, 1.0 - versed), flight(v1, v2, omega, scale)
         # by then it is back, or would be lower than it can be
         if v2 > 0.0:
             end = max(-height / v2, 0.0)
         elif v2 < 0.0:
-            end = -(height + floor) / v2
+            end = -(height + ring.floor) / v2
         elif omega != 0.0:
-            end = MOST_CELLS * spacing / abs(scale * omega)
+            end = MOST_CELLS * spacing / abs(motion.spin)
         else:
             return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
         time, hit, base, chosen, touched, code = first_of_all(
-            own, below, x, y, angle, turn, motion, end, ring, cell, is_open, hollows, joints, lines, arcs
+            own, below, x, y, height, angle, turn, motion, end, ring, ground
         )
         travel += v1 * time
-        turned += scale * omega * time
+        turned += motion.spin * time
         passed += time
         if code != CLEAR:
             return travel, turned, passed, v1, v2, omega, contacts, two, code
@@ -278,46 +276,42 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, cell, is_open, 
             return travel, turned, passed, v1, v2, omega, contacts, two, ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
         if contacts >= limit:
             return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
-        number, hollow, left = left_below(
-            own, below, x, y, angle, time, chosen, touched, motion, ring, cell, is_open, hollows
-        )
+        number, hollow, left = left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, ring, ground)
         below = (number - chosen, hollow, left - base)
         two = two or (contacts > 0 and chosen != 0)
         contacts += 1
-        angle += chosen * spacing + scale * omega * time
-        turn, versed = angle_data(angle)
+        angle += chosen * spacing + motion.spin * time
+        sine, versed = turning(angle)
         own, x, y, n1, n2 = hit, touched[0] - base, 0.0, 0.0, 1.0
         if hit[0] != TOP:
-            x, y, n1, n2 = surface(hit[0], hit[1], x, touched[1], joints, lines, arcs)
+            x, y, n1, n2 = surface(hit[0], hit[1], x, touched[1], ground)
         height = y - versed / scale
-        v1, v2, omega = reflect(v1, v2, omega, n1, n2, turn, disk)
+        v1, v2, omega = reflect(v1, v2, omega, n1, n2, (sine, 1.0 - versed), disk)
 
 
-@_compile
+@compiled
 def collide_disks(
-    position, velocity, disk, ring, limit, cell, is_open, hollows, joints, lines, arcs, out_position,
-    out_velocity, times, contacts, two_satellites, status,
+    position, velocity, disk, ring, limit, ground, out_position, out_velocity, times, contacts, two_satellites, status,
 ):  # fmt: skip
     """Collide a block of disks; fills the output arrays."""
     mass, inertia = disk
-    scale, spacing = ring[0], ring[1]
-    width = scale * cell
+    scale, spacing = ring.scale, ring.spacing
+    width = scale * ground.cell
     for i in range(position.shape[0]):
         norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
         place = (position[i, 0] - math.floor(position[i, 0] / width) * width) / scale
         angle = position[i, 1] - spacing * round(position[i, 1] / spacing)
         travel, turned, time, v1, v2, omega, contacts[i], two_satellites[i], status[i] = collide_disk(
-            place, angle, velocity[i, 0] / norm, velocity[i, 1] / norm, velocity[i, 2] / norm, disk, ring, limit,
-            cell, is_open, hollows, joints, lines, arcs,
-        )  # fmt: skip
+            place, angle, velocity[i, 0] / norm, velocity[i, 1] / norm, velocity[i, 2] / norm, disk, ring, limit, ground
+        )
         out_position[i, 0] = position[i, 0] + scale * travel
         out_position[i, 1] = position[i, 1] + turned
         out_velocity[i, 0], out_velocity[i, 1], out_velocity[i, 2] = norm * v1, norm * v2, norm * omega
         times[i] = scale * time / norm
 
 
-@_inline
-def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs):
+@inlined
+def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, ground):
     """One collision on the cylinder: the contact moves on a straight line with the velocity (v1 + omega, v2).
 
     It starts at (place, 0); ``deepest`` is the wall's depth. Returns the disk's displacement, its turn, the time, the
@@ -327,16 +321,15 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, cell, is_open, 
     x, y = place, 0.0
     own = (ZERO, NOTHING, NOTHING)
     while True:
-        motion = (v1 + omega, v2, 0.0, 1.0)
+        motion = flight(v1 + omega, v2, 0.0, 1.0)
         end = FOREVER
         if v2 > 0.0:
             end = -y / v2
         elif v2 < 0.0:
-            end = min(2.0 * (y + deepest + cell) / -v2, FOREVER)
+            end = min(2.0 * (y + deepest + ground.cell) / -v2, FOREVER)
         time, kind, index, hollow, base, state, code = first_contact(
-            own[0], own[1], own[2], 0.0, x, y, 0.0, end, (0.0, 1.0), motion, slack, cell, is_open, hollows, joints,
-            lines, arcs,
-        )  # fmt: skip
+            own[0], own[1], own[2], 0.0, x, y, 0.0, end, (0.0, 1.0), motion, slack, ground
+        )
         time = min(time, end)
         travel += v1 * time
         turned += omega * time
@@ -353,14 +346,13 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, cell, is_open, 
         if kind == TOP:
             y = 0.0
         else:
-            x, y, n1, n2 = surface(kind, index, x, y, joints, lines, arcs)
+            x, y, n1, n2 = surface(kind, index, x, y, ground)
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (0.0, 1.0), disk)
 
 
-@_compile
+@compiled
 def roll_disks(
-    position, velocity, disk, scale, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs, out_position,
-    out_velocity, times, contacts, status,
+    position, velocity, disk, scale, deepest, slack, limit, ground, out_position, out_velocity, times, contacts, status,
 ):  # fmt: skip
     """Collide a block of disks on the cylinder; fills the output arrays."""
     mass, inertia = disk
@@ -368,8 +360,8 @@ def roll_disks(
         norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
         place = (position[i, 0] + position[i, 1]) / scale
         travel, turned, time, v1, v2, omega, contacts[i], status[i] = roll_disk(
-            place - math.floor(place / cell) * cell, velocity[i, 0] / norm, velocity[i, 1] / norm,
-            velocity[i, 2] / norm, disk, deepest, slack, limit, cell, is_open, hollows, joints, lines, arcs,
+            place - math.floor(place / ground.cell) * ground.cell, velocity[i, 0] / norm, velocity[i, 1] / norm,
+            velocity[i, 2] / norm, disk, deepest, slack, limit, ground,
         )  # fmt: skip
         out_position[i, 0] = position[i, 0] + scale * travel
         out_position[i, 1] = position[i, 1] + scale * turned

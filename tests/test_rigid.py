@@ -106,6 +106,15 @@ def test_an_overhang_keeps_the_satellites_that_are_below_it():
     np.testing.assert_allclose(outgoing[done], out.velocity[done], atol=1e-5)
 
 
+def test_a_lip_without_thickness_is_met_from_below_by_a_satellite_that_came_in_beside_it():
+    # its height is y = .005 - .096 t + .08 t^2 but for smaller terms: below the tops from x = .38, in the opening
+    # (.35, .65), to x = .89, under the lip; it comes in at the very height of the lip's lower side
+    rng = np.random.default_rng(0)
+    position = np.array([0.06781824, -0.03185973]) + 1e-9 * rng.random((200, 2))
+    out = geo.collide(DISK, geo.mushrooms(0.3), 0.1, position, [[-0.63075937, -0.04428023, 1.00015155]])
+    assert (out.contacts > 1).all() and out.two_satellites.all()
+
+
 def test_a_flat_wall_reflects_in_closed_form():
     # the lowest satellite, at the angle a, touches when x2 = cos a - 1; then Proposition 3.2 with k = (0, 1)
     a, v2, omega = 0.01, -1.0, 1e-9
