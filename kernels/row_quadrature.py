@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 # Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
 # it has: some seconds. Who may give up gives one row this share of them: longer ones have pieces without number.
-MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.05
+MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.01
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
@@ -52,6 +52,8 @@ NARROWEST = 1e-13
 # a power of 1.6 to 2.2.
 FIRST_SHARE = 0.05
 PRESUMED_ORDER = 1.75
+# The next stage does most rows again.
+ROWS_AGAIN = 2.0
 # Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
 LEAST_CUT = 1e-7
 # Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error.
@@ -111,6 +113,7 @@ class _Integrator:
         self.most_flights, self.useless = most_flights, useless
         self.rays, self.flights, self.row_count = 0, 0, 0
         self.judged, self.hopeless = useless is None, False
+        self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
         if isinstance(basis, Legendre):
@@ -135,12 +138,21 @@ class _Integrator:
         self._add_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
-        """Divide panels until the error is small enough, or no flights are left: first for coarser tolerances."""
+        """Divide panels until the error is small enough, or no flights are left: first for coarser tolerances.
+
+        The best matrix on the way is returned: a stage that has to stop may leave its rows worse than it found them.
+        """
         for stage in range(self.stages, -1, -1):
-            error = self._meet(self._begin(stage))
-            if self.flights >= self.most_flights or self.hopeless:
+            self._meet(self._begin(stage))
+            if self.flights >= self.most_flights or self.hopeless or (stage and self._next_is_too_far(stage)):
                 break
-        return self._state()[0], error, self.rays
+        return *self.best, self.rays
+
+    def _next_is_too_far(self, stage: int) -> bool:
+        """Whether the next stage would end for lack of flights; asked where it may be given up only."""
+        further = self.best[1] / (self.tolerance / STAGE_RATIO ** (stage - 1))
+        needed = ROWS_AGAIN * self.flights * max(further, 1.0) ** (1.0 / PRESUMED_ORDER)
+        return self.useless is not None and needed > self.most_flights
 
     def _begin(self, stage: int) -> float:
         """The tolerance of a stage; rows whose error is too large for it are done again."""
@@ -153,18 +165,21 @@ class _Integrator:
         self._mend()
         return tolerance
 
-    def _meet(self, tolerance: float) -> float:
-        """Divide panels until the error is below the tolerance, or no flights are left; returns the error."""
+    def _meet(self, tolerance: float) -> None:
+        """Divide panels until the error is below the tolerance, or no flights are left."""
         goal = tolerance
         while True:
-            _, known, hidden = self._state()
-            if known + hidden <= tolerance or self.flights >= self.most_flights or self._is_hopeless(known + hidden):
-                return known + hidden
+            matrix, known, hidden = self._state()
+            error = known + hidden
+            if error < self.best[1]:
+                self.best = matrix, error
+            if error <= tolerance or self.flights >= self.most_flights or self._is_hopeless(error):
+                return
             # errors that only the asymmetry shows lie in panels whose rules agree by chance
             goal = min(goal, max(tolerance - hidden, 0.25 * known))
             chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
             if not chosen.any():
-                return known + hidden
+                return
             self._divide(chosen)
 
     def _is_hopeless(self, error: float) -> bool:
