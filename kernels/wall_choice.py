@@ -34,21 +34,26 @@ def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
         return found
     if law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
-    rays = None
-    if not affordable or promised <= maker.tolerance:
-        rays = maker.sampled(law, "qmc")
+    if not affordable:
+        return maker.sampled(law, "qmc")
+    rays = _all_rays(maker, law) if promised <= maker.tolerance else None
+    if rays is not None:
         promised = float(rays.error)
-        if not affordable or promised <= maker.tolerance:
+        if promised <= maker.tolerance:
             return rays
     rows = maker.rows(law, useless=max(promised, maker.tolerance))
-    if float(rows.error) <= max(promised, maker.tolerance):
+    if float(rows.error) <= maker.tolerance or float(rows.error) <= promised < float("inf"):
         return rows
+    rays = _all_rays(maker, law) if rays is None else rays
+    return rows if rays is None else min(rows, rays, key=lambda matrix: float(matrix.error))
+
+
+def _all_rays(maker: MatrixMaker, law: WallLaw) -> KernelMatrix | None:
+    """The matrix by rays; None if too many do not escape, where rows count theirs in their error."""
     try:
-        rays = maker.sampled(law, "qmc") if rays is None else rays
+        return maker.sampled(law, "qmc")
     except AccuracyError:
-        # too many rays do not escape; the rows have counted theirs in their error
-        return rows
-    return min(rows, rays, key=lambda matrix: float(matrix.error))
+        return None
 
 
 def _is_within_reach(maker: MatrixMaker) -> bool:
@@ -57,7 +62,10 @@ def _is_within_reach(maker: MatrixMaker) -> bool:
 
 
 def _few_rays(maker: MatrixMaker, law: WallLaw) -> tuple[KernelMatrix | None, float]:
-    """A matrix of fewer rays than asked for, if these are enough for the tolerance; and what all rays promise."""
+    """A matrix of fewer rays than asked for, if these are enough for the tolerance; and what all rays promise.
+
+    The promise is infinite where the looks do not tell.
+    """
     # another stream, so that a look that finds them too few changes no result
     source, number, promised = maker.rng.spawn(1)[0], FIRST_RAYS, float("inf")
     while number < maker.samples:

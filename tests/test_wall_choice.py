@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from random_curved_walls import random_curved_wall
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -59,3 +60,9 @@ def test_a_tighter_tolerance_that_is_out_of_reach_gives_no_worse_a_matrix():
     law, basis = ker.WallLaw(geo.focusing_arcs(1.2).foreshorten(geo.Disk(1.0, 0.5))), ker.Legendre(2)
     loose, tight = (float(ker.discretise(law, basis, tolerance=tolerance).error) for tolerance in (1e-4, 1e-10))
     assert loose <= 1e-4 and tight <= loose
+
+
+def test_where_few_rays_are_allowed_the_more_exact_of_rows_and_rays_is_returned():
+    law, basis = ker.WallLaw(random_curved_wall(6)), ker.Legendre(4)
+    chosen, rays = (ker.discretise(law, basis, method=how, tolerance=1e-6, samples=2**13) for how in ("auto", "qmc"))
+    assert float(chosen.error) <= float(rays.error)
