@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from random_curved_walls import random_curved_wall
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from random_curved_walls import random_curved_wall
 
 # A rough profile of 200 pieces, whose beams resolve completely, and a curve whose beams never do.
 PROFILE = geo.Wall.from_vertices(
