@@ -152,11 +152,16 @@ def file_stem(name: str) -> str:
 def prepare(scene: str) -> None:
     """What a new process loads before anything is timed: the wall, and the compiled loops for it."""
     from ..geometry import trace
+    from ..geometry.beams import beams_of
     from ..kernels import Legendre, WallLaw, discretise
     from ..kernels.wall_rows import adaptive_rows
 
     wall = wall_of(scene)
     trace(wall, [0.3, 0.6], [1.0, 2.0])
+    # towards corners, which takes more than double precision
+    trace(wall, np.clip(wall.vertices[:, 0], 0.0, np.nextafter(wall.period, 0.0)), 0.5 * np.pi)
+    if wall.is_polygonal:
+        beams_of([(0.0, 0.0), (0.3, -0.5), (0.6, -0.4), (1.0, 0.0)])
     if scene in QUANTITIES["disk"].scenes:
         by_true_disks(wall, 1e-3, np.random.default_rng(0), 1)
     adaptive_rows(wall, [1.0], 1e-2)
