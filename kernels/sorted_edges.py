@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats
+from .measure import SINE
 from .ragged_lists import ragged
 
 
@@ -45,3 +46,16 @@ def between_cuts(owner: NDArray[np.intp], cut: Floats) -> tuple[NDArray[np.intp]
     owner, cut = owner[order], cut[order]
     kept = np.flatnonzero((owner[1:] == owner[:-1]) & (cut[1:] > cut[:-1]))
     return owner[kept], cut[kept], cut[kept + 1]
+
+
+def without_outermost(angles: Floats, number: int) -> tuple[Floats, float]:
+    """Sorted angles but for so many of them, half at either end, and the measure of what lies beyond those that stay.
+
+    Examples
+    --------
+    >>> kept, beyond = without_outermost(np.array([0.5, 1.0, 2.0]), 2)
+    >>> kept.tolist(), round(beyond, 12)
+    ([1.0], 1.0)
+    """
+    kept = angles[(number + 1) // 2 : angles.size - number // 2]
+    return kept, float(SINE.cdf(kept[0]) + SINE.mass(kept[-1], np.pi)) if kept.size else 1.0
