@@ -40,6 +40,11 @@ class TriangularTeethLaw(BranchLaw):
     angle : float
         Apex angle psi in (0, pi), radians.
 
+    Raises
+    ------
+    InputError
+        If it is not in that range.
+
     Notes
     -----
     Source: Rudzis 2022, section 2.2.2, corrected and completed: the printed law holds for theta <= (pi - psi)/2
