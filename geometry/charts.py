@@ -211,7 +211,15 @@ def plane_crossing(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
 
 
 def plane_crossing_differential(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
-    """Return the differential (..., 2, 6) of `plane_crossing` in (x1, x2, alpha, v1, v2, omega)."""
+    """Return the differential (..., 2, 6) of `plane_crossing` in (x1, x2, alpha, v1, v2, omega).
+
+    Arguments and errors are those of `plane_crossing`.
+
+    Examples
+    --------
+    >>> plane_crossing_differential([0.0, 2.0, 0.0], [1.0, 2.0, 0.0])[0].tolist()
+    [1.0, -0.5, 0.0, -1.0, 0.5, 0.0]
+    """
     _, x2, _ = _split("configuration", configuration, 3)
     w = _velocity(velocity)
     return _matrix(rolling.project_differential(x2, *w), np.broadcast_shapes(x2.shape, w[0].shape))

@@ -24,7 +24,7 @@ from .facing import WIDEST_WEDGE
 from .segment import Segment
 
 if TYPE_CHECKING:
-    from .curve import Curve
+    from .curve import Curve, Point
 
 NONE, FAN, BOWL = 0.0, 1.0, 2.0
 FAN_COLUMN, CHAIN_COLUMNS = 7, 3
@@ -36,8 +36,6 @@ DOUBT = 2.0**-30
 FLATTEST_BOWL = 0.05
 # In a narrower fan the loop takes runs of hits in one step.
 NARROWEST_FAN = WIDEST_WEDGE
-
-Point = tuple[float, float]
 
 
 def closed_row(pieces: Sequence[Curve], places: Sequence[Point], size: float) -> list[float]:

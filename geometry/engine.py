@@ -1,7 +1,7 @@
-"""The compiled loop of the planar tracer. Only `tracing` imports this file, because it loads numba.
+"""The compiled loop of the planar tracer. Loads numba: imported inside functions, and by other compiled loops.
 
 Every optional table is an array or ``None``; numba compiles one version for each combination that occurs, and the
-branches of absent primitives are pruned from it. Layout of the tables: `primitives`.
+branches of absent primitives are pruned from it. Layout of the tables: `scene`.
 
 The formulas are stable by themselves; there is no epsilon that decides which piece is hit:
 

@@ -20,7 +20,7 @@ whose y is multiplied by the stretch, but for the joints.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import asin, cos, hypot, pi, sin
+from math import hypot, pi, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,26 +31,20 @@ from .arc import Arc
 from .bezier import Bezier
 from .closed_forms import NONE, closed_row, closed_table
 from .facing import facing_pairs
+from .piece_rows import SMOOTH_JOINT, arc_row, bezier_row, corners_of, hull_of
 from .segment import Segment
 
 if TYPE_CHECKING:
-    from .curve import Curve
+    from .curve import Curve, Point
     from .wall import Wall
 
-# Tangents that agree to this angle make a smooth joint: a ray at the joint is then reflected alike by both pieces, up
-# to this angle. Joints of arcs and splines that are meant to be smooth agree to a few rounding errors.
-SMOOTH_JOINT = 1e-9
 # An arc of more than this span is cut in two, so that the side of its chord decides what belongs to it.
 LONGEST_ARC = 1.5 * pi
 # A run along an arc is worth its two arctangents and one sincos where it has at least this many hops.
 RUN_HOPS = 8.0
-# Below this half angle the chord and the radius give it more exactly than the difference of two parameters does.
-SHALLOW_ARC = 0.5
 OUTLINE_POINTS = 64
 # A grid pays from about so many lines a hollow: at 256 it was a third faster on a Koch curve; the place was not tuned.
 GRID_LINES = 96
-
-Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -79,7 +73,7 @@ def scene_of(wall: Wall) -> Scene:
     """Build the tables of a wall."""
     tables = _Tables()
     places = [(float(x), float(y)) for x, y in wall.vertices]
-    corners = _corners(list(wall.pieces))
+    corners = corners_of(list(wall.pieces))
     if wall.closes:
         for hollow in wall.hollows:
             chain = _Chain(
@@ -92,7 +86,7 @@ def scene_of(wall: Wall) -> Scene:
         chains = [_Chain(list(wall.pieces), places, corners)]
         for island, island_places in zip(wall.islands, wall.island_vertices, strict=True):
             loop = [(float(x), float(y)) for x, y in island_places]
-            chains.append(_Chain(list(island), loop, _corners(list(island))))
+            chains.append(_Chain(list(island), loop, corners_of(list(island))))
         tables.add_hollow(0.0, wall.period, chains, edges=(0, 0))
     return tables.scene(wall.period, not wall.closes)
 
@@ -101,7 +95,7 @@ def scene_in_one(wall: Wall) -> Scene:
     """The tables of a wall that closes as if its cell were one hollow: one list of all pieces, the flat tops too."""
     tables = _Tables()
     places = [(float(x), float(y)) for x, y in wall.vertices]
-    chain = _Chain(list(wall.pieces), places, _corners(list(wall.pieces)))
+    chain = _Chain(list(wall.pieces), places, corners_of(list(wall.pieces)))
     tables.add_hollow(0.0, wall.period, [chain], edges=(2, 2))
     return tables.scene(wall.period, False)
 
@@ -179,9 +173,9 @@ class _Tables:
             length = hypot(*edge)
             self.lines.append([*edge, -edge[1] / length, edge[0] / length, length, 0.0, 0.0] if is_line else [0.0] * 7)
             if isinstance(piece, Arc):
-                (self.circles if piece.is_circular else self.ellipses).append(_arc_row(piece, start, end) + flags)
+                (self.circles if piece.is_circular else self.ellipses).append(arc_row(piece, start, end) + flags)
             elif isinstance(piece, Bezier):
-                self.beziers.append(_bezier_row(piece, start, end) + flags)
+                self.beziers.append(bezier_row(piece, start, end) + flags)
         self.joints.append([*chain.places[-1], float(chain.corners[-1]), 0.0])
         self.lines.append([0.0] * 7)
 
@@ -227,7 +221,7 @@ class _Tables:
                     numbers.append(joint)
                     starts.append(start)
                     ends.append(end)
-                hulls.append(_hull(piece, start, end))
+                hulls.append(hull_of(piece, start, end))
                 joint += 1
             joint += 1
         rows = facing_pairs(
@@ -263,71 +257,3 @@ class _Tables:
 
 def _table(rows: list[list[float]]) -> Floats | None:
     return np.array(rows, dtype=np.float64) if rows else None
-
-
-def _hull(piece: Curve, start: Point, end: Point) -> list[Point]:
-    """Four points whose convex hull contains the piece."""
-    if isinstance(piece, Segment):
-        return [start, end, start, end]
-    if isinstance(piece, Bezier):
-        return [start, *list(piece.control_points[1:-1])[:2], *[end] * (5 - len(piece.control_points))]
-    x0, y0, x1, y1 = piece.box
-    return [(x0, y0), (x0, y1), (x1, y0), (x1, y1)]
-
-
-def _corners(pieces: list[Curve]) -> list[bool]:
-    """For every joint of the cycle of pieces (the first one again at the end): is it a corner?"""
-    heads = np.array([_tangent(piece, 0.0) for piece in pieces])
-    tails = np.roll(np.array([_tangent(piece, 1.0) for piece in pieces]), 1, axis=0)
-    turn = np.abs(tails[:, 0] * heads[:, 1] - tails[:, 1] * heads[:, 0])
-    corner = (turn > SMOOTH_JOINT) | (np.sum(tails * heads, axis=1) < 0.0)
-    return [*map(bool, corner), bool(corner[0])]
-
-
-def _tangent(piece: Curve, s: float) -> Point:
-    if isinstance(piece, Segment):
-        dx, dy = piece.end[0] - piece.start[0], piece.end[1] - piece.start[1]
-        length = hypot(dx, dy)
-        return dx / length, dy / length
-    x, y = piece.tangent(s)
-    return float(x), float(y)
-
-
-def _arc_row(arc: Arc, start: Point, end: Point) -> list[float]:
-    """One row of ``circles`` or ``ellipses`` but for its flags."""
-    a, b = arc.semi_axes
-    stretch = a / b
-    turn = arc.end_angle - arc.start_angle
-    # anticlockwise arcs have their centre on the left, the free side: they focus
-    sign = 1.0 if turn > 0.0 else -1.0
-    chord = (end[0] - start[0], stretch * (end[1] - start[1]))
-    length = hypot(*chord)
-    direction = (chord[0] / length, chord[1] / length)
-    half = 0.5 * abs(turn)
-    # both joints lie on the circle exactly if sin(half) = kappa length / 2; the better known side gives the other
-    if half < SHALLOW_ARC:
-        half = asin(min(1.0, 0.5 * length / a))
-        curvature = sign / a
-    else:
-        curvature = sign * 2.0 * sin(half) / length
-    normal = (
-        sign * sin(half) * direction[0] - cos(half) * direction[1],
-        sign * sin(half) * direction[1] + cos(half) * direction[0],
-    )
-    short = length if half <= 0.25 * pi else 0.0
-    row = [start[0], start[1], *normal, curvature, *direction, short, 0.0, 0.0, 0.0, 2.0 * half, stretch]
-    return [*row, *start, *end]
-
-
-def _bezier_row(curve: Bezier, start: Point, end: Point) -> list[float]:
-    """One row of ``beziers`` but for its flags."""
-    inner = list(curve.control_points[1:-1])
-    points = np.array([start, *inner, end], dtype=np.float64)
-    if len(points) == 3:
-        a0, a1, a2 = points[0], 2.0 * (points[1] - points[0]), points[0] - 2.0 * points[1] + points[2]
-        a3 = np.zeros(2)
-    else:
-        a0, a1 = points[0], 3.0 * (points[1] - points[0])
-        a2 = 3.0 * (points[0] - 2.0 * points[1] + points[2])
-        a3 = points[3] - points[0] + 3.0 * (points[1] - points[2])
-    return [*a0, *a1, *a2, *a3, *start, *end]

@@ -214,6 +214,11 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     array of shape (n, 2)
         Unfolded: a ray that crosses into the next cell goes on there. It ends at y = 0 exactly if the ray escapes.
 
+    Raises
+    ------
+    InputError
+        If ``wall`` is no wall, ``x`` not finite, ``theta`` not in its range or ``max_collisions`` below 1.
+
     Examples
     --------
     >>> from math import pi

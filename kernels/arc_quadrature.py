@@ -11,10 +11,10 @@ from ..checks import Floats
 from .basis import Basis
 from .measure import gauss_on_intervals
 from .panels import Panels
-from .products import add_blocks, cell_index
+from .products import add_blocks, add_masses, cell_index
 from .ragged_lists import ragged
 from .reflection import is_mirror_symmetric, reflection_matrix
-from .sorted_edges import edges_inside
+from .sorted_edges import between_cuts, edges_inside
 from .stable_angles import flipped, kept_inside
 
 # Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
@@ -87,12 +87,9 @@ def _strips(half_angle: float, edges: Floats) -> _Strips:
         inside = (met > whole.low[owner]) & (met < whole.high[owner])
         owners.append(owner[inside])
         angles.append(met[inside])
-    owner, angle = np.concatenate(owners), np.concatenate(angles)
-    order = np.lexsort((angle, owner))
-    owner, angle = owner[order], angle[order]
-    kept = np.flatnonzero((owner[1:] == owner[:-1]) & (angle[1:] > angle[:-1]))
-    strips = whole.part(owner[kept])
-    return _Strips(strips.hits, angle[kept], angle[kept + 1], strips.lower, strips.upper)
+    owner, low, high = between_cuts(np.concatenate(owners), np.concatenate(angles))
+    strips = whole.part(owner)
+    return _Strips(strips.hits, low, high, strips.lower, strips.upper)
 
 
 def _polygons(half_angle: float) -> _Strips:
@@ -178,9 +175,7 @@ def _add_rows(
     if basis.is_partition:
         target = np.clip(above - 1, 0, basis.size - 1)
         target = basis.size - 1 - target if mirrored else target
-        cell = cell_index(basis, incoming)[row] * basis.size + target
-        flux = np.bincount(cell, weights=mass, minlength=total.size).reshape(total.shape)
-        total += basis.heights[:, None] * flux * basis.heights
+        add_masses(total, basis, cell_index(basis, incoming)[row], target, mass)
         return float(mass.sum())
     width = np.diff(edges)[np.clip(above - 1, 0, edges.size - 2)]
     short = 2.0 * strips.hits[row] * (high - low) * basis.nodes_per_interval < width

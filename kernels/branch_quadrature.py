@@ -72,6 +72,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
 
 
 def has_chain(law: object) -> bool:
+    """Whether branches follow one another somewhere in the law, so that their numbers multiply."""
     if isinstance(law, Combination):
         return any(has_chain(term) for _, term in law.terms)
     return isinstance(law, (Composition, Power)) or (isinstance(law, SpecularFrame) and has_chain(law.law))

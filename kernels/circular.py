@@ -55,6 +55,11 @@ class CircularArcLaw(DrivenLaw):
     half_angle : float
         xi in (0, pi/2], radians.
 
+    Raises
+    ------
+    InputError
+        If it is not in that range.
+
     Notes
     -----
     Hits of a ray with N above about 1e8 are uncertain by N^2 eps, because the ray then ends at a tip within rounding;

@@ -62,6 +62,8 @@ def array_from_counts(
     parts : sequence of (n, n) arrays
         One array for pairs that are independent; several, of independent randomisations or batches of the same size,
         for others. Weights may stand for counts in the latter case.
+    basis : Basis
+        The partition that was counted in.
     symmetrise : bool
         False: P[i, j] = C_ij / N_i, so that rows sum to 1. True: every pair counts both ways, and the flux is
         (C_ij + C_ji) / (2 N).

@@ -9,7 +9,7 @@ import numpy as np
 from ..checks import Floats
 from .basis import Basis
 from .law import DrivenLaw
-from .measure import SINE, gauss_rule
+from .measure import SINE
 from .products import cell_index
 
 # Rays at a time.
@@ -31,8 +31,7 @@ def entry_matrix(law: DrivenLaw, basis: Basis, samples: int) -> tuple[Floats, fl
 def _product_rule(law: DrivenLaw, basis: Basis, samples: int, split: int) -> Floats:
     share = np.arange(split) / split
     edges = np.append((basis.edges[:-1, None] + share * np.diff(basis.edges)[:, None]).ravel(), np.pi)
-    angle, weight = gauss_rule(edges, 1 if basis.is_partition else basis.nodes_per_interval)
-    mass = weight * SINE.density(angle)
+    angle, mass = SINE.quadrature(edges, 1 if basis.is_partition else basis.nodes_per_interval)
     if basis.is_partition:
         # one node an interval does not integrate the weight itself exactly; the measure of the interval does
         mass = SINE.mass(edges[:-1], edges[1:])

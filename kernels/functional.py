@@ -31,7 +31,15 @@ PROBES = 17
 
 
 def air_resistance(theta: Floats, outgoing: Floats) -> Floats:
-    """(3/4)(1 + cos(theta' - theta)): Plakhov's cost, whose mean is 1 for a smooth surface."""
+    """(3/4)(1 + cos(theta' - theta)): Plakhov's cost, whose mean is 1 for a smooth surface.
+
+    Examples
+    --------
+    Retroreflection costs most.
+
+    >>> float(air_resistance(np.array(1.25), np.array(1.25)))
+    1.5
+    """
     return np.asarray(0.75 * (1.0 + np.cos(outgoing - theta)))
 
 

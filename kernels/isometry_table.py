@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, frozen
 from ..errors import InputError
-from .measure import SINE
 from .ragged_lists import ragged
+from .sorted_edges import without_outermost
 from .stable_angles import kept_inside
 
 Whole = NDArray[np.int64]
@@ -294,8 +294,6 @@ class IsometryTable:
         surplus = self.ends.size - limit
         if surplus <= 0:
             return found, left_out
-        # too many everywhere: those nearest to pi/2, and what lies beyond them
-        found = found[(surplus + 1) // 2 : found.size - surplus // 2]
-        if found.size == 0:
-            return found, 1.0
-        return found, min(left_out + float(SINE.cdf(found[0]) + SINE.mass(found[-1], np.pi)), 1.0)
+        # too many everywhere: those nearest to pi/2 stay
+        found, beyond = without_outermost(found, surplus)
+        return found, min(left_out + beyond, 1.0)

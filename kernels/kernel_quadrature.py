@@ -102,8 +102,7 @@ def _row_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, ord
 
 
 def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
-    angle, weight = gauss_rule(outer, order)
-    mass = weight * SINE.density(angle)
+    angle, mass = SINE.quadrature(outer, order)
     source = cell_index(basis, angle)
     flux = np.zeros(basis.size**2)
     step = max(1, ROW_CHUNK // (SHARE_NODES[0] * edges.size))
@@ -185,16 +184,16 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
         fine = np.concatenate(((edges[:-1, None] + share * np.diff(edges)[:, None]).ravel(), [np.pi]))
         if basis.is_partition:
             fine = np.unique(np.concatenate((fine, _crossings(map_angle, basis, fine))))
-            angle, weight = gauss_rule(fine, 1)
+            angle, _ = gauss_rule(fine, 1)
             mass = SINE.mass(fine[:-1], fine[1:])
             total = np.zeros((basis.size, basis.size))
             add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), mass)
             yield total
         else:
-            angle, weight = gauss_rule(fine, basis.nodes_per_interval)
+            angle, mass = SINE.quadrature(fine, basis.nodes_per_interval)
             total = np.zeros((basis.size, basis.size))
             image = np.asarray(map_angle(angle), dtype=np.float64)
-            add_products(total, basis, angle, image, weight * SINE.density(angle))
+            add_products(total, basis, angle, image, mass)
             yield total
         pieces *= 2
 
@@ -270,8 +269,7 @@ def _action_levels(law: HasAction, basis: Basis) -> Iterator[Floats]:
         spent += work
         if level >= 2 and spent > MOST_APPLY_VALUES:
             return
-        angle, weight = gauss_rule(edges, order)
-        mass = weight * SINE.density(angle)
+        angle, mass = SINE.quadrature(edges, order)
         total = np.zeros((basis.size, basis.size))
         for start in range(0, angle.size, step):
             part = slice(start, start + step)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats, frozen, number_between, whole_number
 from .basis import Basis
 from .bins import Bins
-from .measure import SINE, AngularMeasure, WeightName, gauss_rule
+from .measure import SINE, AngularMeasure, WeightName
 
 if TYPE_CHECKING:
     from ..geometry import Wall
@@ -166,10 +166,10 @@ class Panels(Basis):
 
     def _orthonormalise(self) -> Floats:
         """Per panel the upper triangular matrix that turns Legendre polynomials into orthonormal functions."""
-        angle, weight = gauss_rule(self.edges, self.nodes_per_interval)
+        angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
         shape = (self._cells.size, self.nodes_per_interval)
         panel = np.repeat(np.arange(shape[0]), shape[1])
-        root = np.sqrt(weight * self.measure.density(angle))
+        root = np.sqrt(weight)
         table = (root[:, None] * self.legendre(angle, panel)).reshape((*shape, self.degree + 1))
         triangle = np.linalg.qr(table, mode="r")
         inverse = np.linalg.inv(triangle)

@@ -16,7 +16,7 @@ import numpy as np
 from ..checks import Floats
 from .basis import Basis
 from .legendre import Legendre
-from .measure import gauss_on_intervals, gauss_rule
+from .measure import SINE, gauss_on_intervals
 from .panels import Panels
 
 # Periods nearer to theta = pi/2 than this value of d are listed one by one; it is even, so that a period starts there.
@@ -105,8 +105,8 @@ def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats,
     # the mean, up to grazing
     end = float(np.arctan2(2.0 * r, mean_from))
     edges = np.concatenate([[0.0], inside[inside < end], [end]])
-    far, share = gauss_rule(np.unique(edges), max(basis.nodes_per_interval, nodes))
-    share = 0.25 * share * np.sin(far)
+    far, share = SINE.quadrature(np.unique(edges), max(basis.nodes_per_interval, nodes))
+    share *= 0.5
     angle = np.concatenate([theta, far])
     specular = np.concatenate([weight * (1.0 - retro), share])
     return angle, specular, np.concatenate([weight * retro, share]), float(omitted)

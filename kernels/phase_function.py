@@ -120,5 +120,13 @@ class HenyeyGreensteinLaw(DensityLaw):
 
 
 def henyey_greenstein(g: float) -> HenyeyGreensteinLaw:
-    """The Henyey-Greenstein law with mean cosine ``g``, -1 < g < 1; see `HenyeyGreensteinLaw`."""
+    """The Henyey-Greenstein law with mean cosine ``g``, -1 < g < 1; see `HenyeyGreensteinLaw`.
+
+    Raises an InputError if g is not in that range.
+
+    Examples
+    --------
+    >>> henyey_greenstein(-0.5).eigenvalue(3)
+    -0.125
+    """
     return HenyeyGreensteinLaw(g)

@@ -14,8 +14,8 @@ from .bins import Bins
 from .law import Law
 from .legendre import Legendre
 from .matrix import KernelMatrix
-from .measure import SINE, gauss_rule
 from .panels import Panels
+from .products import overlaps
 
 
 def product_matrix(
@@ -63,7 +63,5 @@ def refined(basis: Basis) -> tuple[Basis, Floats]:
         return bins, restriction
     if isinstance(basis, Panels):
         panels = Panels(edges, basis.degree)
-        angle, weight = gauss_rule(edges, basis.nodes_per_interval)
-        weighted = (weight * SINE.density(angle))[:, None] * basis.evaluate(angle)
-        return panels, weighted.T @ panels.evaluate(angle)
+        return panels, overlaps(basis, panels.evaluate, edges)
     raise InputError(f"{basis!r} cannot be refined; expected Bins, Legendre or Panels")

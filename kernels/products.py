@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any
@@ -36,12 +37,16 @@ def cell_index(basis: Basis, angle: Floats) -> NDArray[np.int64]:
     return cell_among(basis.edges, angle) if index is None else np.asarray(index(angle), dtype=np.int64)
 
 
+def overlaps(basis: Basis, functions: Callable[[Floats], Floats], edges: Floats) -> Floats:
+    """<e_i, f_j>, shape (n, k), for functions f_j that are smooth between the edges: values of shape (angles, k)."""
+    angle, weight = basis.measure.quadrature(edges, basis.nodes_per_interval)
+    return np.asarray(basis.evaluate(angle).T @ (weight[:, None] * functions(angle)))
+
+
 def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats) -> None:
     """Add the sum of weight e_i(incoming) e_j(outgoing) over the pairs to ``total``, shape (n, n)."""
     if basis.is_partition:
-        cell = cell_index(basis, incoming) * basis.size + cell_index(basis, outgoing)
-        flux = np.bincount(cell, weights=weight, minlength=total.size).reshape(total.shape)
-        total += basis.heights[:, None] * flux * basis.heights
+        add_masses(total, basis, cell_index(basis, incoming), cell_index(basis, outgoing), weight)
         return
     if isinstance(basis, Panels):
         (source, values), (target, images) = basis.local(incoming), basis.local(outgoing)
@@ -53,6 +58,12 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
         values, images = basis.evaluate(incoming[part]), weight[part, None] * basis.evaluate(outgoing[part])
         with one_blas_thread():
             total += values.T @ images
+
+
+def add_masses(total: Floats, basis: Basis, source: NDArray[np.int64], target: NDArray[np.int64], mass: Floats) -> None:
+    """Add masses that go from cells to cells of a partition to the Galerkin matrix ``total``."""
+    flux = np.bincount(source * basis.size + target, weights=mass, minlength=total.size).reshape(total.shape)
+    total += basis.heights[:, None] * flux * basis.heights
 
 
 def add_blocks(

@@ -33,6 +33,11 @@ class RectangularTeethLaw(BranchLaw):
     height_to_width : float
         r > 0, depth of the crevice over its width.
 
+    Raises
+    ------
+    InputError
+        If it is not a finite number above 0.
+
     Notes
     -----
     Where d exceeds 2^48, float64 does not resolve its fractional part; the law is then the mean over a period,

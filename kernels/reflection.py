@@ -9,8 +9,8 @@ from ..errors import InputError
 from .basis import Basis
 from .bins import Bins
 from .legendre import Legendre
-from .measure import gauss_rule
 from .panels import Panels
+from .products import overlaps
 from .tensor import TensorBasis
 
 # Edges that mirror each other to this distance are mirror images: pi - x rounds by at most one spacing of pi.
@@ -47,9 +47,7 @@ def reflection_matrix(basis: Basis) -> Floats:
     if isinstance(basis, Bins) and is_mirror_symmetric(basis):
         return np.ascontiguousarray(np.eye(basis.size)[::-1])
     edges = np.unique(np.concatenate((basis.edges, np.pi - basis.edges[::-1])))
-    angle, weight = gauss_rule(edges, basis.nodes_per_interval)
-    weighted = (weight * basis.measure.density(angle))[:, None] * basis.evaluate(angle)
-    return np.asarray(weighted.T @ basis.evaluate(np.pi - angle))
+    return overlaps(basis, lambda angle: basis.evaluate(np.pi - angle), edges)
 
 
 def mirror_refinement(basis: Basis) -> tuple[Basis, Floats]:
@@ -71,7 +69,4 @@ def mirror_refinement(basis: Basis) -> tuple[Basis, Floats]:
         fine = Bins(edges, basis.measure.name)
     else:
         raise InputError(f"{basis!r} is not kept by theta -> pi - theta; expected edges that are mirror images")
-    every = np.unique(np.concatenate((edges, basis.edges)))
-    angle, weight = gauss_rule(every, basis.nodes_per_interval)
-    weighted = (weight * basis.measure.density(angle))[:, None] * basis.evaluate(angle)
-    return fine, np.asarray(weighted.T @ fine.evaluate(angle))
+    return fine, overlaps(basis, fine.evaluate, np.unique(np.concatenate((edges, basis.edges))))

@@ -13,9 +13,9 @@ from .legendre import Legendre
 from .measure import gauss_on_intervals
 from .panels import Panels
 from .periodic_tail import crevice_nodes, first_crossing
-from .products import add_products, cell_index
+from .products import add_products
 from .rectangular import crevice_pieces
-from .sorted_edges import edges_inside
+from .sorted_edges import between_cuts, edges_inside
 from .stable_angles import kept_inside
 
 # Products of two functions of a basis times a sinusoid, on a piece of width w, vary like exp(n w) with n the
@@ -82,11 +82,7 @@ def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[
         at = sign[place] * (edge - offset[place])
         owner.append(piece[place])
         cut.append(np.clip(at, low[place], high[place]))
-    owners, cuts = np.concatenate(owner), np.concatenate(cut)
-    order = np.lexsort((cuts, owners))
-    owners, cuts = owners[order], cuts[order]
-    kept = (owners[1:] == owners[:-1]) & (cuts[1:] > cuts[:-1])
-    return owners[1:][kept], cuts[:-1][kept], cuts[1:][kept]
+    return between_cuts(np.concatenate(owner), np.concatenate(cut))
 
 
 def _add_masses(
@@ -96,9 +92,7 @@ def _add_masses(
     # the integral of a sinusoid is its value in the middle times 2 sin(width/2)
     mass = table.density(middle, piece) * np.sin(0.5 * (high - low))
     image = kept_inside(table.sign[piece] * middle + table.offset[piece])
-    cell = cell_index(basis, middle) * basis.size + cell_index(basis, image)
-    flux = np.bincount(cell, weights=mass, minlength=total.size).reshape(total.shape)
-    total += basis.heights[:, None] * flux * basis.heights
+    add_products(total, basis, middle, image, mass)
 
 
 def _add_nodes(

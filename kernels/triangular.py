@@ -11,7 +11,7 @@ from ..checks import Floats, angles, number_between
 from .branching import merged
 from .isometry_table import IsometryTable
 from .law import BranchLaw, entry_points
-from .measure import SINE
+from .sorted_edges import without_outermost
 from .stable_angles import flipped, kept_inside, mixed_arccos
 
 # Kinks closer together than this are one kink computed in two ways.
@@ -39,6 +39,11 @@ class TriangularTeethLaw(BranchLaw):
     ----------
     angle : float
         Apex angle psi in (0, pi), radians.
+
+    Raises
+    ------
+    InputError
+        If it is not in that range.
 
     Notes
     -----
@@ -107,11 +112,7 @@ class TriangularTeethLaw(BranchLaw):
         kinks = kinks[np.diff(kinks, prepend=-1.0) > KINK_SPACING]
         if first == 1 and kinks.size <= limit:
             return kinks, 0.0
-        surplus = max(kinks.size - limit, 0)
-        kinks = kinks[(surplus + 1) // 2 : kinks.size - surplus // 2]
-        if kinks.size == 0:
-            return kinks, 1.0
-        return kinks, float(SINE.cdf(kinks[0]) + SINE.mass(kinks[-1], np.pi))
+        return without_outermost(kinks, max(kinks.size - limit, 0))
 
     def table(self) -> IsometryTable | None:
         """The pieces between the kinks, or None where there are too many."""

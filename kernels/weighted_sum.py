@@ -150,6 +150,7 @@ def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
 
 
 def common_frame(laws: Sequence[Law], verb: str) -> Frame:
+    """The frame that all the laws are in, or an InputError that says what could not be done."""
     for law in laws[1:]:
         if law.frame != laws[0].frame:
             raise InputError(

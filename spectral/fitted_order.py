@@ -78,6 +78,11 @@ def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = Non
         about the line is larger than the spreads explain, it is widened by Birge's ratio. Errors of arrays scatter
         less, so that their interval is too wide rather than too narrow.
 
+    Raises
+    ------
+    InputError
+        If the shapes differ, a size or an error is not above 0, or a number of repeats is below 1.
+
     Examples
     --------
     >>> fit = fit_order([1, 2, 4, 8], [1, 1 / 4, 1 / 16, 1 / 64])
