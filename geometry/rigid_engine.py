@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from .contact_engine import CLEAR, NO, NOTHING, ZERO, first_in_hollow, next_root
+from .contact_engine import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, first_in_hollow, next_root
 from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
 from .flight_engine import compiled, flight, inlined, satellite_after, towards_line, turning
 from .opening_engine import last_hollow
@@ -178,18 +178,24 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
         beyond = abs(other) - reach
         if beyond > 0.0 and (away or beyond >= rate * time):
             break
-        if j != 0 and lowest_until(time, other, away, height, motion) <= slack:
+        if j != 0 and lowest_until(time, other, away, height, motion) <= 2.0 * slack:
+            # two contacts are at one time if the disk falls less than the slack between them
+            tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if hit[0] != NO_PIECE else 0.0
+            until = time + tie
             start = beyond / rate if beyond > 0.0 else 0.0
             x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
             # the path bends upward, so that it stays above its first tangent
-            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * turn_other[0]) * time < 0.0:
+            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * turn_other[0]) * until < 0.0:
                 inside, left = (below[1], below[2]) if j == below[0] else (NOTHING, 0.0)
                 t, kind, index, hollow, left, state, unclear = first_contact(
-                    ZERO, NOTHING, inside, left, x_other, y_other, start, time, turn_other, motion, slack, ground
+                    ZERO, NOTHING, inside, left, x_other, y_other, start, until, turn_other, motion, slack, ground
                 )
+                tied = hit[0] != NO_PIECE and abs(t - time) <= tie
                 if t < time:
                     time, hit, base, code, chosen = t, (kind, index, hollow), left, unclear, j
                     touched = (x_other + state[0], y_other + state[1], state[2], state[3])
+                if tied:
+                    code = CORNER
         j += step
     return time, hit, base, chosen, touched, code
 
