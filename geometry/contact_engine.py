@@ -65,14 +65,8 @@ def next_root(sign, leaving, line, conic, t, end, turned, turn, motion, patience
             # at the start: behind the piece by a rounding error
             return t, turned, CLEAR if number > 0 else CORNER
         ahead = min(end - t, patience)
-        # the first root of a parabola is at most twice as far as that of its tangent: if this parabola has one, no
-        # bound farther on is wanted
-        near = min(ahead, -2.0 * f / f1) if f1 < 0.0 else ahead
-        doubt = (third + growth * near) * near
+        doubt = (third + growth * ahead) * ahead
         step = safe_step(f, f1, f2 - doubt)
-        if step == np.inf and near < ahead:
-            doubt = (third + growth * ahead) * ahead
-            step = safe_step(f, f1, f2 - doubt)
         if step >= ahead:
             if f2 - doubt > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
                 # so near a tangency that rounding decides between two roots and none

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from .contact_engine import CLEAR, NO, NOTHING, ZERO, first_in_hollow, next_root
+from .contact_engine import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, first_in_hollow, next_root
 from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
 from .flight_engine import compiled, flight, inlined, satellite_after, towards_line, turning
 from .opening_engine import last_hollow
@@ -129,7 +129,8 @@ def surface(kind, index, x, y, ground):
 def satellite_at(x, y, turn, j, ring):
     """Where the j-th satellite after the one at (x, y) and the angle (sine, cosine) is, and its angle alike.
 
-    One moves along the chord between them, and every product is as exact as its factors: nothing cancels.
+    It is a chord away, so that its place is not the difference of two of the disk's size. For neighbours, nearly all
+    that are asked for, no sine is computed.
     """
     half_sine, half_cosine = j * ring.half_sine, ring.half_cosine
     if abs(j) != 1:
@@ -142,10 +143,14 @@ def satellite_at(x, y, turn, j, ring):
 
 
 @inlined
-def least_rise(angle):
-    """A bound from below of 1 - cos(angle)."""
-    square = angle * angle
-    return square * (0.5 - square / 24.0)
+def lowest_until(time, angle, away, height, motion):
+    """A bound from below of a satellite's height until then; it starts at ``angle``, which grows if it turns ``away``.
+
+    The disk's lowest point starts at ``height``, and 1 - cos a is at least a^2/2 - a^4/24.
+    """
+    nearest = abs(angle) if away else max(abs(angle) - abs(motion.spin) * time, 0.0)
+    square = nearest * nearest
+    return height + min(motion.v2, 0.0) * time + motion.radius * square * (0.5 - square / 24.0)
 
 
 @inlined
@@ -169,24 +174,28 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
     j = -step * int(math.floor((reach + step * angle) / ring.spacing))  # noqa: RUF046
     for _ in range(MOST_CELLS):
         other = angle + j * ring.spacing
-        approach = rate if other * motion.spin < 0.0 else 0.0
+        away = other * motion.spin >= 0.0
         beyond = abs(other) - reach
-        if beyond > 0.0 and beyond >= approach * time:
+        if beyond > 0.0 and (away or beyond >= rate * time):
             break
-        lowest = height + min(motion.v2, 0.0) * time
-        lowest += motion.radius * least_rise(max(abs(other) - approach * time, 0.0))
-        if j != 0 and lowest <= slack:
-            start = beyond / approach if beyond > 0.0 else 0.0
+        if j != 0 and lowest_until(time, other, away, height, motion) <= 2.0 * slack:
+            # two contacts are at one time if the disk falls less than the slack between them
+            tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if hit[0] != NO_PIECE else 0.0
+            until = time + tie
+            start = beyond / rate if beyond > 0.0 else 0.0
             x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
             # the path bends upward, so that it stays above its first tangent
-            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * turn_other[0]) * time < 0.0:
+            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * turn_other[0]) * until < 0.0:
                 inside, left = (below[1], below[2]) if j == below[0] else (NOTHING, 0.0)
                 t, kind, index, hollow, left, state, unclear = first_contact(
-                    ZERO, NOTHING, inside, left, x_other, y_other, start, time, turn_other, motion, slack, ground
+                    ZERO, NOTHING, inside, left, x_other, y_other, start, until, turn_other, motion, slack, ground
                 )
+                tied = hit[0] != NO_PIECE and abs(t - time) <= tie
                 if t < time:
                     time, hit, base, code, chosen = t, (kind, index, hollow), left, unclear, j
                     touched = (x_other + state[0], y_other + state[1], state[2], state[3])
+                if tied:
+                    code = CORNER
         j += step
     return time, hit, base, chosen, touched, code
 

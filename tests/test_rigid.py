@@ -166,6 +166,19 @@ def test_contacts_that_double_precision_does_not_settle_are_named():
 
 
 @pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("name", ["triangular", "focusing", "dispersing", "elliptical"])
+def test_two_satellites_at_one_time_are_named_where_the_order_decides(name, scale):
+    # a disk that falls between two satellites straight above a wall's line of symmetry: whichever is reflected first
+    # turns the disk its own way
+    wall = WALLS[name]
+    half = 0.5 * Satellites.around(scale, scale * wall.depth).spacing
+    position = [[0.0, half], [0.0, half * (1 - 1e-6)], [0.0, half * (1 + 1e-6)]]
+    out = geo.collide(DISK, wall, scale, position, [[0.0, -1.0, 0.0]])
+    assert out.status.tolist() == [geo.Status.CORNER, geo.Status.ESCAPED, geo.Status.ESCAPED]
+    assert abs(out.velocity[1, 2] - out.velocity[2, 2]) > 1e-2
+
+
+@pytest.mark.parametrize("scale", SCALES)
 def test_the_default_spacing_is_the_least_divisor_that_is_allowed(scale):
     ring = Satellites.around(scale, 1.3 * scale)
     finer = Satellites.deepest_for(ring.count + 1)
