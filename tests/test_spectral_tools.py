@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from scipy.sparse import diags_array
 from scipy.sparse.linalg import LinearOperator
 from scipy.stats import binomtest
@@ -70,6 +71,16 @@ def test_implied_time_scales_are_those_of_the_eigenvalues():
     scales, intervals = spec.spectrum(ker.henyey_greenstein(0.5), k=4).implied_time_scales()
     assert np.allclose(scales, 1 / (np.log(2) * np.arange(1, 4)))
     assert np.all(intervals[:, 0] <= scales) and np.all(scales <= intervals[:, 1])
+
+
+def test_the_eigenfunctions_that_are_drawn_are_the_legendre_polynomials():
+    ax = Figure().subplots()
+    spec.spectrum(ker.henyey_greenstein(0.5), k=3).plot_eigenfunctions(ax)
+    first, second, _ = ax.lines
+    u = np.cos(first.get_xdata())
+    assert [first.get_label(), second.get_label()] == ["0.5 (odd)", "0.25 (even)"]
+    assert np.allclose(first.get_ydata(), np.sqrt(3.0) * u, atol=1e-9)
+    assert np.allclose(second.get_ydata(), np.sqrt(5.0) * (1.5 * u**2 - 0.5), atol=1e-9)
 
 
 # ---- cuts and the Laplacian -------------------------------------------------------------------------------------
