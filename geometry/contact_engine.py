@@ -28,8 +28,7 @@ ROOT_SHARE = 1.0 / 16.0
 WIDEST_SLACK = 1e6
 # A near tangency halves its distance at every step at worst, from the wall's size to its rounding in about 100 steps.
 ROOT_STEPS = 400
-
-
+# Circles and ellipses together, a number that no kind of piece of the planar tracer has.
 ARC = 8
 
 

@@ -36,8 +36,10 @@ class Ground(NamedTuple):
 
 
 class Ring(NamedTuple):
-    """The satellites: farther than ``reach`` from the lowest point they are above the wall, ``-floor`` is the lowest
-    that the disk can be, ``slack`` how far off by rounding a satellite may be; the last two belong to spacing/2.
+    """The satellites, and the disk that carries them.
+
+    Farther than ``reach`` from the lowest point a satellite is above the wall, ``-floor`` is as low as the disk can be,
+    and by rounding a satellite may be off by ``slack``. The last two are the sine and cosine of half the spacing.
     """
 
     scale: float
