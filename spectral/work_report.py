@@ -116,12 +116,17 @@ class WorkReport:
             return error
         return max(min(row.reported, error), min(floor, ROUNDED))
 
-    def kept_level(self, row: WorkRow) -> float:
+    def kept_level(self, row: WorkRow, *, known: bool = False) -> float:
         """The largest `level` at this and all larger budgets of the row's method.
 
-        A rule that happens to hit, and misses again when it is refined, has not reached that error.
+        A rule that happens to hit, and misses again when it is refined, has not reached that error. With ``known``, of
+        the level and what the method reports the larger counts, which is infinite where it reports nothing.
         """
-        return max(self.level(other) for other in self._done(row.method) if other.budget >= row.budget)
+        later = [other for other in self._done(row.method) if other.budget >= row.budget]
+        levels = [self.level(other) for other in later]
+        if known:
+            levels += [float("inf") if other.reported is None else other.reported for other in later]
+        return max(levels)
 
     def order(self, method: str) -> FittedOrder | None:
         """The order in the budget, fitted to errors well above the reference's; None for fewer than three of them."""
@@ -140,17 +145,17 @@ class WorkReport:
                 found.append(row)
         return tuple(found)
 
-    def choice(self) -> float | None:
+    def choice(self, *, known: bool = False) -> float | None:
         """Time of the method that chooses over that of the best other one at equal error, the worst of its rows.
 
-        Between the rows of a method its time is interpolated in the logarithms. Errors are those of `kept_level`. None
-        without rows of both kinds.
+        Between the rows of a method its time is interpolated in the logarithms. Errors are those of `kept_level`: true
+        ones or, with ``known``, those that who uses a method may count on. None without rows of both kinds.
         """
         ratios = []
         for row in self._done(self.auto):
-            error = self.kept_level(row)
+            error = self.kept_level(row, known=known)
             others = (name for name in self.methods if name != self.auto)
-            times = [time for name in others if (time := self._time_to(name, error)) is not None]
+            times = [time for name in others if (time := self._time_to(name, error, known)) is not None]
             if times:
                 ratios.append(row.least / min(times))
         return max(ratios, default=None)
@@ -195,12 +200,12 @@ class WorkReport:
     def _done(self, method: str | None = None) -> list[WorkRow]:
         return [row for row in self.rows if row.is_done and method in (None, row.method)]
 
-    def _time_to(self, method: str, error: float) -> float | None:
-        """The time after which a method has an error and keeps it, or None if it has not."""
+    def _time_to(self, method: str, error: float, known: bool) -> float | None:
+        """The time after which a method has a finite error and keeps it, or None if it has not."""
         best: list[tuple[float, float]] = []
         for row in sorted(self._done(method), key=lambda row: row.least):
-            level = self.kept_level(row)
-            if not best or level < best[-1][1]:
+            level = self.kept_level(row, known=known)
+            if level < (best[-1][1] if best else float("inf")):
                 best.append((row.least, level))
         if not best or best[-1][1] > error:
             return None

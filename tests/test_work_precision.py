@@ -132,6 +132,21 @@ def test_an_error_that_a_larger_budget_loses_again_does_not_count():
     assert synthetic_report(late).choice() == pytest.approx(3.0)
 
 
+def test_errors_that_must_be_known_are_those_that_methods_report():
+    rows = [
+        ("silent", 1e-3, 0.1, None),
+        ("modest", 1e-6, 1.0, 1e-2),
+        ("good", 1e-4, 2.0, 1e-3),
+        ("vain", 1e-2, 0.5, 1e-9),
+    ]
+    methods = [spec.WorkMethod(name, float) for name in ("auto", "silent", "modest", "good", "vain")]
+    report = spec.WorkReport.of(problem("auto"), methods, spec.Machine.here())
+    for name, error, seconds, reported in rows:
+        report = report.with_row(spec.WorkRow(name, 1, "done", {"absolute": error}, (seconds,), reported))
+    assert report.choice() == pytest.approx(30.0)
+    assert report.choice(known=True) == pytest.approx(1.5)
+
+
 def test_a_method_is_measured_against_a_reference_that_it_did_not_make():
     first = spec.ReferenceValue(EXACT, 0.0, "closed form", made_by=("closed form",))
     second = spec.ReferenceValue(EXACT + 1e-3, 1e-3, "quadrature", made_by=("quadrature",))
