@@ -138,6 +138,7 @@ def test_errors_that_must_be_known_are_those_that_methods_report():
         ("modest", 1e-6, 1.0, 1e-2),
         ("good", 1e-4, 2.0, 1e-3),
         ("vain", 1e-2, 0.5, 1e-9),
+        ("auto", 1e-3, 3.0, 1e-3),
     ]
     methods = [spec.WorkMethod(name, float) for name in ("auto", "silent", "modest", "good", "vain")]
     report = spec.WorkReport.of(problem("auto"), methods, spec.Machine.here())
