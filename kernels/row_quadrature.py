@@ -47,13 +47,10 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# When this share of the flights is spent, the error tells whether the rest will do: not later, because errors fall by
-# jumps, when the last of the pieces that matter are seen. From there the error of nine walls fell like the flights to
-# a power of 1.6 to 2.2.
-FIRST_SHARE = 0.05
-PRESUMED_ORDER = 1.75
-# The next stage does most rows again.
-ROWS_AGAIN = 2.0
+# The error after the first rows tells whether the flights will do; later ones do not, because errors fall by jumps,
+# when the last of the pieces that matter are seen. The error of nine walls fell like the flights to a power of 1.6 to
+# 2.2, and rows are done again at each stage. On fourteen walls this told apart those whose rows were of use.
+PRESUMED_ORDER, ROWS_AGAIN = 1.75, 2.0
 # Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
 LEAST_CUT = 1e-7
 # Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error.
@@ -112,7 +109,7 @@ class _Integrator:
         self.tolerance = max(tolerance, 8.0 * np.finfo(np.float64).eps * basis.size)
         self.most_flights, self.useless = most_flights, useless
         self.rays, self.flights, self.row_count = 0, 0, 0
-        self.judged, self.hopeless = useless is None, False
+        self.judged, self.hopeless = False, False
         self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
@@ -150,9 +147,14 @@ class _Integrator:
 
     def _next_is_too_far(self, stage: int) -> bool:
         """Whether the next stage would end for lack of flights; asked where it may be given up only."""
-        further = self.best[1] / (self.tolerance / STAGE_RATIO ** (stage - 1))
-        needed = ROWS_AGAIN * self.flights * max(further, 1.0) ** (1.0 / PRESUMED_ORDER)
-        return self.useless is not None and needed > self.most_flights
+        return self.useless is not None and self._lacks_flights(
+            self.best[1], self.tolerance / STAGE_RATIO ** (stage - 1)
+        )
+
+    def _lacks_flights(self, error: float, wanted: float) -> bool:
+        """Whether it is likely to take too many flights from an error now to a wanted one."""
+        further = max(error / wanted, 1.0) ** (1.0 / PRESUMED_ORDER)
+        return ROWS_AGAIN * self.flights * float(further) > self.most_flights
 
     def _begin(self, stage: int) -> float:
         """The tolerance of a stage; rows whose error is too large for it are done again."""
@@ -183,11 +185,9 @@ class _Integrator:
             self._divide(chosen)
 
     def _is_hopeless(self, error: float) -> bool:
-        """Whether the error spoke against one that is of use with the flights that were left."""
-        if not self.judged and self.flights > FIRST_SHARE * self.most_flights:
-            assert self.useless is not None  # else there is nothing to judge
-            needed = self.flights * max(error / self.useless, 1.0) ** (1.0 / PRESUMED_ORDER)
-            self.judged, self.hopeless = True, needed > self.most_flights
+        """Whether the error of the first rows spoke against one that is of use."""
+        if self.useless is not None and not self.judged:
+            self.judged, self.hopeless = True, self._lacks_flights(error, self.useless)
         return self.hopeless
 
     def _state(self) -> tuple[Floats, float, float]:

@@ -21,6 +21,7 @@ from .known_references import known_reference
 from .quantities import QUANTITIES
 from .scenes import scenes, standard_names, wall_of
 from .time_plan import TimePlan
+from .uniform_disk import DISK
 
 Say = Callable[[str], None]
 
@@ -157,14 +158,15 @@ def prepare(scene: str) -> None:
     from ..kernels.wall_rows import adaptive_rows
 
     wall = wall_of(scene)
-    trace(wall, [0.3, 0.6], [1.0, 2.0])
-    # towards corners, which takes more than double precision
-    trace(wall, np.clip(wall.vertices[:, 0], 0.0, np.nextafter(wall.period, 0.0)), 0.5 * np.pi)
+    for one in (wall, wall.foreshorten(DISK)):
+        trace(one, [0.3, 0.6], [1.0, 2.0])
+        # towards corners, which takes more than double precision
+        trace(one, np.clip(one.vertices[:, 0], 0.0, np.nextafter(one.period, 0.0)), 0.5 * np.pi)
+        adaptive_rows(one, [1.0], 1e-2)
     if wall.is_polygonal:
         beams_of([(0.0, 0.0), (0.3, -0.5), (0.6, -0.4), (1.0, 0.0)])
     if scene in QUANTITIES["disk"].scenes:
         by_true_disks(wall, 1e-3, np.random.default_rng(0), 1)
-    adaptive_rows(wall, [1.0], 1e-2)
     discretise(WallLaw(wall), Legendre(2), "monte-carlo", samples=16)
 
 
