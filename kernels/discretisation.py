@@ -14,7 +14,8 @@ from .law import Law
 from .matrix import KernelMatrix
 from .matrix_maker import MatrixMaker, Method
 from .measure import SINE
-from .sampling import DEFAULT_SAMPLES, RANDOMISATIONS
+from .nets import RANDOMISATIONS
+from .sampling import DEFAULT_SAMPLES
 
 SEED_WITHOUT_RNG = 0
 

@@ -16,6 +16,7 @@ from .bins import Bins
 from .branch_quadrature import branch_matrix
 from .circular import CircularArcLaw
 from .composition import Composition, Power
+from .counting import SampledArray
 from .density import DensityLaw
 from .directions import Directions
 from .entry_quadrature import entry_matrix
@@ -27,10 +28,12 @@ from .least_resistance import LeastResistanceLaw
 from .legendre import Legendre
 from .matrix import KernelMatrix
 from .matrix_algebra import frobenius_error
+from .nets import RANDOMISATIONS, Nets
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
+from .responses import responder
 from .row_quadrature import MOST_FLIGHTS, is_affordable, row_matrix
-from .sampling import RANDOMISATIONS, SamplingMethod, responder, sampled_array
+from .sampling import independent_rays
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
 from .table_quadrature import table_matrix
@@ -86,17 +89,23 @@ class MatrixMaker:
 
     def sampled(self, law: Law, method: Method) -> KernelMatrix:
         """The matrix by rays."""
-        chosen: SamplingMethod = "qmc" if method == "qmc" else "monte-carlo"
-        array, used, lost = sampled_array(law, self.basis, chosen, self.samples, self.rng, self.symmetrise)
-        how = (
-            "variance of multinomial counts"
-            if not array.replicates and chosen == "monte-carlo"
-            else (f"spread of {RANDOMISATIONS} randomisations")
-        )
+        if method == "qmc":
+            return self.from_nets(Nets(law, self.basis, self.rng), self.samples)
+        found = independent_rays(law, self.basis, self.samples, self.rng, self.symmetrise)
+        spread = "spread of 8 parts" if found[0].replicates else "variance of multinomial counts"
+        return self._from_rays("monte-carlo", found, spread)
+
+    def from_nets(self, nets: Nets, samples: int) -> KernelMatrix:
+        """The matrix by at least so many rays of nets."""
+        found = nets.sampled(samples, symmetrise=self.symmetrise)
+        return self._from_rays("qmc", found, f"spread of {RANDOMISATIONS} randomisations")
+
+    def _from_rays(self, method: Method, found: tuple[SampledArray, int, float], how: str) -> KernelMatrix:
+        array, used, lost = found
         if lost:
             how += ", plus a bound for rays that did not escape"
         return replace(
-            self._result(array.symmetric, chosen, array.error, "estimate", how),
+            self._result(array.symmetric, method, array.error, "estimate", how),
             counts=array.counts,
             replicates=array.replicates,
             symmetrised=self.symmetrise,
@@ -175,7 +184,8 @@ class MatrixMaker:
         if isinstance(law, SpecularFrame):
             return self._flipped(law)
         if isinstance(law, WallLaw):
-            return self.rows(law, self.tolerance)
+            # asked for by name, or there is nothing else for the law that this one is a part of
+            return self.rows(law, useless=float("inf"))
         how = "difference of the last two levels of quadrature"
         if isinstance(law, DensityLaw) and not isinstance(self.basis, Directions):
             # three smooth functions are integrated row by row below, on the law's own panels

@@ -81,7 +81,7 @@ def row_matrix(
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
     Where ``useless`` is given, it stops as soon as the first rows speak against an error below that with so many
-    flights.
+    flights, and rows without number are cut short; if it is infinite, only these.
 
     The error is the sum over the panels, of the difference of Kronrod's and Gauss's rule where the rows have a kink,
     of that difference scaled by what dividing the panel showed where they are smooth; plus the errors of the rows;
@@ -146,10 +146,10 @@ class _Integrator:
         return *self.best, self.rays
 
     def _next_is_too_far(self, stage: int) -> bool:
-        """Whether the next stage would end for lack of flights; asked where it may be given up only."""
-        return self.useless is not None and self._lacks_flights(
-            self.best[1], self.tolerance / STAGE_RATIO ** (stage - 1)
-        )
+        """Whether the next stage would end for lack of flights; asked where there is something else to turn to."""
+        if self.useless is None or math.isinf(self.useless):
+            return False
+        return self._lacks_flights(self.best[1], self.tolerance / STAGE_RATIO ** (stage - 1))
 
     def _lacks_flights(self, error: float, wanted: float) -> bool:
         """Whether it is likely to take too many flights from an error now to a wanted one."""
@@ -186,7 +186,7 @@ class _Integrator:
 
     def _is_hopeless(self, error: float) -> bool:
         """Whether the error of the first rows spoke against one that is of use."""
-        if self.useless is not None and not self.judged:
+        if not self.judged and self.useless is not None and math.isfinite(self.useless):
             self.judged, self.hopeless = True, self._lacks_flights(error, self.useless)
         return self.hopeless
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..errors import AccuracyError
+from .nets import Nets
 from .row_quadrature import is_affordable
 from .wall_law import FEW_PIECES
 
@@ -29,14 +29,15 @@ def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
     if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
     affordable = is_affordable(law.wall, maker.basis)
-    found, promised = _few_rays(maker, law) if affordable or _is_within_reach(maker) else (None, float("inf"))
+    nets = Nets(law, maker.basis, maker.rng)
+    found, promised = _few_rays(maker, nets) if affordable or _is_within_reach(maker) else (None, float("inf"))
     if found is not None:
         return found
     if law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
     if not affordable:
-        return maker.sampled(law, "qmc")
-    rays = _all_rays(maker, law) if promised <= maker.tolerance else None
+        return maker.from_nets(nets, maker.samples)
+    rays = _all_rays(maker, nets) if promised <= maker.tolerance else None
     if rays is not None:
         promised = float(rays.error)
         if promised <= maker.tolerance:
@@ -44,14 +45,14 @@ def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
     rows = maker.rows(law, useless=max(promised, maker.tolerance))
     if float(rows.error) <= maker.tolerance or float(rows.error) <= promised < float("inf"):
         return rows
-    rays = _all_rays(maker, law) if rays is None else rays
+    rays = _all_rays(maker, nets) if rays is None else rays
     return rows if rays is None else min(rows, rays, key=lambda matrix: float(matrix.error))
 
 
-def _all_rays(maker: MatrixMaker, law: WallLaw) -> KernelMatrix | None:
+def _all_rays(maker: MatrixMaker, nets: Nets) -> KernelMatrix | None:
     """The matrix by rays; None if too many do not escape, where rows count theirs in their error."""
     try:
-        return maker.sampled(law, "qmc")
+        return maker.from_nets(nets, maker.samples)
     except AccuracyError:
         return None
 
@@ -61,16 +62,15 @@ def _is_within_reach(maker: MatrixMaker) -> bool:
     return maker.tolerance * maker.samples >= 1.0
 
 
-def _few_rays(maker: MatrixMaker, law: WallLaw) -> tuple[KernelMatrix | None, float]:
+def _few_rays(maker: MatrixMaker, nets: Nets) -> tuple[KernelMatrix | None, float]:
     """A matrix of fewer rays than asked for, if these are enough for the tolerance; and what all rays promise.
 
     The promise is infinite where the looks do not tell.
     """
-    # another stream, so that a look that finds them too few changes no result
-    source, number, promised = maker.rng.spawn(1)[0], FIRST_RAYS, float("inf")
+    number, promised = FIRST_RAYS, float("inf")
     while number < maker.samples:
         try:
-            found = replace(maker, samples=number, rng=source).sampled(law, "qmc")
+            found = maker.from_nets(nets, number)
         except AccuracyError:
             # a bin without rays, or rays that do not escape: these few are no measure
             break

@@ -39,8 +39,8 @@ LOST_TOLERANCE = 1e-4
 # triangles included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
 MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
 # Walls of more pieces are tried with fewer beams first; where what these leave is rounding, they do. Rough profiles of
-# 40 to 470 pieces resolved completely with 10 to 140 beams a piece; cavities and fractals never do.
-FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 100, 1e-11
+# 40 to 800 pieces resolved completely with 10 to 140 beams a piece, most with less than 50; cavities never do.
+FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
 # `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..checks import Floats
 from ..kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
-from ..kernels.sampling import responder
+from ..kernels.responses import responder
 
 # Grazing angles, down to where the outgoing angle, good to some 1e-15, still has seven digits.
 ANGLES = 10.0 ** -np.arange(3.0, 9.0)

@@ -34,7 +34,7 @@ from asperity.bench.timing import side_by_side
 from asperity.cli import main
 from asperity.errors import InputError
 from asperity.kernels.directions import Directions
-from asperity.kernels.sampling import RANDOMISATIONS
+from asperity.kernels.nets import RANDOMISATIONS
 
 RAYS = 2**12
 

@@ -10,7 +10,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
-from asperity.kernels.sampling import RANDOMISATIONS
+from asperity.kernels.nets import RANDOMISATIONS
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,8 @@ def test_a_look_that_finds_rays_too_few_changes_no_result():
     basis, generators = ker.Legendre(2), [np.random.default_rng(5) for _ in range(2)]
     looked = ker.discretise(MUSHROOMS, basis, tolerance=1e-8, rng=generators[0])
     asked = ker.discretise(MUSHROOMS, basis, method="qmc", rng=generators[1])
-    assert looked.method == "qmc" and np.array_equal(looked.symmetric, asked.symmetric)
+    # but for the order of sums
+    assert looked.method == "qmc" and np.allclose(looked.symmetric, asked.symmetric, rtol=0.0, atol=1e-15)
 
 
 def test_a_profile_of_many_pieces_takes_rays_for_a_rough_answer_and_isometries_for_an_exact_one():
