@@ -63,7 +63,7 @@ class Nets:
         """The matrix from at least so many rays, 8 times a power of two; see `RaySums.array`."""
         each = 1 << (max(-(-samples // RANDOMISATIONS), 1) - 1).bit_length()
         # all sequences together, so that a few rays of each are one call
-        most = self.sums.chunk // RANDOMISATIONS
+        most = self.sums.chunk(RANDOMISATIONS)
         with progress_bar(RANDOMISATIONS * max(each - self.sums.each, 0)) as bar:
             while self.sums.each < each:
                 number = min(most, each - self.sums.each)

@@ -17,9 +17,8 @@ from .law import Law
 from .reflection import reflection_matrix
 from .wall_law import LOST_TOLERANCE
 
-# Rays at a time, and more where adding up the matrix of counts would take longer than the rays themselves; a power of
-# two, which keeps the balance of nets.
-SMALLEST_CHUNK = 2**16
+# Rays at a time, of all tables together; more where adding up the matrices of counts would take longer than the rays.
+SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
 SLOW_SECONDS = 2.0
 
 
@@ -42,11 +41,10 @@ class RaySums:
         self.tables = np.zeros(shape, dtype=np.int64 if basis.is_partition else np.float64)
         self.each, self.lost = 0, 0
 
-    @property
-    def chunk(self) -> int:
-        """Rays at a time."""
+    def chunk(self, tables: int) -> int:
+        """Rays at a time for each of so many tables; a power of two, which keeps the balance of nets."""
         cells = self.basis.size**2 if self.basis.is_partition else 0
-        return max(SMALLEST_CHUNK, 1 << (cells // 16).bit_length())
+        return max(SMALLEST_CHUNK // tables, 1 << (cells // CELLS_A_RAY).bit_length())
 
     def add(self, table: int, incoming: Floats, outgoing: Floats) -> None:
         """Add rays to one of the tables."""

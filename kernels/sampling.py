@@ -25,14 +25,14 @@ def independent_rays(
     """
     root = [int(word) for word in rng.integers(0, 2**63, size=2)]
     sums = RaySums(law, basis, 1 if basis.is_partition else RANDOMISATIONS)
-    parts = len(sums.tables)
+    parts, chunk = len(sums.tables), sums.chunk(1)
     sums.each = max(-(-samples // parts), 1)
     traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None
     with progress_bar(parts * sums.each) as bar:
         for part in range(parts):
-            for index, start in enumerate(range(0, sums.each, sums.chunk)):
+            for index, start in enumerate(range(0, sums.each, chunk)):
                 own = np.random.default_rng([*root, part, index])
-                theta = SINE.sample(min(sums.chunk, sums.each - start), own)
+                theta = SINE.sample(min(chunk, sums.each - start), own)
                 if traced is None:
                     outgoing = law.sample(theta, own)
                 else:
