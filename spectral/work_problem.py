@@ -80,11 +80,6 @@ class WorkProblem:
         object.__setattr__(self, "references", given)
         object.__setattr__(self, "norms", MappingProxyType(dict(self.norms or usual)))
 
-    @property
-    def main_norm(self) -> str:
-        """Name of the norm that decides."""
-        return next(iter(self.norms))
-
     def reference_for(self, method: str) -> ReferenceValue:
         """The first reference that ``method`` did not make; an InputError if it made them all."""
         for reference in self.references:
