@@ -15,7 +15,7 @@ BLOCKS_PER_THREAD = 4
 
 
 def in_blocks(run: Callable[[slice], None], count: int, threads: int | None, block: int | None = None) -> None:
-    """Call ``run`` with slices that cover ``range(count)``, on ``threads`` threads, by default one a processor.
+    """Call ``run`` with slices that cover ``range(count)``, on ``threads`` threads, by default `usable_processors`.
 
     What ``run`` does with an index must not depend on the slice that contains it.
 
@@ -25,7 +25,7 @@ def in_blocks(run: Callable[[slice], None], count: int, threads: int | None, blo
     slice(0, 3, None)
     slice(3, 5, None)
     """
-    workers = os.cpu_count() or 1 if threads is None else whole_number("threads", threads, 1)
+    workers = usable_processors() if threads is None else whole_number("threads", threads, 1)
     if block is None:
         block = min(MOST_BLOCK, max(LEAST_BLOCK, -(-count // (BLOCKS_PER_THREAD * workers))))
     blocks = [slice(first, min(first + block, count)) for first in range(0, count, block)]
@@ -35,3 +35,9 @@ def in_blocks(run: Callable[[slice], None], count: int, threads: int | None, blo
     else:
         with ThreadPoolExecutor(min(workers, len(blocks))) as pool:
             list(pool.map(run, blocks))
+
+
+def usable_processors() -> int:
+    """How many processors this process may use: all, unless it is pinned to some, as by a batch system."""
+    pinned = hasattr(os, "sched_getaffinity")
+    return len(os.sched_getaffinity(0)) if pinned else os.cpu_count() or 1

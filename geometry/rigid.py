@@ -83,7 +83,7 @@ def collide(
     max_contacts : int
         Disks that are still there after so many contacts end with ``Status.BOUNCE_LIMIT``.
     threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
+        Number of threads; by default one a processor that the process may use. The result does not depend on it.
 
     Returns
     -------

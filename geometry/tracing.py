@@ -119,7 +119,7 @@ def trace(
         than 10^6 flights. A run of hits on one circular arc, between two facing parallel lines or in a wedge is
         computed in one flight, whatever its length, and counts in full.
     threads : int, optional
-        Number of threads; by default one a processor. The result does not depend on it.
+        Number of threads; by default one a processor that the process may use. The result does not depend on it.
 
     Returns
     -------

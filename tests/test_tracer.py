@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
+import threading
+
 import numpy as np
 import pytest
 
 from asperity import geometry as geo
 from asperity.errors import InputError
+from asperity.geometry.blocks import in_blocks
 from plain_tracer import trace_plainly
 
 EPS = np.finfo(float).eps
@@ -306,3 +310,16 @@ def test_foreshortened_ellipses_are_circles():
     same = traced.collisions == circle.collisions
     assert same.mean() > 0.9999
     assert np.max(np.abs(traced.theta - circle.theta)[same]) < 1e-10
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processes cannot be pinned here")
+def test_a_process_that_is_pinned_to_one_core_traces_on_one_thread():
+    before = os.sched_getaffinity(0)
+    own = threading.current_thread().name
+    seen = set()
+    try:
+        os.sched_setaffinity(0, {min(before)})
+        in_blocks(lambda part: seen.add(threading.current_thread().name), 100, None, block=10)
+    finally:
+        os.sched_setaffinity(0, before)
+    assert seen == {own}
