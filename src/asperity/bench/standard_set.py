@@ -56,7 +56,7 @@ RANDOM_FACTOR = 4
 # The library's choice is what is asked for: it has the time of so many other methods.
 AUTO_WEIGHT = 4.0
 QUICK = Effort(True, 4, 0.2, 1.5, 155.0)
-FULL = Effort(False, 4, 2.5, 12.0, 1080.0)
+FULL = Effort(False, 4, 1.5, 12.0, 1080.0)
 # A row with less time than this is not begun.
 LEAST_SECONDS = 0.05
 # What is measured of the random walls.
