@@ -92,7 +92,7 @@ class MatrixMaker:
         if method == "qmc":
             return self.from_nets(Nets(law, self.basis, self.rng), self.samples)
         found = independent_rays(law, self.basis, self.samples, self.rng, self.symmetrise)
-        spread = "spread of 8 parts" if found[0].replicates else "variance of multinomial counts"
+        spread = f"spread of {RANDOMISATIONS} parts" if found[0].replicates else "variance of multinomial counts"
         return self._from_rays("monte-carlo", found, spread)
 
     def from_nets(self, nets: Nets, samples: int) -> KernelMatrix:

@@ -12,7 +12,7 @@ from .law import Law
 from .measure import SINE
 from .ray_sums import RaySums, progress_bar
 from .reflection import is_mirror_symmetric
-from .responses import responder
+from .responses import entry_inside, responder
 from .stable_angles import kept_inside
 
 # Independent randomisations: the spread of eight gives an error within a quarter.
@@ -20,8 +20,6 @@ RANDOMISATIONS = 8
 # Digits of the nets: scrambling them takes a time like their number squared. What lies beyond is one random shift of
 # all points, so that none falls on a corner at a dyadic place but by chance.
 SOBOL_BITS = 32
-# Entry points in (0, 1).
-SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 
 
 class Nets:
@@ -76,7 +74,7 @@ class Nets:
         points = [engine.random(number) + beyond for engine, beyond in zip(self.engines, self.beyond, strict=True)]
         x, u = np.concatenate(points).T
         theta: Floats = kept_inside(SINE.quantile(0.5 * u if self.halved else u))
-        outgoing, escaped = self.respond(np.clip(x, SMALLEST, LARGEST), theta)
+        outgoing, escaped = self.respond(entry_inside(x), theta)
         self.sums.count_lost(escaped)
         for table in range(RANDOMISATIONS):
             part = slice(table * number, (table + 1) * number)

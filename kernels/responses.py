@@ -16,6 +16,13 @@ from .stable_angles import flipped
 
 # Outgoing angles and, for traced rays, which of them escaped.
 Response: TypeAlias = tuple[Floats, "NDArray[np.bool_] | None"]
+# The ends of (0, 1) in double precision.
+SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
+
+
+def entry_inside(x: Floats) -> Floats:
+    """Move uniform numbers that fell on an end of (0, 1) to the nearest float64 inside it."""
+    return np.asarray(np.clip(x, SMALLEST, LARGEST))
 
 
 def responder(law: Law) -> Callable[[Floats, Floats], Response] | None:

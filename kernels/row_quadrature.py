@@ -107,7 +107,9 @@ class _Integrator:
     def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_flights: int, useless: float | None) -> None:
         self.basis = basis
         self.tolerance = max(tolerance, 8.0 * np.finfo(np.float64).eps * basis.size)
-        self.most_flights, self.useless = most_flights, useless
+        self.most_flights = most_flights
+        # an error that is of no use, where there is something else to turn to
+        self.useless = useless if useless is not None and math.isfinite(useless) else None
         self.rays, self.flights, self.row_count = 0, 0, 0
         self.judged, self.hopeless = False, False
         self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
@@ -147,9 +149,8 @@ class _Integrator:
 
     def _next_is_too_far(self, stage: int) -> bool:
         """Whether the next stage would end for lack of flights; asked where there is something else to turn to."""
-        if self.useless is None or math.isinf(self.useless):
-            return False
-        return self._lacks_flights(self.best[1], self.tolerance / STAGE_RATIO ** (stage - 1))
+        wanted = self.tolerance / STAGE_RATIO ** (stage - 1)
+        return self.useless is not None and self._lacks_flights(self.best[1], wanted)
 
     def _lacks_flights(self, error: float, wanted: float) -> bool:
         """Whether it is likely to take too many flights from an error now to a wanted one."""
@@ -186,7 +187,7 @@ class _Integrator:
 
     def _is_hopeless(self, error: float) -> bool:
         """Whether the error of the first rows spoke against one that is of use."""
-        if not self.judged and self.useless is not None and math.isfinite(self.useless):
+        if not self.judged and self.useless is not None:
             self.judged, self.hopeless = True, self._lacks_flights(error, self.useless)
         return self.hopeless
 

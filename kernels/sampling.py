@@ -8,8 +8,9 @@ from .basis import Basis
 from .counting import SampledArray
 from .law import Law
 from .measure import SINE
-from .nets import LARGEST, RANDOMISATIONS, SMALLEST
+from .nets import RANDOMISATIONS
 from .ray_sums import RaySums, progress_bar
+from .responses import entry_inside
 
 # About a second of traced rays.
 DEFAULT_SAMPLES = 2**20
@@ -36,7 +37,7 @@ def independent_rays(
                 if traced is None:
                     outgoing = law.sample(theta, own)
                 else:
-                    outgoing, escaped = traced(np.clip(own.random(theta.shape), SMALLEST, LARGEST), theta)
+                    outgoing, escaped = traced(entry_inside(own.random(theta.shape)), theta)
                     sums.count_lost(escaped)
                 sums.add(part, theta, outgoing)
                 bar.update(theta.size)
