@@ -60,7 +60,7 @@ def array_from_counts(
     Parameters
     ----------
     parts : sequence of (n, n) arrays
-        One array for pairs that are independent; several, of independent randomisations or batches of the same size,
+        One array for pairs that are independent; several, of batches of the same size or parts of a randomised net,
         for others. Weights may stand for counts in the latter case.
     basis : Basis
         The partition that was counted in.
@@ -103,10 +103,10 @@ def array_from_counts(
 
 
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
-    """The estimate from means of e_i(theta) e_j(theta') over independent randomisations, all of the same size.
+    """The estimate from means of e_i(theta) e_j(theta') over batches of the same size or parts of a net.
 
     What is known is put in: P 1 = 1, and where the law keeps the measure also the same for the adjoint. Errors are
-    those of the spread over the randomisations.
+    those of the spread over these.
     """
     raw = np.mean(means, axis=0)
     scale = float(np.linalg.norm(raw)) or 1.0
@@ -123,7 +123,7 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
 
 
 class _Replicates:
-    """The arrays of the randomisations, collected one by one; sparse where that is smaller, dropped if too large."""
+    """The arrays of the parts, collected one by one; sparse where that is smaller, dropped if too large."""
 
     def __init__(self, symmetric: Floats, number: int) -> None:
         self.symmetric, self.number = symmetric, number

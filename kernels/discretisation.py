@@ -14,7 +14,7 @@ from .law import Law
 from .matrix import KernelMatrix
 from .matrix_maker import MatrixMaker, Method
 from .measure import SINE
-from .nets import RANDOMISATIONS
+from .net import PARTS
 from .sampling import DEFAULT_SAMPLES
 
 SEED_WITHOUT_RNG = 0
@@ -95,7 +95,7 @@ def discretise(
         raise InputError(f"method: expected one of {', '.join(get_args(Method))}, got {method!r}")
     if finite_number("tolerance", tolerance) < 0.0:
         raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
-    number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * RANDOMISATIONS)
+    number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)
     source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")

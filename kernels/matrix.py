@@ -45,7 +45,7 @@ class KernelMatrix:
     counts : ndarray of int64, shape (n, n), optional
         Raw counts of sampled pairs (incoming bin, outgoing bin), before any symmetrisation.
     replicates : tuple of arrays
-        ``symmetric`` from independent randomisations, dense or sparse; their mean is ``symmetric``. For errors.
+        ``symmetric`` from equal parts of the rays, dense or sparse; their mean is ``symmetric``. For errors.
     symmetrised : bool
         Whether each sampled pair was counted both ways.
     samples : int

@@ -38,7 +38,7 @@ def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     """``first + second``; errors add."""
     _check_same_basis(first, second)
     replicates: tuple[Any, ...] = ()
-    # independent randomisations cannot be paired; those of one term are shifted by the other where it has none
+    # parts of different samples cannot be paired; those of one term are shifted by the other where it has none
     if first.replicates and not second.replicates:
         replicates = tuple(part + second.symmetric for part in first.replicates)
     elif second.replicates and not first.replicates:

@@ -28,7 +28,7 @@ from .least_resistance import LeastResistanceLaw
 from .legendre import Legendre
 from .matrix import KernelMatrix
 from .matrix_algebra import frobenius_error
-from .nets import RANDOMISATIONS, Nets
+from .net import PARTS, Net
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
 from .responses import responder
@@ -90,15 +90,15 @@ class MatrixMaker:
     def sampled(self, law: Law, method: Method) -> KernelMatrix:
         """The matrix by rays."""
         if method == "qmc":
-            return self.from_nets(Nets(law, self.basis, self.rng), self.samples)
+            return self.from_net(Net(law, self.basis, self.rng), self.samples)
         found = independent_rays(law, self.basis, self.samples, self.rng, self.symmetrise)
-        spread = f"spread of {RANDOMISATIONS} parts" if found[0].replicates else "variance of multinomial counts"
+        spread = f"spread of {PARTS} parts" if found[0].replicates else "variance of multinomial counts"
         return self._from_rays("monte-carlo", found, spread)
 
-    def from_nets(self, nets: Nets, samples: int) -> KernelMatrix:
-        """The matrix by at least so many rays of nets."""
-        found = nets.sampled(samples, symmetrise=self.symmetrise)
-        return self._from_rays("qmc", found, f"spread of {RANDOMISATIONS} randomisations")
+    def from_net(self, net: Net, samples: int) -> KernelMatrix:
+        """The matrix by at least so many rays of a net."""
+        found = net.sampled(samples, symmetrise=self.symmetrise)
+        return self._from_rays("qmc", found, f"spread of {PARTS} parts of a net, which is more exact than that")
 
     def _from_rays(self, method: Method, found: tuple[SampledArray, int, float], how: str) -> KernelMatrix:
         array, used, lost = found
@@ -119,8 +119,8 @@ class MatrixMaker:
         limits = (MOST_FLIGHTS, None) if self.patient else (QUICK_FLIGHTS, useless)
         symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, limits[0], useless=limits[1])
         how = (
-            f"adaptive rows and panels, {rays} rays, predicted cheaper than sampling: Gauss against Kronrod, "
-            "plus undecided entry points and twice the asymmetry"
+            f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
+            "plus undecided entry points"
         )
         return self._result(symmetric, "quadrature", error + ROUNDING * self.basis.size, "estimate", how)
 

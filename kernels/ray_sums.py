@@ -1,4 +1,4 @@
-"""What rays add up to, a table a randomisation, and the matrix with its error that follows."""
+"""What rays add up to, a table for each part of them, and the matrix with its error that follows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .law import Law
 from .reflection import reflection_matrix
 from .wall_law import LOST_TOLERANCE
 
-# Rays at a time, of all tables together; more where adding up the matrices of counts would take longer than the rays.
+# Rays at a time; more where adding up the matrices of counts would take longer than the rays.
 SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
 SLOW_SECONDS = 2.0
 
@@ -27,24 +27,34 @@ class RaySums:
 
     Attributes
     ----------
-    tables : ndarray of shape (randomisations, n, n)
+    tables : ndarray of shape (parts, n, n)
         Integers in bases of cells.
     each : int
-        Rays of every randomisation so far.
+        Rays of every part.
     lost : int
-        Rays that did not escape, of all randomisations. They count as sent back.
+        Rays that did not escape, of all parts. They count as sent back.
     """
 
-    def __init__(self, law: Law, basis: Basis, randomisations: int) -> None:
+    def __init__(self, law: Law, basis: Basis, parts: int) -> None:
         self.law, self.basis = law, basis
-        shape = randomisations, basis.size, basis.size
+        shape = parts, basis.size, basis.size
         self.tables = np.zeros(shape, dtype=np.int64 if basis.is_partition else np.float64)
         self.each, self.lost = 0, 0
 
-    def chunk(self, tables: int) -> int:
-        """Rays at a time for each of so many tables; a power of two, which keeps the balance of nets."""
+    @property
+    def chunk(self) -> int:
+        """Rays at a time; a power of two, which keeps the balance of nets."""
         cells = self.basis.size**2 if self.basis.is_partition else 0
-        return max(SMALLEST_CHUNK // tables, 1 << (cells // CELLS_A_RAY).bit_length())
+        return max(SMALLEST_CHUNK, 1 << (cells // CELLS_A_RAY).bit_length())
+
+    def enlarge(self, each: int) -> None:
+        """Join consecutive parts, a power of two of them, to parts of so many rays; the last ones are empty then."""
+        joined = min(each // self.each, len(self.tables)) if self.each else 1
+        kept = len(self.tables) // joined
+        for place in range(kept):
+            self.tables[place] = self.tables[place * joined : (place + 1) * joined].sum(axis=0)
+        self.tables[kept:] = 0
+        self.each = each
 
     def add(self, table: int, incoming: Floats, outgoing: Floats) -> None:
         """Add rays to one of the tables."""

@@ -8,7 +8,7 @@ from .basis import Basis
 from .counting import SampledArray
 from .law import Law
 from .measure import SINE
-from .nets import RANDOMISATIONS
+from .net import PARTS
 from .ray_sums import RaySums, progress_bar
 from .responses import entry_inside
 
@@ -25,8 +25,8 @@ def independent_rays(
     ``rng``, its part and its own index alone.
     """
     root = [int(word) for word in rng.integers(0, 2**63, size=2)]
-    sums = RaySums(law, basis, 1 if basis.is_partition else RANDOMISATIONS)
-    parts, chunk = len(sums.tables), sums.chunk(1)
+    sums = RaySums(law, basis, 1 if basis.is_partition else PARTS)
+    parts, chunk = len(sums.tables), sums.chunk
     sums.each = max(-(-samples // parts), 1)
     traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None
     with progress_bar(parts * sums.each) as bar:

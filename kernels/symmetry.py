@@ -11,8 +11,9 @@ from ..checks import Floats
 
 # Statistics with fewer degrees of freedom than this carry no information.
 LEAST_FREEDOM = 1e-9
-# Far out the statistic of eight randomisations follows Student's t; its degrees of freedom were fitted to 40,000 trials
-# with normal parts of 1 to 1000 dimensions d as 3.4 d^0.27, which gives upper tails right to a quarter up to z = 3.
+# Far out the statistic of eight independent replicates follows Student's t; its degrees of freedom were fitted to
+# 40,000 trials with normal replicates of 1 to 1000 dimensions d as 3.4 d^0.27, which gives upper tails right to a
+# quarter up to z = 3.
 FREEDOM_AT_ONE, FREEDOM_POWER = 3.4, 0.27
 SYMMETRY_NORM = "||(S - S^T)/2||_F / ||S||_F in an orthonormal basis"
 STOCHASTIC_NORM_CELLS = "largest |sum over j of P[i, j] - 1|"
@@ -103,12 +104,13 @@ def reversibility_z_score(counts: NDArray[np.int64]) -> float:
 
 
 def replicate_z_score(antisymmetric: list[Floats]) -> float:
-    """The z-score of mean antisymmetric parts from independent randomisations, where counts are not independent.
+    """The z-score of mean antisymmetric parts of some replicates, where counts are not independent.
 
     With A_r independent and of mean 0 the inner products <A_r, A_s>, r < s, are uncorrelated and of mean 0; their
     average is compared with its standard error. The fewer dimensions the A_r vary in, the heavier the tails of this
     ratio; so it is made normal through a Student distribution, whose degrees of freedom follow from that number of
-    dimensions, (trace C)^2 / trace C^2 with C the covariance, estimated from the A_r themselves.
+    dimensions, (trace C)^2 / trace C^2 with C the covariance, estimated from the A_r themselves. Parts of one net make
+    up for each other: the score of noise is then lower, and does not accuse more often than it should.
     """
     from scipy.stats import norm, t
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..errors import AccuracyError
-from .nets import Nets
+from .net import Net
 from .row_quadrature import is_affordable
 from .wall_law import FEW_PIECES
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .matrix_maker import MatrixMaker
     from .wall_law import WallLaw
 
-# So many rays tell how many the tolerance needs: the error of scrambled nets falls like their number to a power of
+# So many rays tell how many the tolerance needs: the error of a scrambled net falls like their number to a power of
 # about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
 FIRST_RAYS, NET_ORDER, NET_MARGIN = 2**14, 0.75, 2.0
 
@@ -29,15 +29,15 @@ def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
     if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
     affordable = is_affordable(law.wall, maker.basis)
-    nets = Nets(law, maker.basis, maker.rng)
-    found, promised = _few_rays(maker, nets) if affordable or _is_within_reach(maker) else (None, float("inf"))
+    net = Net(law, maker.basis, maker.rng)
+    found, promised = _few_rays(maker, net) if affordable or _is_within_reach(maker) else (None, float("inf"))
     if found is not None:
         return found
     if law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
     if not affordable:
-        return maker.from_nets(nets, maker.samples)
-    rays = _all_rays(maker, nets) if promised <= maker.tolerance else None
+        return maker.from_net(net, maker.samples)
+    rays = _all_rays(maker, net) if promised <= maker.tolerance else None
     if rays is not None:
         promised = float(rays.error)
         if promised <= maker.tolerance:
@@ -45,14 +45,14 @@ def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
     rows = maker.rows(law, useless=max(promised, maker.tolerance))
     if float(rows.error) <= maker.tolerance or float(rows.error) <= promised < float("inf"):
         return rows
-    rays = _all_rays(maker, nets) if rays is None else rays
+    rays = _all_rays(maker, net) if rays is None else rays
     return rows if rays is None else min(rows, rays, key=lambda matrix: float(matrix.error))
 
 
-def _all_rays(maker: MatrixMaker, nets: Nets) -> KernelMatrix | None:
+def _all_rays(maker: MatrixMaker, net: Net) -> KernelMatrix | None:
     """The matrix by rays; None if too many do not escape, where rows count theirs in their error."""
     try:
-        return maker.from_nets(nets, maker.samples)
+        return maker.from_net(net, maker.samples)
     except AccuracyError:
         return None
 
@@ -62,7 +62,7 @@ def _is_within_reach(maker: MatrixMaker) -> bool:
     return maker.tolerance * maker.samples >= 1.0
 
 
-def _few_rays(maker: MatrixMaker, nets: Nets) -> tuple[KernelMatrix | None, float]:
+def _few_rays(maker: MatrixMaker, net: Net) -> tuple[KernelMatrix | None, float]:
     """A matrix of fewer rays than asked for, if these are enough for the tolerance; and what all rays promise.
 
     The promise is infinite where the looks do not tell.
@@ -70,7 +70,7 @@ def _few_rays(maker: MatrixMaker, nets: Nets) -> tuple[KernelMatrix | None, floa
     number, promised = FIRST_RAYS, float("inf")
     while number < maker.samples:
         try:
-            found = maker.from_nets(nets, number)
+            found = maker.from_net(net, number)
         except AccuracyError:
             # a bin without rays, or rays that do not escape: these few are no measure
             break

@@ -44,7 +44,7 @@ class SpectrumErrors:
         Estimate: one standard error from the rays' randomness; 0 for matrices that were not sampled.
     quantile : float
         Of how many standard errors an interval of 95 % has on each side: 1.96, or Student's quantile where the standard
-        error comes from the spread of a few randomisations.
+        error comes from the spread of a few parts of the rays.
     """
 
     algebraic: Floats

@@ -169,14 +169,15 @@ def enclosures(
         raise AccuracyError(f"{law!r} is not reversible: its spectrum need not be real", np.inf)
     if basis is None and integrates_panels(law):
         trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
-        basis, values = trials.basis, trials.values
-        most_rows = MOST_TRACED_ROWS if traces_rows(law) else MOST_EXACT_ROWS
-        found = residuals(
-            law, basis, trials.vectors, values, most_rows, mirrored=trials.mirrored,
-            quotient_error=TRIAL_SHARE * tolerance,
+        basis, values, vectors, names = trials.basis, trials.values, trials.vectors, trials.parities
+        # rows are what costs: the functions that come next are looked at in the same ones
+        both = residuals(
+            law, basis, np.column_stack([vectors, trials.following]), np.append(values, trials.following_values),
+            MOST_TRACED_ROWS if traces_rows(law) else MOST_EXACT_ROWS,
+            mirrored=trials.mirrored, quotient_error=TRIAL_SHARE * tolerance, leading=len(values),
         )  # fmt: skip
-        after = residuals(law, basis, trials.following, trials.following_values, 0, mirrored=trials.mirrored)
-        names, next_value = trials.parities, _reach(after)
+        found, after = both.split(len(values))
+        next_value = _reach(after)
     else:
         if basis is None:
             basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))

@@ -10,9 +10,20 @@ import numpy as np
 from ..checks import positive_number
 from ..errors import AccuracyError, InputError
 from ..estimates import Estimate
-from ..kernels import Bins, CollisionLaw, DensityLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
+from ..kernels import (
+    Bins,
+    CollisionLaw,
+    DensityLaw,
+    InvolutionLaw,
+    KernelMatrix,
+    Law,
+    Legendre,
+    MatrixLaw,
+    Power,
+    discretise,
+)
 from ..kernels.algebra import made_of_isometries
-from ..kernels.panel_rows import integrates_panels
+from ..kernels.panel_rows import integrates_panels, traces_rows
 from .adapted_panels import adapted_trials
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
@@ -30,6 +41,10 @@ ENCLOSED, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK = 3, 8, 1e-2, 2
 # Enclosures somewhat wider than the tolerance are sought once more, to this share of it; a gap whose error misses the
 # tolerance is handed over as it is where that is below the largest miss, a share of the gap.
 CLOSER, LARGEST_MISS = 0.25, 1e-3
+# From this tolerance on, small matrices by few rays may do for the gap of a traced wall: their sizes, with the errors
+# asked of them, and the rays allowed. What larger bases would change is at most this multiple of the last change where
+# these changes fall like a power of the size of .6 or more.
+ROUGH, GLANCES, FEW_RAYS, BEYOND_CHANGE = 2e-3, ((24, 1.0), (48, 0.1)), 2**17, 2.0
 
 
 @dataclass(frozen=True)
@@ -220,6 +235,10 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     if edge.low >= 1.0 - tolerance:
         # nothing fits between the edge and 1 that the tolerance could tell
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
+    if tolerance >= ROUGH and traces_rows(law):
+        rough = _at_a_glance(law, tolerance, matrices, edge)
+        if rough is not None:
+            return rough
     if isinstance(law, DensityLaw) or integrates_panels(law):
         enclosed = _by_enclosure(law, tolerance, edge)
         if enclosed is not None:
@@ -239,6 +258,24 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     method = _method(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
     return SpectralGap(found.gap, error, "estimate", method, "undecided", reasons, law.frame, found)
+
+
+def _at_a_glance(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap | None:
+    """A rough gap from small matrices by few rays; None where it is not exact enough, or near the essential spectrum.
+
+    Tracing the rows of an enclosure takes ten times as long.
+    """
+    for size, matrix_error in GLANCES:
+        found = spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), k=EIGENVALUES)
+        error = found.gap_error + (BEYOND_CHANGE - 1.0) * float(found.gap_errors.discretisation[0])
+        if error <= tolerance and 1.0 - found.gap - error > edge.high:
+            how = f"algebraic + {BEYOND_CHANGE:.0f} x two-grid + {found.gap_errors.quantile:.3g} x sampling error"
+            reason = f"an eigenvalue {1.0 - found.gap:.4g} beyond the essential spectrum, which reaches {edge.high:.4g}"
+            evidence = (*edge.reasons, reason)
+            return SpectralGap(
+                found.gap, error, "estimate", _method(found, how), "isolated", evidence, law.frame, found
+            )  # fmt: skip
+    return None
 
 
 def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:

@@ -30,7 +30,7 @@ def sampling_quantile(matrix: KernelMatrix) -> float:
 def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Floats:
     """One standard error of each eigenvalue, shape (k,); zeros for matrices that were not sampled.
 
-    To first order an eigenvalue moves by v^T (S_hat - S) v. Where the matrix keeps its independent randomisations,
+    To first order an eigenvalue moves by v^T (S_hat - S) v. Where the matrix keeps the parts of its rays,
     the spread of v^T S_r v over them is used; otherwise the multinomial variance of the counts in each row.
     """
     if len(matrix.replicates) > 1:

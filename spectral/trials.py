@@ -51,6 +51,15 @@ class Residuals:
     norms: Floats
     rows: int
 
+    def split(self, number: int) -> tuple[Residuals, Residuals]:
+        """Those of the first functions, and of the others."""
+        both = (
+            (self.quotients[part], self.quotient_errors[part], self.norms[part])
+            for part in (slice(None, number), slice(number, None))
+        )
+        first, others = (Residuals(*arrays, self.rows) for arrays in both)
+        return first, others
+
 
 def residuals(
     law: Law,
@@ -61,13 +70,15 @@ def residuals(
     *,
     mirrored: bool = False,
     quotient_error: float = 0.0,
+    leading: int | None = None,
 ) -> Residuals:
     """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
 
     ``values``, shape (k,), are the eigenvalues that they are thought to have. ||P v - rho v||^2 is integrated as it
     stands: as <P v, P v> - rho^2 it would lose half of its digits. Panels in the incoming angle are halved where Gauss
-    and Kronrod differ most; their difference counts as error. ``mirrored`` says that each function is even or odd, and
-    the law mirror-symmetric; an error of a quotient below ``quotient_error`` is good enough.
+    and Kronrod differ most for the ``leading`` functions, by default all; their difference counts as error.
+    ``mirrored`` says that each function is even or odd, and the law mirror-symmetric; an error of a quotient below
+    ``quotient_error`` is good enough.
     """
     if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
         return _smooth_residuals(law, basis, vectors, values)
@@ -93,11 +104,11 @@ def residuals(
                 np.maximum(SHARE * square + (8.0 * EPS) ** 2, SHARE * quotient_error),
             ]
         )
-        share = (error / wanted).max(axis=(1, 2))
+        share = (error / wanted)[..., :leading].max(axis=(1, 2))
         affordable = max(most_rows - rows, 0) // (2 * len(NODES))
         worst = np.argsort(-share)[:affordable]
         worst = worst[(share[worst] * len(share) > 1.0) & (np.diff(kept[:, worst], axis=0)[0] > NARROWEST)]
-        if np.all(error.sum(axis=0) <= wanted):
+        if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
             break
         middle = kept[:, worst].mean(axis=0)
         low, high = np.append(kept[0, worst], middle), np.append(middle, kept[1, worst])

@@ -34,7 +34,7 @@ from asperity.bench.timing import side_by_side
 from asperity.cli import main
 from asperity.errors import InputError
 from asperity.kernels.directions import Directions
-from asperity.kernels.nets import RANDOMISATIONS
+from asperity.kernels.net import PARTS
 
 RAYS = 2**12
 
@@ -104,7 +104,7 @@ def test_a_moment_that_is_kept_is_that_of_the_wall(name):
     seen = ker.discretise(ker.WallLaw(wall_of(name)), ker.Legendre(2), "qmc", samples=2**16)
     beyond = max(abs(seen.symmetric[1, 1] - float(moment.value)) - moment.error, 0.0)
     # a standard error from the spread of eight nets: its multiples follow Student's distribution
-    assert norm.isf(t.sf(beyond / seen.error.value, RANDOMISATIONS - 1)) < 4.0
+    assert norm.isf(t.sf(beyond / seen.error.value, PARTS - 1)) < 4.0
     assert moment.error <= 5e-5
 
 

@@ -10,7 +10,8 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
-from asperity.kernels.nets import RANDOMISATIONS
+from asperity.kernels.net import PARTS
+from net_theory import NET_OVER_SPREAD
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ def test_sampled_matrices_lie_within_their_errors(method: str, basis: ker.Basis)
 @pytest.mark.parametrize("symmetrise", [False, True])
 @pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
 @pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(6)], ids=repr)
-def test_reported_errors_are_calibrated(basis: ker.Basis, method: str, symmetrise: bool) -> None:
+def test_reported_errors_hold(basis: ker.Basis, method: str, symmetrise: bool) -> None:
     exact = ker.discretise(ker.TriangularTeethLaw(1.1), basis).symmetric
     ratios = []
     for seed in range(24):
@@ -55,22 +56,24 @@ def test_reported_errors_are_calibrated(basis: ker.Basis, method: str, symmetris
         )
         ratios.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
     # mean of squares over 24 matrices of dozens of entries each; errors from 8 replicates scatter by a quarter
-    assert 0.75 < np.mean(ratios) < 1.35
+    expected = 1.0 if method == "monte-carlo" else NET_OVER_SPREAD
+    assert 0.75 * expected < np.mean(ratios) < 1.35 * expected
 
 
-def test_z_scores_of_sampled_matrices_are_those_of_noise() -> None:
-    scores = {
-        (method, basis): [
+@pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(6)], ids=repr)
+def test_z_scores_of_sampled_matrices_are_those_of_noise_or_of_less(basis: ker.Basis) -> None:
+    independent, net = (
+        [
             ker.discretise(Bounce(), basis, method=method, samples=4096, rng=np.random.default_rng(seed))  # type: ignore[arg-type]
             .symmetry_defect()
             .z_score
             for seed in range(40)
         ]
-        for method in ("qmc", "monte-carlo")
-        for basis in (ker.Bins(12), ker.Legendre(6))
-    }
-    for found in scores.values():
-        assert abs(np.mean(found)) < 0.65 and 0.6 < np.std(found) < 1.5
+        for method in ("monte-carlo", "qmc")
+    )
+    assert abs(np.mean(independent)) < 0.65 and 0.6 < np.std(independent) < 1.5
+    # parts of a net have scores below those of noise, and scatter less
+    assert np.mean(net) < 0.0 and max(net) < 2.0 and np.std(net) < 0.6
 
 
 def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand() -> None:
@@ -83,7 +86,7 @@ def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand
             return ker.SINE.quantile(np.clip(share, 1e-12, 1 - 1e-12))
 
     for method in ("qmc", "monte-carlo"):
-        found = ker.discretise(Drift(), ker.Bins(16), method=method, samples=2**14)  # type: ignore[arg-type]
+        found = ker.discretise(Drift(), ker.Bins(16), method=method, samples=2**16)  # type: ignore[arg-type]
         assert found.symmetry_defect().z_score > 10.0
         assert found.reversible is None
     with pytest.raises(InputError, match="not known to be reversible"):
@@ -120,7 +123,7 @@ def test_the_same_generator_gives_the_same_bits(method: str) -> None:
 def test_replicates_average_to_the_matrix_and_number_eight() -> None:
     for basis in (ker.Bins(12), ker.Bins(300), ker.Legendre(6)):
         found = ker.discretise(Bounce(), basis, "qmc", samples=2**15)
-        assert len(found.replicates) == RANDOMISATIONS
+        assert len(found.replicates) == PARTS
         mean = sum(np.asarray(part.todense() if hasattr(part, "todense") else part) for part in found.replicates) / 8
         assert np.abs(mean - found.symmetric).max() < 1e-12
 

@@ -139,7 +139,7 @@ def test_sampling_error_of_an_eigenvalue_is_calibrated(method, symmetrise):
         assert found.errors.sampling[1] > 0
         scores.append((found.values[1] - exact) / found.errors.sampling[1])
     mean_square = np.mean(np.square(scores))
-    # squares of normal scores have mean 1 and variance 2; over the spread of eight randomisations they are Student
+    # squares of normal scores have mean 1 and variance 2; over the spread of eight replicates they are Student
     # t(7), whose square is F(1, 7) with mean 7/5 and variance 7.84
     expected, variance = (1.0, 2.0) if method == "monte-carlo" else (1.4, 7.84)
     assert abs(mean_square - expected) < 4.5 * np.sqrt(variance / 60)

@@ -1,4 +1,4 @@
-"""Nets of mirror-symmetric laws hold half of the rays; the others are their mirror images."""
+"""Nets go on where they were, and of mirror-symmetric laws hold half of the rays."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
+from asperity.kernels.net import Net
 from asperity.kernels.reflection import reflection_matrix
+from net_theory import NET_OVER_SPREAD
 
 TEETH = ker.TriangularTeethLaw(1.1)
 BASES = [ker.Bins(16), ker.Bins(9), ker.Legendre(6), ker.Panels(np.linspace(0.0, np.pi, 5), 2)]
@@ -40,8 +42,21 @@ def test_matrices_from_half_of_the_rays_are_mirror_symmetric_markov_and_right_wi
         assert np.abs(flip @ found.symmetric @ flip.T - found.symmetric).max() < 1e-14
         assert found.stochastic_defect() < 1e-13 and found.samples == 4096
         squares.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
-    # errors from 8 replicates scatter by a quarter; the mean of their inverse squares is 7/5 where one entry rules
-    assert 0.75 < np.mean(squares) < 1.6
+    # errors from 8 replicates scatter by a quarter; the mean of their inverse squares is 7/5 where one entry rules; and
+    # the order is 3/4 only in the limit
+    assert 0.6 * NET_OVER_SPREAD < np.mean(squares) < 1.6 * NET_OVER_SPREAD
+
+
+@pytest.mark.parametrize("looks", [(8, 16), (64, 512), (8, 4096), (128, 1024, 2048)], ids=repr)
+def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks):
+    basis, last = ker.Bins(4), looks[-1]
+    parted, whole = (Net(Bounce(mirror_symmetric=None), basis, np.random.default_rng(3)) for _ in range(2))
+    for look in looks:
+        found, rays, _ = parted.sampled(look, symmetrise=False)
+        assert rays == look
+    expected, _, _ = whole.sampled(last, symmetrise=False)
+    assert np.array_equal(found.counts, expected.counts)
+    assert np.array_equal(parted.sums.tables, whole.sums.tables)
 
 
 def test_mirror_images_are_worth_as_many_rays_again():
