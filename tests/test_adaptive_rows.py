@@ -9,7 +9,8 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.row_quadrature import row_matrix
+from asperity.kernels.angle_panels import GAUSS, KRONROD, NODES
+from asperity.kernels.row_quadrature import KRONROD_SHARE, row_matrix
 from asperity.kernels.wall_rows import adaptive_rows
 from plain_tracer import trace_plainly
 from random_curved_walls import random_curved_wall
@@ -57,6 +58,17 @@ def test_a_matrix_that_runs_out_of_rays_says_by_how_much_it_fell_short() -> None
     matrix, error, _ = row_matrix(ARCS, ker.Legendre(2), 1e-12, most_flights=200_000)
     assert error > 1e-12
     assert abs(matrix[1, 1] - FIRST_MOMENT) <= error
+
+
+@pytest.mark.parametrize("power, share", [(0.5, 0.375), (1.0, 0.255)])
+def test_where_rows_are_not_smooth_kronrods_rule_errs_by_a_share_of_its_difference_from_gausss(power, share):
+    place = (np.arange(100_000) + 0.5) / 50_000 - 1.0
+    values = np.maximum(NODES - place[:, None], 0.0) ** power
+    miss = values @ KRONROD - (1.0 - place) ** (power + 1.0) / (power + 1.0)
+    scale = np.sqrt(np.mean((values @ (KRONROD - GAUSS)) ** 2))
+    assert np.sqrt(np.mean(miss**2)) / scale == pytest.approx(share, abs=0.001) and share < KRONROD_SHARE
+    # with either sign, so that the errors of panels are added as squares
+    assert abs(np.mean(miss)) < 0.002 * scale
 
 
 def test_rows_of_equal_hollows_and_flat_tops_are_those_of_one_hollow() -> None:
