@@ -49,8 +49,9 @@ ROUNDING = 8.0 * np.finfo(np.float64).eps
 # Edges and offsets of isometries are rounded to about an ulp. That moves a share of about n eps of each of some n
 # cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
 DISPLACED = np.finfo(np.float64).eps
-# Flights of adaptive rows that nobody asked for by name: a second or so; beyond them the shortfall is reported.
-QUICK_FLIGHTS = 8_000_000
+# Flights of adaptive rows that nobody asked for by name: they take about as long as two million rays; beyond them the
+# shortfall is reported.
+QUICK_FLIGHTS = 4_000_000
 # Methods that a sum has if all its terms have them.
 SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
 
@@ -114,9 +115,9 @@ class MatrixMaker:
             raw_defect=array.raw_defect,
         )
 
-    def rows(self, law: WallLaw, useless: float) -> KernelMatrix:
+    def rows(self, law: WallLaw, useless: float, most_flights: int = QUICK_FLIGHTS) -> KernelMatrix:
         """The matrix by adaptive rows; unless they were asked for, within a second or so, if they can be of use."""
-        limits = (MOST_FLIGHTS, None) if self.patient else (QUICK_FLIGHTS, useless)
+        limits = (MOST_FLIGHTS, None) if self.patient else (most_flights, useless)
         symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, limits[0], useless=limits[1])
         how = (
             f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "

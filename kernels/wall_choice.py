@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from ..errors import AccuracyError
@@ -17,20 +18,27 @@ if TYPE_CHECKING:
 # So many rays tell how many the tolerance needs: the error of a scrambled net falls like their number to a power of
 # about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
 FIRST_RAYS, NET_ORDER, NET_MARGIN = 2**14, 0.75, 2.0
+# So many rays take long enough for a look at adaptive rows, with flights that take half of the rays' time: of these a
+# ray has two or three.
+MANY_RAYS, ROW_FLIGHTS_A_RAY = 2**17, 1.0
+# Rows that take longer than all rays must promise this share of their error.
+ROW_ADVANTAGE = 0.5
 
 
 def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
     """The matrix by the way that promises the tolerance soonest, or else the least error in a second or two.
 
-    Isometries of few pieces; as many rays as the tolerance needs; isometries of many pieces; adaptive rows, as long as
-    they promise more than all the rays; all the rays. The more exact matrix is returned.
+    Isometries of few pieces; as many rays as the tolerance needs, or adaptive rows where these promise it sooner;
+    isometries of many pieces; adaptive rows, as long as they promise more than all the rays; all the rays. The more
+    exact matrix is returned.
     """
     # found in less time than a few rays
     if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
     affordable = is_affordable(law.wall, maker.basis)
     net = Net(law, maker.basis, maker.rng)
-    found, promised = _few_rays(maker, net) if affordable or _is_within_reach(maker) else (None, float("inf"))
+    sooner = (lambda rays: _few_rows(maker, law, rays)) if affordable else lambda rays: None
+    found, promised = _few_rays(maker, net, sooner) if affordable or _is_within_reach(maker) else (None, float("inf"))
     if found is not None:
         return found
     if law.exact_law is not None:
@@ -42,7 +50,7 @@ def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
         promised = float(rays.error)
         if promised <= maker.tolerance:
             return rays
-    rows = maker.rows(law, useless=max(promised, maker.tolerance))
+    rows = maker.rows(law, useless=max(ROW_ADVANTAGE * promised, maker.tolerance))
     if float(rows.error) <= maker.tolerance or float(rows.error) <= promised < float("inf"):
         return rows
     rays = _all_rays(maker, net) if rays is None else rays
@@ -62,10 +70,20 @@ def _is_within_reach(maker: MatrixMaker) -> bool:
     return maker.tolerance * maker.samples >= 1.0
 
 
-def _few_rays(maker: MatrixMaker, net: Net) -> tuple[KernelMatrix | None, float]:
+def _few_rows(maker: MatrixMaker, law: WallLaw, rays: int) -> KernelMatrix | None:
+    """A matrix by adaptive rows, if they meet the tolerance in less time than so many rays would."""
+    if rays < MANY_RAYS:
+        return None
+    rows = maker.rows(law, useless=maker.tolerance, most_flights=int(ROW_FLIGHTS_A_RAY * rays))
+    return rows if float(rows.error) <= maker.tolerance else None
+
+
+def _few_rays(
+    maker: MatrixMaker, net: Net, sooner: Callable[[int], KernelMatrix | None]
+) -> tuple[KernelMatrix | None, float]:
     """A matrix of fewer rays than asked for, if these are enough for the tolerance; and what all rays promise.
 
-    The promise is infinite where the looks do not tell.
+    The promise is infinite where the looks do not tell. ``sooner`` may have the matrix in less time than many rays.
     """
     number, promised = FIRST_RAYS, float("inf")
     while number < maker.samples:
@@ -82,4 +100,7 @@ def _few_rays(maker: MatrixMaker, net: Net) -> tuple[KernelMatrix | None, float]
         if needed > maker.samples:
             break
         number = max(2 * number, int(needed))
+        rows = sooner(number)
+        if rows is not None:
+            return rows, promised
     return None, promised
