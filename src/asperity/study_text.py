@@ -225,7 +225,7 @@ def quotation(gap: SpectralGap) -> str:
     """One line to paste into a paper: value, error, kind, verdict, convention, method, version."""
     from . import __version__
 
-    number = "no gap: 0" if gap.verdict == "no gap" else rounded(gap)
+    number = "0" if gap.verdict == "no gap" else rounded(gap)
     return (
         f"spectral gap {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; {gap.method}; "
         f"asperity {__version__}"
