@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .errors import AsperityError
-from .estimates import Estimate
+from .estimates import Estimate, rounded
 from .spectral import diffusivity, mean_squared_slope
 
 if TYPE_CHECKING:
@@ -62,8 +62,6 @@ class Consequences:
 
     def lines(self) -> list[str]:
         """One line a fact."""
-        from .study_text import rounded
-
         lines = []
         if self.slem is not None and self.relaxation_time is not None:
             if math.isfinite(self.relaxation_time.error):
