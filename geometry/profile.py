@@ -108,7 +108,7 @@ def _parse_columns(text: str) -> tuple[Floats, Floats]:
         names_allowed = False
         rows.append((x, height))
     if len(rows) < 2:
-        raise InputError(f"line {len(text.splitlines())}: expected at least two rows of x and height, got {len(rows)}")
+        raise InputError(f"all lines: expected at least two rows of x and height, got {len(rows)}")
     table = np.array(rows)
     return table[:, 0], table[:, 1]
 

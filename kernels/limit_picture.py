@@ -77,5 +77,6 @@ def draw_limit(
     ax.set_xlabel("theta' (radians)")
     ax.set_ylabel("psi' (radians; dots)")
     right.set_ylabel("distribution function of theta' (lines)")
-    right.legend(loc="upper left", fontsize="small", frameon=False)
+    # distribution functions leave this corner free; the frame keeps words off dots
+    right.legend(loc="lower right", fontsize="small", framealpha=0.9)
     return ax

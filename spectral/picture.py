@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..estimates import rounded
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
@@ -91,4 +93,4 @@ def draw_eigenfunctions(found: Spectrum, ax: Axes | None = None) -> Axes:
 def _described(found: Spectrum, gap: SpectralGap | None) -> tuple[float, str]:
     if gap is None:
         return found.gap, f"1 - second eigenvalue of this matrix: {found.gap:.4g}"
-    return gap.value, f"gap {gap.value:.4g} ± {gap.error:.1g} ({gap.verdict})"
+    return gap.value, f"gap {rounded(gap).replace('+-', '±')} ({gap.verdict})"

@@ -124,7 +124,7 @@ def test_a_gap_is_printed_with_its_evidence_and_as_json(convention):
     flags = ["--specular"] if convention == "specular" else []
     text = run("gap", "triangular-teeth", *flags).stdout
     assert "no gap" in text and f"{convention} convention" in text and "essential spectrum" in text
-    assert text.startswith("spectral gap no gap: 0 (bound)")
+    assert text.startswith("spectral gap 0 (bound), no gap, ")
     gap = json.loads(run("gap", "triangular-teeth", "--json", *flags).stdout)
     assert gap["value"] == 0.0 and gap["error"] == 0.0 and gap["kind"] == "bound" and gap["convention"] == convention
     assert gap["verdict"] == "no gap" and len(gap["evidence"]) == 1
@@ -196,10 +196,13 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path, place):
     assert (tmp_path / "file").read_text() == "in the way"
 
 
-@pytest.mark.parametrize("place", ["file/walls.png", "nowhere/walls.png", "walls.unknown"])
-def test_a_picture_that_cannot_be_written_is_refused(tmp_path, place):
+@pytest.mark.parametrize(
+    ("place", "remedy"), [("file/walls.png", "folder"), ("nowhere/walls.png", "folder"), ("walls.unknown", ".png")]
+)
+def test_a_picture_that_cannot_be_written_is_refused(tmp_path, place, remedy):
     (tmp_path / "file").write_text("in the way")
-    assert "cannot write" in refused("walls", "--out", tmp_path / place)
+    words = refused("walls", "--out", tmp_path / place).split("cannot write the picture")[1]
+    assert remedy in words.split(";")[-1]
 
 
 @pytest.mark.parametrize(
@@ -210,6 +213,8 @@ def test_a_picture_that_cannot_be_written_is_refused(tmp_path, place):
         ["study", "flat", "--mass", "heavy"],
         ["study", "flat", "--nosuch"],
         ["study", "flat", "--seed", -1],
+        ["bench", "--extremes", "--savings"],
+        ["bench", "law", "--extremes"],
     ],
 )
 def test_wrong_usage_ends_with_exit_code_two(arguments):

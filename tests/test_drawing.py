@@ -102,7 +102,7 @@ def test_a_gap_is_shaded_and_named_with_its_verdict():
     law = ker.henyey_greenstein(0.5)
     ax = draw_spectrum(spec.spectrum(law, k=6), new_axes(), spec.spectral_gap(law))
     labels = ax.get_legend_handles_labels()[1]
-    assert any(label.startswith("gap 0.5 ") and "isolated" in label for label in labels)
+    assert any(label.startswith("gap 0.50000") and "isolated" in label for label in labels)
     assert "paper convention" in ax.get_title() and ax.get_ylabel() == "eigenvalue"
     low, high = ax.patches[0].get_bbox().intervaly
     assert (low, high) == pytest.approx((0.5, 1.0))

@@ -68,7 +68,7 @@ def angles(name: str, value: ArrayLike) -> Floats:
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         place = f" at index {where}" if where else ""
         raise InputError(
-            f"{name}: expected angles in the open interval (0, pi), in radians, got {array[where]!r}{place} "
+            f"{name}: expected angles in the open interval (0, pi), in radians, got {float(array[where])!r}{place} "
             f"({int(bad.sum())} such)"
         )
     return array

@@ -154,7 +154,7 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
     \b
     Examples:
       asperity verify
-      asperity verify S2.01 S1.3
+      asperity verify S2.01 S1
       asperity verify S2 --json
     """
     import json
@@ -201,4 +201,8 @@ def bench(
     """
     from .bench.commands import run_bench
 
+    if extremes and savings:
+        raise click.UsageError("--extremes and --savings are two reports; choose one")
+    if (extremes or savings) and (problem or compare is not None):
+        raise click.UsageError("--extremes and --savings take no PROBLEM and no --compare; leave these out")
     sys.exit(run_bench(problem, quick=quick, extremes=extremes, savings=savings, out=out, force=force, compare=compare))

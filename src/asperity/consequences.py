@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .errors import AsperityError
-from .estimates import Estimate
+from .estimates import Estimate, rounded
 from .spectral import diffusivity, mean_squared_slope
 
 if TYPE_CHECKING:
@@ -40,6 +40,11 @@ class Consequences:
     flatness: float
     refusal: str = ""
 
+    @property
+    def without_gap(self) -> bool:
+        """Whether it is certain that slem is 1."""
+        return self.slem is not None and self.slem.value - self.slem.error >= 1.0
+
     def as_dict(self) -> dict[str, Any]:
         """Plain values; what is not known or infinite is None."""
         from .study_text import estimate_as_dict, finite
@@ -57,14 +62,12 @@ class Consequences:
 
     def lines(self) -> list[str]:
         """One line a fact."""
-        from .study_text import rounded
-
         lines = []
         if self.slem is not None and self.relaxation_time is not None:
             if math.isfinite(self.relaxation_time.error):
                 time = f"relaxation time {rounded(self.relaxation_time)} steps"
             else:
-                time = "no relaxation time: slem may be 1"
+                time = f"no relaxation time: slem {'is' if self.without_gap else 'may be'} 1"
             lines.append(f"slem {rounded(self.slem)} ({self.slem.kind}: {self.slem.method}), {time}")
         if self.diffusion is not None:
             found = self.diffusion
@@ -76,7 +79,8 @@ class Consequences:
         else:
             lines.append(f"diffusivity refused: {self.refusal}")
         if math.isfinite(self.flatness):
-            lines.append(f"mean squared slope h = {self.flatness:.6g}; for shallow walls the specular gap is about 4 h")
+            use = "" if self.without_gap else "; for shallow walls the specular gap is about 4 h"
+            lines.append(f"mean squared slope h = {self.flatness:.6g}{use}")
         return lines
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 ErrorKind = Literal["bound", "estimate"]
+
+# A number without error is printed to this many decimals.
+DECIMALS = 12
 
 
 @dataclass(frozen=True)
@@ -47,3 +51,20 @@ class Estimate:
 
     def __str__(self) -> str:
         return f"{self.value:.10g} +- {self.error:.2g} ({self.kind}: {self.method})"
+
+
+def rounded(number: Estimate) -> str:
+    """Value and error to the digits that the error leaves.
+
+    Examples
+    --------
+    >>> from asperity.estimates import Estimate
+    >>> rounded(Estimate(0.63297743, 0.00022, "estimate", "")), rounded(Estimate(0.25, 0.0, "bound", ""))
+    ('0.63298 +- 0.00022', '0.25 +- 0')
+    """
+    if number.error == 0.0 or not math.isfinite(number.error):
+        return f"{number.value:.{DECIMALS}g} +- {number.error:g}"
+    decimals = min(max(1 - math.floor(math.log10(number.error)), 0), DECIMALS)
+    if decimals >= DECIMALS:
+        return f"{number.value:.{DECIMALS}f} +- {number.error:.2g}"
+    return f"{number.value:.{decimals}f} +- {number.error:.{decimals}f}"

@@ -159,7 +159,10 @@ def draw_gallery(path: Path, *, overwrite: bool) -> None:
         gallery().savefig(path, dpi=RESOLUTION)
     except FileExistsRefusal:
         raise
-    except (OSError, ValueError) as reason:
+    except OSError as reason:
+        why = reason.strerror or reason
+        raise InputError(f"{path}: cannot write the picture ({why}); choose a folder that exists") from reason
+    except ValueError as reason:
         raise InputError(f"{path}: cannot write the picture ({reason}); use a .png, .pdf or .svg name") from reason
 
 

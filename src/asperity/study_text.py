@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .estimates import Estimate, rounded
+
 if TYPE_CHECKING:
-    from .estimates import Estimate
     from .kernels import KernelMatrix
     from .spectral import Enclosures, SpectralGap
     from .study import Study, TracerCheck
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
 KAC_Z = 4.5
 SHOWN_EIGENVALUES = 8
-# A number without error is printed to this many decimals.
-DECIMALS = 12
 
 
 def summary_of(study: Study) -> str:
@@ -143,23 +141,6 @@ def enclosures_as_text(found: Enclosures) -> list[str]:
     return [f"{found.convention} convention; {found.method}", *map(str, found)]
 
 
-def rounded(number: Estimate) -> str:
-    """Value and error to the digits that the error leaves.
-
-    Examples
-    --------
-    >>> from asperity.estimates import Estimate
-    >>> rounded(Estimate(0.63297743, 0.00022, "estimate", "")), rounded(Estimate(0.25, 0.0, "bound", ""))
-    ('0.63298 +- 0.00022', '0.25 +- 0')
-    """
-    if number.error == 0.0 or not math.isfinite(number.error):
-        return f"{number.value:.{DECIMALS}g} +- {number.error:g}"
-    decimals = min(max(1 - math.floor(math.log10(number.error)), 0), DECIMALS)
-    if decimals >= DECIMALS:
-        return f"{number.value:.{DECIMALS}f} +- {number.error:.2g}"
-    return f"{number.value:.{decimals}f} +- {number.error:.{decimals}f}"
-
-
 def _small(value: float) -> str:
     return f"{value:.2g}"
 
@@ -225,7 +206,7 @@ def quotation(gap: SpectralGap) -> str:
     """One line to paste into a paper: value, error, kind, verdict, convention, method, version."""
     from . import __version__
 
-    number = "no gap: 0" if gap.verdict == "no gap" else rounded(gap)
+    number = "0" if gap.verdict == "no gap" else rounded(gap)
     return (
         f"spectral gap {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; {gap.method}; "
         f"asperity {__version__}"
