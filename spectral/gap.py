@@ -24,6 +24,7 @@ from ..kernels import (
 )
 from ..kernels.algebra import made_of_isometries
 from ..kernels.panel_rows import integrates_panels, traces_rows
+from ..rounding import EPS
 from .adapted_panels import adapted_trials
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
@@ -192,11 +193,11 @@ def _by_theorem(law: Law) -> SpectralGap | None:
     share = lambertian_share(law)
     if share > 0.0:
         edge = essential_edge(law)
-        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * np.finfo(np.float64).eps:
+        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * EPS:
             reason = (
                 f"a Lambertian share a = {share:.6g} makes the gap at least a, and the essential spectrum reaches 1 - a"
             )
-            return _stated(law, share, 4.0 * np.finfo(np.float64).eps, "essential edge", reason, *edge.reasons)
+            return _stated(law, share, 4.0 * EPS, "essential edge", reason, *edge.reasons)
     return None
 
 

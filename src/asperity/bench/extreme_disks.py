@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from .. import geometry as geo
+from ..rounding import EPS
 from .extreme_row import ExtremeRow
 from .uniform_disk import DISK, sampled_velocities
 
 # Written by tests/precise_collision.py
 DATA = "extreme_disks.json"
-EPS = float(np.finfo(np.float64).eps)
 # Measured below 0.4; the margin is that of single rays.
 UNITS = 32.0
 # Rounding errors of a handful of contacts, each of which may magnify them some tens of times; measured below 600.

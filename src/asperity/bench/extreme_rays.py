@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from .. import geometry as geo
+from ..rounding import EPS
 from .extreme_row import ExtremeRow
 from .extreme_walls import extreme_walls
 
 DATA = "extreme_rays.json"
-EPS = float(np.finfo(np.float64).eps)
 UNIT = "eps x condition"
 # The tracer's error in these units is below 5 wherever it was measured; a margin of six.
 UNITS = 32.0
