@@ -9,6 +9,7 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import InputError
+from ..estimates import ErrorKind
 from ..rounding import EPS
 from .algebra import lists_branches
 from .arc_quadrature import arc_matrix
@@ -261,7 +262,7 @@ class MatrixMaker:
             return all(map(self._acts_accurately, _factors(law)))
         return self._acts_accurately(law.law) if isinstance(law, SpecularFrame) else True
 
-    def _result(self, symmetric: Floats, method: str, error: float, kind: str, how: str) -> KernelMatrix:
+    def _result(self, symmetric: Floats, method: str, error: float, kind: ErrorKind, how: str) -> KernelMatrix:
         return KernelMatrix(symmetric, self.basis, frobenius_error(error, kind, how), method=method)
 
 
