@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..checks import Floats, positive_number
+from ..checks import Floats, number_between, positive_number
 from ..errors import InputError
 from .configuration import ConfigurationSpace
 from .disk import Disk
@@ -117,6 +117,13 @@ def draw_collision(
     matplotlib Axes
         Lengths in units of the wall. Dots are satellites at height 0 and at every contact, lines their paths; the rim
         between them, dashed, does not touch the wall.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> axes = draw_collision(geo.Disk(), geo.triangular_teeth(2.0), 0.01, [0.0025, 0.0], [0.0, -1.0, 0.0])
+    >>> axes.get_ylabel()
+    'height above the tops'
     """
     eps = positive_number("scale", scale)
     space = ConfigurationSpace(wall, disk, eps, spacing)
@@ -165,7 +172,7 @@ def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Float
 
 
 def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | None = None) -> Axes:
-    """Draw the section x2 = ``height`` of the free configurations over one cell and two spacings.
+    """Draw the section x2 = ``height`` of the free configurations over two cells and two spacings.
 
     Free space is white. Inside the bands alpha in Z, marked at the side, the solid is a bent cylinder over the wall,
     x1 + sin(alpha) constant; in the gaps between them two satellites are below the tops and two cylinders cross.
@@ -181,9 +188,15 @@ def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | Non
     Returns
     -------
     matplotlib Axes
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> space = ConfigurationSpace(geo.triangular_teeth(2.0), geo.Disk(), 0.01)
+    >>> draw_configurations(space, -0.5).get_images()[0].get_extent()
+    [0.0, 2.0, -1.0, 1.0]
     """
-    if not -1.0 < height < 0.0:
-        raise InputError(f"height: expected a number in (-1, 0), in depths of the wall, got {height!r}")
+    height = number_between("height", height, -1.0, 0.0)
     if ax is None:
         from matplotlib import pyplot
 

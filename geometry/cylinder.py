@@ -140,6 +140,17 @@ def collide_modified(
         ``time`` is that on the cylinder.
 
     Source: Rudzis 2022, section 5.2 (eq. 4.75 for eta, the signs of section 5.2 corrected).
+
+    Examples
+    --------
+    A disk that falls straight down into a crevice comes straight back:
+
+    >>> from asperity import geometry as geo
+    >>> notch = geo.Wall.from_vertices([(0, 0), (0, -0.5), (1, -0.5), (1, 0)])
+    >>> disk = geo.Disk(mass=1.0, inertia=1.0)
+    >>> out = collide_modified(disk, notch, 0.001, [[0.00025, 0.0]], [[0.0, -2.0, 0.0]], spacing=np.pi / 32)
+    >>> out.position.tolist(), out.velocity.tolist(), out.time.tolist()
+    ([[0.00025, 0.0]], [[0.0, 2.0, 0.0]], [0.0005])
     """
     charts = RollingCharts(spacing)
     at, moving = checked_states(position, velocity)

@@ -55,6 +55,14 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
         Lengths are in the units of the wall. A dot marks where a ray enters, a ring where it leaves; a ray that does
         not escape ends in a cross. Both axes have the same scale unless the wall is very shallow or very deep; the
         label of the vertical axis then says by what factor it is stretched.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> draw_wall(geo.triangular_teeth(1.5), 0.25, np.pi / 2).get_ylabel()
+    'y'
+    >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
+    'y (stretched 29.1 times against x)'
     """
     places, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     if ax is None:

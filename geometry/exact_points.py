@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
-from ..rounding import UNIT_ROUNDOFF
+from ..rounding import EPS, UNIT_ROUNDOFF
 
 # Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
-CROSS_ULPS = 3.0 + 16.0 * 2.0**-52
+CROSS_ULPS = 3.0 + 16.0 * EPS
 
 Vector = tuple[int, int]
 

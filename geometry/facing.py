@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..rounding import EPS
 
 # In a wedge wider than this a ray makes ten hits at most; a run is not worth its arctangents there.
 WIDEST_WEDGE = 0.3
@@ -62,7 +63,7 @@ def facing_pairs(
         first, second = first[:kept], second[:kept]
     rows: list[tuple[int, PairRow]] = []
     for i, j in zip(first.tolist(), second.tolist(), strict=True):
-        found = _facing(starts[i], ends[i], starts[j], ends[j], hulls, TOUCH_ULPS * 2.0**-52 * size)
+        found = _facing(starts[i], ends[i], starts[j], ends[j], hulls, TOUCH_ULPS * EPS * size)
         if found is not None:
             rows.append((int(numbers[i]), [float(numbers[j]), *found[0]]))
             rows.append((int(numbers[j]), [float(numbers[i]), *found[1]]))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..checks import Floats, frozen
+from ..rounding import EPS
 from .hollow import Hollow
 from .segment import Segment
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 # Shapes are equal, and sides level or vertical, to this share of the size of the numbers: places are rounded once
 # each, and named walls compute them by some ten operations.
-SHAPE_TOLERANCE = 64.0 * np.finfo(np.float64).eps
+SHAPE_TOLERANCE = 64.0 * EPS
 # Besides its ends three inner points tell a piece: circles need three points, ellipses and cubics five.
 INNER = np.array([0.25, 0.5, 0.75])
 

@@ -75,6 +75,16 @@ def read_profile(path: str | PathLike[str], row: int | None = None) -> tuple[Flo
     ------
     InputError
         If the file cannot be read; the message says why, with the line.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "profile.txt"
+    ...     _ = file.write_text("x, height\\n0, 2\\n1, 5\\n3, 4")
+    ...     x, height = read_profile(file)
+    >>> x.tolist(), height.tolist()
+    ([0.0, 1.0, 3.0], [2.0, 5.0, 4.0])
     """
     file = Path(path)
     if not file.is_file():

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..checks import Floats
+from ..rounding import EPS
 from .disk import Disk
 from .satellites import Satellites
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 # is for rounding.
 ROOM = 1e-9
 # Positions carry a few rounding errors of their size each, as those of rays do (engine.JOINT_ULPS).
-SLACK = 16.0 * float(np.finfo(np.float64).eps)
+SLACK = 16.0 * EPS
 
 
 class Ground(NamedTuple):

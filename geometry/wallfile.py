@@ -67,6 +67,15 @@ def load_wall(path: str | PathLike[str]) -> Wall:
         If the file cannot be read, is not TOML, or has a missing, unknown or unsuitable key.
     WallError
         If the wall breaks a condition.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "wall.toml"
+    ...     _ = file.write_text("period = 1.0\\nvertices = [[0, 0], [0.2, -0.4], [1, 0]]")
+    ...     load_wall(file) == Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
+    True
     """
     file = Path(path)
     try:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..rounding import EPS
 from .basis import Basis
 from .measure import gauss_on_intervals
 from .panels import Panels
@@ -28,7 +29,7 @@ SHORT = 0.1
 CHUNK = 2**21
 NOISE_PROBES = 5
 # Rows are integrals over delta in an interval of length 2 sin(xi) at most, with ends known to about pi eps.
-ROUNDING = 4.0 * np.pi * np.finfo(np.float64).eps
+ROUNDING = 4.0 * np.pi * EPS
 
 
 def arc_matrix(half_angle: float, basis: Basis) -> tuple[Floats, float]:

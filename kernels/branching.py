@@ -8,11 +8,12 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import InputError
+from ..rounding import EPS
 from .law import Law
 from .stable_angles import kept_inside
 
 # Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
-SAME_ANGLE = 16.0 * np.finfo(np.float64).eps
+SAME_ANGLE = 16.0 * EPS
 # Merging compares all pairs, and the number of branches of a chain grows exponentially unless they merge.
 MOST_BRANCHES = 64
 # Pairs of an interval and a kink of the next law that are compared: some hundred megabytes.

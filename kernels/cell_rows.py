@@ -8,8 +8,8 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import InputError
-from ..estimates import ErrorKind
 from .matrix import KernelMatrix
+from .matrix_pair import check_same_basis
 from .row_transport import grid_wasserstein
 
 # From two arrays of probabilities, shape (..., n, n), to their distances, shape (...).
@@ -44,18 +44,7 @@ def distance_of_rows(matrix: KernelMatrix, order: float, sup: bool) -> RowsDista
 
 
 def check_comparable(first: KernelMatrix, second: KernelMatrix) -> None:
-    """Raise an InputError unless both are on the same cells and in the same frame."""
+    """Raise an InputError unless both are on the same cells and in the same convention."""
     for matrix in (first, second):
         stochastic_rows(matrix)
-    if first.basis != second.basis:
-        raise InputError(f"the matrices have different bins, {first.basis!r} and {second.basis!r}; discretise again")
-    if first.frame != second.frame:
-        raise InputError(
-            f"the matrices are in different conventions, {first.frame!r} and {second.frame!r}; use "
-            "in_specular_frame() on both or on neither"
-        )
-
-
-def joint_kind(first: KernelMatrix, second: KernelMatrix) -> ErrorKind:
-    """Whether what is computed from both has a bound for its error, or an estimate."""
-    return "bound" if first.error.kind == second.error.kind == "bound" else "estimate"
+    check_same_basis(first, second)

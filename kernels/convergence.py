@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ..checks import Floats, finite_array, frozen, generator, number_between, whole_number
 from ..errors import InputError
 from ..estimates import Estimate
+from ..rounding import EPS
 
 if TYPE_CHECKING:
     from ..geometry import Disk, Wall
@@ -99,7 +100,7 @@ class LimitStudy:
             raise InputError(
                 f"{column}: expected at least {FEWEST_SCALES} positive entries for a slope, got {values.tolist()}"
             )
-        spread = np.maximum(self.errors[column] / values, np.finfo(float).eps)
+        spread = np.maximum(self.errors[column] / values, EPS)
         x, y = np.log(bases[against]), np.log(values)
         design = np.stack([x, np.ones_like(x)], axis=1) / spread[:, None]
         inverse = np.linalg.inv(design.T @ design)

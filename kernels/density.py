@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, finite_array, frozen
 from ..errors import AccuracyError, InputError
+from ..rounding import EPS
 from .law import AngleFunction, Law, set_facts
 from .measure import SINE, gauss_on_intervals
 from .stable_angles import kept_inside
@@ -185,7 +186,7 @@ class DensityLaw(Law):
         share = np.arange(CELLS_PER_PANEL) / CELLS_PER_PANEL
         inner = (edges[:-1, None] + share * np.diff(edges)[:, None]).ravel()
         # A jump of the density is approached from both sides.
-        gap = 4.0 * np.finfo(np.float64).eps
+        gap = 4.0 * EPS
         return np.unique(np.concatenate([inner, [np.pi], self.breakpoints - gap, self.breakpoints + gap]))
 
     def _row_quadrature(self, edges: Floats, order: int) -> tuple[Floats, Floats]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, frozen
 from ..errors import InputError
+from ..rounding import EPS
 from .ragged_lists import ragged
 from .sorted_edges import without_outermost
 from .stable_angles import kept_inside
@@ -18,7 +19,7 @@ from .stable_angles import kept_inside
 Whole = NDArray[np.int64]
 
 # Offsets are sums of a few angles of the wall, found along different routes: dozens of roundings of numbers below 2 pi.
-SAME_OFFSET = 64.0 * np.pi * np.finfo(np.float64).eps
+SAME_OFFSET = 64.0 * np.pi * EPS
 # Rows of a table that misses nothing sum to 1 within the rounding of their many terms; below this it is made good.
 ROUNDED_ROW = 1e-9
 # Candidates a query looks at are held at a time.

@@ -11,10 +11,11 @@ from ..errors import AccuracyError
 from ..estimates import Estimate
 from .basis import Basis
 from .bins import Bins
-from .cell_rows import cell_middles, joint_kind, stochastic_rows
+from .cell_rows import cell_middles, stochastic_rows
 from .discretisation import discretise
 from .law import Law
 from .matrix import KernelMatrix
+from .matrix_pair import joint_kind
 from .resampling import matrix_error
 from .row_distance import matrix_distance
 from .row_transport import Distributions, wasserstein

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats
 from ..errors import InputError
+from ..rounding import EPS
 from .basis import Basis
 from .measure import SINE, gauss_on_intervals, gauss_rule
 from .products import add_products, cell_index
@@ -26,7 +27,7 @@ SHARES, SHARE_NODES = np.array([1 / 32, 1 / 4]), (4, 8, 16)
 ROW_NODES = (6, 4, 2)
 MOST_ROW_VALUES = 2**27
 # Edges are their own mirror images within this.
-MIRROR_TOLERANCE = 4.0 * np.finfo(np.float64).eps * np.pi
+MIRROR_TOLERANCE = 4.0 * EPS * np.pi
 # Numbers held at a time.
 CHUNK = 2**21
 # Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.

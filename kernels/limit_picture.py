@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import finite_array, generator, whole_number
+from ..errors import InputError
 from .satellite_law import SatelliteLaw
 
 if TYPE_CHECKING:
@@ -51,12 +52,26 @@ def draw_limit(
     matplotlib Axes
         Dots are the two angles; the dotted line is psi' = pi - psi. Lines, on the right axis, are the distribution
         functions of theta'.
+
+    Raises
+    ------
+    InputError
+        If there are more scales than colours that stay apart, or a number is unsuitable.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> rng = np.random.default_rng(1)
+    >>> draw_limit(geo.Disk(), geo.focusing_arcs(1.2), 1e-3, (1.0, 1.2), rng, samples=50).get_xlabel()
+    "theta' (radians)"
     """
     from ..geometry import trace
 
     generator(rng)
     whole_number("samples", samples, 1)
     eps = np.atleast_1d(finite_array("scales", scales))
+    if eps.ndim > 1 or eps.size > len(COLOURS):
+        raise InputError(f"scales: expected at most {len(COLOURS)} numbers, got shape {eps.shape}")
     theta, psi = angles
     if ax is None:
         from matplotlib import pyplot

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import InputError
-from ..estimates import Estimate
+from ..estimates import ErrorKind, Estimate
+from .matrix_pair import check_same_basis, check_same_frame, joint_kind
 from .reflection import is_mirror_symmetric, reflection_matrix
 from .tensor import TensorBasis
 
@@ -17,9 +18,9 @@ if TYPE_CHECKING:
     from .matrix import KernelMatrix
 
 
-def frobenius_error(error: float, kind: str, method: str) -> Estimate:
+def frobenius_error(error: float, kind: ErrorKind, method: str) -> Estimate:
     """The Estimate that ``KernelMatrix.error`` holds: its value and its half width are both the Frobenius error."""
-    return Estimate(error, error, "bound" if kind == "bound" else "estimate", method)
+    return Estimate(error, error, kind, method)
 
 
 def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
@@ -36,7 +37,7 @@ def scaled(matrix: KernelMatrix, factor: float) -> KernelMatrix:
 
 def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     """``first + second``; errors add."""
-    _check_same_basis(first, second)
+    check_same_basis(first, second)
     replicates: tuple[Any, ...] = ()
     # parts of different samples cannot be paired; those of one term are shifted by the other where it has none
     if first.replicates and not second.replicates:
@@ -44,7 +45,7 @@ def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     elif second.replicates and not first.replicates:
         replicates = tuple(part + first.symmetric for part in second.replicates)
     how = f"sum of ({first.error.method}) and ({second.error.method})"
-    error = frobenius_error(float(first.error) + float(second.error), _joint_kind(first, second), how)
+    error = frobenius_error(float(first.error) + float(second.error), joint_kind(first, second), how)
     return replace(
         _derived(first, first.symmetric + second.symmetric, error, f"{_name(first)} + {_name(second)}"),
         replicates=replicates,
@@ -56,11 +57,11 @@ def added(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
 
 def multiplied(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     """First the one, then the other: S_1 S_2, with S_1 S_2 - S_1* S_2* = E_1 S_2* + S_1 E_2."""
-    _check_same_basis(first, second)
+    check_same_basis(first, second)
     mine, yours = float(first.error), float(second.error)
     how = f"product of ({first.error.method}) and ({second.error.method})"
     total = mine * second.norm_bound + (first.norm_bound + mine) * yours
-    error = frobenius_error(total, _joint_kind(first, second), how)
+    error = frobenius_error(total, joint_kind(first, second), how)
     return replace(
         _derived(first, first.symmetric @ second.symmetric, error, f"{_name(first)} @ {_name(second)}"),
         reversible=first.reversible if first is second else None,
@@ -89,14 +90,14 @@ def to_power(matrix: KernelMatrix, exponent: int) -> KernelMatrix:
 
 def tensor_product(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     """The two kernels side by side: A x B - A* x B* = E_A x B + A* x E_B, in the Frobenius norm."""
-    _check_same_frame(first, second)
+    check_same_frame(first, second)
     mine, yours = float(first.error), float(second.error)
     size = float(np.linalg.norm(first.symmetric)) + mine
     error = mine * float(np.linalg.norm(second.symmetric)) + size * yours
     whole = _derived(
         first,
         np.asarray(np.kron(first.symmetric, second.symmetric), dtype=np.float64),
-        frobenius_error(error, _joint_kind(first, second), "tensor product"),
+        frobenius_error(error, joint_kind(first, second), "tensor product"),
         f"({_name(first)}) x ({_name(second)})",
         TensorBasis((first.basis, second.basis)),
     )
@@ -139,24 +140,6 @@ def _derived(
 
 def _name(matrix: KernelMatrix) -> str:
     return matrix.law or matrix.method
-
-
-def _check_same_basis(first: KernelMatrix, second: KernelMatrix) -> None:
-    if first.basis != second.basis:
-        raise InputError(f"the matrices have different bases, {first.basis!r} and {second.basis!r}; discretise again")
-    _check_same_frame(first, second)
-
-
-def _check_same_frame(first: KernelMatrix, second: KernelMatrix) -> None:
-    if first.frame != second.frame:
-        raise InputError(
-            f"the matrices are in different conventions, {first.frame!r} and {second.frame!r}; "
-            "use in_specular_frame() on both or on neither"
-        )
-
-
-def _joint_kind(first: KernelMatrix, second: KernelMatrix) -> str:
-    return "bound" if first.error.kind == second.error.kind == "bound" else "estimate"
 
 
 def _both(first: bool | None, second: bool | None) -> bool | None:

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..checks import Floats
 from ..errors import InputError
+from ..estimates import ErrorKind
+from ..rounding import EPS
 from .algebra import lists_branches
 from .arc_quadrature import arc_matrix
 from .basis import Basis
@@ -45,10 +47,10 @@ Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 
 # Rounding of an exact matrix: the edges of n cells carry a rounding error each, which moves a share of about n eps of
 # a cell's measure; 1.2e-13 was measured where n eps is 1.1e-13.
-ROUNDING = 8.0 * np.finfo(np.float64).eps
+ROUNDING = 8.0 * EPS
 # Edges and offsets of isometries are rounded to about an ulp. That moves a share of about n eps of each of some n
 # cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
-DISPLACED = np.finfo(np.float64).eps
+DISPLACED = EPS
 # Flights of adaptive rows that nobody asked for by name: they take about as long as two million rays; beyond them the
 # shortfall is reported.
 QUICK_FLIGHTS = 4_000_000
@@ -261,7 +263,7 @@ class MatrixMaker:
             return all(map(self._acts_accurately, _factors(law)))
         return self._acts_accurately(law.law) if isinstance(law, SpecularFrame) else True
 
-    def _result(self, symmetric: Floats, method: str, error: float, kind: str, how: str) -> KernelMatrix:
+    def _result(self, symmetric: Floats, method: str, error: float, kind: ErrorKind, how: str) -> KernelMatrix:
         return KernelMatrix(symmetric, self.basis, frobenius_error(error, kind, how), method=method)
 
 

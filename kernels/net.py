@@ -61,8 +61,16 @@ class Net:
         self.beyond = source.random(2) * 2.0**-SOBOL_BITS
 
     def sampled(self, samples: int, *, symmetrise: bool) -> tuple[SampledArray, int, float]:
-        """The matrix from at least so many rays, 8 times a power of two; see `RaySums.array`."""
+        """The matrix from at least so many rays, 8 times a power of two; see `RaySums.array`.
+
+        Raises
+        ------
+        InputError
+            If these are more than the sequence has points.
+        """
         each = 1 << (max(-(-samples // PARTS), 1) - 1).bit_length()
+        if PARTS * each > 1 << SOBOL_BITS:
+            raise InputError(f"samples: a net has at most 2^{SOBOL_BITS} rays, got {samples}; use method 'monte-carlo'")
         done = PARTS * self.sums.each
         if each > self.sums.each:
             self.sums.enlarge(each)

@@ -9,11 +9,11 @@ import numpy as np
 from ..checks import Floats
 from ..estimates import Estimate
 from .basis import Basis
-from .cell_rows import joint_kind
 from .discretisation import discretise
 from .law import Law
 from .legendre import Legendre
 from .matrix import KernelMatrix
+from .matrix_pair import joint_kind
 
 # Weights of 2^-60 and less are below the rounding of the sum.
 LARGEST_ORDER = 58

@@ -9,12 +9,13 @@ import numpy as np
 from ..checks import Floats
 from ..errors import InputError
 from ..estimates import Estimate
-from .cell_rows import distance_of_rows, joint_kind, stochastic_rows
+from .cell_rows import distance_of_rows, stochastic_rows
 from .density import DensityLaw
 from .involution import InvolutionLaw
 from .kernel_quadrature import jumps_of_map
 from .law import Law
 from .matrix import KernelMatrix
+from .matrix_pair import joint_kind
 from .measure import SINE, gauss_on_intervals
 from .outgoing import ENTRY_POINTS, outgoing_distributions, parts_of
 from .resampling import matrix_error

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..rounding import EPS
 from .angle_panels import NODES, AnglePanels
 from .basis import Basis
 from .hollow_rows import NO_LIMIT
@@ -118,7 +119,7 @@ class _Integrator:
 
     def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_flights: int, useless: float | None) -> None:
         self.basis = basis
-        self.tolerance = max(tolerance, 8.0 * np.finfo(np.float64).eps * basis.size)
+        self.tolerance = max(tolerance, 8.0 * EPS * basis.size)
         self.most_flights = most_flights
         # an error that is of no use, where there is something else to turn to
         self.useless = useless if useless is not None and math.isfinite(useless) else None

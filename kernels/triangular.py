@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, number_between
+from ..rounding import EPS
 from .branching import merged
 from .isometry_table import IsometryTable
 from .law import BranchLaw, entry_points
@@ -15,7 +16,7 @@ from .sorted_edges import without_outermost
 from .stable_angles import flipped, kept_inside, mixed_arccos
 
 # Kinks closer together than this are one kink computed in two ways.
-KINK_SPACING = 16.0 * np.finfo(np.float64).eps
+KINK_SPACING = 16.0 * EPS
 # A table has four pieces between two kinks; laws with more kinks than this have none.
 MOST_LISTED_KINKS = 2**17
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles
 from ..errors import AccuracyError, InputError
+from ..rounding import EPS
 from .circular import CircularArcLaw
 from .ideal import specular
 from .isometry import table_of
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from ..geometry.hollow import Hollow
 
 # Widths add up to the period, and an arc is a semicircle, to this share: sums and angles of a handful of operations.
-ROUNDED = 64.0 * np.finfo(np.float64).eps
+ROUNDED = 64.0 * EPS
 # The hollows with closed forms have at most this many pieces.
 MOST_PIECES_KNOWN = 3
 # Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the

@@ -11,6 +11,7 @@ from ..checks import Floats, positive_number
 from ..errors import InputError
 from ..estimates import ErrorKind, Estimate
 from ..kernels import Law
+from ..rounding import EPS
 from .essential import grazing_symbol
 from .ideal_parts import ideal_spectrum
 
@@ -110,7 +111,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     exact = ideal_spectrum(law) is not None
     kind: ErrorKind = "bound" if exact else "estimate"
     if exact:
-        eta_error = 8.0 * float(np.finfo(np.float64).eps) * (1.0 + eta) / (1.0 - zeta)
+        eta_error = 8.0 * EPS * (1.0 + eta) / (1.0 - zeta)
     method = f"persistence of grazing flights, upper wall as {arrangement}"
     return Diffusivity(eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, doubt, arrangement)
 

@@ -12,6 +12,7 @@ from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
 from ..estimates import Estimate
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
+from ..rounding import EPS
 from .parity import Parity, halves, outermost_by_parity
 from .sampling import NORMAL_95, sampling_errors, sampling_quantile
 from .two_grids import two_grid_changes
@@ -239,7 +240,7 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
 def _errors(
     matrix: KernelMatrix, values: Floats, vectors: Floats, algebraic: Floats, changes: Floats
 ) -> SpectrumErrors:
-    rounding = matrix.basis.size * np.finfo(np.float64).eps
+    rounding = matrix.basis.size * EPS
     return SpectrumErrors(
         algebraic=frozen(algebraic + rounding),
         # an entry's error moves an eigenvalue by no more than the Frobenius norm; sampled ones have their own part

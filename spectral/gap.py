@@ -24,6 +24,7 @@ from ..kernels import (
 )
 from ..kernels.algebra import made_of_isometries
 from ..kernels.panel_rows import integrates_panels, traces_rows
+from ..rounding import EPS
 from .adapted_panels import adapted_trials
 from .eigenvalues import Spectrum, spectrum
 from .enclosure import enclosures
@@ -192,11 +193,11 @@ def _by_theorem(law: Law) -> SpectralGap | None:
     share = lambertian_share(law)
     if share > 0.0:
         edge = essential_edge(law)
-        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * np.finfo(np.float64).eps:
+        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * EPS:
             reason = (
                 f"a Lambertian share a = {share:.6g} makes the gap at least a, and the essential spectrum reaches 1 - a"
             )
-            return _stated(law, share, 4.0 * np.finfo(np.float64).eps, "essential edge", reason, *edge.reasons)
+            return _stated(law, share, 4.0 * EPS, "essential edge", reason, *edge.reasons)
     return None
 
 
@@ -232,8 +233,8 @@ def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
 
 def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
     edge = essential_edge(law)
-    if edge.low >= 1.0 - tolerance:
-        # nothing fits between the edge and 1 that the tolerance could tell
+    if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
+        # the edge cannot be told from 1, and no eigenvalue fits between that the tolerance could tell
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
     if tolerance >= ROUGH and traces_rows(law):
         rough = _at_a_glance(law, tolerance, matrices, edge)

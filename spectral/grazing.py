@@ -11,7 +11,7 @@ import numpy as np
 from ..checks import Floats
 from ..kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
-from ..kernels.responses import responder
+from ..kernels.responses import entry_inside, responder
 
 # Grazing angles, down to where the outgoing angle, good to some 1e-15, still has seven digits.
 ANGLES = 10.0 ** -np.arange(3.0, 9.0)
@@ -138,7 +138,7 @@ def _entry_mean(function: Callable[[Floats], Floats]) -> tuple[Floats, float]:
     while low.size:
         half = 0.5 * (high - low)
         x = (0.5 * (low + high))[:, None] + half[:, None] * NODES
-        values = function(np.clip(x, np.finfo(np.float64).tiny, 1.0 - 2.0**-53).ravel()).reshape(*x.shape, 2)
+        values = function(entry_inside(x.ravel())).reshape(*x.shape, 2)
         rays += x.size
         integral = half[:, None] * np.einsum("k,pkj->pj", KRONROD, values)
         error = half * np.abs(np.einsum("k,pkj->pj", KRONROD - GAUSS, values)).sum(axis=1)

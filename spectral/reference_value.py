@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, finite_array, finite_number, frozen
 from ..errors import InputError
+from ..rounding import EPS
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,4 +60,4 @@ class ReferenceValue:
 
 
 # A value that is exact in the text may carry the rounding of a few thousand operations.
-ROUNDED = 4096.0 * float(np.finfo(np.float64).eps)
+ROUNDED = 4096.0 * EPS

@@ -13,6 +13,7 @@ from ..errors import AccuracyError, InputError
 from ..estimates import ErrorKind, Estimate
 from ..kernels import DensityLaw, KernelMatrix, Law
 from ..kernels.measure import SINE
+from ..rounding import EPS
 from .eigenvalues import Spectrum, spectrum
 from .essential import essential_edge
 from .ideal_parts import ideal_spectrum
@@ -160,7 +161,7 @@ def _steps(factor: float, target: float) -> int:
         return 0
     if factor <= 0.0:
         return 1
-    return int(np.ceil(np.log(target) / np.log(factor) * (1.0 - 4.0 * np.finfo(np.float64).eps)))
+    return int(np.ceil(np.log(target) / np.log(factor) * (1.0 - 4.0 * EPS)))
 
 
 def _time_scale(modulus: float) -> float:

@@ -132,3 +132,8 @@ def test_the_path_of_a_collision_has_its_contacts_on_the_wall():
         depth = (low[..., 1] + across / np.tan(0.6)) * np.sin(0.6)
         np.testing.assert_allclose(np.abs(depth).min(axis=0), 0.0, atol=1e-10)
     assert max(lengths) > 4
+
+
+def test_a_picture_of_more_scales_than_it_has_colours_is_refused():
+    with pytest.raises(InputError, match="scales: expected at most 4 numbers"):
+        ker.draw_limit(geo.Disk(), TEETH, [0.1, 0.05, 0.02, 0.01, 0.005], (1.0, 1.2), np.random.default_rng(0), 4)

@@ -273,7 +273,7 @@ def test_what_cannot_be_compared_is_refused():
     law, matrix = ker.specular(), ker.discretise(ker.specular(), ker.Bins(4))
     with pytest.raises(InputError, match="same frame"):
         ker.distance(law, law.in_specular_frame())
-    with pytest.raises(InputError, match="different bins"):
+    with pytest.raises(InputError, match="different bases"):
         ker.distance(matrix, ker.discretise(law, ker.Bins(8)))
     with pytest.raises(InputError, match="kind"):
         ker.distance(law, law, kind="nearby")

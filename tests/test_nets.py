@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
-from asperity.kernels.net import Net
+from asperity.errors import InputError
+from asperity.kernels import ray_sums
+from asperity.kernels.net import PARTS, SOBOL_BITS, Net
 from asperity.kernels.reflection import reflection_matrix
 from net_theory import NET_OVER_SPREAD
 
@@ -57,6 +59,30 @@ def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks):
     expected, _, _ = whole.sampled(last, symmetrise=False)
     assert np.array_equal(found.counts, expected.counts)
     assert np.array_equal(parted.sums.tables, whole.sums.tables)
+
+
+@pytest.mark.parametrize("chunk", [1, 8, 64, 4096])
+@pytest.mark.parametrize("looks", [(2000,), (1, 100, 1000, 3), (30, 31, 900)], ids=repr)
+def test_parts_of_a_net_are_its_consecutive_eighths_whatever_is_traced_at_a_time(looks, chunk, monkeypatch):
+    monkeypatch.setattr(ray_sums, "SMALLEST_CHUNK", chunk)
+    basis, law = ker.Bins(2), Bounce(mirror_symmetric=None)
+    net, twin = (Net(law, basis, np.random.default_rng(5)) for _ in range(2))
+    for look in looks:
+        net.sampled(look, symmetrise=False)
+    x, u = (twin.sequence.random(PARTS * net.sums.each) + twin.beyond).T
+    theta = ker.SINE.quantile(u)
+    parts = zip(np.split(theta, PARTS), np.split(law.respond(x, theta), PARTS), strict=True)
+    assert PARTS * net.sums.each >= max(looks)
+    for table, (incoming, outgoing) in zip(net.sums.tables, parts, strict=True):
+        cells = [2 * (incoming > np.pi / 2), outgoing > np.pi / 2]
+        assert np.array_equal(table.ravel(), np.bincount(cells[0] + cells[1], minlength=4))
+
+
+def test_more_rays_than_a_net_has_are_refused_before_the_first_is_traced():
+    net = Net(Bounce(), ker.Bins(2), np.random.default_rng(1))
+    with pytest.raises(InputError, match="at most 2\\^32 rays, got 4294967297; use method 'monte-carlo'"):
+        net.sampled(2**SOBOL_BITS + 1, symmetrise=False)
+    assert net.sums.each == 0 and not net.sums.tables.any()
 
 
 def test_mirror_images_are_worth_as_many_rays_again():

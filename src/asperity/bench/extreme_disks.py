@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
-from functools import cache, partial
-from importlib.resources import files
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from .. import geometry as geo
+from ..rounding import EPS
 from .extreme_row import ExtremeRow
+from .kept_data import kept
 from .uniform_disk import DISK, sampled_velocities
 
 # Written by tests/precise_collision.py
 DATA = "extreme_disks.json"
-EPS = float(np.finfo(np.float64).eps)
 # Measured below 0.4; the margin is that of single rays.
 UNITS = 32.0
 # Rounding errors of a handful of contacts, each of which may magnify them some tens of times; measured below 600.
@@ -32,7 +30,7 @@ def disk_cases(disks: int) -> dict[str, Callable[[], ExtremeRow]]:
 
 def _case(scale: float, disks: int) -> ExtremeRow:
     """The known disks, then as many random ones sent there and back."""
-    rows = _data()[f"{scale:g}"]
+    rows = kept(DATA)[f"{scale:g}"]
     start = np.array([[float.fromhex(number) for number in row[0]] for row in rows])
     exact = np.array([[float.fromhex(number) for number in row[1]] for row in rows])
     contacts, condition = (np.array([row[k] for row in rows]) for k in (2, 3))
@@ -62,8 +60,3 @@ def _there_and_back(scale: float, disks: int) -> tuple[float, float, int, dict[s
     involution = np.abs(back.velocity + velocity[gone])[same].max(initial=0.0)
     energy = np.abs(DISK.inner(there.velocity, there.velocity) - 1.0)[gone].max(initial=0.0)
     return float(involution), float(energy), int((~same).sum()), there.counts()
-
-
-@cache
-def _data() -> dict[str, list[list[Any]]]:
-    return json.loads(files(__package__).joinpath(DATA).read_text(encoding="utf-8"))  # type: ignore[no-any-return]

@@ -11,10 +11,10 @@ from .. import geometry as geo
 from ..checks import Floats
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Legendre, TriangularTeethLaw, discretise, maxwell
 from ..kernels.matrix_algebra import frobenius_error
+from ..rounding import EPS
 from ..spectral import spectrum
 from .extreme_row import ExtremeRow
 
-EPS = float(np.finfo(np.float64).eps)
 # Rounding errors of some tens of operations on quantities of size 1.
 ROUNDED = 256.0 * EPS
 SPECTRUM_SIZE = 64

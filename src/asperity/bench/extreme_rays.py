@@ -5,21 +5,19 @@ The rays and their references lie in ``extreme_rays.json``, which ``tests/precis
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, partial
-from importlib.resources import files
-from typing import Any
+from functools import partial
 
 import numpy as np
 
 from .. import geometry as geo
+from ..rounding import EPS
 from .extreme_row import ExtremeRow
 from .extreme_walls import extreme_walls
+from .kept_data import kept
 
 DATA = "extreme_rays.json"
-EPS = float(np.finfo(np.float64).eps)
 UNIT = "eps x condition"
 # The tracer's error in these units is below 5 wherever it was measured; a margin of six.
 UNITS = 32.0
@@ -84,7 +82,7 @@ def _case(name: str, build: Callable[[], geo.Wall]) -> ExtremeRow:
 
 def known_rays(name: str) -> tuple[str, tuple[KnownRay, ...]]:
     """What a case is measured against, and its rays."""
-    case = _data()[name]
+    case = kept(DATA)[name]
     return case["reference"], tuple(
         KnownRay(
             float.fromhex(x), float.fromhex(theta), float("nan") if out is None else float.fromhex(out), hits or 0,
@@ -115,8 +113,3 @@ def compare_rays(name: str, wall: geo.Wall) -> ExtremeRow:
         name, reference, float(worst), UNITS, UNIT, counts=traced.counts(), flagged_rightly=right,
         note="; ".join(notes),
     )  # fmt: skip
-
-
-@cache
-def _data() -> dict[str, dict[str, Any]]:
-    return json.loads(files(__package__).joinpath(DATA).read_text(encoding="utf-8"))  # type: ignore[no-any-return]

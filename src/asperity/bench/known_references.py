@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..spectral import ReferenceValue
+from .kept_data import kept
 
 FILE = Path(__file__).with_name("standard_references.json")
 
 
-@cache
-def _table() -> dict[str, dict[str, Any]]:
-    table: dict[str, dict[str, Any]] = json.loads(FILE.read_text(encoding="utf-8"))
-    return table
-
-
 def known_reference(problem: str) -> ReferenceValue | None:
     """The reference of a problem SCENE/QUANTITY, or None where no independent one is known."""
-    entry = _table().get(problem)
+    entry = kept(FILE.name).get(problem)
     if entry is None:
         return None
     value = np.asarray(entry["value"], dtype=np.float64)
