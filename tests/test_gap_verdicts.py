@@ -152,3 +152,17 @@ def test_henyey_greenstein_has_a_gap_with_a_bound():
 def test_a_law_that_is_not_reversible_has_no_gap_to_quote():
     with pytest.raises(AccuracyError, match="not symmetric"):
         spec.spectral_gap(ker.MatrixLaw(np.roll(np.eye(8), 1, axis=1)))
+
+
+@pytest.mark.parametrize(
+    "law, tolerance, expected",
+    [
+        # specular reflection keeps even functions: (1 + g^2)/2 lies beyond the edge at 1/2
+        (0.5 * ker.specular() + 0.5 * ker.henyey_greenstein(0.9), 0.6, 0.5 * (1.0 - 0.9**2)),
+        (ker.CircularArcLaw(1.2), 2.0, 1.0 - 0.3670253152),
+    ],
+    ids=["half specular", "arc"],
+)
+def test_a_coarse_tolerance_does_not_turn_the_edge_into_a_gap(law, tolerance, expected):
+    gap = spec.spectral_gap(law, tolerance=tolerance)
+    assert abs(float(gap) - expected) <= gap.error <= tolerance
