@@ -23,7 +23,7 @@ from ..kernels import (
     discretise,
 )
 from ..kernels.algebra import made_of_isometries
-from ..kernels.panel_rows import integrates_panels, traces_rows
+from ..kernels.panel_rows import has_costly_rows, integrates_panels, traces_rows
 from ..rounding import EPS
 from .adapted_panels import adapted_trials
 from .eigenvalues import Spectrum, spectrum
@@ -240,7 +240,7 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
         rough = _at_a_glance(law, tolerance, matrices, edge)
         if rough is not None:
             return rough
-    if isinstance(law, DensityLaw) or integrates_panels(law):
+    if isinstance(law, DensityLaw) or (integrates_panels(law) and not has_costly_rows(law)):
         enclosed = _by_enclosure(law, tolerance, edge)
         if enclosed is not None:
             return enclosed

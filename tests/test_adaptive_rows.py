@@ -10,6 +10,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.angle_panels import GAUSS, KRONROD, NODES
+from asperity.kernels.panel_rows import has_costly_rows
 from asperity.kernels.row_quadrature import KRONROD_SHARE, row_matrix
 from asperity.kernels.wall_rows import adaptive_rows
 from plain_tracer import trace_plainly
@@ -103,6 +104,12 @@ def test_rows_that_fall_short_are_kept_where_they_know_more_than_rays():
     assert chosen.method == "quadrature" and 1e-9 < float(chosen.error) < float(rays.error)
     # the error of rays is a standard error
     assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= float(chosen.error) + 2.0 * float(rays.error)
+
+
+def test_a_look_at_some_rows_tells_a_chaotic_hollow_in_sums_and_in_the_other_convention_too():
+    chaotic, tame = (ker.WallLaw(random_curved_wall(kind)) for kind in (13, 15))
+    assert has_costly_rows(0.5 * chaotic + 0.5 * ker.lambertian()) and has_costly_rows(chaotic.in_specular_frame())
+    assert not has_costly_rows(tame) and not has_costly_rows(ker.specular())
 
 
 def test_rows_of_channels_without_bottom_in_sight_are_those_of_the_closed_form():
