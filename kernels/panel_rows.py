@@ -34,7 +34,7 @@ HEIGHT_PROBES = 5
 
 # A look at some rows tells chaotic hollows: 31,000 and 71,000 flights a row against 260 to 7,400 of 28 other walls. One
 # row stops at so many.
-LOOK_ANGLES: Floats = (np.arange(12) + 0.5) * np.pi / 12.0
+LOOK_ANGLES = np.linspace(0.13, 3.01, 12)
 LOOK_TOLERANCE = 1e-3
 MANY_FLIGHTS, MOST_FLIGHTS_OF_A_LOOK = 15_000, 400_000
 

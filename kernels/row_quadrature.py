@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from ..geometry import Wall
 
 # Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
-# it has: some seconds. Who may give up gives one row this share of them: longer ones have pieces without number.
-MOST_FLIGHTS, LARGEST_ROW = 40_000_000, 0.02
+# it has: some seconds. Who may give up gives one row this share of them, or so many: longer ones have pieces without
+# number.
+MOST_FLIGHTS, LARGEST_ROW, LEAST_LARGEST_ROW = 40_000_000, 0.02, 80_000
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
@@ -139,7 +140,11 @@ class _Integrator:
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
         self.rows = WallRows(
-            wall, degree, inside, least, NO_LIMIT if useless is None else int(LARGEST_ROW * most_flights)
+            wall,
+            degree,
+            inside,
+            least,
+            NO_LIMIT if useless is None else max(int(LARGEST_ROW * most_flights), LEAST_LARGEST_ROW),
         )
         edges = basis.edges
         if self.halved:
