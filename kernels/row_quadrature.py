@@ -139,13 +139,8 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        self.rows = WallRows(
-            wall,
-            degree,
-            inside,
-            least,
-            NO_LIMIT if useless is None else max(int(LARGEST_ROW * most_flights), LEAST_LARGEST_ROW),
-        )
+        longest = NO_LIMIT if useless is None else max(int(LARGEST_ROW * most_flights), LEAST_LARGEST_ROW)
+        self.rows = WallRows(wall, degree, inside, least, longest)
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..errors import AccuracyError
@@ -35,72 +35,86 @@ def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
     # found in less time than a few rays
     if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
-    affordable = is_affordable(law.wall, maker.basis)
-    net = Net(law, maker.basis, maker.rng)
-    sooner = (lambda rays: _few_rows(maker, law, rays)) if affordable else lambda rays: None
-    found, promised = _few_rays(maker, net, sooner) if affordable or _is_within_reach(maker) else (None, float("inf"))
+    ways = _Ways(maker, law, is_affordable(law.wall, maker.basis), Net(law, maker.basis, maker.rng))
+    found = ways.within_the_tolerance()
     if found is not None:
         return found
     if law.exact_law is not None:
         return maker.make(law.exact_law, "auto")
-    if not affordable:
-        return maker.from_net(net, maker.samples)
-    rays = _all_rays(maker, net) if promised <= maker.tolerance else None
-    if rays is not None:
-        promised = float(rays.error)
-        if promised <= maker.tolerance:
-            return rays
-    rows = maker.rows(law, useless=max(ROW_ADVANTAGE * promised, maker.tolerance))
-    if float(rows.error) <= maker.tolerance or float(rows.error) <= promised < float("inf"):
-        return rows
-    rays = _all_rays(maker, net) if rays is None else rays
-    return rows if rays is None else min(rows, rays, key=lambda matrix: float(matrix.error))
+    return ways.rows_or_all_rays() if ways.affordable else ways.rays(maker.samples)
 
 
-def _all_rays(maker: MatrixMaker, net: Net) -> KernelMatrix | None:
-    """The matrix by rays; None if too many do not escape, where rows count theirs in their error."""
-    try:
-        return maker.from_net(net, maker.samples)
-    except AccuracyError:
-        return None
+@dataclass
+class _Ways:
+    """Rays and adaptive rows to one matrix.
 
-
-def _is_within_reach(maker: MatrixMaker) -> bool:
-    """Whether an order of 1 in the number of rays would meet the tolerance: if not, a look at a few is in vain."""
-    return maker.tolerance * maker.samples >= 1.0
-
-
-def _few_rows(maker: MatrixMaker, law: WallLaw, rays: int) -> KernelMatrix | None:
-    """A matrix by adaptive rows, if they meet the tolerance in less time than so many rays would."""
-    if rays < MANY_RAYS:
-        return None
-    rows = maker.rows(law, useless=maker.tolerance, most_flights=int(ROW_FLIGHTS_A_RAY * rays))
-    return rows if float(rows.error) <= maker.tolerance else None
-
-
-def _few_rays(
-    maker: MatrixMaker, net: Net, sooner: Callable[[int], KernelMatrix | None]
-) -> tuple[KernelMatrix | None, float]:
-    """A matrix of fewer rays than asked for, if these are enough for the tolerance; and what all rays promise.
-
-    The promise is infinite where the looks do not tell. ``sooner`` may have the matrix in less time than many rays.
+    Attributes
+    ----------
+    affordable : bool
+        Whether rows are worth a look.
+    promised : float
+        The error that all rays promise, by what a few of them have shown; infinite where these do not tell.
     """
-    number, promised = FIRST_RAYS, float("inf")
-    while number < maker.samples:
+
+    maker: MatrixMaker
+    law: WallLaw
+    affordable: bool
+    net: Net
+    promised: float = float("inf")
+
+    def rays(self, number: int) -> KernelMatrix:
+        """The matrix by at least so many rays; the net goes on where it was."""
+        return self.maker.from_net(self.net, number)
+
+    def within_the_tolerance(self) -> KernelMatrix | None:
+        """The matrix by fewer rays than asked for, or by rows where these are sooner; None if all rays are needed."""
+        maker, number = self.maker, FIRST_RAYS
+        # not even an order of 1 in the number of rays would meet the tolerance: a look at a few is in vain
+        if not self.affordable and maker.tolerance * maker.samples < 1.0:
+            return None
+        while number < maker.samples:
+            try:
+                found = self.rays(number)
+            except AccuracyError:
+                # a bin without rays, or rays that do not escape: these few are no measure
+                return None
+            error = float(found.error)
+            if error <= maker.tolerance:
+                return found
+            self.promised = error * (number / maker.samples) ** NET_ORDER
+            needed = NET_MARGIN * number * (error / maker.tolerance) ** (1.0 / NET_ORDER)
+            if needed > maker.samples:
+                return None
+            number = max(2 * number, int(needed))
+            rows = self._few_rows(number)
+            if rows is not None:
+                return rows
+        return None
+
+    def _few_rows(self, rays: int) -> KernelMatrix | None:
+        """The matrix by adaptive rows, if they meet the tolerance in less time than so many rays would."""
+        if not self.affordable or rays < MANY_RAYS:
+            return None
+        rows = self.maker.rows(self.law, self.maker.tolerance, int(ROW_FLIGHTS_A_RAY * rays))
+        return rows if float(rows.error) <= self.maker.tolerance else None
+
+    def rows_or_all_rays(self) -> KernelMatrix:
+        """The more exact of the two; rays are not traced where rows promise more, nor rows where rays will do."""
+        tolerance = self.maker.tolerance
+        rays = self._all_rays() if self.promised <= tolerance else None
+        if rays is not None:
+            self.promised = float(rays.error)
+            if self.promised <= tolerance:
+                return rays
+        rows = self.maker.rows(self.law, max(ROW_ADVANTAGE * self.promised, tolerance))
+        if float(rows.error) <= tolerance or float(rows.error) <= self.promised < float("inf"):
+            return rows
+        rays = self._all_rays() if rays is None else rays
+        return rows if rays is None else min(rows, rays, key=lambda matrix: float(matrix.error))
+
+    def _all_rays(self) -> KernelMatrix | None:
+        """The matrix by rays; None if too many do not escape, where rows count theirs in their error."""
         try:
-            found = maker.from_net(net, number)
+            return self.rays(self.maker.samples)
         except AccuracyError:
-            # a bin without rays, or rays that do not escape: these few are no measure
-            break
-        error = float(found.error)
-        if error <= maker.tolerance:
-            return found, error
-        promised = error * (number / maker.samples) ** NET_ORDER
-        needed = NET_MARGIN * number * (error / maker.tolerance) ** (1.0 / NET_ORDER)
-        if needed > maker.samples:
-            break
-        number = max(2 * number, int(needed))
-        rows = sooner(number)
-        if rows is not None:
-            return rows, promised
-    return None, promised
+            return None

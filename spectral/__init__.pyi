@@ -15,7 +15,6 @@ from .essential import EssentialEdge as EssentialEdge
 from .essential import essential_edge as essential_edge
 from .fitted_order import FittedOrder as FittedOrder
 from .fitted_order import fit_order as fit_order
-from .gap import SpectralGap as SpectralGap
 from .gap import gaps_in_both_conventions as gaps_in_both_conventions
 from .gap import spectral_gap as spectral_gap
 from .laplacian import LaplacianComparison as LaplacianComparison
@@ -28,6 +27,7 @@ from .reference_value import ReferenceValue as ReferenceValue
 from .relaxation import MixingTime as MixingTime
 from .relaxation import mixing_time as mixing_time
 from .sampling import bootstrap_intervals as bootstrap_intervals
+from .verdict import SpectralGap as SpectralGap
 from .work_problem import WorkMethod as WorkMethod
 from .work_problem import WorkProblem as WorkProblem
 from .work_report import MethodFacts as MethodFacts

@@ -2,76 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 
 from ..checks import positive_number
 from ..errors import AccuracyError, InputError
-from ..estimates import Estimate
 from ..kernels import (
     Bins,
     CollisionLaw,
-    DensityLaw,
     InvolutionLaw,
     KernelMatrix,
     Law,
-    Legendre,
     MatrixLaw,
     Power,
     discretise,
 )
 from ..kernels.algebra import made_of_isometries
-from ..kernels.panel_rows import has_costly_rows, integrates_panels, traces_rows
 from ..rounding import EPS
-from .adapted_panels import adapted_trials
 from .eigenvalues import Spectrum, spectrum
-from .enclosure import enclosures
 from .essential import EssentialEdge, essential_edge
+from .gap_routes import enclosed_gap, rough_gap
 from .ideal_parts import ideal_spectrum
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .relaxation import largest_modulus
 from .separation import lambertian_share
-
-Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
-
-# Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
-# exact the look is that counts them.
-ENCLOSED, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK = 3, 8, 1e-2, 2
-# Enclosures somewhat wider than the tolerance are sought once more, to this share of it; a gap whose error misses the
-# tolerance is handed over as it is where that is below the largest miss, a share of the gap.
-CLOSER, LARGEST_MISS = 0.25, 1e-3
-# From this tolerance on, small matrices by few rays may do for the gap of a traced wall: their sizes, with the errors
-# asked of them, and the rays allowed. What larger bases would change is at most this multiple of the last change where
-# these changes fall like a power of the size of .6 or more.
-ROUGH, GLANCES, FEW_RAYS, BEYOND_CHANGE = 2e-3, ((24, 1.0), (48, 0.1)), 2**17, 2.0
-
-
-@dataclass(frozen=True)
-class SpectralGap(Estimate):
-    """1 - sup of the spectrum off the constants, with its error and a verdict.
-
-    Attributes
-    ----------
-    verdict : {"isolated", "essential edge", "no gap", "undecided"}
-        Whether the gap ends at an isolated eigenvalue, at an edge of the essential spectrum, is zero, or cannot be
-        told from the refinements made.
-    evidence : tuple of str
-        What the verdict rests on, line by line.
-    convention : {"paper", "specular"}
-        The gap that the literature quotes is that of the specular convention (``law.in_specular_frame()``).
-    spectrum : Spectrum or None
-        The finest spectrum that was computed.
-    """
-
-    verdict: Verdict
-    evidence: tuple[str, ...]
-    convention: str
-    spectrum: Spectrum | None = None
-
-    def __str__(self) -> str:
-        return f"{super().__str__()}, {self.verdict}, {self.convention} convention"
+from .verdict import SpectralGap, Verdict, made_from
 
 
 def spectral_gap(
@@ -163,7 +117,7 @@ def gaps_in_both_conventions(
 
 def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
     found = spectrum(matrix, k=EIGENVALUES)
-    method = _method(found, "algebraic + two-grid + 1.96 x sampling error")
+    method = made_from(found, "algebraic + two-grid + 1.96 x sampling error")
     evidence = ("one matrix: its basis was not refined",)
     return SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
 
@@ -227,7 +181,7 @@ def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
     found = spectrum(discretise(law, Bins(law.edges)), k=EIGENVALUES)
     error = float(found.gap_errors.algebraic[0])
     reason = f"the law is constant on {law.edges.size - 1} bins: beyond these its spectrum is 0"
-    method = _method(found, "algebraic error; the basis is exact")
+    method = made_from(found, "algebraic error; the basis is exact")
     return SpectralGap(min(found.gap, 1.0), error, "bound", method, "isolated", (reason,), found.convention, found)
 
 
@@ -236,47 +190,24 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # the edge cannot be told from 1, and no eigenvalue fits between that the tolerance could tell
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
-    if tolerance >= ROUGH and traces_rows(law):
-        rough = _at_a_glance(law, tolerance, matrices, edge)
-        if rough is not None:
-            return rough
-    if isinstance(law, DensityLaw) or (integrates_panels(law) and not has_costly_rows(law)):
-        enclosed = _by_enclosure(law, tolerance, edge)
-        if enclosed is not None:
-            return enclosed
+    found_at_once = rough_gap(law, tolerance, matrices, edge) or enclosed_gap(law, tolerance, edge)
+    if found_at_once is not None:
+        return found_at_once
     steps = refined(law, tolerance, matrices, edge)
     found, error = steps.finest, steps.error
     reasons = (*edge.reasons, *steps.evidence, *_lower_bound(law))
     top = 1.0 - found.gap
     if top - error > edge.high and steps.converges:
-        method = _method(found, steps.how)
+        method = made_from(found, steps.how)
         outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
         return SpectralGap(found.gap, error, "estimate", method, "isolated", (*reasons, outside), law.frame, found)
     if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
         return _at_edge(law, edge, (*reasons, short), found)
     # two grids say nothing where refinement does not converge; the gap of a Galerkin matrix is never too small
-    method = _method(found, "not converged: an upper bound but for its noise")
+    method = made_from(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
     return SpectralGap(found.gap, error, "estimate", method, "undecided", reasons, law.frame, found)
-
-
-def _at_a_glance(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap | None:
-    """A rough gap from small matrices by few rays; None where it is not exact enough, or near the essential spectrum.
-
-    Tracing the rows of an enclosure takes ten times as long.
-    """
-    for size, matrix_error in GLANCES:
-        found = spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), k=EIGENVALUES)
-        error = found.gap_error + (BEYOND_CHANGE - 1.0) * float(found.gap_errors.discretisation[0])
-        if error <= tolerance and 1.0 - found.gap - error > edge.high:
-            how = f"algebraic + {BEYOND_CHANGE:.0f} x two-grid + {found.gap_errors.quantile:.3g} x sampling error"
-            reason = f"an eigenvalue {1.0 - found.gap:.4g} beyond the essential spectrum, which reaches {edge.high:.4g}"
-            evidence = (*edge.reasons, reason)
-            return SpectralGap(
-                found.gap, error, "estimate", _method(found, how), "isolated", evidence, law.frame, found
-            )  # fmt: skip
-    return None
 
 
 def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:
@@ -292,45 +223,6 @@ def _at_edge(law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Sp
     )  # fmt: skip
 
 
-def _by_enclosure(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
-    """The gap from an indexed enclosure, where the separation of the spectrum is known."""
-    if isinstance(law, DensityLaw):
-        found = (_enclosed_gap(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
-        return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
-    number = _number_to_enclose(law, edge)
-    gap = None if number is None else _enclosed_gap(law, number, tolerance)
-    if number is not None and gap is not None and tolerance < gap.error <= tolerance / CLOSER:
-        gap = _enclosed_gap(law, number, CLOSER * tolerance) or gap
-    # other bases than adapted panels would hardly do better
-    return gap if gap is not None and gap.error <= max(tolerance, LARGEST_MISS * gap.value) else None
-
-
-def _enclosed_gap(law: Law, number: int, tolerance: float) -> SpectralGap | None:
-    found = enclosures(law, number, tolerance=tolerance)
-    listed = [item for item in found if item.label == "indexed" and item.index]
-    top = max(listed, key=lambda item: item.value, default=None)
-    # nothing that is not listed is larger
-    if top is None or top.low <= max(found.separation.radius, 0.0):
-        return None
-    gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
-    return SpectralGap(gap, error, top.kind, f"indexed enclosure; {found.method}", "isolated", (str(top),), law.frame)
-
-
-def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
-    """How many of the largest moduli reach down to the largest value off the constants, at a first look.
-
-    None where that value is not beyond the essential spectrum.
-    """
-    look = adapted_trials(law, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK)
-    values = look.values[np.argsort(-np.abs(look.values), kind="stable")]
-    found = np.flatnonzero(values[1:] > edge.high)
-    return int(found[0]) + 2 if found.size else None
-
-
 def _lower_bound(law: Law) -> tuple[str, ...]:
     share = lambertian_share(law)
     return (f"the gap is at least {share:.6g}, the Lambertian share of the law",) if share > 0.0 else ()
-
-
-def _method(found: Spectrum, how: str) -> str:
-    return f"{found.basis!r}, {found.method}; {how}"

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from .eigenvalues import Spectrum
-    from .gap import SpectralGap
+    from .verdict import SpectralGap
 
 # Okabe and Ito's blue and vermilion, which stay apart for colour-blind readers.
 KNOWN, UNKNOWN = "#0072B2", "#D55E00"

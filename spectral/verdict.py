@@ -1,0 +1,42 @@
+"""A spectral gap with what is known of it: its error, its verdict and the evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from ..estimates import Estimate
+from .eigenvalues import Spectrum
+
+Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
+
+
+@dataclass(frozen=True)
+class SpectralGap(Estimate):
+    """1 - sup of the spectrum off the constants, with its error and a verdict.
+
+    Attributes
+    ----------
+    verdict : {"isolated", "essential edge", "no gap", "undecided"}
+        Whether the gap ends at an isolated eigenvalue, at an edge of the essential spectrum, is zero, or cannot be
+        told from the refinements made.
+    evidence : tuple of str
+        What the verdict rests on, line by line.
+    convention : {"paper", "specular"}
+        The gap that the literature quotes is that of the specular convention (``law.in_specular_frame()``).
+    spectrum : Spectrum or None
+        The finest spectrum that was computed.
+    """
+
+    verdict: Verdict
+    evidence: tuple[str, ...]
+    convention: str
+    spectrum: Spectrum | None = None
+
+    def __str__(self) -> str:
+        return f"{super().__str__()}, {self.verdict}, {self.convention} convention"
+
+
+def made_from(found: Spectrum, how: str) -> str:
+    """The method of a gap that was read off a matrix."""
+    return f"{found.basis!r}, {found.method}; {how}"
