@@ -103,7 +103,7 @@ def test_a_moment_that_is_kept_is_that_of_the_wall(name):
     moment = known_reference(f"{name}/moment")
     seen = ker.discretise(ker.WallLaw(wall_of(name)), ker.Legendre(2), "qmc", samples=2**16)
     beyond = max(abs(seen.symmetric[1, 1] - float(moment.value)) - moment.error, 0.0)
-    # a standard error from the spread of eight nets: its multiples follow Student's distribution
+    # a standard error from the spread of eight parts of a net: its multiples follow Student's distribution
     assert norm.isf(t.sf(beyond / seen.error.value, PARTS - 1)) < 4.0
     assert moment.error <= 5e-5
 
