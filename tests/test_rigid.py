@@ -214,3 +214,13 @@ def test_bad_input_is_refused_with_what_to_do(change, words):
 def test_a_disk_without_mass_is_refused():
     with pytest.raises(InputError, match="mass"):
         geo.Disk(mass=0.0)
+
+
+def test_a_disk_that_hardly_rises_still_meets_the_teeth_that_its_satellites_pass():
+    """After two contacts it rises at 2e-8 of its speed, for two million times its own flight; beside it 1e-5 away."""
+    x1, alpha = float.fromhex("0x1.57db386cde54dp-8"), float.fromhex("0x1.1faa321480667p+2")
+    velocity = [float.fromhex(v) for v in ("0x1.7110241ce5b49p-2", "-0x1.d98e328f28dcep-2", "-0x1.254823bc9dd96p+0")]
+    states = [[x1 + shift, alpha] for shift in (0.0, 1e-9, -1e-9, 1e-6, 1e-5, -1e-5)]
+    hit = geo.collide(geo.Disk(), geo.triangular_teeth(0.7), 0.1, states, [velocity] * len(states))
+    assert hit.contacts.tolist() == [3] * len(states) and hit.escaped.all()
+    assert np.abs(hit.velocity - hit.velocity[0]).max() < 1e-4
