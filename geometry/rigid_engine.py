@@ -155,6 +155,15 @@ def lowest_until(time, angle, away, height, motion):
 
 
 @inlined
+def out_of_reach_after(angle, motion, ring):
+    """When a satellite now at ``angle`` is out of reach, with a spacing to spare; after a turn it comes as another."""
+    if motion.spin == 0.0:
+        return np.inf
+    ahead = -angle if motion.spin > 0.0 else angle
+    return (ring.reach + ring.spacing + ahead) / abs(motion.spin)
+
+
+@inlined
 def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, ground):
     """First contact of any satellite before ``end``.
 
@@ -164,15 +173,14 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
     of its angle, and code.
     """
     reach, slack, rate = ring.reach, ring.slack, abs(motion.spin)
-    # each satellite is looked at until it is out of reach; after a whole turn it comes as another one
-    step = -1 if motion.spin > 0.0 else 1
-    passed = (reach + ring.spacing + step * angle) / rate if rate > 0.0 else end
+    passed = out_of_reach_after(angle, motion, ring)
     time, kind, index, hollow, base, state, code = first_contact(
         own[0], own[1], own[2], 0.0, x, y, 0.0, min(end, passed), turn, motion, slack, ground
     )
     hit, chosen, touched = (kind, index, hollow), 0, (x + state[0], y + state[1], state[2], state[3])
     time = min(time, end)
     # the others in the order in which they come within reach of the wall
+    step = -1 if motion.spin > 0.0 else 1
     # numba's floor is a float
     j = -step * int(math.floor((reach + step * angle) / ring.spacing))  # noqa: RUF046
     for _ in range(MOST_CELLS):
@@ -184,9 +192,7 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
         if j != 0 and lowest_until(time, other, away, height, motion) <= 2.0 * slack:
             # two contacts are at one time if the disk falls less than the slack between them
             tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if hit[0] != NO_PIECE else 0.0
-            until = time + tie
-            if rate > 0.0:
-                until = min(until, (reach + ring.spacing + step * other) / rate)
+            until = min(time + tie, out_of_reach_after(other, motion, ring))
             start = beyond / rate if beyond > 0.0 else 0.0
             x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
             # the path bends upward, so that it stays above its first tangent

@@ -49,11 +49,12 @@ class RaySums:
 
     def enlarge(self, each: int) -> None:
         """Join consecutive parts, a power of two of them, to parts of so many rays; the last ones are empty then."""
-        joined = min(each // self.each, len(self.tables)) if self.each else 1
-        kept = len(self.tables) // joined
-        for place in range(kept):
-            self.tables[place] = self.tables[place * joined : (place + 1) * joined].sum(axis=0)
-        self.tables[kept:] = 0
+        if self.each:
+            joined = min(each // self.each, len(self.tables))
+            kept = len(self.tables) // joined
+            for place in range(kept):
+                self.tables[place] = self.tables[place * joined : (place + 1) * joined].sum(axis=0)
+            self.tables[kept:] = 0
         self.each = each
 
     def add(self, table: int, incoming: Floats, outgoing: Floats) -> None:

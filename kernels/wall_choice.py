@@ -18,9 +18,8 @@ if TYPE_CHECKING:
 # So many rays tell how many the tolerance needs: the error of a scrambled net falls like their number to a power of
 # about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
 FIRST_RAYS, NET_ORDER, NET_MARGIN = 2**14, 0.75, 2.0
-# So many rays take long enough for a look at adaptive rows, with flights that take half of the rays' time: of these a
-# ray has two or three.
-MANY_RAYS, ROW_FLIGHTS_A_RAY = 2**17, 1.0
+# So many rays take long enough for a look at adaptive rows, with as many flights: a ray has two or three.
+MANY_RAYS = 2**17
 # Rows that take longer than all rays must promise this share of their error.
 ROW_ADVANTAGE = 0.5
 
@@ -95,7 +94,7 @@ class _Ways:
         """The matrix by adaptive rows, if they meet the tolerance in less time than so many rays would."""
         if not self.affordable or rays < MANY_RAYS:
             return None
-        rows = self.maker.rows(self.law, self.maker.tolerance, int(ROW_FLIGHTS_A_RAY * rays))
+        rows = self.maker.rows(self.law, self.maker.tolerance, most_flights=rays)
         return rows if float(rows.error) <= self.maker.tolerance else None
 
     def rows_or_all_rays(self) -> KernelMatrix:

@@ -6,16 +6,7 @@ import numpy as np
 
 from ..checks import positive_number
 from ..errors import AccuracyError, InputError
-from ..kernels import (
-    Bins,
-    CollisionLaw,
-    InvolutionLaw,
-    KernelMatrix,
-    Law,
-    MatrixLaw,
-    Power,
-    discretise,
-)
+from ..kernels import Bins, CollisionLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
 from ..kernels.algebra import made_of_isometries
 from ..rounding import EPS
 from .eigenvalues import Spectrum, spectrum
@@ -25,7 +16,7 @@ from .ideal_parts import ideal_spectrum
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .relaxation import largest_modulus
 from .separation import lambertian_share
-from .verdict import SpectralGap, Verdict, made_from
+from .verdict import SpectralGap, Verdict, isolated, made_from
 
 
 def spectral_gap(
@@ -195,12 +186,11 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
         return found_at_once
     steps = refined(law, tolerance, matrices, edge)
     found, error = steps.finest, steps.error
-    reasons = (*edge.reasons, *steps.evidence, *_lower_bound(law))
-    top = 1.0 - found.gap
-    if top - error > edge.high and steps.converges:
-        method = made_from(found, steps.how)
-        outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
-        return SpectralGap(found.gap, error, "estimate", method, "isolated", (*reasons, outside), law.frame, found)
+    evidence = (*steps.evidence, *_lower_bound(law))
+    gap = isolated(found, error, steps.how, edge, law.frame, evidence) if steps.converges else None
+    if gap is not None:
+        return gap
+    reasons, top = (*edge.reasons, *evidence), 1.0 - found.gap
     if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
         return _at_edge(law, edge, (*reasons, short), found)

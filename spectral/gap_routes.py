@@ -11,7 +11,7 @@ from .eigenvalues import spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge
 from .refinement import EIGENVALUES, SharedMatrices
-from .verdict import SpectralGap, made_from
+from .verdict import SpectralGap, isolated
 
 # Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
 # exact the look is that counts them.
@@ -35,13 +35,10 @@ def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essent
     for size, matrix_error in GLANCES:
         found = spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), k=EIGENVALUES)
         error = found.gap_error + (BEYOND_CHANGE - 1.0) * float(found.gap_errors.discretisation[0])
-        if error <= tolerance and 1.0 - found.gap - error > edge.high:
-            how = f"algebraic + {BEYOND_CHANGE:.0f} x two-grid + {found.gap_errors.quantile:.3g} x sampling error"
-            reason = f"an eigenvalue {1.0 - found.gap:.4g} beyond the essential spectrum, which reaches {edge.high:.4g}"
-            evidence = (*edge.reasons, reason)
-            return SpectralGap(
-                found.gap, error, "estimate", made_from(found, how), "isolated", evidence, law.frame, found
-            )  # fmt: skip
+        how = f"algebraic + {BEYOND_CHANGE:.0f} x two-grid + {found.gap_errors.quantile:.3g} x sampling error"
+        gap = isolated(found, error, how, edge, law.frame) if error <= tolerance else None
+        if gap is not None:
+            return gap
     return None
 
 

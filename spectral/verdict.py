@@ -7,6 +7,7 @@ from typing import Literal
 
 from ..estimates import Estimate
 from .eigenvalues import Spectrum
+from .essential import EssentialEdge
 
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 
@@ -40,3 +41,15 @@ class SpectralGap(Estimate):
 def made_from(found: Spectrum, how: str) -> str:
     """The method of a gap that was read off a matrix."""
     return f"{found.basis!r}, {found.method}; {how}"
+
+
+def isolated(
+    found: Spectrum, error: float, how: str, edge: EssentialEdge, convention: str, evidence: tuple[str, ...] = ()
+) -> SpectralGap | None:
+    """The gap of a matrix as that of the law; None unless its interval lies beyond the essential spectrum."""
+    top = 1.0 - found.gap
+    if top - error <= edge.high:
+        return None
+    outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
+    reasons = (*edge.reasons, *evidence, outside)
+    return SpectralGap(found.gap, error, "estimate", made_from(found, how), "isolated", reasons, convention, found)
