@@ -10,7 +10,7 @@ RUN := $(VENV)/.installed
 DEV := $(VENV)/.installed-dev
 
 .DEFAULT_GOAL := help
-.PHONY: help study test check format-check lint types docs bench build format clean distclean
+.PHONY: help study test test-lowest test-newest check format-check lint types docs bench build format clean distclean
 # two installs into one environment must not run side by side
 .NOTPARALLEL:
 
@@ -22,6 +22,17 @@ study: $(RUN) ## study a wall and draw it into study/ (WALL=NAME or NAME:paramet
 
 test: $(DEV) ## run the tests, on every core
 	$(PY) -m pytest --numprocesses auto --dist worksteal
+
+# pip takes the newest versions by itself, but leaves alone what an environment has: so these two start from nothing.
+test-lowest: ## run the tests with the lowest versions of all dependencies, in .venv-lowest
+	$(PYTHON) -m venv --clear .venv-lowest
+	.venv-lowest/bin/python -m pip install --quiet --constraint constraints/lowest.txt --editable '.[dev]'
+	.venv-lowest/bin/python -m pytest --numprocesses auto --dist worksteal
+
+test-newest: ## run the tests with the newest versions of all dependencies, in .venv-newest
+	$(PYTHON) -m venv --clear .venv-newest
+	.venv-newest/bin/python -m pip install --quiet --upgrade --upgrade-strategy eager --editable '.[dev]'
+	.venv-newest/bin/python -m pytest --numprocesses auto --dist worksteal
 
 check: format-check lint types docs test ## everything a change must pass
 
@@ -48,13 +59,13 @@ format: $(DEV) ## rewrite the sources as `make check` wants them
 	$(PY) -m ruff format .
 	$(PY) -m ruff check --fix .
 
-clean: ## remove what the other targets wrote, except .venv
+clean: ## remove what the other targets wrote, except the environments
 	rm -rf build dist study bench-results docs/_build docs/api/generated docs/generated src/asperity.egg-info
 	rm -rf .mypy_cache .pytest_cache .ruff_cache .hypothesis
-	find . -path ./$(VENV) -prune -o -name __pycache__ -prune -exec rm -rf {} +
+	find . -path './.venv*' -prune -o -name __pycache__ -prune -exec rm -rf {} +
 
-distclean: clean ## remove .venv too
-	rm -rf $(VENV)
+distclean: clean ## remove the environments too
+	rm -rf $(VENV) .venv-lowest .venv-newest
 
 # An environment that was left half made (no pip in it) is made again.
 define make_environment
