@@ -17,12 +17,19 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.timing import least_time
 
-from .metastable import WELLS, metastable_table
+from .metastable import WELLS, Solution, metastable_table
 
 WORKER = Path(__file__).with_name("peer_worker.py")
 # name in `peer_worker`, what it computes with, and requirements
-TRACERS = {"embree": ("single", "embreex"), "mitsuba": ("single", "mitsuba"), "billiards": ("double", "billiards")}
+# Embree comes with the system, as libembree-dev does in Debian; its program needs numpy only
+TRACERS = {"embree": ("single", "numpy"), "mitsuba": ("single", "mitsuba")}
 CHAINS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
+INTRODUCTION = (
+    "Every peer is run as its best users run it, in one thread: Embree from C, one call a ray segment; Mitsuba with "
+    "the whole loop over reflections compiled by Dr.Jit, which needs a recent LLVM; deeptime told that the chain is "
+    "reversible; scipy with shift and inversion. Direct simulation codes such as SPARTA are not measured: their time "
+    "goes into moving particles between cells."
+)
 # Limits of single commands, and of all of them together, which end before their section does.
 MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 210.0
 # Without an index pip should say so soon.
@@ -37,7 +44,7 @@ def peer_table(folder: Path) -> str:
     peers = PeerEnvironment(folder / "environment")
     folder.mkdir(parents=True, exist_ok=True)
     wells = metastable_table({"deeptime": lambda matrix: _deeptime_wells(folder, peers, matrix)})
-    return "\n".join([*_tracers(folder, peers), "", *_chains(folder, peers), "", *wells])
+    return "\n".join([INTRODUCTION, "", *_tracers(folder, peers), "", *_chains(folder, peers), "", *wells])
 
 
 class PeerEnvironment:
@@ -135,14 +142,14 @@ def _chains(folder: Path, peers: PeerEnvironment) -> list[str]:
     return lines
 
 
-def _deeptime_wells(folder: Path, peers: PeerEnvironment, matrix: csr_array[Any]) -> tuple[np.ndarray[Any, Any], str]:
-    """Eigenvalues of a sparse chain by deeptime, in a process whose start is part of the time."""
+def _deeptime_wells(folder: Path, peers: PeerEnvironment, matrix: csr_array[Any]) -> Solution:
+    """Eigenvalues of a sparse chain by deeptime, in a process whose start is not part of the time."""
     data = folder / "wells.npz"
     np.savez(data, entries=matrix.data, columns=matrix.indices, starts=matrix.indptr, wanted=WELLS)
     answer = peers.run("deeptime_wells", CHAINS["deeptime"], data)
     if isinstance(answer, str):
         raise RuntimeError(answer)
-    return np.array(answer["values"]), f"none; {answer['version']}, {answer['seconds']:.2f} s without its start"
+    return Solution(np.array(answer["values"]), f"none; {answer['version']}", answer["seconds"])
 
 
 def _last_line(text: str) -> str:
