@@ -83,11 +83,12 @@ def outermost(array: Floats, constant: Floats | None, k: int, which: Which = "mo
     clusters may be cut: a copy that is not listed is not larger than those that are.
     """
     size = len(array)
-    if size >= SMALL and k <= LARGEST_SHARE * size:
-        found = _proved(Deflated.of(array, constant), k, which)
-        if found is not None:
-            return found
-    return _by_lapack(array, constant, k, which)
+    if size < SMALL or k > LARGEST_SHARE * size:
+        return _by_lapack(array, constant, k, which, "all eigenvalues by LAPACK")
+    found = _proved(Deflated.of(array, constant), k, which)
+    if isinstance(found, str):
+        return _by_lapack(array, constant, k, which, f"all eigenvalues by LAPACK, since {found}")
+    return found
 
 
 def end_values(array: Floats, constant: Floats | None, top: int, bottom: int) -> tuple[Floats, Floats]:
@@ -101,7 +102,7 @@ def end_values(array: Floats, constant: Floats | None, top: int, bottom: int) ->
         lower = _more(matrix, _nothing(len(array)), bottom, "SA") if bottom else _nothing(len(array))
         if upper is not None and lower is not None:
             return np.sort(upper[0])[::-1], np.sort(lower[0])
-    values = _by_lapack(array, constant, len(array), "largest").values
+    values = _by_lapack(array, constant, len(array), "largest", "").values
     return values[:top], values[::-1][:bottom]
 
 
@@ -117,8 +118,8 @@ def counted_from_above(values: Floats, which: Which) -> int:
     return len(values) if which == "largest" else max(int(np.sum(values > 0.0)), min(1, len(values)))
 
 
-def _proved(matrix: Deflated, k: int, which: Which) -> Extremes | None:
-    """By Lanczos and Cholesky; None where the one does not converge or the other does not bear it out."""
+def _proved(matrix: Deflated, k: int, which: Which) -> Extremes | str:
+    """By Lanczos and Cholesky; in words why not, where the one does not converge or the other does not bear it out."""
     end: Literal["LM", "LA"] = "LM" if which == "moduli" else "LA"
     none = _nothing(len(matrix.array))
     found = _more(matrix, none, k + GUARDS, end) or _more(matrix, none, k, end)
@@ -126,22 +127,22 @@ def _proved(matrix: Deflated, k: int, which: Which) -> Extremes | None:
         if found is not None and which == "moduli" and np.all(found[0] <= 0.0):
             found = _more(matrix, found, 1, "LA")
         if found is None:
-            return None
+            return "Lanczos did not converge"
         listed = _without_others(matrix, found, k, which)
-        if listed is not None:
+        if isinstance(listed, Extremes):
             return listed
-        found = _more(matrix, found, MORE_VALUES, end)
-    return None
+        reason, found = listed, _more(matrix, found, MORE_VALUES, end)
+    return reason
 
 
-def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Extremes | None:
-    """The k wanted ones of those found, if they are good and no other eigenvalue is beyond the last of them."""
+def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Extremes | str:
+    """The k wanted ones of those found; or why they are not good, or other eigenvalues may be beyond the last."""
     values, vectors = found
     rounding = len(matrix.array) * EPS * max(1.0, float(np.abs(values).max()))
     residuals = np.linalg.norm(matrix @ vectors - vectors * values, axis=0)
     joint = float(np.linalg.norm(residuals)) + rounding
     if joint > LARGEST_RESIDUAL:
-        return None
+        return f"Lanczos left a residual of {joint:.2g}"
     places = wanted(values, k, which)
     chosen = values[places]
     top = counted_from_above(chosen, which)
@@ -157,7 +158,7 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
         threshold = end + joint + CLEARANCE * rounding
         margin = 0.0 if others <= threshold else margin_below(matrix, sign, vectors, values, threshold)
         if margin is None:
-            return None
+            return f"a Cholesky factorisation did not rule out others beyond {sign * threshold:.12g}"
         reach[sign] = threshold + margin
     upper = np.maximum(reach[1.0] - chosen[:top], 0.0)
     lower = np.maximum(reach.get(-1.0, 0.0) + chosen[top:], 0.0)
@@ -203,7 +204,7 @@ def _nothing(size: int) -> _Pairs:
     return np.empty(0), np.empty((size, 0))
 
 
-def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which) -> Extremes:
+def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which, method: str) -> Extremes:
     from scipy.linalg import eigh
 
     values, vectors = eigh(array) if constant is None else off_constants(array, constant)
@@ -214,4 +215,4 @@ def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which) -> 
     norm = max(1.0, float(np.abs(values).max(initial=0.0)))
     residuals = np.linalg.norm(Deflated.of(array, constant) @ vectors - vectors * values, axis=0)
     errors = residuals + len(array) * EPS * norm
-    return Extremes(values, vectors, top, residuals, errors, "all eigenvalues by LAPACK")
+    return Extremes(values, vectors, top, residuals, errors, method)

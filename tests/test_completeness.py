@@ -1,0 +1,190 @@
+"""The proof by factorisation itself: its margin against Higham's theorem, and thresholds on either side of a value."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from asperity.spectral.completeness import Deflated, margin_below, norm_beyond
+
+U = 2.0**-53
+RNG = np.random.default_rng(11)
+
+
+def orthogonal(size: int) -> np.ndarray:
+    return np.linalg.qr(RNG.normal(size=(size, size)))[0]
+
+
+def symmetric(values: list[float], basis: np.ndarray) -> np.ndarray:
+    array = (basis * np.asarray(values)) @ basis.T
+    return 0.5 * (array + array.T)
+
+
+def nothing(size: int) -> tuple[np.ndarray, np.ndarray]:
+    return np.empty((size, 0)), np.empty(0)
+
+
+def higham(size: int) -> float:
+    """gamma_{n + 3}: gamma_{n + 1} of theorem 10.3, with a rounding for reciprocals of pivots and one for the root."""
+    terms = (size + 3) * U
+    return terms / (1.0 - terms)
+
+
+# ---- the margin, where the factor is known -----------------------------------------------------------------------
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_margin_of_a_diagonal_matrix_is_that_of_the_theorem(sign):
+    """R is the root of the diagonal, so both norms of |R| are the root of its largest entry; six roundings an entry."""
+    entries, threshold = np.array([0.5, -0.25, 0.125, 0.0]), 0.75
+    margin = margin_below(Deflated.of(np.diag(entries), None), sign, *nothing(4), threshold)
+    largest = float(np.max(threshold - sign * entries))
+    parts = float(np.sqrt(0.5**2 + 0.25**2 + 0.125**2)) + 0.75
+    assert margin == pytest.approx(higham(4) * largest + 6.0 * U * parts, rel=1e-12)
+
+
+def test_the_margin_counts_the_vectors_that_are_moved_and_the_squares_that_they_add():
+    entries, threshold, value = np.array([0.5, -0.25, 0.125]), 0.75, 0.5
+    margin = margin_below(Deflated.of(np.diag(entries), None), 1.0, np.eye(3)[:, :1], np.array([value]), threshold)
+    # the vector goes up by value + 1 + |value| = 2, from .75 - .5 to 2.25
+    parts = float(np.sqrt(0.25 + 0.0625 + 0.015625)) + 0.75 + 2.0
+    assert margin == pytest.approx(higham(3) * 2.25 + 7.0 * U * parts, rel=1e-12)
+
+
+def test_the_margin_counts_the_deflation():
+    """Off e_1 the matrix diag(.5, -.25, .125) is diag(0, -.25, .125); e_1 goes up by 1 + |threshold|; u = e_1/4."""
+    matrix = Deflated.of(np.diag([0.5, -0.25, 0.125]), np.eye(3)[0])
+    assert matrix.image is not None and matrix.image.tolist() == [0.25, 0.0, 0.0]
+    margin = margin_below(matrix, 1.0, *nothing(3), 0.75)
+    parts = float(np.sqrt(0.25 + 0.0625 + 0.015625)) + 0.75 + 1.75 + 0.5
+    assert margin == pytest.approx(higham(3) * 2.5 + 7.0 * U * parts, rel=1e-12)
+
+
+def test_the_margin_takes_the_largest_row_and_the_largest_column():
+    """B = R^T R with R = [[2, 1], [0, 2]]: its columns sum up to 3, and so does its first row."""
+    array, threshold = np.array([[0.0, -2.0], [-2.0, -1.0]]), 4.0
+    margin = margin_below(Deflated.of(array, None), 1.0, *nothing(2), threshold)
+    assert margin == pytest.approx(higham(2) * 9.0 + 6.0 * U * (3.0 + 4.0), rel=1e-12)
+
+
+@pytest.mark.parametrize("size", [3, 10, 40])
+def test_the_margin_is_above_the_backward_error_in_exact_arithmetic(size):
+    """The factor of LAPACK, multiplied out in fractions, differs from B by less than the margin says."""
+    from scipy.linalg.lapack import dpotrf
+
+    for _ in range(3):
+        array = symmetric(RNG.uniform(-1.0, 1.0, size).tolist(), orthogonal(size))
+        threshold = float(np.linalg.eigvalsh(array)[-1]) + 1e-3
+        margin = margin_below(Deflated.of(array, None), 1.0, *nothing(size), threshold)
+        factor = np.tril(dpotrf(threshold * np.eye(size) - array, lower=1)[0])
+        exact = [[Fraction(x) for x in row] for row in factor]
+        error = np.array(
+            [
+                [
+                    float(
+                        sum(exact[i][k] * exact[j][k] for k in range(min(i, j) + 1))
+                        - (Fraction(threshold) if i == j else 0)
+                        + Fraction(float(array[i, j]))
+                    )
+                    for j in range(size)
+                ]
+                for i in range(size)
+            ]
+        )
+        assert margin is not None and 0.0 < np.linalg.norm(error, 2) <= margin
+
+
+# ---- what is proved, on either side of an eigenvalue -------------------------------------------------------------
+CASES = {"plain": False, "deflated": True}
+
+
+@pytest.mark.parametrize("deflated", CASES.values(), ids=CASES)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("size", [6, 30])
+def test_a_threshold_is_proved_above_an_eigenvalue_and_not_below(deflated, sign, size):
+    """Of a deflated matrix S is far from its compression: c is no eigenvector, and c^T S c lies beyond all."""
+    basis = orthogonal(size)
+    values = np.linspace(-0.6, 0.7, size)
+    constant = None
+    array = symmetric(values.tolist(), basis)
+    if deflated:
+        constant = basis[:, 0]
+        turned = RNG.normal(size=size)
+        # adding c u^T + u c^T changes nothing on the complement of c
+        array += np.outer(constant, turned) + np.outer(turned, constant)
+        array = 0.5 * (array + array.T)
+        values = values[1:]
+    matrix = Deflated.of(array, constant)
+    extreme = float(np.max(sign * values))
+    for distance in (1e-3, 1e-9):
+        margin = margin_below(matrix, sign, *nothing(size), extreme + distance)
+        assert margin is not None and margin < 1e-11
+        margin = margin_below(matrix, sign, *nothing(size), extreme - distance)
+        assert margin is None or margin >= distance
+    # the eigenvector moved away, the next one is the largest: also where the threshold is negative
+    order = np.argsort(sign * values)[::-1]
+    vectors, next_value = basis[:, order[:1] + deflated], float(sign * values[order[1]])
+    assert margin_below(matrix, sign, vectors, values[order[:1]], next_value + 1e-9) is not None
+    refused = margin_below(matrix, sign, vectors, values[order[:1]], next_value - 1e-9)
+    assert refused is None or refused >= 1e-9
+
+
+@pytest.mark.parametrize("threshold", [-0.3, -2.0, -50.0])
+def test_vectors_and_the_constant_are_moved_beyond_any_threshold_that_may_be_asked(threshold):
+    """All other values lie below the threshold; the listed one and the deflated direction must not spoil the proof."""
+    basis = orthogonal(8)
+    values = np.array([0.0, 0.9, *np.linspace(threshold - 3.0, threshold - 0.1, 6)])
+    array = symmetric(values.tolist(), basis)
+    matrix = Deflated.of(array, basis[:, 0])
+    margin = margin_below(matrix, 1.0, basis[:, 1:2], values[1:2], threshold)
+    # the listed vector goes up by .9 + 1 + .9 only, which is less than the third threshold asks for: refused, not false
+    proved = margin is not None
+    assert proved == (threshold > -1.9)
+    if proved:
+        assert margin < 1e-11
+
+
+def test_a_missing_copy_is_never_proved_away():
+    basis = orthogonal(12)
+    array = symmetric([0.9, 0.9, *np.linspace(-0.5, 0.5, 10)], basis)
+    matrix = Deflated.of(array, None)
+    assert margin_below(matrix, 1.0, basis[:, :1], np.array([0.9]), 0.6) is None
+    assert margin_below(matrix, 1.0, basis[:, :2], np.array([0.9, 0.9]), 0.6) is not None
+
+
+def test_a_margin_of_one_row_is_right_in_fifty_digits():
+    """The least case, worked out: B = t - s, R = sqrt(B), and R^2 is off by less than the margin."""
+    with mp.workdps(50):
+        for s in (0.1, 0.3, -0.7):
+            margin = margin_below(Deflated.of(np.array([[s]]), None), 1.0, *nothing(1), 0.9)
+            root = mp.mpf(float(np.sqrt(0.9 - s)))
+            assert abs(root**2 - (mp.mpf(0.9) - mp.mpf(s))) <= margin
+            assert margin == pytest.approx(higham(1) * (0.9 - s) + 6.0 * U * (abs(s) + 0.9), rel=1e-12)
+
+
+# ---- the deflated matrix and its norms ---------------------------------------------------------------------------
+@pytest.mark.parametrize("deflated", CASES.values(), ids=CASES)
+def test_a_deflated_matrix_multiplies_vectors_and_blocks_as_the_compression(deflated):
+    size = 9
+    array = symmetric(RNG.uniform(-1.0, 1.0, size).tolist(), orthogonal(size))
+    constant = orthogonal(size)[:, 2] if deflated else None
+    matrix = Deflated.of(array, constant)
+    projector = np.eye(size) - (np.outer(constant, constant) if constant is not None else 0.0)
+    exact = projector @ array @ projector
+    block = RNG.normal(size=(size, 4))
+    assert np.allclose(matrix @ block, exact @ block, rtol=0.0, atol=1e-14)
+    assert np.allclose(matrix @ block[:, 1], exact @ block[:, 1], rtol=0.0, atol=1e-14)
+    assert (matrix @ block[:, 1]).shape == (size,)
+    assert matrix.frobenius == pytest.approx(np.linalg.norm(exact), rel=1e-13)
+
+
+def test_the_norm_beyond_is_that_of_the_values_that_are_left():
+    basis = orthogonal(7)
+    values = np.array([0.9, -0.8, 0.5, 0.4, -0.3, 0.2, 0.1])
+    matrix = Deflated.of(symmetric(values.tolist(), basis), None)
+    rest = float(np.sqrt(np.sum(values[2:] ** 2)))
+    assert rest <= norm_beyond(matrix, values[:2]) <= rest * (1.0 + 1e-13)
+    # of nothing that is left the bound is that of rounding: 2 n^2 u |S|_F^2
+    whole = float(np.sum(values**2))
+    assert norm_beyond(matrix, values) == pytest.approx(np.sqrt(2.0 * 49.0 * U * whole), rel=0.2)
