@@ -184,6 +184,9 @@ def test_equality_is_that_of_the_functions() -> None:
     assert Bins(4) == Bins(Bins(4).edges)
     assert Bins(4) != Bins(4, weight="sin2")
     assert Legendre(3) != Legendre(4)
+    assert Legendre(3) != Legendre(3, weight="sin2") and hash(Legendre(3)) != hash(Legendre(3, weight="sin2"))
+    assert Panels([0, 1, np.pi], 2) != Panels([0, 1, np.pi], 3)
+    assert Panels([0, 1, np.pi], 2) != Panels([0, 1, np.pi], 2, weight="sin2")
     assert Panels([0, 1, np.pi], 2) == Panels([0, 1, np.pi], 2)
     assert len({Bins(4), Bins(Bins(4).edges), Legendre(4)}) == 2
 

@@ -75,6 +75,19 @@ def test_branches_of_triangular_teeth_are_isometries_that_conserve():
             assert np.allclose(rolling @ matrix, rolling, atol=1e-13)
 
 
+def test_branches_without_probability_are_left_out():
+    """Teeth of apex psi have two outcomes up to theta = (pi - psi)/2 and three or four beyond (ledger S2.06, S2.07)."""
+    psi = 0.7
+    K = ker.CollisionLaw(ker.TriangularTeethLaw(psi), geo.Disk())
+    assert ker.TriangularTeethLaw(psi).branches(0.5)[0].shape == (4,)
+    shallow = [float(p) for p, _ in K.branches(0.5)]
+    assert len(shallow) == 2 and sum(shallow) == pytest.approx(1.0, abs=1e-14)
+    # a branch stays if it has a probability at one of the angles
+    several = K.branches([0.5, 2.0])
+    assert [bool(p[0] > 0.0) for p, _ in several] == [True, True, False]
+    assert all(np.any(p > 0.0) for p, _ in several)
+
+
 def test_branches_give_the_sampled_velocities():
     disk = geo.Disk(1.3, 0.4)
     K = ker.CollisionLaw.from_wall(geo.triangular_teeth(0.9), disk)
@@ -157,6 +170,8 @@ def test_velocities_that_point_away_are_refused():
     rng = np.random.default_rng(0)
     with pytest.raises(InputError, match="v2 < 0"):
         K.sample([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]], rng)
+    with pytest.raises(InputError, match=r"v2 >= 0 at row \[1\]"):
+        K.sample([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]], rng)
     with pytest.raises(InputError, match="shape"):
         K.sample([0.0, -1.0], rng)
     with pytest.raises(InputError, match="Generator"):
