@@ -26,7 +26,7 @@ class Solution(NamedTuple):
     seconds: float | None = None
 
 
-Solver = Callable[[csr_array[Any]], Solution]
+Solver = Callable[["csr_array[Any]"], Solution]
 
 
 @dataclass(frozen=True)

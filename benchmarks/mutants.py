@@ -118,18 +118,24 @@ def mutants_of(module: str, share: float, seed: int) -> list[Mutant]:
         _run(["cosmic-ray", "init", "mutants.toml", "mutants.sqlite"], tree, environment)
         database = str(tree / "mutants.sqlite")
         with use_db(database, WorkDB.Mode.open) as work:
-            _leave_out(work, share, random.Random(seed))
+            _leave_out(work, (tree / module).read_text(encoding="utf-8").splitlines(), share, random.Random(seed))
         _run(["cosmic-ray", "exec", "mutants.toml", "mutants.sqlite"], tree, environment)
         with use_db(database, WorkDB.Mode.open) as work:
             results = [result for _, result in work.completed_work_items if result.test_outcome is not None]
             return [_mutant(module, result.diff, result.is_killed) for result in results]
 
 
-def _leave_out(work, share: float, chance: random.Random) -> None:
+def _leave_out(work, source: list[str], share: float, chance: random.Random) -> None:
+    """Skip the kinds that are not listed, decorators, whose arguments are no arithmetic, and all but a share."""
     from cosmic_ray.work_item import WorkerOutcome, WorkResult
 
     items = sorted(work.pending_work_items, key=lambda item: str(item.mutations))
-    wanted = [item for item in items if item.mutations[0].operator_name.endswith(KINDS)]
+    wanted = [
+        item
+        for item in items
+        if item.mutations[0].operator_name.endswith(KINDS)
+        and not source[item.mutations[0].start_pos[0] - 1].lstrip().startswith("@")
+    ]
     tried = {item.job_id for item in chance.sample(wanted, round(share * len(wanted)))}
     left_out = [item.job_id for item in items if item.job_id not in tried]
     work.set_multiple_results(left_out, WorkResult(worker_outcome=WorkerOutcome.SKIPPED))

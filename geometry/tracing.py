@@ -150,7 +150,7 @@ def trace(
     _check_wall(wall)
     x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
-    starts, incoming = np.ascontiguousarray(x_all).ravel(), np.ascontiguousarray(theta_all).ravel()
+    starts, incoming = x_all.flatten(), theta_all.flatten()
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
     scene = wall.scene

@@ -41,7 +41,7 @@ def test_the_margin_of_a_diagonal_matrix_is_that_of_the_theorem(sign):
     margin = margin_below(Deflated.of(np.diag(entries), None), sign, *nothing(4), threshold)
     largest = float(np.max(threshold - sign * entries))
     parts = float(np.sqrt(0.5**2 + 0.25**2 + 0.125**2)) + 0.75
-    assert margin == pytest.approx(higham(4) * largest + 6.0 * U * parts, rel=1e-12)
+    assert margin == pytest.approx(higham(4) * largest + 6.0 * U * parts, rel=1e-12, abs=0.0)
 
 
 def test_the_margin_counts_the_vectors_that_are_moved_and_the_squares_that_they_add():
@@ -49,7 +49,7 @@ def test_the_margin_counts_the_vectors_that_are_moved_and_the_squares_that_they_
     margin = margin_below(Deflated.of(np.diag(entries), None), 1.0, np.eye(3)[:, :1], np.array([value]), threshold)
     # the vector goes up by value + 1 + |value| = 2, from .75 - .5 to 2.25
     parts = float(np.sqrt(0.25 + 0.0625 + 0.015625)) + 0.75 + 2.0
-    assert margin == pytest.approx(higham(3) * 2.25 + 7.0 * U * parts, rel=1e-12)
+    assert margin == pytest.approx(higham(3) * 2.25 + 7.0 * U * parts, rel=1e-12, abs=0.0)
 
 
 def test_the_margin_counts_the_deflation():
@@ -58,14 +58,14 @@ def test_the_margin_counts_the_deflation():
     assert matrix.image is not None and matrix.image.tolist() == [0.25, 0.0, 0.0]
     margin = margin_below(matrix, 1.0, *nothing(3), 0.75)
     parts = float(np.sqrt(0.25 + 0.0625 + 0.015625)) + 0.75 + 1.75 + 0.5
-    assert margin == pytest.approx(higham(3) * 2.5 + 7.0 * U * parts, rel=1e-12)
+    assert margin == pytest.approx(higham(3) * 2.5 + 7.0 * U * parts, rel=1e-12, abs=0.0)
 
 
 def test_the_margin_takes_the_largest_row_and_the_largest_column():
     """B = R^T R with R = [[2, 1], [0, 2]]: its columns sum up to 3, and so does its first row."""
     array, threshold = np.array([[0.0, -2.0], [-2.0, -1.0]]), 4.0
     margin = margin_below(Deflated.of(array, None), 1.0, *nothing(2), threshold)
-    assert margin == pytest.approx(higham(2) * 9.0 + 6.0 * U * (3.0 + 4.0), rel=1e-12)
+    assert margin == pytest.approx(higham(2) * 9.0 + 6.0 * U * (3.0 + 4.0), rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("size", [3, 10, 40])
@@ -160,7 +160,7 @@ def test_a_margin_of_one_row_is_right_in_fifty_digits():
             margin = margin_below(Deflated.of(np.array([[s]]), None), 1.0, *nothing(1), 0.9)
             root = mp.mpf(float(np.sqrt(0.9 - s)))
             assert abs(root**2 - (mp.mpf(0.9) - mp.mpf(s))) <= margin
-            assert margin == pytest.approx(higham(1) * (0.9 - s) + 6.0 * U * (abs(s) + 0.9), rel=1e-12)
+            assert margin == pytest.approx(higham(1) * (0.9 - s) + 6.0 * U * (abs(s) + 0.9), rel=1e-12, abs=0.0)
 
 
 # ---- the deflated matrix and its norms ---------------------------------------------------------------------------
@@ -187,4 +187,4 @@ def test_the_norm_beyond_is_that_of_the_values_that_are_left():
     assert rest <= norm_beyond(matrix, values[:2]) <= rest * (1.0 + 1e-13)
     # of nothing that is left the bound is that of rounding: 2 n^2 u |S|_F^2
     whole = float(np.sum(values**2))
-    assert norm_beyond(matrix, values) == pytest.approx(np.sqrt(2.0 * 49.0 * U * whole), rel=0.2)
+    assert norm_beyond(matrix, values) == pytest.approx(np.sqrt(2.0 * 49.0 * U * whole), rel=0.2, abs=0.0)

@@ -41,7 +41,8 @@ def test_enclosures_by_steps_are_at_most_a_hundred_times_as_wide_as_the_error(bi
 def test_maxwell_has_one_indexed_eigenvalue_and_the_rest_is_refused_with_the_reason():
     found = spec.enclosures(ker.maxwell(0.3), 3)
     assert [item.label for item in found] == ["indexed", "contains-spectrum", "contains-spectrum"]
-    assert 1.0 in found[0] and 0.7 in found[1] and 0.7 in found[2]
+    # .7 and -.7 are eigenvalues of infinite multiplicity: which of them come first is a matter of rounding
+    assert 1.0 in found[0] and all(0.7 in item or -0.7 in item for item in found[1:])
     assert "not indexed" in found[1].reason and "Lambertian share" in found[1].reason
 
 

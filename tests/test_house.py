@@ -77,7 +77,7 @@ def test_the_lower_bounds_are_the_versions_that_the_tests_are_run_with():
     bounds = [bound.replace(">=", "==") for bound in project["dependencies"]]
     bounds += [bound.replace(">=", "==") for bound in project["optional-dependencies"]["profiles"]]
     lines = (ROOT / "constraints/lowest.txt").read_text().splitlines()
-    assert [line for line in lines if not line.startswith("#")] == bounds
+    assert [line for line in lines if "==" in line] == bounds
 
 
 def test_the_module_runs_as_the_command():
