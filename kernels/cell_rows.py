@@ -10,7 +10,7 @@ from ..checks import Floats
 from ..errors import InputError
 from .matrix import KernelMatrix
 from .matrix_pair import check_same_basis
-from .row_transport import grid_wasserstein
+from .row_transport import grid_wasserstein, power_mean
 
 # From two arrays of probabilities, shape (..., n, n), to their distances, shape (...).
 RowsDistance = Callable[[Floats, Floats], Floats]
@@ -38,7 +38,7 @@ def distance_of_rows(matrix: KernelMatrix, order: float, sup: bool) -> RowsDista
     def between(one: Floats, other: Floats) -> Floats:
         one, other = np.broadcast_arrays(one, other)
         rows = grid_wasserstein(one, other, points, order)
-        return np.asarray(rows.max(axis=-1) if sup else (rows**order @ weights) ** (1.0 / order))
+        return np.asarray(rows.max(axis=-1)) if sup else power_mean(rows, weights, order)
 
     return between
 

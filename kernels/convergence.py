@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, finite_array, frozen, generator, number_between, whole_number
 from ..errors import InputError
-from ..estimates import Estimate
+from ..estimates import NORMAL_95, Estimate, student_95
 from ..rounding import EPS
 
 if TYPE_CHECKING:
     from ..geometry import Disk, Wall
 
-# A slope needs two points, and its standard error three.
+# A slope needs two points, and its error three.
 FEWEST_SCALES = 3
 COLUMNS = ("distance", "floor", "psi_defect", "two_satellites", "strays", "drift", "shift")
 
@@ -76,7 +76,10 @@ class LimitStudy:
     collisions: int
 
     def order(self, column: str, against: str = "scales") -> Estimate:
-        """The exponent p of column ~ against^p, fitted by least squares with weights; the error is its standard error.
+        """The exponent p of column ~ against^p, fitted by least squares with weights.
+
+        The error is the half width of an interval of 95 %: where the points scatter about the line by more than their
+        sampling errors by that scatter, with Student's quantile, else by the sampling errors.
 
         Parameters
         ----------
@@ -107,8 +110,10 @@ class LimitStudy:
         slope, offset = inverse @ design.T @ (y / spread)
         # where the points scatter about the line by more than their sampling errors, the scatter counts
         excess = np.sum(((y - slope * x - offset) / spread) ** 2) / (len(x) - 2)
-        error = math.sqrt(float(inverse[0, 0]) * max(1.0, float(excess)))
-        return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales, standard error")
+        standard_error = math.sqrt(float(inverse[0, 0]))
+        by_scatter = student_95(len(x) - 1) * math.sqrt(float(excess)) if excess > 1.0 else 0.0
+        error = standard_error * max(NORMAL_95, by_scatter)
+        return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales")
 
 
 def limit_study(

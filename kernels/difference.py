@@ -12,6 +12,7 @@ from .cell_rows import check_comparable, distance_of_rows, stochastic_rows
 from .counting import Counts
 from .matrix import KernelMatrix
 from .resampling import CHUNK, null_distances, pooled_rows, rows_of_counts
+from .row_transport import wasserstein_order
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def difference_test(
     Raises
     ------
     InputError
-        If the bins differ, or nothing was counted.
+        If the bins differ, the order is not a number of at least 1, or nothing was counted.
 
     Notes
     -----
@@ -99,7 +100,7 @@ def difference_test(
     source = np.random.default_rng(0) if rng is None else generator(rng)
     if first.counts is None and second.counts is None:
         raise InputError("difference_test: expected counts in one matrix at least; of exact laws take the distance")
-    common, measured = pooled_rows(first, second), (float(order), kind == "sup")
+    common, measured = pooled_rows(first, second), (wasserstein_order(order), kind == "sup")
     if first.counts is None or second.counts is None:
         pair = [
             stochastic_rows(matrix) if matrix.counts is None else rows_of_counts(matrix.counts, common)

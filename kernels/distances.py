@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from ..checks import finite_number, positive_number
+from ..checks import positive_number
 from ..errors import InputError
 from ..estimates import Estimate
 from .cell_rows import check_comparable
@@ -16,6 +16,7 @@ from .matrix import KernelMatrix
 from .pseudometric import moment_distance
 from .resampling import noise_floor
 from .row_distance import law_distance, matrix_distance
+from .row_transport import wasserstein_order
 
 Kind = Literal["rows", "sup", "joint", "pseudometric"]
 
@@ -100,9 +101,7 @@ def distance(
     """
     if kind not in get_args(Kind):
         raise InputError(f"kind: expected one of {', '.join(get_args(Kind))}, got {kind!r}")
-    power = finite_number("order", order)
-    if power < 1.0:
-        raise InputError(f"order: expected a number of at least 1, got {order!r}")
+    power = wasserstein_order(order)
     positive_number("tolerance", tolerance)
     for law in (first, second):
         if not isinstance(law, (Law, KernelMatrix)):

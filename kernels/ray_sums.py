@@ -47,16 +47,6 @@ class RaySums:
         cells = self.basis.size**2 if self.basis.is_partition else 0
         return max(SMALLEST_CHUNK, 1 << (cells // CELLS_A_RAY).bit_length())
 
-    def enlarge(self, each: int) -> None:
-        """Join consecutive parts, a power of two of them, to parts of so many rays; the last ones are empty then."""
-        if self.each:
-            joined = min(each // self.each, len(self.tables))
-            kept = len(self.tables) // joined
-            for place in range(kept):
-                self.tables[place] = self.tables[place * joined : (place + 1) * joined].sum(axis=0)
-            self.tables[kept:] = 0
-        self.each = each
-
     def add(self, table: int, incoming: Floats, outgoing: Floats) -> None:
         """Add rays to one of the tables."""
         found = (count_pairs if self.basis.is_partition else sum_products)(self.basis, incoming, outgoing)

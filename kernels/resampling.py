@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..checks import Floats
+from ..estimates import NORMAL_95
 from .cell_rows import distance_of_rows, stochastic_rows
 from .counting import Counts
 from .matrix import KernelMatrix
 
-# Resamples whose mean is the noise floor, good to a tenth or so, and their standard deviations in the error.
+# Resamples whose mean is the noise floor, good to a tenth or so, and whose spread is in the error.
 RESAMPLES = 32
-DEVIATIONS = 3.0
 SEED = 0
 # Counts held at a time.
 CHUNK = 2**22
@@ -80,19 +80,24 @@ def _draws(matrix: KernelMatrix, common: Floats, number: int, rng: np.random.Gen
         yield np.broadcast_to(common, (min(chunk, number - start), *common.shape))
 
 
-def matrix_error(matrix: KernelMatrix, order: float, sup: bool) -> float:
-    """How far a matrix may be from that of its law.
+def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> float:
+    """How far the distance of two matrices may be from that of their laws: as far as both matrices are from theirs.
 
-    Where pairs were counted: the distance of resamples from the sample, its mean and three deviations. Else what the
-    Frobenius error E of ``symmetric`` allows: W_1 <= pi/2 sum_j |dP_ij|, whose mean over i is at most pi/2 E by Cauchy
-    and Schwarz, and whose largest value is at most pi/2 E / sqrt(w_i); and W_p^p <= pi^(p - 1) W_1.
+    Where pairs were counted, the distance of resamples from the sample tells how far: its mean, and its deviation by a
+    quantile, the deviations of two samples being independent. Else it is what the Frobenius error E of ``symmetric``
+    allows: W_1 <= pi/2 sum_j |dP_ij|, whose mean over i is at most pi/2 E by Cauchy and Schwarz, and whose largest
+    value is at most pi/2 E / sqrt(w_i); and W_p^p <= pi^(p - 1) W_1.
     """
-    if matrix.counts is None:
-        error = float(matrix.error) / (float(np.sqrt(matrix.weights.min())) if sup else 1.0)
-        return float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order))
-    own = stochastic_rows(matrix)
-    between = distance_of_rows(matrix, order, sup)
-    rng = np.random.default_rng(SEED)
-    draws = resampled(matrix.counts, own, RESAMPLES, rng)
-    found = np.concatenate([between(rows_of_counts(counts, own), own) for counts in draws])
-    return float(np.mean(found) + DEVIATIONS * np.std(found))
+    known, mean, variance = 0.0, 0.0, 0.0
+    for matrix in (first, second):
+        if matrix.counts is None:
+            error = float(matrix.error) / (float(np.sqrt(matrix.weights.min())) if sup else 1.0)
+            known += float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order))
+            continue
+        own = stochastic_rows(matrix)
+        between = distance_of_rows(matrix, order, sup)
+        draws = resampled(matrix.counts, own, RESAMPLES, np.random.default_rng(SEED))
+        found = np.concatenate([between(rows_of_counts(counts, own), own) for counts in draws])
+        mean += float(np.mean(found))
+        variance += float(np.var(found, ddof=1))
+    return known + mean + NORMAL_95 * float(np.sqrt(variance))

@@ -18,8 +18,8 @@ from .matrix import KernelMatrix
 from .matrix_pair import joint_kind
 from .measure import SINE, gauss_on_intervals
 from .outgoing import ENTRY_POINTS, outgoing_distributions, parts_of
-from .resampling import matrix_error
-from .row_transport import wasserstein
+from .resampling import matrices_error
+from .row_transport import power_mean, wasserstein
 from .specular_frame import SpecularFrame
 from .weighted_sum import Combination
 
@@ -61,7 +61,7 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
             break
         angle, mass = _nodes(low, high, sup)
         rows = _rows(first, second, angle, edges, order)
-        found.append(float(rows.max()) if sup else float(mass @ rows**order) ** (1.0 / order))
+        found.append(float(rows.max()) if sup else float(power_mean(rows, mass, order)))
         if level == 0:
             continue
         steps = np.abs(np.diff(found))
@@ -76,7 +76,7 @@ def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup
     """The same between matrices on the same cells: rows are point masses in the middle of the cells."""
     between = distance_of_rows(first, order, sup)
     value = float(between(stochastic_rows(first), stochastic_rows(second)))
-    error = matrix_error(first, order, sup) + matrix_error(second, order, sup) + ROUNDING
+    error = matrices_error(first, second, order, sup) + ROUNDING
     how = "distribution functions on the cells, and the errors of both matrices"
     return Estimate(value, error, joint_kind(first, second), how)
 

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..checks import Floats
+from ..checks import Floats, finite_number
+from ..errors import InputError
+from ..rounding import EPS
 from .sorted_edges import cell_among
 
-# Ends of a piece that agree to this share are integrated by the value in the middle: the divided difference below
-# would lose the other digits, and the neglected term is of the order of the square.
-EQUAL_ENDS = 1e-5
+# Ends of a piece that agree to this share, over the order to the power 4/5, are integrated by two terms about the
+# middle: the divided difference below would lose more digits than the third term, 1/1920 of the fourth power, has.
+EQUAL_ENDS = (1920.0 * EPS) ** 0.2
 # A step of a cumulative distribution smaller than this is none.
 SMALLEST_STEP = 1e-300
 # Numbers at a time: they stay in the cache, which makes it three times faster.
@@ -93,18 +95,44 @@ def wasserstein(first: Distributions, second: Distributions, order: float = 1.0)
     quarter, three = levels[:, :-1] + 0.25 * width, levels[:, :-1] + 0.75 * width
     early = first.quantile(quarter) - second.quantile(quarter)
     late = first.quantile(three) - second.quantile(three)
-    start, end = 1.5 * early - 0.5 * late, 1.5 * late - 0.5 * early
-    power = np.sum(width * _mean_power(start, end, order), axis=1)
-    return np.asarray(power ** (1.0 / order))
+    # steps of no width have no meaning at all
+    start, end = (np.where(width > 0.0, side, 0.0) for side in (1.5 * early - 0.5 * late, 1.5 * late - 0.5 * early))
+    # powers of the share of the largest: those of angles leave the range of numbers at high orders
+    largest = np.maximum(np.abs(start), np.abs(end)).max(axis=1, initial=0.0)
+    unit = np.where(largest > 0.0, largest, 1.0)[:, None]
+    power = np.sum(width * _mean_power(start / unit, end / unit, order), axis=1)
+    return np.asarray(largest * power ** (1.0 / order))
 
 
 def _mean_power(start: Floats, end: Floats, order: float) -> Floats:
     """The mean of the p-th power of the modulus of a linear function between two values."""
-    rise = end - start
-    flat = np.abs(rise) <= EQUAL_ENDS * np.maximum(np.abs(start), np.abs(end))
-    middle = np.abs(0.5 * (start + end)) ** order
+    rise, middle = end - start, 0.5 * (start + end)
+    flat = np.abs(rise) <= EQUAL_ENDS / order**0.8 * np.maximum(np.abs(start), np.abs(end))
+    bend = order * rise / np.where(flat & (middle != 0.0), middle, np.inf)
+    near = np.abs(middle) ** order * (1.0 + (1.0 - 1.0 / order) * bend**2 / 24.0)
     primitive = [np.sign(value) * np.abs(value) ** (order + 1.0) / (order + 1.0) for value in (start, end)]
-    return np.where(flat, middle, (primitive[1] - primitive[0]) / np.where(flat, 1.0, rise))
+    return np.where(flat, near, (primitive[1] - primitive[0]) / np.where(flat, 1.0, rise))
+
+
+def power_mean(values: Floats, weights: Floats, order: float) -> Floats:
+    """(sum_j w_j v_j^p)^(1/p) over the last axis, for values that are not negative and any order.
+
+    Examples
+    --------
+    >>> float(power_mean(np.array([3.0, 3.0]), np.array([0.5, 0.5]), 1e6))
+    3.0
+    """
+    largest = np.asarray(values.max(axis=-1, initial=0.0))
+    unit = np.where(largest > 0.0, largest, 1.0)
+    return np.asarray(largest * ((values / unit[..., None]) ** order @ weights) ** (1.0 / order))
+
+
+def wasserstein_order(order: float) -> float:
+    """The order p of a Wasserstein distance, checked: a finite number of at least 1."""
+    power = finite_number("order", order)
+    if power < 1.0:
+        raise InputError(f"order: expected a number of at least 1, got {order!r}")
+    return power
 
 
 def grid_wasserstein(first: Floats, second: Floats, points: Floats, order: float = 1.0) -> Floats:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, finite_array, frozen, generator, positive_number, whole_number
 from ..errors import InputError
-from ..estimates import Estimate
+from ..estimates import NORMAL_95, Estimate
 from ..kernels import Law
 from ..kernels.measure import SINE
 from .diffusion import Arrangement, check_arrangement
@@ -52,8 +52,9 @@ class ExitTimes:
     def eta(self) -> Estimate:
         """The slope of L^2/(D_0 tau) in ln L: D over that of diffuse walls.
 
-        The slope settles as L grows, so that the upper half of the lengths gives the value; the error is two standard
-        errors of it, by the delta method over particles, plus its difference from that of the lower half.
+        The slope settles as L grows, so that the upper half of the lengths gives the value; the error is the
+        half width of its interval of 95 %, by the delta method over particles, plus its difference from that of the
+        lower half.
         """
         log = np.log(self.lengths)
         middle = len(log) // 2
@@ -64,7 +65,7 @@ class ExitTimes:
         influence = (self.times / self.means)[:, middle:] @ (-self.scaled[middle:] * upper)
         spread = float(influence.std(ddof=1) / np.sqrt(len(self.times)))
         method = f"slope of L^2/(D_0 tau) in ln L, {len(self.times)} particles"
-        return Estimate(value, 2.0 * spread + drift, "estimate", method)
+        return Estimate(value, NORMAL_95 * spread + drift, "estimate", method)
 
 
 def _slope_weights(log: Floats) -> Floats:

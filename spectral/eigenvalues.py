@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..checks import Floats, frozen, whole_number
 from ..errors import AccuracyError, InputError
-from ..estimates import Estimate
+from ..estimates import NORMAL_95, Estimate
 from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ..rounding import EPS
 from .parity import Parity, halves, outermost_by_parity
-from .sampling import NORMAL_95, sampling_errors, sampling_quantile
+from .sampling import sampling_errors, sampling_quantile
 from .two_grids import two_grid_changes
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..checks import Floats, number_between, whole_number
 from ..errors import InputError
+from ..estimates import NORMAL_95, student_95
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -15,16 +16,9 @@ if TYPE_CHECKING:
     from ..kernels import KernelMatrix
 
 
-NORMAL_95 = 1.959963984540054
-
-
 def sampling_quantile(matrix: KernelMatrix) -> float:
     """How many standard errors of `sampling_errors` an interval of 95 % has on each side."""
-    if len(matrix.replicates) < 2:
-        return NORMAL_95
-    from scipy.special import stdtrit
-
-    return float(stdtrit(len(matrix.replicates) - 1, 0.975))
+    return student_95(len(matrix.replicates)) if len(matrix.replicates) > 1 else NORMAL_95
 
 
 def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Floats:

@@ -12,7 +12,6 @@ from asperity.errors import InputError
 from asperity.kernels import ray_sums
 from asperity.kernels.net import PARTS, SOBOL_BITS, Net
 from asperity.kernels.reflection import reflection_matrix
-from net_theory import NET_OVER_SPREAD
 
 TEETH = ker.TriangularTeethLaw(1.1)
 BASES = [ker.Bins(16), ker.Bins(9), ker.Legendre(6), ker.Panels(np.linspace(0.0, np.pi, 5), 2)]
@@ -38,15 +37,14 @@ def sampled(law: ker.Law, basis: ker.Basis, seed: int) -> ker.KernelMatrix:
 def test_matrices_from_half_of_the_rays_are_mirror_symmetric_markov_and_right_within_their_errors(basis):
     exact = ker.discretise(TEETH, basis).symmetric
     flip = reflection_matrix(basis)
-    squares = []
+    within = []
     for seed in range(24):
         found = sampled(Bounce(), basis, seed)
         assert np.abs(flip @ found.symmetric @ flip.T - found.symmetric).max() < 1e-14
         assert found.stochastic_defect() < 1e-13 and found.samples == 4096
-        squares.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
-    # errors from 8 replicates scatter by a quarter; the mean of their inverse squares is 7/5 where one entry rules; and
-    # the order is 3/4 only in the limit
-    assert 0.6 * NET_OVER_SPREAD < np.mean(squares) < 1.6 * NET_OVER_SPREAD
+        within.append(np.linalg.norm(found.symmetric - exact) <= float(found.error))
+    # six of 24 or more are outside of intervals of 95 % once in a thousand times
+    assert sum(within) > 18
 
 
 @pytest.mark.parametrize("looks", [(8, 16), (64, 512), (8, 4096), (128, 1024, 2048)], ids=repr)
@@ -63,25 +61,38 @@ def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks):
 
 @pytest.mark.parametrize("chunk", [1, 8, 64, 4096])
 @pytest.mark.parametrize("looks", [(2000,), (1, 100, 1000, 3), (30, 31, 900)], ids=repr)
-def test_parts_of_a_net_are_its_consecutive_eighths_whatever_is_traced_at_a_time(looks, chunk, monkeypatch):
+def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at_a_time(looks, chunk, monkeypatch):
     monkeypatch.setattr(ray_sums, "SMALLEST_CHUNK", chunk)
     basis, law = ker.Bins(2), Bounce(mirror_symmetric=None)
     net, twin = (Net(law, basis, np.random.default_rng(5)) for _ in range(2))
     for look in looks:
         net.sampled(look, symmetrise=False)
-    x, u = (twin.sequence.random(PARTS * net.sums.each) + twin.beyond).T
-    theta = ker.SINE.quantile(u)
-    parts = zip(np.split(theta, PARTS), np.split(law.respond(x, theta), PARTS), strict=True)
-    assert PARTS * net.sums.each >= max(looks)
-    for table, (incoming, outgoing) in zip(net.sums.tables, parts, strict=True):
-        cells = [2 * (incoming > np.pi / 2), outgoing > np.pi / 2]
+    digits = [[int(place * 2**SOBOL_BITS) for place in point] for point in twin.sequence.random(net.sums.each)]
+    assert PARTS * net.sums.each >= max(looks) and len({tuple(shift) for shift in net.shifts.tolist()}) == PARTS
+    for table, shift, beyond in zip(net.sums.tables, net.shifts.tolist(), net.beyond, strict=True):
+        shifted = [[number ^ by for number, by in zip(point, shift, strict=True)] for point in digits]
+        x, u = (np.array(shifted) / 2**SOBOL_BITS + beyond).T
+        incoming = ker.SINE.quantile(u)
+        cells = [2 * (incoming > np.pi / 2), law.respond(x, incoming) > np.pi / 2]
         assert np.array_equal(table.ravel(), np.bincount(cells[0] + cells[1], minlength=4))
+
+
+@pytest.mark.parametrize("rays", [8, 64, 1024])
+def test_each_part_is_a_net(rays):
+    # of 2^k points of a (0, k, 2)-net one is in every dyadic rectangle of that area, in any shape
+    net = Net(Bounce(mirror_symmetric=None), ker.Bins(2), np.random.default_rng(6))
+    digits = (net.sequence.random(rays) * 2.0**SOBOL_BITS).astype(np.uint64)
+    for shift in net.shifts:
+        x, y = ((digits ^ shift) * 2.0**-SOBOL_BITS).T
+        for width in 2 ** np.arange(rays.bit_length()):
+            cells = np.floor(x * width) * (rays // width) + np.floor(y * (rays // width))
+            assert np.array_equal(np.sort(cells), np.arange(rays))
 
 
 def test_more_rays_than_a_net_has_are_refused_before_the_first_is_traced():
     net = Net(Bounce(), ker.Bins(2), np.random.default_rng(1))
-    with pytest.raises(InputError, match="at most 2\\^32 rays, got 4294967297; use method 'monte-carlo'"):
-        net.sampled(2**SOBOL_BITS + 1, symmetrise=False)
+    with pytest.raises(InputError, match="at most 34359738368 rays, got 34359738369; use method 'monte-carlo'"):
+        net.sampled(PARTS * 2**SOBOL_BITS + 1, symmetrise=False)
     assert net.sums.each == 0 and not net.sums.tables.any()
 
 
@@ -105,4 +116,4 @@ def test_a_basis_without_the_symmetry_takes_rays_from_both_sides():
     exact = ker.discretise(TEETH, basis).symmetric
     found = sampled(Bounce(), basis, 1)
     assert found.counts.sum() == 4096
-    assert np.linalg.norm(found.symmetric - exact) < 3.0 * float(found.error)
+    assert np.linalg.norm(found.symmetric - exact) < 2.0 * float(found.error)

@@ -11,7 +11,6 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
 from asperity.kernels.net import PARTS
-from net_theory import NET_OVER_SPREAD
 
 
 @dataclass(frozen=True)
@@ -39,41 +38,16 @@ def test_sampled_matrices_lie_within_their_errors(method: str, basis: ker.Basis)
         assert found.samples == 2**16
 
 
-@pytest.mark.parametrize("symmetrise", [False, True])
 @pytest.mark.parametrize("method", ["qmc", "monte-carlo"])
 @pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(6)], ids=repr)
-def test_reported_errors_hold(basis: ker.Basis, method: str, symmetrise: bool) -> None:
-    exact = ker.discretise(ker.TriangularTeethLaw(1.1), basis).symmetric
-    ratios = []
-    for seed in range(24):
-        found = ker.discretise(
-            Bounce(),
-            basis,
-            method=method,
-            samples=4096,
-            rng=np.random.default_rng(seed),
-            symmetrise=symmetrise,  # type: ignore[arg-type]
-        )
-        ratios.append(np.sum((found.symmetric - exact) ** 2) / float(found.error) ** 2)
-    # mean of squares over 24 matrices of dozens of entries each; errors from 8 replicates scatter by a quarter
-    expected = 1.0 if method == "monte-carlo" else NET_OVER_SPREAD
-    assert 0.75 * expected < np.mean(ratios) < 1.35 * expected
-
-
-@pytest.mark.parametrize("basis", [ker.Bins(12), ker.Legendre(6)], ids=repr)
-def test_z_scores_of_sampled_matrices_are_those_of_noise_or_of_less(basis: ker.Basis) -> None:
-    independent, net = (
-        [
-            ker.discretise(Bounce(), basis, method=method, samples=4096, rng=np.random.default_rng(seed))  # type: ignore[arg-type]
-            .symmetry_defect()
-            .z_score
-            for seed in range(40)
-        ]
-        for method in ("monte-carlo", "qmc")
-    )
-    assert abs(np.mean(independent)) < 0.65 and 0.6 < np.std(independent) < 1.5
-    # parts of a net have scores below those of noise, and scatter less
-    assert np.mean(net) < 0.0 and max(net) < 2.0 and np.std(net) < 0.6
+def test_z_scores_of_sampled_matrices_are_those_of_noise(basis: ker.Basis, method: str) -> None:
+    scores = [
+        ker.discretise(Bounce(), basis, method=method, samples=4096, rng=np.random.default_rng(seed))  # type: ignore[arg-type]
+        .symmetry_defect()
+        .z_score
+        for seed in range(40)
+    ]
+    assert abs(np.mean(scores)) < 0.65 and 0.6 < np.std(scores) < 1.5
 
 
 def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand() -> None:

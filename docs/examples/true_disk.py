@@ -34,7 +34,7 @@ def main(
             "distance at the least scale": float(study.distance[-1]),
             "of which sampling": float(study.floor[-1]),
             "order of psi' in rho": float(study.order("psi_defect", "spacings")),
-            "its standard error": study.order("psi_defect", "spacings").error,
+            "its half width of 95 %": study.order("psi_defect", "spacings").error,
             "psi' defect/rho": float(study.psi_defect[-1] / study.spacings[-1]),
             "two satellites/(eps/rho^2)": float(study.two_satellites[-1] * study.spacings[-1] ** 2 / scales[-1]),
             "correlation": foreshortened + float(study.shift[-1]),

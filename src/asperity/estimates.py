@@ -8,6 +8,10 @@ from typing import Literal
 
 ErrorKind = Literal["bound", "estimate"]
 
+# The share of intervals of estimated width that hold the true value.
+LEVEL = 0.95
+# Of how many standard deviations such an interval of a normal variable has on each side.
+NORMAL_95 = 1.959963984540054
 # A number without error is printed to this many decimals.
 DECIMALS = 12
 
@@ -23,10 +27,17 @@ class Estimate:
     error : float
         Half width of the interval around ``value``; ``inf`` where nothing is known.
     kind : {"bound", "estimate"}
-        ``"bound"``: the true value is within ``error`` (to rounding). ``"estimate"``: the error is itself estimated,
-        as a standard error or from two resolutions; ``method`` says which.
+        ``"bound"``: the true value is within ``error``, to rounding. ``"estimate"``: ``error`` is the half width of an
+        interval that holds the true value in 95 of 100 cases. Where sampling is the only error it does so in 95 % of
+        repetitions; where it comes from two resolutions, in at least 95 % of problems.
     method : str
         How value and error were found, in words.
+
+    Notes
+    -----
+    Where a quantity has errors from several sources their half widths are added as they are. That is right if they are
+    not independent, and on the safe side if they are: the sum of a bound and a half width of 95 % is one of 95 %, that
+    of two half widths one of 95 % or more for errors of normal distribution.
 
     Examples
     --------
@@ -68,3 +79,16 @@ def rounded(number: Estimate) -> str:
     if decimals >= DECIMALS:
         return f"{number.value:.{DECIMALS}f} +- {number.error:.2g}"
     return f"{number.value:.{decimals}f} +- {number.error:.{decimals}f}"
+
+
+def student_95(parts: int) -> float:
+    """Of how many standard errors, from the spread of so many parts, an interval of 95 % has on each side.
+
+    Examples
+    --------
+    >>> round(student_95(8), 3), round(student_95(10**6), 3)
+    (2.365, 1.96)
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(parts - 1, 0.5 * (1.0 + LEVEL)))

@@ -14,7 +14,7 @@ import numpy as np
 from .checks import positive_number
 from .consequences import Consequences, consequences_of
 from .errors import AccuracyError, FileExistsRefusal, InputError
-from .estimates import Estimate
+from .estimates import NORMAL_95, Estimate
 from .geometry import Disk, Wall, trace
 from .kernels import Bins, CollisionLaw, KernelMatrix, Law, Legendre, WallLaw, discretise
 from .kernels.measure import SINE
@@ -61,7 +61,7 @@ class TracerCheck:
     def z_score(self) -> float:
         """Deviation of the mean from Kac's formula in standard errors; 0 where every ray has the same number."""
         deviation = self.mean_collisions.value - self.expected_collisions
-        return deviation / self.mean_collisions.error if self.mean_collisions.error > 0.0 else 0.0
+        return deviation / self.mean_collisions.error * NORMAL_95 if self.mean_collisions.error > 0.0 else 0.0
 
 
 @dataclass(frozen=True)
@@ -310,8 +310,8 @@ def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
     ray = trace(wall, lefts[which] + widths[which] * rng.random(CHECK_RAYS), SINE.sample(CHECK_RAYS, rng))
     boundary = wall.arc_length - wall.flat_top
     mean = Estimate(
-        float(np.mean(ray.collisions)), float(np.std(ray.collisions, ddof=1) / np.sqrt(CHECK_RAYS)), "estimate",
-        f"one standard error of {CHECK_RAYS} rays",
+        float(np.mean(ray.collisions)), NORMAL_95 * float(np.std(ray.collisions, ddof=1) / np.sqrt(CHECK_RAYS)),
+        "estimate", f"spread of {CHECK_RAYS} rays",
     )  # fmt: skip
     return TracerCheck(MappingProxyType(ray.counts()), mean, float(boundary / widths.sum()))
 
