@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,11 +14,14 @@ from .law import BranchLaw, entry_points
 from .measure import SINE
 from .stable_angles import flipped
 
-# d = 2 r |cot theta| carries a relative error of about 2 eps, so above 2^48 its fractional part is known to 1/8 at
-# best. There the law is replaced by its mean over a period of d, which is what any interval of such angles sees.
-RESOLVABLE_CROSSINGS = 2.0**48
-MEAN_CROSSINGS = 0.5
+# d = 2 r |cot theta| carries a relative error of about 2 eps. Above the first number that is too much for the rest of a
+# division by 2, which is then found in double-double arithmetic, and above the second in as many digits as it takes.
+# Both numbers are those of the given float64 theta and r, however fast the rest changes with them.
+LARGEST_PLAIN, LARGEST_DOUBLE_DOUBLE = 2.0**6, 2.0**48
+# Bits beyond those of d itself.
+MORE_BITS = 80
 LARGEST_COUNT = 2.0**62
+SPACING = float(np.spacing(np.pi))
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,9 @@ class RectangularTeethLaw(BranchLaw):
 
     Notes
     -----
-    Where d exceeds 2^48, float64 does not resolve its fractional part; the law is then the mean over a period,
-    specular with probability 3/4.
+    The law is that of the given float64 angle, to rounding, however many crossings it has. Where d is large it changes
+    completely from one float64 to the next; an angle that is not exact to its last digit has, for all that is known,
+    the mean over a period of d: specular with probability 3/4.
 
     Source: Rudzis 2022, section 2.2.1, corrected (the even and odd cases are swapped in print).
 
@@ -65,7 +70,8 @@ class RectangularTeethLaw(BranchLaw):
 
     def crossings(self, theta: ArrayLike) -> Floats:
         """d = 2 r |cot theta|: crevice widths crossed between entry and exit."""
-        return np.asarray(2.0 * self.height_to_width / np.abs(np.tan(angles("theta", theta))))
+        with np.errstate(over="ignore"):
+            return np.asarray(2.0 * self.height_to_width / np.abs(np.tan(angles("theta", theta))))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and angles, shape ``theta.shape + (2,)``: specular first, then retroreflection."""
@@ -84,29 +90,65 @@ class RectangularTeethLaw(BranchLaw):
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left end of the flat top."""
         x, theta = entry_points(x), angles("theta", theta)
-        sides = self._sides_hit(x, theta, _resolvable(self.crossings(theta)))
+        sides = _sides_hit(x, theta, crossings_modulo_two(self.height_to_width, theta))
         return np.where(np.mod(sides, 2.0) == 0.0, flipped(theta), theta)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
-        """Number of reflections, a hit of the flat top counting as one; at most 2^62 are counted."""
+        """Number of reflections, a hit of the flat top counting as one; at most 2^62 are counted.
+
+        The parity is right; beyond 2^52 the number itself has the error of float64.
+        """
         x, theta = entry_points(x), angles("theta", theta)
-        sides = self._sides_hit(x, theta, np.minimum(self.crossings(theta), LARGEST_COUNT))
-        return np.asarray(1 + sides.astype(np.int64))
-
-    def _sides_hit(self, x: Floats, theta: Floats, crossings: Floats) -> Floats:
-        # Distance, in crevice widths, from the entry point to the side that the ray flies towards.
-        ahead = np.where(theta < 0.5 * np.pi, 2.0 * x - 1.0, 2.0 - 2.0 * x)
-        return np.where(x <= 0.5, 0.0, np.maximum(np.ceil(crossings - ahead), 0.0))
+        rest = crossings_modulo_two(self.height_to_width, theta)
+        # whole numbers of pairs, so that the parity is right where d has more digits than a float64
+        pairs = np.rint(0.5 * (np.minimum(self.crossings(theta), LARGEST_COUNT) - rest)).astype(np.int64)
+        sides = 2 * pairs + _sides_hit(x, theta, rest).astype(np.int64)
+        return np.asarray(1 + np.where(x <= 0.5, 0, sides))
 
 
-def _resolvable(crossings: Floats) -> Floats:
-    return np.where(crossings <= RESOLVABLE_CROSSINGS, crossings, MEAN_CROSSINGS)
+def _sides_hit(x: Floats, theta: Floats, crossings: Floats) -> Floats:
+    # Distance, in crevice widths, from the entry point to the side that the ray flies towards.
+    ahead = np.where(theta < 0.5 * np.pi, 2.0 * x - 1.0, 2.0 - 2.0 * x)
+    return np.where(x <= 0.5, 0.0, np.maximum(np.ceil(crossings - ahead), 0.0))
+
+
+def crossings_modulo_two(height_to_width: float, theta: Floats) -> Floats:
+    """d mod 2, in [0, 2], with an error below 1e-13 for every float64 theta.
+
+    Examples
+    --------
+    >>> rest = crossings_modulo_two(1.5, np.array([2.0**-30]))[0]    # d = 3 2^30 - 2^-30 + ...
+    >>> float(2.0 - rest) == 2.0**-30
+    True
+    """
+    theta = np.asarray(theta, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        crossings = np.asarray(2.0 * height_to_width / np.abs(np.tan(theta)))
+    # theta = pi/2 is the float64 nearest to it
+    rest = np.asarray(np.mod(np.where(crossings <= LARGEST_PLAIN, crossings, 0.0), 2.0))
+    many = crossings > LARGEST_PLAIN
+    if np.any(many):
+        from .crossing_engine import crossings_modulo_two as in_double_double
+
+        exceeding = many & (crossings > LARGEST_DOUBLE_DOUBLE)
+        rest[many] = in_double_double(2.0 * height_to_width, theta[many])
+        rest[exceeding] = [_in_many_digits(height_to_width, float(angle)) for angle in theta[exceeding]]
+    return rest
+
+
+def _in_many_digits(height_to_width: float, theta: float) -> float:
+    import mpmath
+
+    # d is below 2^(exponent of r - exponent of the sine + 2), and the sine not below the spacing of float64 at pi
+    bits = math.frexp(height_to_width)[1] - math.frexp(min(theta, SPACING))[1] + MORE_BITS
+    with mpmath.workprec(max(bits, 0) + MORE_BITS):
+        return float(mpmath.fmod(2 * mpmath.mpf(height_to_width) * abs(mpmath.cot(mpmath.mpf(theta))), 2))
 
 
 def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
     """The probability of retroreflection in a crevice: the distance from d to the nearest even number."""
-    crossings = _resolvable(np.asarray(2.0 * height_to_width / np.abs(np.tan(theta))))
-    return np.asarray(np.abs(crossings - 2.0 * np.rint(0.5 * crossings)))
+    rest = crossings_modulo_two(height_to_width, theta)
+    return np.asarray(np.minimum(rest, 2.0 - rest))
 
 
 def crevice_kinks(height_to_width: float, limit: int) -> tuple[Floats, float]:
