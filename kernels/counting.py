@@ -133,6 +133,14 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
     return SampledArray(symmetric, replicates.half_width(), replicates.kept(), defect, None)
 
 
+def half_width(symmetric: Floats, replicates: Sequence[Replicate]) -> float:
+    """What the randomness of the rays has in the error of a matrix from several parts of them."""
+    found = _Replicates(symmetric, len(replicates))
+    for part in replicates:
+        found.add(np.asarray(part - symmetric))
+    return found.half_width()
+
+
 class _Replicates:
     """The arrays of the parts, collected one by one; sparse where that is smaller, dropped if too large."""
 

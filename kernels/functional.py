@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..checks import Floats, finite_array, positive_number
 from ..errors import InputError
-from ..estimates import Estimate
+from ..estimates import Estimate, student_95
 from .basis import Basis
 from .branch_quadrature import has_chain
+from .counting import half_width
 from .directions import Directions
-from .discretisation import discretise
+from .discretisation import SEED_WITHOUT_RNG
 from .law import AngleFunction, Law
+from .matrix import KernelMatrix
+from .matrix_maker import MatrixMaker
 from .measure import SINE, gauss_rule
 from .panels import Panels
+from .sampling import DEFAULT_SAMPLES
 
 CostFunction = Callable[[Floats, Floats], Floats]
 
@@ -61,7 +67,8 @@ def resistance(
     law : Law
         In the paper's convention.
     tolerance : float
-        Wanted error.
+        Wanted error. Of a wall of few pieces that has to be traced it takes at most some forty million flights of
+        rays, 5 to 15 seconds; ``error`` says what these have reached.
     cost : callable
         ``cost(theta, theta_out)`` of two arrays that broadcast, radians; smooth between the breakpoints.
     incoming : callable, optional
@@ -114,11 +121,23 @@ def resistance(
     else:
         basis, coefficients, missed = _represented(weighted, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
-    matrix = discretise(law, basis, tolerance=MATRIX_SHARE * wanted / max(size, 1.0))
+    source = np.random.default_rng(SEED_WITHOUT_RNG)
+    share = MATRIX_SHARE * wanted / max(size, 1.0)
+    matrix = MatrixMaker(basis, share, DEFAULT_SAMPLES, source, False, patient=False, thorough=True).make(law, "auto")
     value = float(np.sum(coefficients * matrix.symmetric))
-    error = size * float(matrix.error) + missed
+    error = _error(matrix, coefficients) + missed
     how = f"{matrix.method} on {basis!r} ({matrix.error.method})"
     return Estimate(value, error, matrix.error.kind, how)
+
+
+def _error(matrix: KernelMatrix, coefficients: Floats) -> float:
+    """The error of sum_ij c_ij S_ij: that of S by Cauchy and Schwarz, but what comes of rays by their own spread."""
+    size, parts = float(np.linalg.norm(coefficients)), len(matrix.replicates)
+    if parts < 2:
+        return size * float(matrix.error)
+    each = [float(cast(Any, part * coefficients).sum()) for part in matrix.replicates]
+    other = max(float(matrix.error) - half_width(matrix.symmetric, matrix.replicates), 0.0)
+    return student_95(parts) * float(np.std(each, ddof=1)) / math.sqrt(parts) + size * other
 
 
 def _represented(function: CostFunction, breakpoints: Floats, tolerance: float) -> tuple[Panels, Floats, float]:

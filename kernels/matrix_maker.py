@@ -34,13 +34,14 @@ from .net import PARTS, Net
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
 from .responses import responder
-from .row_quadrature import MOST_FLIGHTS, is_affordable, row_matrix
+from .row_quadrature import LARGEST_ROW, MOST_FLIGHTS, is_affordable, row_matrix
 from .sampling import independent_rays
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
 from .table_quadrature import table_matrix
 from .wall_choice import wall_matrix
 from .wall_law import WallLaw
+from .wall_rows import is_few
 from .weighted_sum import Combination
 
 Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
@@ -54,13 +55,20 @@ DISPLACED = EPS
 # Flights of adaptive rows that nobody asked for by name: they take about as long as two million rays; beyond them the
 # shortfall is reported.
 QUICK_FLIGHTS = 4_000_000
+# Flights of one row, as a share of all, where a thorough answer is wanted: in some steep Bezier hollows rows with a
+# fiftieth are not whole, and in bottles with a neck of a hundredth of their width rows have no end.
+THOROUGH_ROW = 0.25
 # Methods that a sum has if all its terms have them.
 SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
 
 
 @dataclass(frozen=True)
 class MatrixMaker:
-    """The arguments of `discretise`, which stay the same while a law is taken apart."""
+    """The arguments of `discretise`, which stay the same while a law is taken apart.
+
+    ``patient``: adaptive rows were asked for by name. ``thorough``: they may take some seconds where neither rays nor
+    rows met the tolerance in one.
+    """
 
     basis: Basis
     tolerance: float
@@ -68,12 +76,13 @@ class MatrixMaker:
     rng: np.random.Generator
     symmetrise: bool
     patient: bool
+    thorough: bool = False
 
     def make(self, law: Law, method: Method) -> KernelMatrix:
         """The matrix of a law; the facts of the whole law are put in by `discretise`."""
         if isinstance(law, WallLaw) and law.closed_form is None and method in ("auto", "qmc", "monte-carlo"):
             # before its exact law is looked for, which may take a second
-            return wall_matrix(self, law) if method == "auto" else self.sampled(law, method)
+            return self._of_wall(law) if method == "auto" else self.sampled(law, method)
         closed_form = _replacement(law)
         if closed_form is not None and (method == "auto" or method in self.methods(closed_form)[:-1]):
             return self.make(closed_form, method)
@@ -90,6 +99,13 @@ class MatrixMaker:
             return self._sum(law, "auto")
         return self._made_by(law, methods[0])
 
+    def _of_wall(self, law: WallLaw) -> KernelMatrix:
+        found = wall_matrix(self, law)
+        if not self.thorough or float(found.error) <= self.tolerance or not is_few(law.wall):
+            return found
+        rows = self.rows(law, float("inf"), MOST_FLIGHTS, THOROUGH_ROW)
+        return min(found, rows, key=lambda matrix: float(matrix.error))
+
     def sampled(self, law: Law, method: Method) -> KernelMatrix:
         """The matrix by rays."""
         if method == "qmc":
@@ -101,7 +117,7 @@ class MatrixMaker:
     def from_net(self, net: Net, samples: int) -> KernelMatrix:
         """The matrix by at least so many rays of a net."""
         found = net.sampled(samples, symmetrise=self.symmetrise)
-        return self._from_rays("qmc", found, f"spread of {PARTS} parts of a net, which is more exact than that")
+        return self._from_rays("qmc", found, f"spread of {PARTS} nets")
 
     def _from_rays(self, method: Method, found: tuple[SampledArray, int, float], how: str) -> KernelMatrix:
         array, used, lost = found
@@ -117,10 +133,14 @@ class MatrixMaker:
             raw_defect=array.raw_defect,
         )
 
-    def rows(self, law: WallLaw, useless: float, most_flights: int = QUICK_FLIGHTS) -> KernelMatrix:
+    def rows(
+        self, law: WallLaw, useless: float, most_flights: int = QUICK_FLIGHTS, largest_row: float = LARGEST_ROW
+    ) -> KernelMatrix:
         """The matrix by adaptive rows; unless they were asked for, within a second or so, if they can be of use."""
         limits = (MOST_FLIGHTS, None) if self.patient else (most_flights, useless)
-        symmetric, error, rays = row_matrix(law.wall, self.basis, self.tolerance, limits[0], useless=limits[1])
+        symmetric, error, rays = row_matrix(
+            law.wall, self.basis, self.tolerance, limits[0], useless=limits[1], largest_row=largest_row
+        )
         how = (
             f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
             "plus undecided entry points"

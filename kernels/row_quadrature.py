@@ -86,12 +86,19 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
 
 
 def row_matrix(
-    wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS, *, useless: float | None = None
+    wall: Wall,
+    basis: Basis,
+    tolerance: float,
+    most_flights: int = MOST_FLIGHTS,
+    *,
+    useless: float | None = None,
+    largest_row: float = LARGEST_ROW,
 ) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
     Where ``useless`` is given, it stops as soon as the first rows speak against an error below that with so many
-    flights, and rows without number are cut short; if it is infinite, only these.
+    flights, and rows without number are cut short, at the share ``largest_row`` of the flights; if it is infinite, only
+    these.
 
     A panel's error is half the difference of Kronrod's and Gauss's rule where the rows have a kink, and that difference
     scaled by what dividing the panel showed where they are smooth. Signs differ from panel to panel: their errors, and
@@ -103,7 +110,7 @@ def row_matrix(
         inner = Legendre(FEWEST_FUNCTIONS)
         share = min(SPREAD_MARGIN * max(basis.size - 1, 1) / (FEWEST_FUNCTIONS - 1), 1.0)
     wanted = None if useless is None else useless / share
-    matrix, error, rays = _Integrator(wall, inner, tolerance / share, most_flights, wanted).run()
+    matrix, error, rays = _Integrator(wall, inner, tolerance / share, most_flights, wanted, largest_row).run()
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), share * error, rays
 
 
@@ -118,7 +125,15 @@ def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_flights: int = 
 class _Integrator:
     """One matrix in the making."""
 
-    def __init__(self, wall: Wall, basis: Basis, tolerance: float, most_flights: int, useless: float | None) -> None:
+    def __init__(
+        self,
+        wall: Wall,
+        basis: Basis,
+        tolerance: float,
+        most_flights: int,
+        useless: float | None,
+        largest_row: float = LARGEST_ROW,
+    ) -> None:
         self.basis = basis
         self.tolerance = max(tolerance, 8.0 * EPS * basis.size)
         self.most_flights = most_flights
@@ -139,7 +154,7 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        longest = NO_LIMIT if useless is None else max(int(LARGEST_ROW * most_flights), LEAST_LARGEST_ROW)
+        longest = NO_LIMIT if useless is None else max(int(largest_row * most_flights), LEAST_LARGEST_ROW)
         self.rows = WallRows(wall, degree, inside, least, longest)
         edges = basis.edges
         if self.halved:
