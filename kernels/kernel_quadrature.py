@@ -239,11 +239,6 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
     return _until_settled(_action_levels(law, basis), tolerance)
 
 
-def action_is_affordable(law: HasAction, basis: Basis) -> bool:
-    """Whether the two coarsest levels of `action_matrix` take no more than about a second."""
-    return sum(_action_rule(law, basis, level)[2] for level in (0, 1)) <= MOST_APPLY_VALUES
-
-
 def _action_rule(law: HasAction, basis: Basis, level: int) -> tuple[Floats, int, int]:
     """Edges, order and number of values of basis functions of one level."""
     share = np.arange(1) if basis.is_partition else np.arange(4) / 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,20 +12,19 @@ from ..checks import Floats
 from ..errors import InputError
 from ..estimates import ErrorKind
 from ..rounding import EPS
-from .algebra import lists_branches
+from .algebra import holds_of_all, lists_branches
 from .arc_quadrature import arc_matrix
 from .basis import Basis
 from .bins import Bins
-from .branch_quadrature import branch_matrix
+from .branch_quadrature import branch_matrix, has_chain
 from .circular import CircularArcLaw
-from .composition import Composition, Power
 from .counting import SampledArray
 from .density import DensityLaw
 from .directions import Directions
 from .entry_quadrature import entry_matrix
 from .involution import InvolutionLaw
 from .isometry import table_of
-from .kernel_quadrature import action_is_affordable, action_matrix, density_matrix, map_matrix
+from .kernel_quadrature import action_matrix, density_matrix, map_matrix
 from .law import DrivenLaw, Law
 from .least_resistance import LeastResistanceLaw
 from .legendre import Legendre
@@ -36,6 +36,7 @@ from .reflection import mirror_refinement, reflection_matrix
 from .responses import responder
 from .row_quadrature import LARGEST_ROW, MOST_FLIGHTS, is_affordable, row_matrix
 from .sampling import independent_rays
+from .scattering_words import is_scattered, scattered_matrix
 from .specular_frame import SpecularFrame
 from .symmetry import SymmetryDefect
 from .table_quadrature import table_matrix
@@ -43,6 +44,7 @@ from .wall_choice import wall_matrix
 from .wall_law import WallLaw
 from .wall_rows import is_few
 from .weighted_sum import Combination
+from .words import Word, factors_of, law_of, words_of
 
 Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 
@@ -86,18 +88,12 @@ class MatrixMaker:
         closed_form = _replacement(law)
         if closed_form is not None and (method == "auto" or method in self.methods(closed_form)[:-1]):
             return self.make(closed_form, method)
+        if has_chain(law) and method != "monte-carlo":
+            return self._chained(law, method)
         if method != "auto":
             return self._made_by(law, method)
-        methods = self.methods(law)
-        if methods[0] == "exact":
-            try:
-                return self._exact(law)
-            except InputError:
-                # a composition with too many branches to list; it says so only when they are listed
-                methods = self.methods(law, isometries=False)
-        if isinstance(law, Combination) and methods[0] != "exact":
-            return self._sum(law, "auto")
-        return self._made_by(law, methods[0])
+        best = self.methods(law)[0]
+        return self._sum(law, "auto") if isinstance(law, Combination) and best != "exact" else self._made_by(law, best)
 
     def _of_wall(self, law: WallLaw) -> KernelMatrix:
         found = wall_matrix(self, law)
@@ -147,34 +143,36 @@ class MatrixMaker:
         )
         return self._result(symmetric, "quadrature", error + ROUNDING * self.basis.size, "estimate", how)
 
-    def methods(self, law: Law, isometries: bool = True) -> tuple[Method, ...]:
+    def methods(self, law: Law) -> tuple[Method, ...]:
         """The methods that a law has, the best first; ``"monte-carlo"``, which all have, last."""
         closed_form = _replacement(law)
         driven: tuple[Method, ...] = ("qmc",) if responder(law) is not None else ()
         found: tuple[Method, ...]
         if closed_form is not None:
             found = (*self.methods(closed_form)[:-1], *driven)
-        elif isometries and lists_branches(law):
+        elif has_chain(law):
+            found = _common([self._word_methods(word) for _, word in self._terms(law)])
+        elif lists_branches(law):
             found = ("exact", "quadrature", *driven)
         elif isinstance(law, Combination):
-            each = [self.methods(term) for _, term in law.terms_checked()]
-            found = tuple(name for name in SUMMABLE if all(name in names for names in each))
+            found = _common([self.methods(term) for _, term in law.terms_checked()])
         elif isinstance(law, SpecularFrame):
-            found = tuple(name for name in self.methods(law.law, isometries)[:-1] if name != "exact")
+            found = tuple(name for name in self.methods(law.law)[:-1] if name != "exact")
         elif isinstance(law, DrivenLaw):
             rows = isinstance(law, WallLaw) and is_affordable(law.wall, self.basis)
             accurate = isinstance(law, CircularArcLaw) or rows or self._acts_accurately(law)
             found = ("quadrature", "qmc") if accurate else ("qmc", "quadrature")
-        elif isinstance(law, (Composition, Power)):
-            found = ("quadrature",) if all(map(self._acts_accurately, _factors(law))) else ()
         else:
             found = ("quadrature", *driven)
         return (*dict.fromkeys(found), "monte-carlo")
 
-    def _made_by(self, law: Law, method: Method) -> KernelMatrix:
+    def _check_method(self, law: Law, method: Method) -> None:
         methods = self.methods(law)
-        if method not in methods:
+        if method != "auto" and method not in methods:
             raise InputError(f"method: {law!r} has no method {method!r}; it has {', '.join(methods)}")
+
+    def _made_by(self, law: Law, method: Method) -> KernelMatrix:
+        self._check_method(law, method)
         if method == "exact":
             return self._sum(law, method) if _is_sum_of_others(law) else self._exact(law)
         if method == "quadrature":
@@ -185,21 +183,89 @@ class MatrixMaker:
 
     def _exact(self, law: Law) -> KernelMatrix:
         table = table_of(law)
-        if table is not None:
-            symmetric, omitted = table_matrix(table, self.basis)
-            how, left = (
-                "masses and Gauss rules on every piece of the table of isometries, to rounding",
-                "unresolved beams",
-            )
-        else:
-            symmetric, omitted = branch_matrix(law, self.basis, self.tolerance)
-            how, left = "Gauss rules between the kinks of isometries, to rounding", "omitted kinks"
+        symmetric, omitted = self._isometric(law, self.basis)
+        how, left = (
+            ("masses and Gauss rules on every piece of the table of isometries, to rounding", "unresolved beams")
+            if table is not None
+            else ("Gauss rules between the kinks of isometries, to rounding", "omitted kinks")
+        )
         # two Markov kernels cannot be further apart than their norms together
         furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(self.basis.size))
-        size = self.basis.size
-        error = min(omitted + ROUNDING * size + DISPLACED * size**1.5, furthest)
+        error = min(omitted + _rounding(self.basis), furthest)
         found = self._result(symmetric, "exact", error, "bound", how + (f", plus {left}" if omitted else ""))
         return found if table is None else replace(found, unresolved=table.unresolved)
+
+    def _isometric(self, law: Law, basis: Basis) -> tuple[Floats, float]:
+        """The matrix of a law of isometries, and a bound of its error apart from rounding."""
+        table = table_of(law)
+        return branch_matrix(law, basis, self.tolerance) if table is None else table_matrix(table, basis)
+
+    # ---- laws one after the other ----------------------------------------------------------------------------
+    def _terms(self, law: Law) -> list[tuple[float, Word]]:
+        """The law as a sum of chains; as one chain, of sums too, where that would be too many."""
+        words = words_of(law)
+        return [(1.0, factors_of(law))] if words is None else [(weight, word) for word, weight in words.items()]
+
+    def _word_methods(self, word: Word) -> tuple[Method, ...]:
+        if _is_short(word):
+            return self.methods(law_of(word))
+        if all(map(lists_branches, word)):
+            return ("exact", "quadrature", "monte-carlo")
+        return ("quadrature", "monte-carlo") if all(map(_is_computable, word)) else ("monte-carlo",)
+
+    def _chained(self, law: Law, method: Method) -> KernelMatrix:
+        self._check_method(law, method)
+        terms = self._terms(law)
+        made = [(weight, self._word(word, method)) for weight, word in terms]
+        return made[0][1] if len(terms) == 1 else self._summed(made)
+
+    def _word(self, word: Word, method: Method) -> KernelMatrix:
+        """The matrix of a chain: by the first way that meets the tolerance, or else with the least error."""
+        if _is_short(word):
+            return self.make(law_of(word), method)
+        found: list[KernelMatrix] = []
+        reasons: list[InputError] = []
+        for way in self._ways(word, method):
+            try:
+                found.append(way(word))
+            except InputError as reason:
+                # more branches than can be listed, or panels than can be held
+                reasons.append(reason)
+            if found and float(found[-1].error) <= self.tolerance:
+                break
+        if not found:
+            raise reasons[-1]
+        return min(found, key=lambda matrix: float(matrix.error))
+
+    def _ways(self, word: Word, method: Method) -> list[Callable[[Word], KernelMatrix]]:
+        methods = self._word_methods(word)
+        ways: list[Callable[[Word], KernelMatrix]] = []
+        if method != "quadrature" and "exact" in methods:
+            ways.append(lambda chain: self._exact(law_of(chain)))
+        if method != "exact" and "quadrature" in methods:
+            if is_scattered(word):
+                ways.append(self._scattered)
+            ways.append(self._product)
+        return ways or [lambda chain: self.sampled(law_of(chain), "monte-carlo")]
+
+    def _scattered(self, word: Word) -> KernelMatrix:
+        def isometric(chain: Sequence[Law], basis: Basis) -> tuple[Floats, float]:
+            symmetric, omitted = self._isometric(law_of(tuple(chain)), basis)
+            return symmetric, omitted + _rounding(basis)
+
+        symmetric, error = scattered_matrix(word, self.basis, isometric)
+        how = "eigenvalues of scatterings between isometries, to rounding, plus omitted kinks and polynomials"
+        return self._result(symmetric, "quadrature", error, "estimate", how)
+
+    def _product(self, word: Word) -> KernelMatrix:
+        share = self.tolerance / (2.0 * len(word))
+
+        def make(law: Law, panels: Basis) -> KernelMatrix:
+            return replace(self, basis=panels, tolerance=share).make(law, "auto")
+
+        symmetric, error = product_matrix(word, self.basis, make, self.tolerance)
+        how = "what panels leave out between the factors, from their last coefficients, plus the factors' errors"
+        return self._result(symmetric, "quadrature", error + _rounding(self.basis), "estimate", how)
 
     def _quadrature(self, law: Law) -> KernelMatrix:
         if isinstance(law, Combination):
@@ -223,11 +289,6 @@ class MatrixMaker:
             how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
         elif isinstance(law, DrivenLaw) and not self._acts_accurately(law):
             symmetric, error = entry_matrix(law, self.basis, self.samples)
-        elif isinstance(law, (Composition, Power)) and (
-            self.basis.is_partition or not action_is_affordable(law, self.basis)
-        ):
-            symmetric, error = product_matrix(_factors(law), self.basis, self._on_finer)
-            how = "difference of products in bases of two and four times the size, plus the factors' errors"
         else:
             symmetric, error = action_matrix(law, self.basis, self.tolerance)
             if law.reversible:
@@ -237,7 +298,9 @@ class MatrixMaker:
         return self._result(symmetric, "quadrature", error, "estimate", how)
 
     def _sum(self, law: Law, method: Method) -> KernelMatrix:
-        terms = [(weight, self.make(term, method)) for weight, term in Combination.of(law).terms_checked()]
+        return self._summed([(weight, self.make(term, method)) for weight, term in Combination.of(law).terms_checked()])
+
+    def _summed(self, terms: list[tuple[float, KernelMatrix]]) -> KernelMatrix:
         total = sum((weight * matrix for weight, matrix in terms[1:]), start=terms[0][0] * terms[0][1])
         sampled = [(weight, matrix) for weight, matrix in terms if matrix.samples]
         single = sampled[0] if len(sampled) == 1 else None
@@ -262,26 +325,13 @@ class MatrixMaker:
             error=inner.error,
         )
 
-    def _on_finer(self, law: Law, finer: Basis) -> KernelMatrix:
-        return replace(self, basis=finer).make(law, "auto")
-
-    def _acts_accurately(self, law: Law) -> bool:
+    def _acts_accurately(self, law: DrivenLaw) -> bool:
         """Whether ``law.apply`` is accurate for the functions of the basis.
 
         A law driven by an entry point averages over a fixed rule, unless it has an `apply` of its own, which is then
         accurate for smooth functions: those of Legendre, not those with edges.
         """
-        if hasattr(law, "closed_form"):
-            return law.closed_form is not None and self._acts_accurately(law.closed_form)
-        if isinstance(law, CircularArcLaw):
-            return True
-        if isinstance(law, DrivenLaw):
-            return type(law)._apply is not DrivenLaw._apply and isinstance(self.basis, Legendre)
-        if isinstance(law, Combination):
-            return all(self._acts_accurately(term) for _, term in law.terms)
-        if isinstance(law, (Composition, Power)):
-            return all(map(self._acts_accurately, _factors(law)))
-        return self._acts_accurately(law.law) if isinstance(law, SpecularFrame) else True
+        return type(law)._apply is not DrivenLaw._apply and isinstance(self.basis, Legendre)
 
     def _result(self, symmetric: Floats, method: str, error: float, kind: ErrorKind, how: str) -> KernelMatrix:
         return KernelMatrix(symmetric, self.basis, frobenius_error(error, kind, how), method=method)
@@ -297,8 +347,29 @@ def _is_sum_of_others(law: Law) -> bool:
     return isinstance(law, Combination) and not lists_branches(law)
 
 
-def _factors(law: Composition | Power) -> tuple[Law, ...]:
-    return law.laws if isinstance(law, Composition) else (law.law,) * law.exponent
+def _common(each: Sequence[tuple[Method, ...]]) -> tuple[Method, ...]:
+    return tuple(name for name in SUMMABLE if all(name in names for names in each))
+
+
+def _is_short(word: Word) -> bool:
+    """Whether a chain is the identity, a single law, or that in the other frame."""
+    return len(word) < 2 or isinstance(law_of(word), SpecularFrame)
+
+
+def _is_computable(law: Law) -> bool:
+    """Whether no part of a law needs rays."""
+    return holds_of_all(
+        law,
+        lambda part: (
+            not isinstance(part, DrivenLaw)
+            or isinstance(part, CircularArcLaw)
+            or getattr(part, "exact_law", None) is not None
+        ),
+    )
+
+
+def _rounding(basis: Basis) -> float:
+    return float(ROUNDING * basis.size + DISPLACED * basis.size**1.5)
 
 
 def _scaled_defect(single: tuple[float, KernelMatrix], total: KernelMatrix) -> SymmetryDefect | None:

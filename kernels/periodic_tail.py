@@ -62,8 +62,13 @@ def sum_rule(count: Floats, nodes: int) -> tuple[Floats, Floats]:
 
 def first_crossing(basis: Basis) -> int:
     """The d, an even number, up to which the periods of a crevice are to be listed one by one for this basis."""
-    stiffness = basis.size if isinstance(basis, Legendre) else 0
+    stiffness = _stiffness(basis)
     return max(FIRST_CROSSING, stiffness + stiffness % 2)
+
+
+def _stiffness(basis: Basis) -> int:
+    """The number of polynomials in cos(theta) on the whole of (0, pi) that the basis has."""
+    return basis.size if isinstance(basis, Legendre) else int(getattr(basis, "polynomial_degree", 0))
 
 
 def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats, Floats, float]:
@@ -114,16 +119,17 @@ def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats,
 
 def _cells(basis: Basis) -> tuple[Floats, int, int]:
     """Angles below pi/2 at which blocks are cut, and the nodes that the functions of the basis need in addition."""
-    edges = basis.edges
+    number = int(np.ceil(np.pi * _stiffness(basis) / WIDEST))
+    regular = np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2]
     if isinstance(basis, Legendre):
-        number = int(np.ceil(np.pi * basis.size / WIDEST))
-        return np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2], MORE_BLOCK_NODES, MORE_HALF_NODES
-    both = np.unique(np.concatenate([edges, np.pi - edges]))
+        return regular, MORE_BLOCK_NODES, MORE_HALF_NODES
+    both = np.unique(np.concatenate([regular, basis.edges, np.pi - basis.edges]))
     cells = both[(both > 0.0) & (both < 0.5 * np.pi)]
-    if basis.is_partition:
-        return cells, 0, 0
-    extra = basis.degree if isinstance(basis, Panels) else basis.nodes_per_interval
-    return cells, extra + MORE_BLOCK_NODES, extra
+    first = getattr(basis, "first", basis)
+    extra = first.degree if isinstance(first, Panels) else 0 if first.is_partition else first.nodes_per_interval
+    if number:
+        return cells, extra + MORE_BLOCK_NODES, extra + MORE_HALF_NODES
+    return cells, extra + MORE_BLOCK_NODES if extra else 0, extra
 
 
 def _density(crossing: Floats, r: float) -> Floats:

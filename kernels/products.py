@@ -48,6 +48,10 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
     if basis.is_partition:
         add_masses(total, basis, cell_index(basis, incoming), cell_index(basis, outgoing), weight)
         return
+    own = getattr(basis, "add_products", None)
+    if own is not None:
+        own(total, incoming, outgoing, weight)
+        return
     if isinstance(basis, Panels):
         (source, values), (target, images) = basis.local(incoming), basis.local(outgoing)
         add_blocks(total, basis, source, target, values, weight[:, None] * images)
