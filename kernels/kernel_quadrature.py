@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..checks import Floats
 from ..errors import InputError
 from ..rounding import EPS
+from .angle_panels import NODES, AnglePanels
 from .basis import Basis
+from .legendre import Legendre
 from .measure import SINE, gauss_on_intervals, gauss_rule
 from .products import add_products, cell_index
 
@@ -32,6 +34,8 @@ MIRROR_TOLERANCE = 4.0 * EPS * np.pi
 CHUNK = 2**21
 # Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.
 ROW_CHUNK = 2**17
+# Kinks that panels begin with; the share of the tolerance that one of them may spend, and what rounding leaves.
+FIRST_KINKS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
 # Rows are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 BISECTIONS = 60
@@ -183,8 +187,9 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
     while pieces == 4 or pieces * edges.size * basis.nodes_per_interval <= MOST_MAP_POINTS:
         share = np.arange(pieces) / pieces
         fine = np.concatenate(((edges[:-1, None] + share * np.diff(edges)[:, None]).ravel(), [np.pi]))
-        if basis.is_partition:
+        if not isinstance(basis, Legendre):
             fine = np.unique(np.concatenate((fine, _crossings(map_angle, basis, fine))))
+        if basis.is_partition:
             angle, _ = gauss_rule(fine, 1)
             mass = SINE.mass(fine[:-1], fine[1:])
             total = np.zeros((basis.size, basis.size))
@@ -235,44 +240,36 @@ def _bisected(low: Floats, high: Floats, before: Callable[[Floats], NDArray[np.b
 
 
 def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, P e_j> by Gauss rules in theta between kinks, with P e_j from ``law.apply``: refined until it settles."""
-    return _until_settled(_action_levels(law, basis), tolerance)
+    """<e_i, P e_j> by Kronrod's rule in theta with P e_j from ``law.apply``, and an estimate of its Frobenius error.
 
-
-def _action_rule(law: HasAction, basis: Basis, level: int) -> tuple[Floats, int, int]:
-    """Edges, order and number of values of basis functions of one level."""
-    share = np.arange(1) if basis.is_partition else np.arange(4) / 4
-    split = (basis.edges[:-1, None] + share * np.diff(basis.edges)[:, None]).ravel()
+    Panels between edges and kinks are halved until each is settled or the work exceeds about a second. The error is the
+    sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
+    """
     try:
-        kinks = law.kinks(32 * 4**level)[0]
+        kinks = law.kinks(FIRST_KINKS)[0]
     except InputError:
         kinks = np.empty(0)
-    edges = np.unique(np.concatenate((split, [np.pi], GRAZING_EDGES, np.pi - GRAZING_EDGES, kinks)))
-    order = 2 if basis.is_partition else -(-basis.nodes_per_interval // 4)
-    order += 4 * level
-    return edges, order, (edges.size - 1) * order * _fan_out(law) * basis.size
-
-
-def _fan_out(law: HasAction) -> int:
-    return max(int(law.fan_out), 1)
-
-
-def _action_levels(law: HasAction, basis: Basis) -> Iterator[Floats]:
-    level, spent = 0, 0
-    step = max(1, CHUNK // (_fan_out(law) * basis.size))
-    while True:
-        edges, order, work = _action_rule(law, basis, level)
-        spent += work
-        if level >= 2 and spent > MOST_APPLY_VALUES:
-            return
-        angle, mass = SINE.quadrature(edges, order)
-        total = np.zeros((basis.size, basis.size))
-        for start in range(0, angle.size, step):
-            part = slice(start, start + step)
-            image = law.apply(basis.evaluate, angle[part])
-            total += basis.evaluate(angle[part]).T @ (mass[part, None] * image)
-        yield total
-        level += 1
+    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, kinks)))
+    low, high = edges[:-1], edges[1:]
+    total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0
+    values = NODES.size * basis.size * max(int(law.fan_out), 1)
+    while low.size:
+        spent += values * low.size
+        # the next round is twice as large at most
+        last = spent + 2 * values * low.size > MOST_APPLY_VALUES
+        settled = np.zeros(low.size, dtype=np.bool_)
+        step = max(1, CHUNK // max(values, basis.size**2))
+        for start in range(0, low.size, step):
+            panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
+            panels.image = law.apply(basis.evaluate, panels.angle)
+            difference = panels.differences(basis)
+            done = last | (difference <= max(PANEL_SHARE * tolerance, SETTLED))
+            settled[start : start + step] = done
+            total += panels.kept(done).values(basis).sum(axis=0)
+            error += float(difference[done].sum())
+        middle = 0.5 * (low + high)[~settled]
+        low, high = np.append(low[~settled], middle), np.append(middle, high[~settled])
+    return total, error
 
 
 def _until_settled(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:

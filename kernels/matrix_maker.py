@@ -291,6 +291,7 @@ class MatrixMaker:
             symmetric, error = entry_matrix(law, self.basis, self.samples)
         else:
             symmetric, error = action_matrix(law, self.basis, self.tolerance)
+            how = "difference of the rules of Gauss and Kronrod, panel by panel"
             if law.reversible:
                 # an under-resolved row of a reversible law shows as asymmetry
                 error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
