@@ -30,7 +30,7 @@ LARGEST_REPLICATES = 2**28
 # Of the dimensions in which eight parts seem to vary so many count. Where a few of them rule, their estimate is too
 # large: the coverage of simulated normal parts is 92 to 94 % then, 95 to 96 % where all are alike.
 SURE_DIMENSIONS = 0.8
-# Entries of a part that are compared with those of the others; of larger arrays some rows, which vary in fewer dimensions.
+# Entries of a part that are compared with those of the others; of larger arrays some rows, of fewer dimensions.
 MOST_COMPARED = 2**20
 WORST_NAMED = 8
 
