@@ -15,12 +15,11 @@ from ..kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ..kernels.algebra import Rules, fold, made_of_isometries
 from ..kernels.ideal import LambertianLaw
 from ..kernels.phase_function import HenyeyGreensteinLaw
-from .grazing import REMEMBERED, GrazingLimit, grazing_limit
+from .grazing import REMEMBERED, SWAP, GrazingLimit, grazing_limit
 
 if TYPE_CHECKING:
     from ..geometry import Wall
 
-SWAP = np.array([[0.0, 1.0], [1.0, 0.0]])
 # Entry points a short step apart leave by the same angle where all reflections are at straight pieces: rounding is
 # below this, and a curved piece turns the ray by the step over its radius, 1e-7 or more unless it is flat.
 STEP, SAME_ANGLE = 1e-7, 1e-11
@@ -131,9 +130,12 @@ def _leaf(law: Law) -> _Part:
         return _Part((1.0, 1.0), grazing, *errors, True, (note,))
     limit = grazing_limit(law)
     errors = (limit.error, limit.entry_error)
-    note = (
-        f"{law!r}: grazing rays, E[sin(theta)/sin(theta')] -> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
-    )
+    how = f"-> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
+    if not limit.resolved:
+        how = "has no limit that can be told in double precision, so the essential spectrum may reach 1"
+    elif limit.error == 0.0:
+        how += ", by the shape of the wall at y = 0"
+    note = f"{law!r}: grazing rays, E[sin(theta)/sin(theta')] {how}"
     if isinstance(law, DensityLaw):
         return _Part((0.0, 0.0), limit.matrix, *errors, False, (note, f"{law!r} has a density, taken as bounded"))
     if isinstance(law, InvolutionLaw):

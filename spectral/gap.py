@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..checks import positive_number
@@ -12,10 +14,11 @@ from ..rounding import EPS
 from .eigenvalues import Spectrum, spectrum
 from .essential import EssentialEdge, essential_edge
 from .gap_routes import enclosed_gap, rough_gap
-from .ideal_parts import ideal_spectrum
+from .ideal_parts import ideal_spectrum, without_identity
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .relaxation import largest_modulus
 from .separation import lambertian_share
+from .shallow import shallow_gap
 from .verdict import SpectralGap, Verdict, isolated, made_from
 
 
@@ -177,7 +180,27 @@ def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
 
 
 def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
+    """By what is known best: of shallow walls the form of 1 - P, else enclosures and matrices."""
+    share, rest = without_identity(law)
+    if share < 1.0:
+        own = SharedMatrices(matrices.rng)
+        return _scaled(_by_theorem(rest) or _by_refinement(rest, tolerance / share, own), share)
     edge = essential_edge(law)
+    small = shallow_gap(law, edge)
+    if small is not None and small.error <= tolerance:
+        return small
+    found = _by_matrices(law, tolerance, matrices, edge).cut_at_zero()
+    return small if small is not None and small.error < found.error else found
+
+
+def _scaled(found: SpectralGap, share: float) -> SpectralGap:
+    """The gap of (1 - share) + share R from that of R."""
+    reason = f"a share {share:.6g} of the law is R, the rest keeps all angles: the gap is {share:.6g} times that of R"
+    value, error = share * found.value, share * found.error + 4.0 * EPS * share * found.value
+    return replace(found, value=value, error=error, evidence=(reason, *found.evidence), spectrum=None)
+
+
+def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap:
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
         # the edge cannot be told from 1, and no eigenvalue fits between that the tolerance could tell
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))

@@ -62,7 +62,7 @@ def _gap_of_enclosures(law: Law, number: int, tolerance: float) -> SpectralGap |
     listed = [item for item in found if item.label == "indexed" and item.index]
     top = max(listed, key=lambda item: item.value, default=None)
     # nothing that is not listed is larger
-    if top is None or top.low <= max(found.separation.radius, 0.0):
+    if top is None or top.low <= max(found.separation.radius, 0.0) or top.high >= 1.0:
         return None
     gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
     return SpectralGap(gap, error, top.kind, f"indexed enclosure; {found.method}", "isolated", (str(top),), law.frame)

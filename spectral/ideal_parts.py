@@ -1,11 +1,12 @@
-"""The spectrum of laws made of specular reflection, retroreflection and Lambertian reflection."""
+"""What ideal laws in a law, specular and Lambertian reflection and retroreflection, say of its spectrum."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ..kernels import Law
+from ..kernels import Combination, Law, SpecularFrame
 from ..kernels.algebra import Rules, fold
 from ..kernels.ideal import IsometryLaw, LambertianLaw
 from ..rounding import EPS
@@ -75,3 +76,32 @@ def _chain(parts: Sequence[IdealSpectrum | None]) -> IdealSpectrum | None:
 
 def _turned(part: IdealSpectrum | None) -> IdealSpectrum | None:
     return None if part is None else IdealSpectrum(part.even, -part.odd, part.rounding)
+
+
+def without_identity(law: Law) -> tuple[float, Law]:
+    """1 - a and R of P = a 1 + (1 - a) R, where the structure of a law shows such an a > 0; else 1 and P itself.
+
+    The identity is retroreflection in the paper's convention, specular reflection in the other.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> without_identity(0.75 * ker.retroreflection() + 0.25 * ker.henyey_greenstein(0.5))
+    (0.25, henyey_greenstein(0.5))
+    """
+    turned = isinstance(law, SpecularFrame)
+    inner = law.law if isinstance(law, SpecularFrame) else law
+    inner = getattr(inner, "closed_form", None) or inner
+    if not isinstance(inner, Combination):
+        return 1.0, law
+    terms = [(weight, SpecularFrame.of(term) if turned else term) for weight, term in inner.terms_checked()]
+    rest = [(weight, term) for weight, term in terms if weight > 0.0 and not _keeps_angles(term)]
+    if not rest or len(rest) == sum(weight > 0.0 for weight, _ in terms):
+        return 1.0, law
+    share = math.fsum(weight for weight, _ in rest)
+    return share, rest[0][1] if len(rest) == 1 else Combination(tuple((weight / share, term) for weight, term in rest))
+
+
+def _keeps_angles(law: Law) -> bool:
+    inner = law.law if isinstance(law, SpecularFrame) else law
+    return isinstance(inner, IsometryLaw) and inner.retro == (law.frame == "paper")

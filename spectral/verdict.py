@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from ..estimates import Estimate
 from .eigenvalues import Spectrum
@@ -34,6 +36,14 @@ class SpectralGap(Estimate):
     convention: str
     spectrum: Spectrum | None = None
 
+    def cut_at_zero(self) -> SpectralGap:
+        """The part of the interval at or above 0: the norm of a law is 1, so that no gap is negative."""
+        low, high = self.value - self.error, max(self.value + self.error, 0.0)
+        if low >= 0.0 or high == np.inf:
+            return self
+        cut = f"a gap is never negative: the interval {self.value:.6g} +- {self.error:.2g} is cut at 0"
+        return replace(self, value=0.5 * high, error=0.5 * high, evidence=(*self.evidence, cut))
+
     def __str__(self) -> str:
         return f"{super().__str__()}, {self.verdict}, {self.convention} convention"
 
@@ -46,9 +56,9 @@ def made_from(found: Spectrum, how: str) -> str:
 def isolated(
     found: Spectrum, error: float, how: str, edge: EssentialEdge, convention: str, evidence: tuple[str, ...] = ()
 ) -> SpectralGap | None:
-    """The gap of a matrix as that of the law; None unless its interval lies beyond the essential spectrum."""
+    """The gap of a matrix as that of the law; None unless its interval lies between the essential spectrum and 1."""
     top = 1.0 - found.gap
-    if top - error <= edge.high:
+    if top - error <= edge.high or found.gap <= error:
         return None
     outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
     reasons = (*edge.reasons, *evidence, outside)
