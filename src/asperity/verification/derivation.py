@@ -1,83 +1,330 @@
-"""Exact derivations of equalities: by a normal form, by squares, or because a difference is constant.
+"""Exact derivations of equalities and inequalities on a domain, part by part.
+
+The domain is taken apart into its inside and its faces, and these at the places where a function jumps or bends. On
+each part both sides are resolved into smooth functions, and compared by a normal form, by squares, or because the
+derivative of their difference vanishes. A part on which a side is defined nowhere needs no proof.
 
 Imported only by functions, because it imports sympy.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
 
-from .domain import SIMPLE, Domain
-from .normal_form import Parameters, vanishes
+from .balls import Unclear, Undefined, evaluate
+from .domain import Domain, tightened
+from .normal_form import vanishes
+from .polyhedron import Inequality
+from .resolution import Resolution
+from .signs import NOT_NEGATIVE, POSITIVE, Part, is_continuous, is_infinite
+from .verdict import Verdict
+from .zeros import zeros
 
-# Functions that are continuous wherever they are defined, and analytic inside.
-_TRIGONOMETRIC = (sp.sin, sp.cos, sp.tan, sp.cot, sp.sec, sp.csc, sp.asin, sp.acos, sp.atan)
-_SMOOTH = (*_TRIGONOMETRIC, sp.exp, sp.log, sp.sinh, sp.cosh, sp.tanh)
-_CONTINUOUS = {*_SMOOTH, sp.Abs, sp.Max, sp.Min}
-PLACES = (*(sp.pi * sp.Rational(p, q) for p, q in ((1, 2), (1, 3), (1, 4), (1, 6), (2, 3))), 0, *SIMPLE[:3], -sp.pi / 4)
+# More parts than this, or parts of parts, are not looked at.
+PARTS = 400
+DEPTH = 8
+# Beyond so many operations an algebraic number is not examined.
+LARGEST_NUMBER = 60
+NUMBER_BITS = 256
+
+# A symbol of this beginning is half of an integer, which is not halved again.
+HALF = "half of "
+
+EXPANSION = "expansion"
+NORMAL_FORM = "polynomial normal form"
+SQUARES = "neither side is negative, and the polynomial normal forms of the squares agree"
+DERIVATIVE = "the derivative of the difference vanishes on a connected domain, and so does the difference at one point"
+ALGEBRAIC = "algebraic numbers"
+ANGLES = "the sine of the difference is 0, and the difference is small"
+SIGN = "the sign of the difference"
+
+Refute = Callable[[Domain, int], Verdict | None]
 
 
-def derive_equality(left: Any, right: Any, domain: Domain) -> str | None:
-    """Name the route by which left = right was derived on the whole of the domain's intervals, or return None.
+@dataclass
+class Derivation:
+    """The search for a proof of one relation between two sides.
 
-    The conditions that tie symbols together are not used: what is derived without them holds with them.
+    Parameters
+    ----------
+    left, right : sympy expressions
+    relation : {"==", "<=", "<"}
+    refute : callable
+        Looks for a counterexample on a part, among so many points.
     """
-    if sp.expand(left - right) == 0:
-        return "expansion"
-    if domain.closed and not _is_made_of_continuous_functions(left - right):
-        # the parameters leave out the ends, and at a jump nothing follows for them
+
+    left: Any
+    right: Any
+    relation: str
+    refute: Refute
+    routes: list[str] = field(default_factory=list)
+    reason: str = "no proof among the routes known"
+    _parts: int = 0
+
+    def verdict(self, domain: Domain) -> Verdict | None:
+        """Proved or refuted, or None with a `reason`."""
+        cells = domain.cells()
+        if cells is None:
+            self.reason = "the domain has too many faces"
+            return None
+        for cell in cells:
+            found = self._tried(cell, 0)
+            if found is not None or self._failed:
+                return found
+        return Verdict("proved", "; ".join(dict.fromkeys(self.routes)) or "defined nowhere on the domain")
+
+    _failed: bool = False
+
+    def _give_up(self, reason: str | None = None) -> None:
+        self._failed = True
+        self.reason = reason or self.reason
+
+    def _tried(self, domain: Domain, depth: int) -> Verdict | None:
+        try:
+            return self._on(domain, depth)
+        except sp.polys.polyerrors.BasePolynomialError as error:
+            self._give_up(f"sympy's polynomials do not serve: {error}")
+            return None
+
+    def _on(self, domain: Domain, depth: int) -> Verdict | None:
+        """A refutation on an open part, or None: then it is proved there, unless `_failed` is set."""
+        if domain.is_empty or not domain.has_allowed_values:
+            return None
+        self._parts += 1
+        if self._parts > PARTS:
+            self._give_up("too many parts")
+            return None
+        if depth:
+            refuted = self.refute(domain, 3)
+            if refuted is not None:
+                return refuted
+        box = boxed(domain)
+        if box.polyhedron.is_empty:
+            return None
+        values = dict(box.values)
+        left, right = (side.xreplace(values) for side in (self.left, self.right))
+        if is_infinite(left) or is_infinite(right):
+            return None
+        part = Part(box)
+        if self.relation == "==":
+            route = equal_as_written(left, right, part)
+            if route is not None:
+                self.routes.append(route)
+                return None
+        resolution = Resolution(part)
+        try:
+            left, right = resolution.resolved(left), resolution.resolved(right)
+        except Undefined:
+            return None
+        route = self._route(left, right, part)
+        if route is not None:
+            self.routes.append(route)
+            return None
+        places = [*resolution.undetermined, *resolution.limits]
+        if self.relation != "==":
+            # where the difference, or its slope, changes its sign
+            difference = right - left
+            slopes = [sp.diff(difference, symbol) for symbol in box.symbols]
+            arguments = [f.args[0] for f in sorted(difference.atoms(sp.Function), key=str)]
+            places += [difference, *slopes, *arguments, *box.symbols]
+        pieces = self._pieces(box, places) if depth < DEPTH else None
+        if pieces is None:
+            self._give_up()
+            return None
+        for piece in pieces:
+            found = self._tried(piece, depth + 1)
+            if found is not None or self._failed:
+                return found
         return None
-    parameters = Parameters(domain, half_angles=True)
-    if vanishes(left - right, Parameters(domain, half_angles=False)) or vanishes(left - right, parameters):
-        return "polynomial normal form"
-    if all(parameters.factored(side).is_nonnegative for side in (left, right)) and vanishes(
-        left**2 - right**2, parameters
-    ):
-        return "neither side is negative, and the polynomial normal forms of the squares agree"
-    if _is_constant(left - right, parameters) and any(
-        vanishes((left - right).subs(place), parameters) for place in _places(domain)
-    ):
-        return "the derivatives of the difference vanish on a connected domain, and so does it at one point"
+
+    def _route(self, left: Any, right: Any, part: Part) -> str | None:
+        if self.relation == "==":
+            return derive_equality(left, right, part)
+        difference = right - left
+        allowed = POSITIVE if self.relation == "<" else NOT_NEGATIVE
+        if part.thorough_signs(difference) <= allowed:
+            return SIGN
+        if self.relation == "<=" and derive_equality(left, right, part) is not None:
+            return NORMAL_FORM
+        return None
+
+    @staticmethod
+    def _pieces(domain: Domain, places: list[Any]) -> list[Domain] | None:
+        """The part cut at the zeros of the first expression that can be cut at."""
+        for e in dict.fromkeys(factor for place in places for factor in sp.Mul.make_args(place)):
+            symbols = [s for s in domain.symbols if e.has(s)]
+            if len(symbols) == 1 and e.free_symbols <= set(symbols):
+                (symbol,) = symbols
+                low, high, *_ = domain.interval(symbol)
+                try:
+                    cuts = zeros(e, symbol, low, high)
+                except (Undefined, Unclear):
+                    continue
+                if cuts:
+                    return _cut(domain, symbol, cuts)
+            elif len(symbols) > 1:
+                linear = Inequality.of(e, strict=True) or _linear_factor(e)
+                if linear is None:
+                    continue
+                opposite = Inequality.of(-linear.expression, strict=True)
+                assert opposite is not None
+                pieces = [domain.where(linear), domain.where(opposite), domain.on(linear)]
+                return [piece for piece in pieces if piece is not None]
+        for symbol in domain.symbols:
+            if symbol.is_integer and symbol.is_even is None and not str(symbol).startswith(HALF):
+                halves = [(sp.Dummy(f"{HALF}{symbol}", integer=True), rest) for rest in (0, 1)]
+                return [domain.replaced(symbol, 2 * half + rest, half) for half, rest in halves]
+        return None
+
+
+def _linear_factor(e: Any) -> Inequality | None:
+    if not e.is_polynomial():
+        return None
+    for factor in sp.Mul.make_args(sp.factor(e)):
+        linear = Inequality.of(factor.as_base_exp()[0], strict=True)
+        if linear is not None and linear.coefficients:
+            return linear
     return None
 
 
-def _is_made_of_continuous_functions(e: Any) -> bool:
-    # roots and logarithms jump only in the complex plane
-    return _CONTINUOUS.issuperset(f.func for f in e.atoms(sp.Function)) and not e.has(sp.I)
+def _cut(domain: Domain, symbol: Any, cuts: list[Any]) -> list[Domain]:
+    pieces = []
+    for low, high in pairwise([None, *cuts, None]):
+        piece = domain
+        if low is not None:
+            piece = piece.where(tightened(Inequality({symbol: sp.Integer(1)}, -low, strict=True)))
+        if high is not None:
+            piece = piece.where(tightened(Inequality({symbol: sp.Integer(-1)}, high, strict=True)))
+        # an integer may have few values left
+        cells = piece.cells() if symbol.is_integer else None
+        pieces += [piece] if cells is None else cells
+    points = [domain.fixed(symbol, cut) for cut in cuts]
+    return pieces + [point for point in points if point is not None]
 
 
-def _is_constant(difference: Any, parameters: Parameters) -> bool:
-    if not _is_continuous(difference, parameters):
+def boxed(domain: Domain) -> Domain:
+    """The domain with a new symbol for the slack of every inequality between symbols, as far as symbols suffice."""
+    slacks: set[Any] = set()
+    while True:
+        ties = [one for one in domain.inequalities if len(one.coefficients) > 1 and not slacks & set(one.coefficients)]
+        choice = next(
+            ((one, s) for one in ties for s in sorted(one.coefficients, key=str) if abs(one.coefficients[s]) == 1), None
+        )
+        if choice is None:
+            return domain
+        one, symbol = choice
+        slack = sp.Dummy(f"d_{symbol}", real=True)
+        slacks.add(slack)
+        value = sp.expand(symbol + (slack - one.expression) / one.coefficients[symbol])
+        domain = domain.replaced(symbol, value, slack)
+
+
+def expands_to_zero(difference: Any) -> bool:
+    return bool(sp.expand(difference, power_exp=False, log=False) == 0)
+
+
+def equal_as_written(left: Any, right: Any, part: Part) -> str | None:
+    """The route by which two sides are found equal without regard to branches."""
+    if expands_to_zero(left - right):
+        return EXPANSION
+    if vanishes(left - right, part.plain) or vanishes(left - right, part.parameters):
+        return NORMAL_FORM
+    return None
+
+
+def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -> str | None:
+    """The route by which two resolved sides are found equal on an open part, or None."""
+    route = equal_as_written(left, right, part)
+    if route is not None:
+        return route
+    difference = left - right
+    if not difference.free_symbols:
+        return _equal_numbers(difference)
+    if all(part.is_nonnegative(side) for side in (left, right)) and vanishes(left**2 - right**2, part.parameters):
+        return SQUARES
+    if differentiate:
+        for symbol in sorted(difference.free_symbols, key=str):
+            if _is_constant_along(difference, symbol, part) and _vanishes_somewhere(
+                difference, symbol, part, differentiate - 1
+            ):
+                return DERIVATIVE
+    return None
+
+
+def _is_constant_along(difference: Any, symbol: Any, part: Part) -> bool:
+    slope = sp.diff(difference, symbol)
+    if is_infinite(slope) or slope.has(sp.Derivative, sp.Subs, sp.DiracDelta):
         return False
-    return all(vanishes(sp.diff(difference, symbol), parameters) for symbol in difference.free_symbols)
+    return is_continuous(difference, part) and (
+        vanishes(slope, part.parameters) or vanishes(slope, part.plain) or _resolves_to_zero(slope, part)
+    )
 
 
-def _is_continuous(e: Any, parameters: Parameters) -> bool:
-    """Whether an expression is shown to be defined and continuous on the whole domain, and analytic inside."""
-    if not all(_is_continuous(part, parameters) for part in e.args):
+def _resolves_to_zero(slope: Any, part: Part) -> bool:
+    try:
+        return vanishes(Resolution(part).resolved(slope), part.parameters)
+    except Undefined:
         return False
-    if e.is_Function and e.func not in _SMOOTH:
+
+
+def _vanishes_somewhere(difference: Any, symbol: Any, part: Part, differentiate: int) -> bool:
+    """Whether the difference is 0 for one value of a symbol, inside or at an end up to which it is continuous."""
+    low, high, *_ = part.domain.interval(symbol)
+    inside = [place for place in _PLACES if bool(low < place) and bool(place < high)][:4]
+    if low.is_finite and high.is_finite:
+        inside.append((low + high) / 2)
+    for place, is_end in [(end, True) for end in (low, high) if end.is_finite] + [(p, False) for p in inside]:
+        face = part.domain.face(symbol, place)
+        there = difference.xreplace({symbol: place})
+        if face is None or face.polyhedron.is_empty or is_infinite(there):
+            continue
+        if is_end and not is_continuous(difference, part, (symbol, place)):
+            continue
+        on_face = Part(face)
+        try:
+            resolved = Resolution(on_face).resolved(there)
+        except Undefined:
+            continue
+        if derive_equality(resolved, sp.Integer(0), on_face, differentiate) is not None:
+            return True
+    return False
+
+
+_PLACES = (
+    sp.Integer(0), sp.Integer(1), sp.Rational(1, 2), sp.Integer(-1), sp.Rational(-1, 2), sp.Integer(2), sp.pi / 4,
+    sp.pi / 3, sp.pi / 6, sp.pi / 2, -sp.pi / 4,
+)  # fmt: skip
+
+
+def _equal_numbers(difference: Any) -> str | None:
+    """The route by which a number is found to be 0."""
+    try:
+        ball = evaluate(difference, {}, NUMBER_BITS).ball
+    except (Undefined, Unclear):
+        return None
+    if not ball.contains(0) or not abs(ball) < 1 or sp.count_ops(difference) > LARGEST_NUMBER:
+        return None
+    if difference.has(sp.asin, sp.acos, sp.atan):
+        sine = sp.expand_trig(sp.sin(sp.expand(difference)))
+        if not sine.has(sp.sin, sp.cos, sp.asin, sp.acos, sp.atan) and _is_algebraic_zero(sine):
+            return ANGLES
+        return None
+    return ALGEBRAIC if _is_algebraic_zero(difference) else None
+
+
+def _is_algebraic_zero(number: Any) -> bool:
+    number = sp.expand(number)
+    if number == 0:
+        return True
+    if not number.is_algebraic:
         return False
-    if e.func in (sp.asin, sp.acos):
-        return bool(parameters.factored(1 - e.args[0] ** 2).is_nonnegative)
-    if e.func is sp.log:
-        return bool(parameters.factored(e.args[0]).is_positive)
-    if e.func in (sp.tan, sp.sec):
-        return bool(parameters.factored(sp.cos(e.args[0])).is_nonzero)
-    if e.func in (sp.cot, sp.csc):
-        return bool(parameters.factored(sp.sin(e.args[0])).is_nonzero)
-    if e.is_Pow:
-        base = parameters.factored(e.base)
-        if e.exp.is_Integer:
-            return bool(e.exp > 0 or base.is_nonzero)
-        return bool(e.exp.is_Rational and (base.is_positive or (e.exp > 0 and base.is_nonnegative)))
-    return bool(e.is_Add or e.is_Mul or e.is_Function or e.is_Symbol or e.is_number)
-
-
-def _places(domain: Domain) -> list[dict[Any, Any]]:
-    """Points inside, at which inverse functions have known values."""
-    inside = {s: [p for p in PLACES if bool(low < p) and bool(p < high)] for s, (low, high) in domain.intervals.items()}
-    depth = min((len(values) for values in inside.values()), default=0)
-    return [{symbol: values[index] for symbol, values in inside.items()} for index in range(depth)]
+    unknown = sp.Dummy()
+    try:
+        return bool(sp.minimal_polynomial(number, unknown) == unknown)
+    except (NotImplementedError, sp.polys.polyerrors.BasePolynomialError):
+        return False

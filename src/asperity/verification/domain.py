@@ -1,105 +1,288 @@
-"""The domain of an identity: an interval for every symbol, and conditions that tie symbols together.
+"""The domain of an identity: real or integer symbols, inequalities between them, and further conditions.
 
 Imported only by functions, because it imports sympy.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
 from ..errors import InputError
+from .balls import Unclear, Undefined, is_true
+from .polyhedron import BITS, Inequality, Polyhedron, sign_of
 
 # Simple numbers first, because a counterexample of small numbers is read more easily.
 SIMPLE = tuple(sp.Rational(p, q) for q in (1, 2, 3, 5) for p in range(1, 16))
-RANDOM_POINTS = 24
+# At these an inverse function or a step has a known value, or a pole or a jump stands.
+SPECIAL = (0, 1, -1, sp.pi / 2, sp.pi, -sp.pi / 2, 2 * sp.pi, -sp.pi, sp.pi / 4, sp.pi / 3)
 # Some random points lie this close to an end of the interval, or this far out, on a logarithmic scale.
 CLOSEST = 1e-6
 FARTHEST = 1e4
-# So many simple numbers are tried for a symbol.
-SIMPLE_TRIES = 40
 # Random numbers are rounded to so many digits, or to more where the interval is shorter than that.
 DIGITS = (9, 17, 40)
-# A point of the domain is looked for so many times before the conditions are taken for empty.
-ATTEMPTS = 1000
+# So many points are tried for one that is found, before the conditions are taken for empty.
+ATTEMPTS = 40
+# Domains with more faces, and integers with more values, are not taken apart.
+FACES = 200
+VALUES = 24
 
 
 @dataclass(frozen=True)
 class Domain:
-    """Intervals, exact, one a symbol, taken without their ends; ``closed`` says that some end belongs to the domain.
+    """Where an identity is asked about, or a part of that.
 
-    ``conditions`` are the relations that are not the bound of one symbol.
+    Parameters
+    ----------
+    symbols : tuple of symbols
+        Those that vary, real.
+    inequalities : tuple of Inequality
+        Linear ones, in these symbols.
+    conditions : tuple of relations
+        All others, in the original symbols.
+    values : mapping
+        Symbols that do not vary here, as expressions in those that do.
+    original : tuple of symbols
+        Those of the whole domain, of which `points` gives the values.
     """
 
-    intervals: dict[Any, tuple[Any, Any]]
+    symbols: tuple[Any, ...]
+    inequalities: tuple[Inequality, ...] = ()
     conditions: tuple[Any, ...] = ()
-    closed: bool = False
+    values: Mapping[Any, Any] = field(default_factory=dict)
+    original: tuple[Any, ...] = ()
 
     @classmethod
-    def of(cls, symbols: Iterable[Any], assumptions: Iterable[Any]) -> Domain:
-        """Read the assumptions of the symbols themselves, and relations such as ``0 < theta``.
+    def of(cls, symbols: Iterable[Any], relations: Iterable[Any]) -> Domain:
+        """Read what the symbols carry, and relations.
 
         Raises
         ------
         InputError
-            If an assumption is no inequality, or a symbol is not real, or an interval is empty.
+            If a relation is no inequality, or a symbol is not real, or no point meets them.
         """
-        relations = [part for given in assumptions for part in _relations(given)]
-        every = set(symbols).union(*(relation.free_symbols for relation in relations))
-        intervals = {symbol: _own_interval(symbol) for symbol in sorted(every, key=str)}
-        conditions = []
-        closed = any(
-            (s.is_nonnegative and not s.is_positive) or (s.is_nonpositive and not s.is_negative) for s in every
-        )
+        relations = [part for given in relations for part in _parts(given)]
+        every = sorted(set(symbols).union(*(relation.free_symbols for relation in relations)), key=str)
+        inequalities = [bound for symbol in every for bound in _own_bounds(symbol)]
+        conditions = [sp.Ne(symbol, 0) for symbol in every if symbol.is_zero is False and symbol.is_extended_positive
+                      is not True and symbol.is_extended_negative is not True]  # fmt: skip
         for relation in relations:
-            bound = _bound(relation)
-            if bound is None:
+            linear = None
+            if not isinstance(relation, sp.Ne):
+                linear = Inequality.of(relation.gts - relation.lts, isinstance(relation, sp.Gt | sp.Lt))
+            if linear is None:
                 conditions.append(relation)
-                continue
-            symbol, low, high = bound
-            closed = closed or isinstance(relation, sp.Le | sp.Ge)
-            old_low, old_high = intervals[symbol]
-            intervals[symbol] = sp.Max(old_low, low), sp.Min(old_high, high)
-        for symbol, (low, high) in intervals.items():
-            if not bool(low < high):
-                raise InputError(f"assumptions: no value of {symbol} lies between {low} and {high}")
-        return cls(intervals, tuple(conditions), closed)
+            else:
+                inequalities.append(tightened(linear))
+        domain = cls(tuple(every), tuple(inequalities), tuple(conditions), {}, tuple(every))
+        if domain.is_empty:
+            raise InputError(f"assumptions: no point meets {', '.join(map(str, relations)) or 'them'}{_ranges(domain)}")
+        return domain
 
-    def points(self, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
-        """Rational points inside, simple ones first, that meet the conditions and what the symbols carry, exactly."""
+    @cached_property
+    def polyhedron(self) -> Polyhedron:
+        return Polyhedron(self.symbols, self.inequalities)
+
+    @cached_property
+    def is_empty(self) -> bool:
+        """Whether it is seen that no point lies in it."""
+        if self.polyhedron.is_empty:
+            return True
+        for symbol in self.symbols:
+            low, high, low_closed, high_closed = self.interval(symbol)
+            if symbol.is_integer and low.is_finite and high.is_finite:
+                numbers = range(int(sp.ceiling(low)), int(sp.floor(high)) + 1) if high - low < VALUES else None
+                inside = numbers is None or any(
+                    (low < n or (low_closed and low == n)) and (n < high or (high_closed and high == n))
+                    and has_properties(symbol, sp.Integer(n)) for n in numbers
+                )  # fmt: skip
+                if not inside:
+                    return True
+        return False
+
+    def interval(self, symbol: Any) -> tuple[Any, Any, bool, bool]:
+        """The ends between which a symbol varies, and whether they belong to the interval."""
+        if symbol not in self._intervals:
+            others = [s for s in self.symbols if s != symbol]
+            self._intervals[symbol] = Polyhedron([symbol, *others], self.inequalities).bounds(0, {})
+        return self._intervals[symbol]
+
+    @cached_property
+    def _intervals(self) -> dict[Any, tuple[Any, Any, bool, bool]]:
+        return {}
+
+    # ---- parts
+
+    def fixed(self, symbol: Any, value: Any) -> Domain | None:
+        """The part in which a symbol has a value, an expression in the others; None where it is not linear."""
+        inequalities = [one.substituted(symbol, value) for one in self.inequalities]
+        if None in inequalities:
+            return None
+        value = sp.sympify(value)
+        values = {s: v.xreplace({symbol: value}) for s, v in self.values.items()} | {symbol: value}
+        symbols = tuple(s for s in self.symbols if s != symbol)
+        return replace(self, symbols=symbols, inequalities=tuple(filter(None, inequalities)), values=values)
+
+    def face(self, symbol: Any, end: Any) -> Domain | None:
+        """What bounds it where a symbol reaches an end of its interval that no other symbol moves; None otherwise."""
+        if any(symbol in one.coefficients and len(one.coefficients) > 1 for one in self.inequalities):
+            return None
+        others = tuple(one for one in self.inequalities if symbol not in one.coefficients)
+        return replace(self, inequalities=others).fixed(symbol, end)
+
+    def where(self, one: Inequality) -> Domain:
+        """The part in which one more inequality holds."""
+        return replace(self, inequalities=(*self.inequalities, one))
+
+    def replaced(self, symbol: Any, value: Any, new: Any, inequalities: Iterable[Inequality] = ()) -> Domain:
+        """The same with ``symbol`` written as an expression in a new symbol."""
+        part = self.fixed(symbol, value)
+        assert part is not None
+        return replace(part, symbols=(*part.symbols, new), inequalities=(*part.inequalities, *inequalities))
+
+    def cells(self) -> list[Domain] | None:
+        """Open parts that make up the whole: the inside and the faces; None if there are too many.
+
+        An integer with few values is taken value by value, an even or odd one through its half.
+        """
+        parts = [self]
+        for symbol in self.symbols:
+            parts = [piece for part in parts for piece in part._by_integers(symbol)]
+        found: list[Domain] = []
+        for part in parts:
+            closed = [one for one in part.inequalities if not one.strict and one.coefficients]
+            if len(parts) * 2 ** len(closed) > FACES:
+                return None
+            for on_face in product((False, True), repeat=len(closed)):
+                cell: Domain | None = replace(
+                    part,
+                    inequalities=(
+                        *(one for one in part.inequalities if one.strict),
+                        *(replace(one, strict=True) for one, face in zip(closed, on_face, strict=True) if not face),
+                    ),
+                )
+                for one in (one for one, face in zip(closed, on_face, strict=True) if face):
+                    cell = cell.on(one) if cell is not None else None
+                if cell is not None and not cell.is_empty and cell.has_allowed_values:
+                    found.append(cell)
+        # the inside first
+        return sorted(found, key=lambda cell: -len(cell.symbols))
+
+    def _by_integers(self, symbol: Any) -> list[Domain]:
+        if not symbol.is_integer:
+            return [self]
+        low, high, *_ = self.interval(symbol)
+        if low.is_finite and high.is_finite and high - low < VALUES:
+            numbers = [sp.Integer(n) for n in range(int(sp.ceiling(low)), int(sp.floor(high)) + 1)]
+            return [part for n in numbers if has_properties(symbol, n) and (part := self.fixed(symbol, n)) is not None]
+        if symbol.is_even or symbol.is_odd:
+            half = sp.Dummy(str(symbol), integer=True)
+            return [self.replaced(symbol, 2 * half + (1 if symbol.is_odd else 0), half)]
+        return [self]
+
+    def on(self, one: Inequality) -> Domain | None:
+        """The part where the left side of an inequality is 0, None if there is none."""
+        here = Inequality.of(one.expression.xreplace(dict(self.values)), False)
+        assert here is not None
+        for symbol, coefficient in here.coefficients.items():
+            return self.fixed(symbol, sp.expand(symbol - here.expression / coefficient))
+        return self if sign_of(here.constant) == 0 else None
+
+    @property
+    def has_allowed_values(self) -> bool:
+        """Whether the values of the fixed symbols have the properties that the symbols carry, and meet conditions."""
+        fixed = {s: v for s, v in self.values.items() if not v.free_symbols}
+        if not all(has_properties(symbol, value) for symbol, value in fixed.items()):
+            return False
+        decided = [c for c in self.conditions if c.free_symbols and c.free_symbols <= set(fixed)]
+        return not any(_is_false(condition, fixed) for condition in decided)
+
+    # ---- points
+
+    def points(self, rng: np.random.Generator, count: int) -> Iterator[dict[Any, Any]]:
+        """Exact points, simple ones first, as values of the original symbols; each meets every condition."""
         found = 0
-        for attempt in range(ATTEMPTS):
-            simple = attempt < ATTEMPTS // 4 and found < RANDOM_POINTS // 2
-            point = {symbol: self._value(symbol, simple, rng) for symbol in self.intervals}
-            conditions_met = all(condition.xreplace(point) is sp.true for condition in self.conditions)
-            if conditions_met and all(_fits(symbol, value) for symbol, value in point.items()):
+        for attempt in range(ATTEMPTS * count):
+            point = self._point(rng, simple=attempt < 4 * count and found < count // 2)
+            if point is not None:
                 found += 1
                 yield point
-            if found >= RANDOM_POINTS:
+            if found >= count:
                 return
-        if not found and self.conditions:
-            raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, self.conditions))}")
 
-    def _value(self, symbol: Any, simple: bool, rng: np.random.Generator) -> Any:
-        low, high = self.intervals[symbol]
-        if simple:
-            for sign in rng.choice([-1, 1], SIMPLE_TRIES):
-                value = int(sign) * SIMPLE[rng.integers(len(SIMPLE))]
-                if bool(low < value) and bool(value < high) and _fits(symbol, value):
-                    return value
-        value = _between(float(low), float(high), rng)
-        if symbol.is_integer:
-            return sp.Integer(round(value))
-        for digits in DIGITS:
-            exact = sp.Rational(np.format_float_positional(value, digits, unique=False, fractional=False))
-            if bool(low < exact) and bool(exact < high):
-                return exact
-        # shorter than floats can tell
-        return sp.Rational(str(sp.N((low + high) / 2, DIGITS[-1])))
+    def _point(self, rng: np.random.Generator, simple: bool) -> dict[Any, Any] | None:
+        point: dict[Any, Any] = {}
+        for position, symbol in enumerate(self.symbols):
+            bounds = self.polyhedron.bounds(position, point)
+            value = _number(symbol, bounds, simple, rng)
+            if value is None:
+                return None
+            point[symbol] = value
+        point |= {s: value.xreplace(point) for s, value in self.values.items()}
+        whole = {s: point[s] for s in self.original}
+        return whole if self.allows(whole) else None
+
+    def allows(self, point: Mapping[Any, Any]) -> bool:
+        """Whether a point of the original symbols has their properties and certainly meets the conditions."""
+        try:
+            return all(has_properties(s, value) for s, value in point.items()) and all(
+                is_true(condition, point, BITS) for condition in self.conditions
+            )
+        except (Undefined, Unclear):
+            return False
+
+
+def has_properties(symbol: Any, value: Any) -> bool:
+    """Whether a number has the properties that a symbol carries: even, say, or not zero."""
+    return all(getattr(value, f"is_{name}") in (given, None) for name, given in symbol.assumptions0.items())
+
+
+def _is_false(condition: Any, point: Mapping[Any, Any]) -> bool:
+    try:
+        return not is_true(condition, point, BITS)
+    except Undefined:
+        return True
+    except Unclear:
+        return False
+
+
+def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng: np.random.Generator) -> Any:
+    low, high, low_closed, high_closed = bounds
+    ends = [end for end, closed in ((low, low_closed), (high, high_closed)) if closed]
+    if low == high:
+        return low if ends else None
+    if ends and rng.random() < 0.2:
+        return ends[rng.integers(len(ends))]
+    if simple:
+        for _ in range(20):
+            value = sp.sympify(SPECIAL[rng.integers(len(SPECIAL))]) if rng.random() < 0.3 else (
+                int(rng.choice([-1, 1])) * SIMPLE[rng.integers(len(SIMPLE))]
+            )  # fmt: skip
+            if bool(low < value) and bool(value < high) and has_properties(symbol, value):
+                return value
+    value = _between(float(low), float(high), rng)
+    if symbol.is_integer:
+        # small ones, or as far out as other numbers
+        number = sp.Integer(round(value) if rng.random() < 0.5 else int(rng.integers(-3, 4)))
+        if symbol.is_even is not None and symbol.is_even != number.is_even:
+            number += 1
+        inside = (low < number or (low_closed and low == number)) and (
+            number < high or (high_closed and number == high)
+        )
+        return number if bool(inside) else None
+    for digits in DIGITS:
+        exact = sp.Rational(np.format_float_positional(value, digits, unique=False, fractional=False))
+        if bool(low < exact) and bool(exact < high):
+            return exact
+    # shorter than floats can tell
+    middle = (low + high) / 2
+    return middle if middle.is_Rational else sp.Rational(str(sp.N(middle, DIGITS[-1])))
 
 
 def _between(low: float, high: float, rng: np.random.Generator) -> float:
@@ -114,46 +297,50 @@ def _between(low: float, high: float, rng: np.random.Generator) -> float:
     return low + (high - low) * (share if rng.random() < 0.5 else 1.0 - share)
 
 
-def _fits(symbol: Any, value: Any) -> bool:
-    """Whether a number has the properties that a symbol carries: even, say, or not zero."""
-    return all(getattr(value, f"is_{name}") in (given, None) for name, given in symbol.assumptions0.items())
-
-
 def _logarithmic(rng: np.random.Generator, top: float) -> float:
     return float(np.exp(rng.uniform(np.log(CLOSEST), np.log(top))))
 
 
-def _relations(given: Any) -> list[Any]:
+def _parts(given: Any) -> list[Any]:
     given = sp.sympify(given)
     if given is sp.true:
         return []
+    if given is sp.false:
+        raise InputError("assumptions: no point meets them, because one is false")
     if isinstance(given, sp.And):
-        return [part for argument in given.args for part in _relations(argument)]
-    if isinstance(given, sp.Ne) or (isinstance(given, sp.core.relational.Relational) and not isinstance(given, sp.Eq)):
+        return [part for argument in given.args for part in _parts(argument)]
+    if isinstance(given, sp.Ne | sp.Lt | sp.Le | sp.Gt | sp.Ge):
         return [given]
     raise InputError(
         f"assumptions: expected inequalities such as 0 < theta, got {given!r}; substitute equations in both sides first"
     )
 
 
-def _own_interval(symbol: Any) -> tuple[Any, Any]:
-    if symbol.is_real is False:
-        raise InputError(f"{symbol}: expected a real symbol, because identities are verified over the real numbers")
+def _own_bounds(symbol: Any) -> list[Inequality]:
     if symbol.is_zero:
         raise InputError(f"{symbol}: expected a symbol that may differ from 0; substitute 0 for it in both sides")
     if symbol.is_nonnegative:
-        return sp.Integer(0), sp.oo
+        return [tightened(Inequality({symbol: sp.Integer(1)}, sp.Integer(0), bool(symbol.is_positive)))]
     if symbol.is_nonpositive:
-        return -sp.oo, sp.Integer(0)
-    return -sp.oo, sp.oo
+        return [tightened(Inequality({symbol: sp.Integer(-1)}, sp.Integer(0), bool(symbol.is_negative)))]
+    return []
 
 
-def _bound(relation: Any) -> tuple[Any, Any, Any] | None:
-    if isinstance(relation, sp.Ne):
-        return None
-    small, large = relation.lts, relation.gts
-    if large.is_Symbol and small.is_number:
-        return large, small, sp.oo
-    if small.is_Symbol and large.is_number:
-        return small, -sp.oo, large
-    return None
+def tightened(one: Inequality) -> Inequality:
+    """A bound of one integer moved to the next integer, which then belongs to it."""
+    if len(one.coefficients) != 1:
+        return one
+    ((symbol, coefficient),) = one.coefficients.items()
+    if not symbol.is_integer:
+        return one
+    end = one.end(symbol, {})
+    if coefficient > 0:
+        end = sp.floor(end) + 1 if one.strict else sp.ceiling(end)
+        return Inequality({symbol: sp.Integer(1)}, -end, False)
+    end = sp.ceiling(end) - 1 if one.strict else sp.floor(end)
+    return Inequality({symbol: sp.Integer(-1)}, end, False)
+
+
+def _ranges(domain: Domain) -> str:
+    empty = [s for s in domain.symbols if s.is_integer]
+    return f" ({', '.join(map(str, empty))} integer)" if empty else ""

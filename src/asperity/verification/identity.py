@@ -1,4 +1,4 @@
-"""Identities of a user's own: proved, refuted with a counterexample, or undecided."""
+"""Identities and inequalities of a user's own: proved, refuted with a counterexample, or undecided."""
 
 from __future__ import annotations
 
@@ -8,37 +8,50 @@ from typing import Any
 from ..errors import InputError
 from .verdict import Verdict, every
 
-SEED = 0
+TIME_LIMIT = 10.0
+# Points at which both sides are compared before a proof is sought.
+POINTS = 24
 
 
-def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[Any, Any]] = ()) -> Verdict:
-    """Decide whether two expressions are equal wherever both are defined.
+def verify(
+    lhs: Any,
+    rhs: Any = None,
+    assumptions: Iterable[Any] | Mapping[Any, tuple[Any, Any]] = (),
+    *,
+    time_limit: float | None = TIME_LIMIT,
+) -> Verdict:
+    """Decide whether two expressions are equal wherever both are defined and real, or whether an inequality holds.
 
     Parameters
     ----------
     lhs, rhs : sympy expressions, numbers, matrices or nested sequences of them
         Both of one shape; they are compared entry by entry. Decimal numbers are taken as the fractions that they are
-        in binary.
+        in binary. ``lhs`` may be a relation such as ``a <= b`` instead, or a sequence of them; then there is no
+        ``rhs``, and the assumptions may stand second.
     assumptions : sympy relation, iterable of them, or mapping from symbols to open intervals
-        Inequalities such as ``0 < theta`` or ``theta < sympy.pi``, or ``{theta: (0, sympy.pi)}``, beside what the
-        symbols themselves carry (``positive=True``). Symbols stand for real numbers.
+        Inequalities such as ``0 < theta`` or ``x <= y``, or ``{theta: (0, sympy.pi)}``, beside what the symbols
+        themselves carry (``positive=True``, ``integer=True``). Symbols stand for real numbers.
+    time_limit : float or None
+        Seconds after which the answer is ``"undecided"``. The work is done in a process of its own, which is ended
+        then; it is started with the first call, which takes about a second, and kept. None: no limit, and no process.
 
     Returns
     -------
     Verdict
-        ``"proved"`` rests on an exact derivation. ``"refuted"`` has a rational counterexample that meets the
-        assumptions, and both values there. ``"undecided"`` means that neither was found: no counterexample among the
-        points tried, no proof among the routes known.
+        ``"proved"`` rests on an exact derivation. ``"refuted"`` has a counterexample: an exact point that meets the
+        assumptions, at which both sides are defined and balls that contain their values show that the relation fails.
+        ``"undecided"`` names the reason.
 
     Raises
     ------
     InputError
-        If the shapes differ, an assumption is not an inequality, or no point meets the assumptions.
+        If the shapes differ, an assumption is not an inequality, no point meets the assumptions, or at none of the
+        points of the domain that were looked at both sides are defined and real.
 
     Notes
     -----
-    Sums and products of sines take tenths of a second. Roots and absolute values of sums of angles are factored, which
-    may take a minute before the answer is *undecided*; bounds for the angles and fewer of them help.
+    An expression is defined at a point where it and all its parts are real numbers, with the conventions of sympy:
+    0**0 is 1, the cube root of -1 is not real, sign(0) is 0, and ``acot`` jumps at 0.
 
     Examples
     --------
@@ -49,42 +62,120 @@ def verify(lhs: Any, rhs: Any, assumptions: Iterable[Any] | Mapping[Any, tuple[A
     >>> verdict = verify(sympy.sqrt(m**2), -m)
     >>> verdict.answer, sorted(verdict.counterexample)
     ('refuted', ['m'])
+    >>> verify(sympy.sin(m) <= m).answer
+    'proved'
     """
     import sympy as sp
 
+    if rhs is None or _are_relations(sp, lhs):
+        if rhs is not None and assumptions != ():
+            raise InputError("rhs: expected none beside a relation; assumptions are the second argument then")
+        claims, given = _relations_as_claims(sp, lhs), assumptions if rhs is None else rhs
+    else:
+        claims, given = _equations(sp, lhs, rhs), assumptions
+    if time_limit is None:
+        return decide(claims, _relations(sp, given))
+    if not time_limit > 0:
+        raise InputError(f"time_limit: expected a positive number of seconds or None, got {time_limit!r}")
+    from .worker import decide_in_time
+
+    return decide_in_time(claims, _relations(sp, given), float(time_limit))
+
+
+def decide(claims: list[tuple[Any, Any, str]], relations: list[Any]) -> Verdict:
+    """The verdict on claims (left, right, "==", "<=" or "<"), all on the same assumptions."""
+    verdicts = []
+    for claim in claims:
+        verdicts.append(_decided(*claim, relations))
+        if verdicts[-1].answer == "refuted":
+            break
+    return every(*verdicts)
+
+
+def _are_relations(sp: Any, side: Any) -> bool:
+    if isinstance(side, list | tuple):
+        return bool(side) and all(_are_relations(sp, part) for part in side)
+    return isinstance(side, sp.logic.boolalg.Boolean | bool) and not isinstance(side, sp.Symbol)
+
+
+def _relations_as_claims(sp: Any, given: Any) -> list[tuple[Any, Any, str]]:
+    if isinstance(given, list | tuple):
+        return [claim for part in given for claim in _relations_as_claims(sp, part)]
+    if isinstance(given, sp.And):
+        return [claim for part in given.args for claim in _relations_as_claims(sp, part)]
+    if given in (True, False, sp.true, sp.false):
+        # sympy has decided it, or python has
+        return [(sp.Integer(0), sp.Integer(0 if given else 1), "==")]
+    kinds = {sp.Eq: "==", sp.Le: "<=", sp.Ge: "<=", sp.Lt: "<", sp.Gt: "<"}
+    if type(given) not in kinds:
+        raise InputError(f"lhs: expected two sides, or a relation such as a <= b, got {given!r} alone")
+    left, right = (_exact(sp, side) for side in given.args)
+    return [
+        (right, left, kinds[type(given)]) if isinstance(given, sp.Ge | sp.Gt) else (left, right, kinds[type(given)])
+    ]
+
+
+def _equations(sp: Any, lhs: Any, rhs: Any) -> list[tuple[Any, Any, str]]:
     left, right = _entries(sp, lhs), _entries(sp, rhs)
     if len(left) != len(right):
         raise InputError(f"lhs, rhs: expected one shape, got {len(left)} and {len(right)} entries")
     if isinstance(lhs, sp.MatrixBase) and isinstance(rhs, sp.MatrixBase) and lhs.shape != rhs.shape:
         raise InputError(f"lhs, rhs: expected matrices of one shape, got {lhs.shape} and {rhs.shape}")
-    given = _relations(sp, assumptions)
-    return every(*(_decided(a, b, given) for a, b in zip(left, right, strict=True)))
+    return [(a, b, "==") for a, b in zip(left, right, strict=True)]
 
 
 def _entries(sp: Any, side: Any) -> list[Any]:
     if isinstance(side, sp.MatrixBase | list | tuple):
         return [entry for part in side for entry in _entries(sp, part)]
-    return [sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(e))]
+    return [_exact(sp, side)]
+
+
+def _exact(sp: Any, side: Any) -> Any:
+    return sp.sympify(side, rational=False).replace(lambda e: e.is_Float, lambda e: sp.Rational(e))
 
 
 def _relations(sp: Any, assumptions: Any) -> list[Any]:
     if isinstance(assumptions, Mapping):
         return [side for symbol, (low, high) in assumptions.items() for side in (low < symbol, symbol < high)]
-    return [assumptions] if isinstance(assumptions, sp.Basic) else list(assumptions)
+    return [assumptions] if isinstance(assumptions, sp.Basic | bool) else list(assumptions)
 
 
-def _decided(left: Any, right: Any, assumptions: list[Any]) -> Verdict:
-    import numpy as np
+def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Verdict:
+    import sympy as sp
 
-    from .derivation import derive_equality
+    from .derivation import EXPANSION, Derivation, expands_to_zero
     from .domain import Domain
-    from .refutation import refute_equality
+    from .integrals import prepared
+    from .refutation import Search
 
-    domain = Domain.of(left.free_symbols | right.free_symbols, assumptions)
-    refuted = refute_equality(left, right, domain.points(np.random.default_rng(SEED)))
-    if refuted is not None:
-        return refuted
-    route = derive_equality(left, right, domain)
-    if route is not None:
-        return Verdict("proved", route)
-    return Verdict("undecided", "no counterexample among the points tried, and no proof among the routes known")
+    relations = [sp.sympify(given).replace(lambda e: e.is_Float, lambda e: sp.Rational(e)) for given in assumptions]
+    symbols = set(left.free_symbols | right.free_symbols).union(*(given.free_symbols for given in relations))
+    real = {symbol: _as_real(sp, symbol) for symbol in symbols}
+    domain = Domain.of(real.values(), [given.xreplace(real) for given in relations])
+    left, right = (prepared(side.xreplace(real), domain) for side in (left, right))
+    search = Search(left, right, relation, domain)
+    derivation = Derivation(left, right, relation, search.refutation)
+    expands = relation == "==" and expands_to_zero(left - right)
+    found = search.refutation(domain, POINTS, until_defined=expands)
+    if expands and found is None and search.defined:
+        return Verdict("proved", EXPANSION)
+    if not search.tried:
+        raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, relations))}")
+    if found is None:
+        found = derivation.verdict(domain)
+    if search.undefined == search.tried or (found is not None and found.answer == "proved" and not derivation.routes):
+        raise InputError(
+            f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {left} and {right}, and at "
+            f"each of {search.tried} points one of them is not"
+        )
+    if found is None:
+        found = Verdict("undecided", f"no counterexample among {search.tried} points, and {derivation.reason}")
+    names = {str(stand_in): str(symbol) for symbol, stand_in in real.items()}
+    place = {names.get(name, name): value for name, value in found.counterexample.items()}
+    return Verdict(found.answer, found.evidence, place, found.values)
+
+
+def _as_real(sp: Any, symbol: Any) -> Any:
+    if symbol.is_real is False:
+        raise InputError(f"{symbol}: expected a real symbol, because identities are verified over the real numbers")
+    return symbol if symbol.is_real else sp.Dummy(symbol.name, **{**symbol._assumptions_orig, "real": True})

@@ -29,12 +29,20 @@ _BY_SINES = {
 }
 
 
+# Sine and cosine of inverse functions, wherever these are defined.
+_OF_INVERSE = {
+    sp.asin: lambda x: (x, sp.sqrt(1 - x**2)),
+    sp.acos: lambda x: (sp.sqrt(1 - x**2), x),
+    sp.atan: lambda x: (x / sp.sqrt(1 + x**2), 1 / sp.sqrt(1 + x**2)),
+}
+
+
 def vanishes(expression: Any, parameters: Parameters) -> bool:
     """Whether the normal form is 0, which proves that the expression is: on open intervals, and where it is continuous
     at their ends too."""
     e = parameters.normal(expression)
     # functions without a normal form of their own: equal ones have become one expression
-    e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function) if f.func is not sp.Abs})
+    e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function, sp.Max, sp.Min) if f.func is not sp.Abs})
     roots: dict[Any, tuple[Any, int]] = {}
     e = _without_roots(e, roots)
     e = sp.together(e).as_numer_denom()[0]
@@ -43,6 +51,8 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
         e = _reduced(e, root, index, radicand)
     for cosine, sine in parameters.circles.values():
         e = _reduced(e, sine, 2, 1 - cosine**2)
+    for sign in parameters.alternations:
+        e = _reduced(e, sign, 2, sp.Integer(1))
     return bool(sp.expand(e) == 0)
 
 
@@ -60,14 +70,26 @@ class Parameters:
         self._angles: dict[Any, tuple[Any, Any]] = {}
         self._exponentials: dict[Any, Any] = {}
         self._divisors: dict[Any, int] = {}
+        self._alternations: dict[Any, Any] = {}
         self.circles: dict[Any, tuple[Any, Any]] = {}
+
+    @property
+    def alternations(self) -> tuple[Any, ...]:
+        """What stands for powers of -1."""
+        return tuple(self._alternations.values())
+
+    def _interval(self, symbol: Any) -> tuple[Any, Any]:
+        if symbol not in self._domain.symbols:
+            return -sp.oo, sp.oo
+        low, high, *_ = self._domain.interval(symbol)
+        return low, high
 
     def normal(self, e: Any) -> Any:
         """The expression in the parameters, roots and absolute values drawn apart into factors of known sign."""
         for function, by_sines in _BY_SINES.items():
             e = e.replace(function, by_sines)
-        e = e.replace(lambda p: p.func is sp.exp and p.has(sp.I), lambda p: sp.expand(p, complex=True))
-        arguments = {f.args[0] for f in e.atoms(sp.sin, sp.cos, sp.exp)}
+        arguments = {f.args[0] for f in e.atoms(sp.sin, sp.cos)}
+        arguments |= {argument for f in e.atoms(sp.exp, sp.Pow) if (argument := self._exponent(f)) is not None}
         changed = False
         for argument in arguments:
             for share, unit in _terms(argument):
@@ -88,15 +110,14 @@ class Parameters:
     def _rebuilt(self, e: Any) -> Any:
         if e.is_Symbol:
             if e not in self._numbers:
-                self._numbers[e] = _running(self._domain.intervals.get(e, (-sp.oo, sp.oo)), e)
+                self._numbers[e] = _running(self._interval(e), e)
             return self._numbers[e]
         if e.func in (sp.sin, sp.cos):
             sine, cosine = self._sine_and_cosine(e.args[0])
             return sine if e.func is sp.sin else cosine
-        if e.func is sp.exp:
-            return sp.Mul(
-                *(self._exponential(unit) ** (share * self._divisors[unit]) for share, unit in _terms(e.args[0]))
-            )
+        exponent = self._exponent(e)
+        if exponent is not None:
+            return sp.Mul(*(self._exponential(share, unit) for share, unit in _terms(exponent)))
         if not e.args:
             return e
         if not _is_arithmetic(e):
@@ -105,6 +126,11 @@ class Parameters:
         parts = [self._rebuilt(part) for part in e.args]
         if e.is_Pow and parts[1].is_Rational and not parts[1].is_Integer:
             return _power(parts[0], parts[1])
+        if e.is_Pow and e.base == -1 and e.exp.is_integer:
+            return self._alternating(e.exp)
+        if e.is_Pow and not parts[1].is_Rational:
+            # equal to what is written alike: it jumps where its base is 0
+            return self._opaque.setdefault((parts[0], parts[1]), sp.Dummy("p"))
         if e.func is sp.Abs:
             return sp.Mul(*(_absolute(factor) ** times for factor, times in _factors(parts[0])))
         if e.func is sp.log:
@@ -135,22 +161,57 @@ class Parameters:
 
     def _unit_circle(self, unit: Any) -> tuple[Any, Any]:
         """Sine and cosine of ``unit`` divided by its divisor."""
+        if unit not in self._angles and unit.func in _OF_INVERSE and self._divisors[unit] == 1:
+            self._angles[unit] = tuple(self._rebuilt(part) for part in _OF_INVERSE[unit.func](unit.args[0]))
         if unit not in self._angles:
-            low, high = self._domain.intervals.get(unit, (-sp.oo, sp.oo))
-            low, high = low / self._divisors[unit], high / self._divisors[unit]
+            low, high = (end / self._divisors[unit] for end in self._interval(unit))
             low, high = _plain_end(low, sp.floor), _plain_end(high, sp.ceiling)
+            # half turns by which the interval is brought between -pi and pi
+            turns = sp.floor(low / sp.pi) + (1 if high - low > sp.pi else 0) if (high - low).is_finite else 0
+            low, high = low - turns * sp.pi, high - turns * sp.pi
             if self._half_angles and bool(low >= -sp.pi) and bool(high <= sp.pi):
                 ends = (sp.tan(low / 2) if low != -sp.pi else -sp.oo, sp.tan(high / 2) if high != sp.pi else sp.oo)
                 t = _running(ends, unit)
-                self._angles[unit] = 2 * t / (1 + t**2), (1 - t**2) / (1 + t**2)
+                sign = -1 if turns % 2 else 1
+                self._angles[unit] = sign * 2 * t / (1 + t**2), sign * (1 - t**2) / (1 + t**2)
             else:
                 cosine, sine = sp.Dummy("c", real=True), sp.Dummy("s", real=True)
                 self.circles[unit] = cosine, sine
                 self._angles[unit] = sine, cosine
         return self._angles[unit]
 
-    def _exponential(self, unit: Any) -> Any:
-        return self._exponentials.setdefault(unit, sp.Dummy("E", positive=True))
+    def _exponent(self, e: Any) -> Any:
+        """u where e is exp(u), or a power of a positive base that is none of the rational powers; else None."""
+        if e.func is sp.exp:
+            return e.args[0]
+        if not e.is_Pow or e.exp.is_Rational:
+            return None
+        if e.base.is_Rational and e.base > 0:
+            return e.exp * sp.Add(*(k * sp.log(p) for p, k in sp.factorrat(e.base).items()))
+        is_positive = e.base.is_positive or (e.base.is_Symbol and bool(self._interval(e.base)[0] >= 0))
+        return e.exp * sp.log(e.base) if is_positive else None
+
+    def _alternating(self, exponent: Any) -> Any:
+        """(-1) to the power of an integer."""
+        found = sp.Integer(1)
+        for share, unit in _terms(exponent):
+            if not (share.is_Integer and unit.is_integer):
+                return self._opaque.setdefault(((-1), exponent), sp.Dummy("p"))
+            if unit == 1:
+                found *= (-1) ** share
+            elif share % 2:
+                # a pair (c, 0) with c^2 = 1
+                if unit not in self._alternations:
+                    self._alternations[unit] = sp.Dummy("a", real=True)
+                found *= self._alternations[unit]
+        return found
+
+    def _exponential(self, share: Any, unit: Any) -> Any:
+        if unit.func is sp.log:
+            base = self._rebuilt(unit.args[0])
+            return base**share if share.is_Integer else _power(base, share)
+        symbol = self._exponentials.setdefault(unit, sp.Dummy("E", positive=True))
+        return symbol ** (share * self._divisors[unit])
 
 
 def _is_arithmetic(e: Any) -> bool:
@@ -239,6 +300,11 @@ def _without_roots(e: Any, roots: dict[Any, tuple[Any, int]]) -> Any:
     if e.func is sp.Abs:
         return _root(_without_roots(e.args[0], roots) ** 2, 2, roots)
     if e.is_Pow and e.exp.is_Rational and not e.exp.is_Integer:
+        if e.base.is_Integer and e.base > 1:
+            # the roots of different primes are independent
+            return sp.Mul(
+                *(_root(sp.Integer(p), int(e.exp.q), roots) ** (k * e.exp.p) for p, k in sp.factorint(e.base).items())
+            )
         return _root(_without_roots(e.base, roots), int(e.exp.q), roots) ** e.exp.p
     return e.func(*(_without_roots(part, roots) for part in e.args))
 

@@ -1,63 +1,107 @@
-"""Counterexamples: rational points at which intervals that contain both sides are disjoint.
+"""Counterexamples: exact points of the domain at which balls that contain both sides are disjoint.
 
-Imported only by functions, because it imports sympy and mpmath.
+Imported only by functions, because it imports sympy and flint.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
-import mpmath
+import numpy as np
 import sympy as sp
+from flint import ctx
 
-from .enclosure import enclose
+from .balls import Unclear, Undefined, Value, evaluate
+from .domain import Domain
 from .verdict import Verdict
 
-# Both sides are first evaluated to this many digits; a difference beyond half of them is worth enclosing.
-DIGITS = 40
-NEGLIGIBLE = mpmath.mpf(10) ** (-DIGITS // 2)
+SEED = 0
+# Both sides are evaluated with so many bits, one after the other; with most at the first point, with many at a few.
+BITS = (64, 256, 2048)
+CLOSE_LOOKS = 4
+MOST_BITS = 1 << 15
 SHOWN = 20
+# So many times as many points are tried where a side is often undefined.
+MORE = 4
 
 
-def refute_equality(left: Any, right: Any, points: Iterable[dict[Any, Any]]) -> Verdict | None:
-    """Return a refutation at the first of the points where left and right differ, or None."""
-    symbols = sorted(left.free_symbols | right.free_symbols, key=str)
-    try:
-        sides = [sp.lambdify(symbols, side, "mpmath") for side in (left, right)]
-    except NotImplementedError:
-        # an integral without bounds, or another expression without a value
+@dataclass
+class Search:
+    """The search for a counterexample to a relation, and what it saw.
+
+    Attributes
+    ----------
+    tried : int
+        Points of the domain at which both sides were looked at.
+    defined : int
+        Those among them at which both are certainly defined.
+    undefined : int
+        Those among them at which one is certainly not.
+    """
+
+    left: Any
+    right: Any
+    relation: str
+    domain: Domain
+    tried: int = 0
+    defined: int = 0
+    undefined: int = 0
+
+    def __post_init__(self) -> None:
+        self._rng = np.random.default_rng(SEED)
+
+    def refutation(self, part: Domain, count: int, until_defined: bool = False) -> Verdict | None:
+        """The first counterexample among some points of a part, or among those up to one where both are defined."""
+        before = self.defined
+        for point in part.points(self._rng, MORE * count):
+            found = self._at(point)
+            if found is not None or self.defined - before >= (1 if until_defined else count):
+                return found
         return None
-    for point in points:
-        rationals = [point[symbol] for symbol in symbols]
-        a, b = (_value(side, rationals, DIGITS) for side in sides)
-        if a is None or b is None or abs(a - b) <= NEGLIGIBLE * max(abs(a), abs(b), 1):
-            continue
-        one, other = enclose(left, point), enclose(right, point)
-        if one is None or other is None:
-            again = [_value(side, rationals, 2 * DIGITS) for side in sides]
-            if None in again or abs(again[0] - a) + abs(again[1] - b) > NEGLIGIBLE * abs(a - b):
+
+    def _at(self, point: dict[Any, Any]) -> Verdict | None:
+        self.tried += 1
+        bits_to_try = (*BITS, MOST_BITS) if self.defined == 0 else BITS if self.defined < CLOSE_LOOKS else BITS[:2]
+        seen = False
+        for bits in bits_to_try:
+            try:
+                left, right = evaluate(self.left, point, bits), evaluate(self.right, point, bits)
+            except Undefined:
+                self.undefined += 1
+                return None
+            except Unclear:
                 continue
-            how = f"{DIGITS} and {2 * DIGITS} digits"
-        elif one.b < other.a or other.b < one.a:
-            how = "interval arithmetic"
+            if not seen:
+                seen = True
+                self.defined += 1
+            if self._is_broken(left, right):
+                return Verdict(
+                    "refuted",
+                    "counterexample, by ball arithmetic",
+                    {str(symbol): str(value) for symbol, value in point.items()},
+                    _shown(left, right),
+                )
+            if left.exact is not None and left.exact == right.exact:
+                break
+        return None
+
+    def _is_broken(self, left: Value, right: Value) -> bool:
+        if left.exact is not None and right.exact is not None and (left.exact - right.exact).is_Rational:
+            sign = int(sp.sign(left.exact - right.exact))
+        elif left.ball > right.ball or left.ball < right.ball:
+            sign = 1 if left.ball > right.ball else -1
         else:
-            continue
-        return Verdict(
-            "refuted",
-            f"counterexample, by {how}",
-            {str(symbol): str(value) for symbol, value in point.items()},
-            (mpmath.nstr(a, SHOWN), mpmath.nstr(b, SHOWN)),
-        )
-    return None
+            return False
+        return sign != 0 if self.relation == "==" else sign > 0 if self.relation == "<=" else sign >= 0
 
 
-def _value(side: Any, rationals: list[Any], digits: int) -> Any:
-    """The value at a rational point, computed to so many digits; None where it is undefined or not a number."""
-    with mpmath.workdps(digits):
-        try:
-            value = side(*(mpmath.mpf(int(number.p)) / int(number.q) for number in rationals))
-            return value if mpmath.isfinite(value) else None
-        except (ArithmeticError, ValueError, TypeError, NameError, AttributeError):
-            # a pole, or a function that mpmath does not know
-            return None
+def _shown(left: Value, right: Value) -> tuple[str, str]:
+    """Both values, with as many digits as it takes to tell them apart."""
+    digits = SHOWN
+    with ctx.workprec(MOST_BITS):
+        while True:
+            shown = tuple(side.ball.mid().str(digits, radius=False) for side in (left, right))
+            if shown[0] != shown[1] or digits > MOST_BITS:
+                return shown[0], shown[1]
+            digits *= 2

@@ -1,0 +1,295 @@
+"""Values and ranges of real expressions in ball arithmetic, which a rounding error cannot make wrong.
+
+An expression is defined at a point where it and all its parts are real numbers. The powers 0**0 and x**0 are 1, as in
+sympy; a root of a negative number is not real, and a power of a negative number is real where its exponent is an
+integer.
+
+Imported only by functions, because it imports sympy and flint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import sympy as sp
+from flint import arb, ctx, fmpq
+
+
+class Undefined(Exception):
+    """The expression is certainly not a real number: at the point, or anywhere in the box."""
+
+
+class Unclear(Exception):
+    """At this precision, or for want of a rule, the value cannot be told."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A ball that contains the value, and the value itself where it is a rational number times a power of pi."""
+
+    ball: Any
+    exact: Any = None
+
+    @property
+    def sign(self) -> int:
+        """-1, 0 or 1; `Unclear` is raised where the ball does not tell."""
+        if self.exact is not None:
+            return int(sp.sign(self.exact))
+        if self.ball > 0:
+            return 1
+        if self.ball < 0:
+            return -1
+        raise Unclear
+
+
+def evaluate(expression: Any, point: Mapping[Any, Any], bits: int) -> Value:
+    """Return the value of an expression where every symbol is an exact number, or a ball of numbers.
+
+    Raises
+    ------
+    Undefined
+        If it is certainly not defined, for a ball: nowhere in it.
+    Unclear
+        If that cannot be told, or a function is not known.
+    """
+    with ctx.workprec(bits):
+        return _value(expression, {symbol: _given(number) for symbol, number in point.items()})
+
+
+def interval(low: Any, high: Any, bits: int = 64) -> Any:
+    """A ball that contains all numbers between two exact ones."""
+    with ctx.workprec(bits):
+        ends = [_value(sp.sympify(end), {}).ball for end in (low, high)]
+        return ends[0].union(ends[1])
+
+
+def is_true(relation: Any, point: Mapping[Any, Any], bits: int) -> bool:
+    """Whether a relation, or a combination of relations, holds; raises as `evaluate` does."""
+    with ctx.workprec(bits):
+        return _truth(relation, {symbol: _given(number) for symbol, number in point.items()})
+
+
+def _given(number: Any) -> Value:
+    return Value(number) if isinstance(number, arb) else _value(number, {})
+
+
+def _exactly(number: Any) -> Value | None:
+    """The value of a sympy number that is kept exactly, None of another."""
+    if number.is_Rational:
+        return Value(arb(fmpq(int(number.p), int(number.q))), number)
+    share, rest = number.as_coeff_Mul(rational=True)
+    base, power = rest.as_base_exp()
+    if base is sp.pi and power.is_Integer:
+        return Value(arb.pi() ** int(power) * fmpq(int(share.p), int(share.q)), number)
+    return None
+
+
+def _value(e: Any, point: Mapping[Any, Value]) -> Value:
+    if e in point:
+        return point[e]
+    if e in _CONSTANTS:
+        return Value(_CONSTANTS[e](), sp.pi if e is sp.pi else None)
+    if e.is_Rational:
+        found = _exactly(e)
+        assert found is not None
+        return found
+    if e in (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I):
+        raise Undefined
+    if isinstance(e, sp.Piecewise):
+        for branch, condition in e.args:
+            if _truth(condition, point):
+                return _value(branch, point)
+        raise Undefined
+    if not (e.is_Add or e.is_Mul or e.is_Pow or e.func in _FUNCTIONS):
+        raise Unclear
+    parts = [_value(argument, point) for argument in e.args]
+    exact = _exact_result(e.func, parts)
+    if exact is not None:
+        return exact
+    balls = [part.ball for part in parts]
+    if e.is_Add:
+        result = sum(balls[1:], balls[0])
+    elif e.is_Mul:
+        result = balls[0]
+        for ball in balls[1:]:
+            result = result * ball
+    elif e.is_Pow:
+        result = _power(*parts)
+    else:
+        result = _FUNCTIONS[e.func](*parts)
+    if isinstance(result, Value):
+        return result
+    if result.is_nan():
+        raise Unclear
+    return Value(result)
+
+
+def _exact_result(function: Any, parts: list[Value]) -> Value | None:
+    if any(part.exact is None for part in parts):
+        if function is sp.Mul and any(part.exact == 0 for part in parts):
+            return _exactly(sp.S.Zero)
+        return None
+    if function is sp.Pow and not (parts[1].exact.is_Integer and abs(parts[1].exact) < 1000):
+        # a power such as (1/3)**(10**9) is not to be written out
+        if parts[0].exact not in (0, 1) and not (parts[1].exact.is_Rational and parts[1].exact.q < 7):
+            return None
+        if abs(parts[1].exact) > 1000:
+            return None
+    result = function(*(part.exact for part in parts))
+    if result in (sp.zoo, sp.nan, sp.oo, -sp.oo) or result.is_real is False:
+        raise Undefined
+    return _exactly(result)
+
+
+def _truth(relation: Any, point: Mapping[Any, Value]) -> bool:
+    if relation in (sp.true, sp.false):
+        return bool(relation)
+    if isinstance(relation, sp.And):
+        return all([_truth(part, point) for part in relation.args])
+    if isinstance(relation, sp.Or):
+        return any([_truth(part, point) for part in relation.args])
+    if isinstance(relation, sp.Not):
+        return not _truth(relation.args[0], point)
+    if not isinstance(relation, sp.core.relational.Relational):
+        raise Unclear
+    left, right = (_value(side, point) for side in relation.args)
+    exact = None if left.exact is None or right.exact is None else left.exact - right.exact
+    sign = Value(left.ball - right.ball, exact).sign
+    return bool(relation.func(sp.Integer(sign), 0))
+
+
+def _power(base: Value, exponent: Value) -> Any:
+    power = exponent.exact
+    if power is not None and power.is_Integer:
+        if power < 0 and base.ball.contains(0):
+            raise Unclear
+        return base.ball ** int(power)
+    if base.exact == 0:
+        if exponent.sign > 0:
+            return _exactly(sp.S.Zero)
+        raise Undefined
+    if base.ball > 0:
+        return (exponent.ball * base.ball.log()).exp() if power != sp.S.Half else base.ball.sqrt()
+    if base.ball < 0:
+        if (power is not None and power.is_Rational) or not exponent.ball.contains_integer():
+            raise Undefined
+        raise Unclear
+    if base.ball >= 0 and exponent.ball > 0:
+        # from 0 to the power of the upper end
+        top = base.ball.upper()
+        return arb(0).union((exponent.ball * top.log()).exp()) if power is not None else _unclear()
+    return _unclear()
+
+
+def _unclear(*_: Value) -> Any:
+    raise Unclear
+
+
+def _within(low: float | None, high: float | None, function: Callable[[Any], Any], open_ends: bool = False) -> Any:
+    """A function that is real between two numbers."""
+
+    def image(x: Value) -> Any:
+        if (low is not None and x.ball < low) or (high is not None and x.ball > high):
+            raise Undefined
+        inside = (low is None or x.ball >= low) and (high is None or x.ball <= high)
+        if not inside or (open_ends and ((low is not None and x.ball <= low) or (high is not None and x.ball >= high))):
+            raise Unclear
+        return function(x.ball)
+
+    return image
+
+
+def _logarithm(x: Value) -> Any:
+    if x.ball < 0:
+        raise Undefined
+    return x.ball.log() if x.ball > 0 else _unclear()
+
+
+def _sign(x: Value) -> Any:
+    return _exactly(sp.Integer(x.sign))
+
+
+def _step(x: Value, at_zero: Value | None = None) -> Any:
+    sign = x.sign
+    return (at_zero or _exactly(sp.S.Half)) if sign == 0 else _exactly(sp.Integer((1 + sign) // 2))
+
+
+def _whole(name: str) -> Any:
+    def image(x: Value) -> Any:
+        number = getattr(x.ball, name)().unique_fmpz()
+        return _unclear() if number is None else _exactly(sp.Integer(int(number)))
+
+    return image
+
+
+def _remainder(x: Value, y: Value) -> Any:
+    if y.ball.contains(0):
+        raise Unclear
+    number = (x.ball / y.ball).floor().unique_fmpz()
+    return _unclear() if number is None else x.ball - y.ball * arb(number)
+
+
+def _direction(y: Value, x: Value) -> Any:
+    if x.ball > 0:
+        return (y.ball / x.ball).atan()
+    if y.ball > 0:
+        return arb.pi() / 2 - (x.ball / y.ball).atan()
+    if y.ball < 0:
+        return -arb.pi() / 2 - (x.ball / y.ball).atan()
+    if x.ball < 0 and y.exact == 0:
+        return _exactly(sp.pi)
+    return _unclear()
+
+
+def _extreme(name: str) -> Any:
+    def image(*values: Value) -> Any:
+        result = values[0].ball
+        for value in values[1:]:
+            result = getattr(result, name)(value.ball)
+        return result
+
+    return image
+
+
+def _by(name: str) -> Any:
+    return lambda x: getattr(x.ball, name)()
+
+
+def _of_inverse(function: Any) -> Any:
+    def image(x: Value) -> Any:
+        return _unclear() if x.ball.contains(0) else function(Value(1 / x.ball))
+
+    return image
+
+
+_CONSTANTS: dict[Any, Any] = {
+    sp.pi: arb.pi, sp.E: arb.const_e, sp.EulerGamma: arb.const_euler, sp.Catalan: arb.const_catalan,
+    sp.GoldenRatio: lambda: (1 + arb(5).sqrt()) / 2,
+}  # fmt: skip
+_ARCSINE, _ARCCOSINE = _within(-1, 1, lambda x: x.asin()), _within(-1, 1, lambda x: x.acos())
+_FUNCTIONS: dict[Any, Any] = {
+    **{getattr(sp, name): _by(name) for name in (
+        "sin", "cos", "tan", "cot", "sec", "csc", "exp", "sinh", "cosh", "tanh", "coth", "sech", "csch", "atan",
+        "asinh", "erf", "erfc", "erfi", "gamma",
+    )},
+    sp.log: _logarithm,
+    sp.asin: _ARCSINE,
+    sp.acos: _ARCCOSINE,
+    # sympy's arc cotangent jumps at 0, where it is pi/2
+    sp.acot: _of_inverse(_by("atan")),
+    sp.asec: _of_inverse(_ARCCOSINE),
+    sp.acsc: _of_inverse(_ARCSINE),
+    sp.acosh: _within(1, None, lambda x: x.acosh()),
+    sp.atanh: _within(-1, 1, lambda x: x.atanh(), open_ends=True),
+    sp.atan2: _direction,
+    sp.Abs: lambda x: abs(x.ball),
+    sp.Max: _extreme("max"),
+    sp.Min: _extreme("min"),
+    sp.sign: _sign,
+    sp.Heaviside: _step,
+    sp.floor: _whole("floor"),
+    sp.ceiling: _whole("ceil"),
+    sp.Mod: _remainder,
+}  # fmt: skip

@@ -1,0 +1,137 @@
+"""Integrals by antiderivatives that are proved, derivatives carried out, and imaginary exponents as sines.
+
+Imported only by functions, because it imports sympy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import sympy as sp
+
+from ..errors import InputError
+from .balls import Undefined
+from .derivation import derive_equality
+from .domain import Domain
+from .polyhedron import Inequality
+from .resolution import Resolution
+from .signs import Part, is_continuous, is_infinite
+
+# Where the derivative of an expression made of these is undefined, so is what sympy writes for it.
+_SMOOTH = (sp.sin, sp.cos, sp.tan, sp.cot, sp.exp, sp.log, sp.sinh, sp.cosh, sp.tanh, sp.asin, sp.acos, sp.atan)
+_ENTIRE = {sp.exp, sp.sin, sp.cos, sp.sinh, sp.cosh}
+
+
+def prepared(e: Any, domain: Domain) -> Any:
+    """The expression with its derivatives, integrals and fractional parts carried out, as far as that is proved.
+
+    Raises
+    ------
+    InputError
+        If it is written with the imaginary unit otherwise than in exponents and polynomials.
+    """
+    e = e.replace(sp.frac, lambda x: x - sp.floor(x))
+    e = e.replace(sp.Mod, lambda x, y: x - y * sp.floor(x / y))
+    e = e.replace(lambda part: isinstance(part, sp.Derivative), _derivative)
+    e = e.replace(lambda part: isinstance(part, sp.Integral), lambda part: _integral(part, domain))
+    if e.has(sp.I):
+        functions = {f.func for f in e.atoms(sp.Function) if f.has(sp.I)}
+        real = sp.expand(e, complex=True) if functions <= _ENTIRE else e
+        if real.has(sp.I, sp.re, sp.im):
+            raise InputError(f"{e}: expected a real expression, got one with the imaginary unit")
+        e = real
+    return e
+
+
+def _derivative(e: Any) -> Any:
+    functions = {f.func for f in e.expr.atoms(sp.Function)}
+    return e.doit() if functions <= set(_SMOOTH) else e
+
+
+def _integral(e: Any, domain: Domain) -> Any:
+    if e.function.has(sp.Integral) or any(len(limits) != 3 for limits in e.limits):
+        return e
+    integrand, (variable, low, high) = e.function, e.limits[0]
+    found = _definite(integrand, variable, low, high, domain)
+    if found is None:
+        return e
+    return found if len(e.limits) == 1 else prepared(sp.Integral(found, *e.limits[1:]), domain)
+
+
+def _definite(integrand: Any, variable: Any, low: Any, high: Any, domain: Domain) -> Any:
+    """The difference of an antiderivative, proved to be one between the ends and continuous up to them."""
+    t = sp.Dummy(str(variable), real=True)
+    f = integrand.xreplace({variable: t})
+    if f.is_number:
+        return f * (high - low) if low.is_finite is not False and high.is_finite is not False else None
+    ends = [low, high]
+    bounds: list[Inequality] | None
+    if all(not end.free_symbols for end in ends):
+        reverse = bool(low > high)
+        first, last = ends[::-1] if reverse else ends
+        bounds = [Inequality({t: sp.Integer(sign)}, -sign * end, True) for sign, end in ((1, first), (-1, last))
+                  if end.is_finite]  # fmt: skip
+    else:
+        bounds = _between(t, low, high, domain)
+    cells = domain.cells()
+    if bounds is None or cells is None:
+        return None
+    antiderivative = sp.integrate(f, t)
+    if antiderivative.has(sp.Integral, sp.I) or is_infinite(antiderivative):
+        return None
+    for cell in cells:
+        if not all(bound.expression.free_symbols <= {t, *cell.symbols} for bound in bounds):
+            bounds_here = [Inequality.of(b.expression.xreplace(dict(cell.values)), True) for b in bounds]
+        else:
+            bounds_here = list(bounds)
+        if None in bounds_here:
+            return None
+        inside = replace(
+            cell, symbols=(*cell.symbols, t), inequalities=(*cell.inequalities, *filter(None, bounds_here))
+        )
+        if inside.polyhedron.is_empty:
+            # no length
+            continue
+        part = Part(inside)
+        values = dict(cell.values)
+        here, derivative = antiderivative.xreplace(values), sp.diff(antiderivative, t).xreplace(values)
+        try:
+            resolution = Resolution(part)
+            here = resolution.resolved(here)
+            equal = derive_equality(resolution.resolved(f.xreplace(values)), resolution.resolved(derivative), part)
+        except Undefined:
+            return None
+        if equal is None or not is_continuous(here, part):
+            return None
+        for end in ends:
+            if end.is_finite is not False and not is_continuous(here, part, (t, end.xreplace(values), cell)):
+                return None
+    at_ends = [
+        antiderivative.xreplace({t: end}) if end.is_infinite is not True
+        else sp.limit(antiderivative, t, end, "-" if end is sp.oo else "+")
+        for end in ends
+    ]  # fmt: skip
+    value = at_ends[1] - at_ends[0]
+    return None if value.has(sp.Limit) or is_infinite(value) else value
+
+
+def _between(t: Any, low: Any, high: Any, domain: Domain) -> list[Inequality] | None:
+    """Bounds of an interval that holds everything between two ends."""
+    above, below = Inequality.of(t - low, True), Inequality.of(high - t, True)
+    if above is None or (below is None and high is not sp.oo):
+        return None
+    if below is None:
+        return [above]
+    for first, last in ((low, high), (high, low)):
+        order = Inequality.of(last - first, False)
+        if order is not None and domain.polyhedron.implies(order):
+            return [Inequality.of(t - first, True), Inequality.of(last - t, True)]  # type: ignore[list-item]
+    # whichever comes first: beyond the bounds that both have
+    bounds = []
+    for sign in (1, -1):
+        for bound in {0, *(end for s in domain.symbols for end in domain.interval(s)[:2] if end.is_finite)}:
+            beyond = [Inequality.of(sign * (end - bound), True) for end in (low, high)]
+            if all(one is not None and domain.polyhedron.implies(one) for one in beyond):
+                bounds.append(Inequality({t: sp.Integer(sign)}, -sign * sp.sympify(bound), True))
+    return bounds

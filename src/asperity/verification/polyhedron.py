@@ -1,0 +1,131 @@
+"""Linear inequalities between symbols: whether they can be met, and a point that meets them.
+
+Imported only by functions, because it imports sympy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import sympy as sp
+
+from .balls import evaluate
+
+# Enough to compare any two numbers that a user writes as ends of intervals and that differ.
+BITS = 2000
+
+
+@dataclass(frozen=True)
+class Inequality:
+    """sum of coefficient * symbol, plus a constant, is positive (``strict``), or not negative."""
+
+    coefficients: Mapping[Any, Any]
+    constant: Any
+    strict: bool
+
+    @classmethod
+    def of(cls, expression: Any, strict: bool) -> Inequality | None:
+        """expression > 0 or >= 0 if it is linear with rational coefficients, else None."""
+        constant = sp.Integer(0)
+        coefficients: dict[Any, Any] = {}
+        for term in sp.Add.make_args(sp.expand(expression)):
+            share, unit = term.as_coeff_Mul(rational=True)
+            if not term.free_symbols:
+                constant += term
+            elif unit.is_Symbol:
+                coefficients[unit] = coefficients.get(unit, 0) + share
+            else:
+                return None
+        if constant.is_real is not True or constant.is_finite is not True:
+            return None
+        return cls({s: c for s, c in coefficients.items() if c != 0}, constant, strict)
+
+    @property
+    def expression(self) -> Any:
+        """The left side as a sympy expression."""
+        return sp.Add(*(c * s for s, c in self.coefficients.items()), self.constant)
+
+    def negated(self) -> Inequality:
+        """What holds where this does not."""
+        return Inequality({s: -c for s, c in self.coefficients.items()}, -self.constant, not self.strict)
+
+    def substituted(self, symbol: Any, value: Any) -> Inequality | None:
+        """The inequality for a value of one symbol, None if it is not linear then."""
+        return Inequality.of(self.expression.xreplace({symbol: value}), self.strict)
+
+    def end(self, symbol: Any, point: Mapping[Any, Any]) -> Any:
+        """The bound that it sets to one symbol where the others are given."""
+        rest = sp.Add(*(c * point[s] for s, c in self.coefficients.items() if s != symbol), self.constant)
+        return -rest / self.coefficients[symbol]
+
+
+def sign_of(number: Any) -> int:
+    """The sign of an exact number; a number that cannot be told from 0 in many digits is refused as unclear."""
+    if number.is_Rational or number.is_infinite:
+        return int(sp.sign(number))
+    for bits in (100, BITS):
+        ball = evaluate(number, {}, bits).ball
+        if ball > 0 or ball < 0:
+            return 1 if ball > 0 else -1
+    return evaluate(sp.nsimplify(sp.simplify(number)), {}, BITS).sign
+
+
+class Polyhedron:
+    """The points that meet some linear inequalities; symbols are eliminated one by one (Fourier and Motzkin)."""
+
+    def __init__(self, symbols: Sequence[Any], inequalities: Iterable[Inequality]) -> None:
+        self.symbols, self.inequalities = tuple(symbols), tuple(inequalities)
+
+    @cached_property
+    def _tower(self) -> tuple[list[tuple[Any, list[Inequality]]], bool]:
+        """For every symbol the bounds in terms of those before it, and whether all can be met."""
+        remaining, tower = list(self.inequalities), []
+        for symbol in reversed(self.symbols):
+            here = [one for one in remaining if symbol in one.coefficients]
+            remaining = [one for one in remaining if symbol not in one.coefficients]
+            below = [one for one in here if one.coefficients[symbol] > 0]
+            above = [one for one in here if one.coefficients[symbol] < 0]
+            remaining += [_sum(a, -b.coefficients[symbol], b, a.coefficients[symbol]) for a in below for b in above]
+            tower.append((symbol, here))
+        signs = [(sign_of(one.constant), one.strict) for one in remaining]
+        return tower[::-1], all(sign > 0 or (sign == 0 and not strict) for sign, strict in signs)
+
+    @property
+    def is_empty(self) -> bool:
+        return not self._tower[1]
+
+    def bounds(self, position: int, point: Mapping[Any, Any]) -> tuple[Any, Any, bool, bool]:
+        """Ends of the interval of a symbol for given values of those before it, and whether they belong to it."""
+        symbol, here = self._tower[0][position]
+        low, high, low_closed, high_closed = -sp.oo, sp.oo, False, False
+        for one in here:
+            end = one.end(symbol, point)
+            if one.coefficients[symbol] > 0:
+                closer = sign_of(end - low) if low != -sp.oo else 1
+                if closer > 0 or (closer == 0 and one.strict):
+                    low, low_closed = end, not one.strict
+            else:
+                closer = sign_of(high - end) if high != sp.oo else 1
+                if closer > 0 or (closer == 0 and one.strict):
+                    high, high_closed = end, not one.strict
+        return low, high, low_closed, high_closed
+
+    def implies(self, one: Inequality) -> bool:
+        """Whether an inequality holds at every point."""
+        opposite = one.negated()
+        return Polyhedron(self.symbols, (*self.inequalities, opposite)).is_empty
+
+
+def _sum(a: Inequality, times: Any, b: Inequality, other_times: Any) -> Inequality:
+    coefficients = {
+        s: times * a.coefficients.get(s, 0) + other_times * b.coefficients.get(s, 0)
+        for s in {*a.coefficients, *b.coefficients}
+    }
+    return Inequality(
+        {s: c for s, c in coefficients.items() if c != 0},
+        times * a.constant + other_times * b.constant,
+        a.strict or b.strict,
+    )

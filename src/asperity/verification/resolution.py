@@ -1,0 +1,346 @@
+"""An expression on an open part of a domain without the functions that jump, bend or have branches.
+
+Every rule holds wherever the expression is defined. Where a sign is not known, the expression whose sign decides is
+handed back, so that the part can be cut at its zeros.
+
+Imported only by functions, because it imports sympy.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import sympy as sp
+
+from .balls import Unclear, Undefined, evaluate
+from .signs import NEGATIVE, NOT_NEGATIVE, NOT_POSITIVE, POSITIVE, ZERO, Part, is_infinite
+
+BITS = 128
+# A function with more pieces than this on one part is left as it is.
+PIECES = 40
+LARGEST = 120
+
+
+class Resolution:
+    """Resolves expressions on one part.
+
+    Attributes
+    ----------
+    undetermined : list
+        Expressions whose signs decide what an expression is.
+    limits : list
+        Expressions whose signs decide where it is defined, or smooth.
+    """
+
+    def __init__(self, part: Part) -> None:
+        self._part = part
+        self.undetermined: list[Any] = []
+        self.limits: list[Any] = []
+        self._done: dict[Any, Any] = {}
+
+    def resolved(self, e: Any) -> Any:
+        """The expression without what could be resolved; `Undefined` is raised if it is defined nowhere."""
+        if is_infinite(e):
+            raise Undefined
+        if not e.args or isinstance(e, sp.Integral | sp.Sum | sp.Product | sp.Derivative | sp.Subs | sp.Limit):
+            return e
+        if e not in self._done:
+            if isinstance(e, sp.Piecewise):
+                self._done[e] = self._cases(e)
+            else:
+                args = [self.resolved(argument) for argument in e.args]
+                again = e if tuple(args) == e.args else e.func(*args)
+                if is_infinite(again):
+                    raise Undefined
+                rule = _RULES.get(again.func)
+                self._done[e] = rule(self, again) if rule is not None else again
+        return self._done[e]
+
+    def _signs(self, e: Any, limit: bool = False) -> Any:
+        signs = self._part.signs(e)
+        if len(signs) > 1 and not signs <= NOT_NEGATIVE and not signs <= NOT_POSITIVE:
+            (self.limits if limit else self.undetermined).append(e)
+        return signs
+
+    # ---- bends and jumps
+
+    def _absolute(self, e: Any) -> Any:
+        signs = self._signs(e.args[0])
+        if signs <= NOT_NEGATIVE:
+            return e.args[0]
+        return -e.args[0] if signs <= NOT_POSITIVE else e
+
+    def _sign(self, e: Any) -> Any:
+        signs = self._signs(e.args[0])
+        if len(signs) == 1:
+            return sp.Integer(next(iter(signs)))
+        self.undetermined.append(e.args[0])
+        return e
+
+    def _step(self, e: Any) -> Any:
+        signs = self._signs(e.args[0])
+        if len(signs) == 1:
+            return e.func(sp.Integer(next(iter(signs))), *e.args[1:])
+        self.undetermined.append(e.args[0])
+        return e
+
+    def _extreme(self, e: Any) -> Any:
+        factor = 1 if e.func is sp.Max else -1
+        kept: list[Any] = []
+        for one in e.args:
+            signs = {other: self._signs(factor * (other - one)) for other in kept}
+            if not any(found <= NOT_NEGATIVE for found in signs.values()):
+                kept = [other for other in kept if not signs[other] <= NOT_POSITIVE] + [one]
+        return kept[0] if len(kept) == 1 else e.func(*kept)
+
+    def _floor(self, e: Any) -> Any:
+        found = self._piece(e.args[0], sp.Integer(0), sp.Integer(1))
+        return e if found is None else sp.Integer(found)
+
+    def _ceiling(self, e: Any) -> Any:
+        found = self._piece(-e.args[0], sp.Integer(0), sp.Integer(1))
+        return e if found is None else -sp.Integer(found)
+
+    def _remainder(self, e: Any) -> Any:
+        x, y = e.args
+        whole = self.resolved(sp.floor(x / y))
+        return e if whole.has(sp.floor) else x - y * whole
+
+    def _piece(self, e: Any, start: Any, length: Any) -> int | None:
+        """k where start + k length <= e < start + (k + 1) length on the whole part; at the ends only e matters."""
+        for point in self._part.domain_points():
+            try:
+                value = evaluate((e - start) / length, point, BITS)
+            except Undefined:
+                continue
+            except Unclear:
+                return None
+            k = value.ball.floor().unique_fmpz()
+            if k is None:
+                continue
+            low, high = start + int(k) * length, start + (int(k) + 1) * length
+            if self._part.signs(e - low) <= NOT_NEGATIVE and self._part.signs(high - e) == POSITIVE:
+                return int(k)
+            self._cut_at_levels(e, start, length)
+            return None
+        return None
+
+    def _cut_at_levels(self, e: Any, start: Any, length: Any) -> None:
+        try:
+            reach = evaluate((e - start) / length, self._part.box(), BITS).ball
+        except (Undefined, Unclear):
+            return
+        first, last = float(reach.lower()), float(reach.upper())
+        if last - first < PIECES:
+            levels = range(int(first // 1), int(last // 1) + 2)
+            self.undetermined += [
+                g for k in levels if len(self._part.signs(g := e - start - k * length)) > 1
+            ]  # fmt: skip
+
+    # ---- cases
+
+    def _cases(self, e: Any) -> Any:
+        """The branch that applies; e itself where that is not known."""
+        for branch, condition in e.args:
+            truth = self._truth(condition)
+            if truth is None:
+                return e
+            if truth:
+                return self.resolved(branch)
+        raise Undefined
+
+    def _truth(self, condition: Any) -> bool | None:
+        if condition in (sp.true, sp.false):
+            return bool(condition)
+        if isinstance(condition, sp.And | sp.Or):
+            parts = [self._truth(part) for part in condition.args]
+            deciding = isinstance(condition, sp.Or)
+            if None in parts:
+                # a part that is not known may also not be defined
+                return None
+            return deciding if deciding in parts else not deciding
+        if isinstance(condition, sp.Not):
+            truth = self._truth(condition.args[0])
+            return None if truth is None else not truth
+        if not isinstance(condition, sp.core.relational.Relational):
+            return None
+        difference = self.resolved(condition.lhs) - self.resolved(condition.rhs)
+        truths = {bool(condition.func(sp.Integer(sign), 0)) for sign in self._signs(difference)}
+        if len(truths) == 1:
+            return truths.pop()
+        self.undetermined.append(difference)
+        return None
+
+    # ---- inverse functions
+
+    def _direction(self, e: Any) -> Any:
+        y, x = e.args
+        across, along = self._signs(y), self._signs(x)
+        if along == POSITIVE:
+            return self.resolved(sp.atan(y / x))
+        if across == POSITIVE:
+            return sp.pi / 2 - self.resolved(sp.atan(x / y))
+        if across == NEGATIVE:
+            return -sp.pi / 2 - self.resolved(sp.atan(x / y))
+        if along == NEGATIVE and across <= NOT_NEGATIVE:
+            return sp.pi + self.resolved(sp.atan(y / x))
+        self.undetermined += [y, x]
+        return e
+
+    def _arcsine(self, e: Any) -> Any:
+        (w,) = e.args
+        self._limit(1 - w, 1 + w)
+        sign, core = (-1, -w) if w.could_extract_minus_sign() else (1, w)
+        if core.func is sp.cos:
+            return sign * (sp.pi / 2 - self.resolved(sp.acos(core)))
+        if core.func is sp.sin:
+            k = self._piece_of_angle(core.args[0], -sp.pi / 2)
+            if k is not None:
+                return sign * (-1) ** k * (core.args[0] - k * sp.pi)
+        # one function for both
+        return sign * (sp.pi / 2 - sp.acos(core))
+
+    def _arccosine(self, e: Any) -> Any:
+        (w,) = e.args
+        self._limit(1 - w, 1 + w)
+        if w.could_extract_minus_sign():
+            return sp.pi - self.resolved(sp.acos(-w))
+        if w.func is sp.sin:
+            k = self._piece_of_angle(w.args[0], -sp.pi / 2)
+            return e if k is None else sp.pi / 2 - (-1) ** k * (w.args[0] - k * sp.pi)
+        if w.func is sp.cos:
+            k = self._piece_of_angle(w.args[0], sp.Integer(0))
+            if k is not None:
+                return (k + 1) * sp.pi - w.args[0] if k % 2 else w.args[0] - k * sp.pi
+        return e
+
+    def _arctangent(self, e: Any) -> Any:
+        (w,) = e.args
+        sign, core = (-1, -w) if w.could_extract_minus_sign() else (1, w)
+        if core.func is sp.tan:
+            k = self._piece_of_angle(core.args[0], -sp.pi / 2)
+            if k is not None:
+                return sign * (core.args[0] - k * sp.pi)
+        if core.func is sp.cot:
+            k = self._piece_of_angle(core.args[0], sp.Integer(0))
+            if k is not None:
+                return sign * (sp.pi / 2 + k * sp.pi - core.args[0])
+        return e
+
+    def _piece_of_angle(self, angle: Any, start: Any) -> int | None:
+        return self._piece(angle, start, sp.pi)
+
+    def _arccotangent(self, e: Any) -> Any:
+        signs = self._signs(e.args[0])
+        if signs == ZERO:
+            return sp.pi / 2
+        if 0 not in signs:
+            return self.resolved(sp.atan(1 / e.args[0]))
+        self.undetermined.append(e.args[0])
+        return e
+
+    # ---- where an expression is defined, and products under roots and logarithms
+
+    def _limit(self, *expressions: Any) -> None:
+        """What must not be negative."""
+        for expression in expressions:
+            if self._signs(expression, limit=True) <= NEGATIVE:
+                raise Undefined
+
+    def _power(self, e: Any) -> Any:
+        base, exponent = e.base, e.exp
+        if exponent.is_Integer:
+            if exponent < 0 and self._signs(base, limit=True) <= ZERO:
+                raise Undefined
+            return e
+        signs = self._signs(base, limit=True)
+        if exponent.is_Rational and signs <= NEGATIVE:
+            raise Undefined
+        if signs == ZERO:
+            return self._power_of_zero(e)
+        if exponent.is_Rational and exponent.q == 2 and base.free_symbols and sp.count_ops(base) < LARGEST:
+            return self._root_of_product(e)
+        return e
+
+    def _power_of_zero(self, e: Any) -> Any:
+        signs = self._signs(e.exp)
+        if signs <= NEGATIVE:
+            raise Undefined
+        if len(signs) == 1:
+            return sp.Integer(0 if signs == POSITIVE else 1)
+        self.undetermined.append(e.exp)
+        return e
+
+    def _root_of_product(self, e: Any) -> Any:
+        """Even powers under a square root, outside it."""
+        outside, inside = sp.Integer(1), sp.Integer(1)
+        for factor in sp.Mul.make_args(sp.factor(e.base)):
+            base, times = factor.as_base_exp()
+            if times.is_Integer and times % 2 == 0 and base.free_symbols:
+                outside *= self._absolute(sp.Abs(base, evaluate=False)) ** (times * e.exp)
+            else:
+                inside *= factor
+        return e if outside == 1 else outside * inside**e.exp
+
+    def _logarithm(self, e: Any) -> Any:
+        if self._signs(e.args[0], limit=True) <= NOT_POSITIVE:
+            raise Undefined
+        if sp.count_ops(e.args[0]) > LARGEST:
+            return e
+        total, rest = sp.Integer(0), sp.Integer(1)
+        for factor in sp.Mul.make_args(sp.factor(e.args[0])):
+            base, times = factor.as_base_exp()
+            signs = self._signs(base)
+            if times.is_Rational and signs == POSITIVE:
+                total += times * sp.log(base)
+            elif times.is_Integer and signs == NEGATIVE:
+                total += times * sp.log(-base)
+                rest *= (-1) ** times
+            else:
+                rest *= factor
+        return total if rest == 1 else total + sp.log(rest)
+
+    def _reciprocal(self, e: Any) -> Any:
+        return self.resolved((sp.acos if e.func is sp.asec else sp.asin)(1 / e.args[0]))
+
+    def _hyperbolic(self, e: Any) -> Any:
+        (x,) = e.args
+        if e.func is sp.asinh:
+            return sp.log(x + sp.sqrt(x**2 + 1))
+        if e.func is sp.acosh:
+            self._limit(x - 1)
+            return sp.log(x + sp.sqrt(x**2 - 1))
+        self._limit(1 - x, 1 + x)
+        return sp.log((1 + x) / (1 - x)) / 2
+
+    def _pole(self, e: Any) -> Any:
+        self._signs(sp.cos(e.args[0]) if e.func in (sp.tan, sp.sec) else sp.sin(e.args[0]), limit=True)
+        return e
+
+
+_RULES: dict[Any, Any] = {
+    sp.Abs: Resolution._absolute,
+    sp.sign: Resolution._sign,
+    sp.Heaviside: Resolution._step,
+    sp.Max: Resolution._extreme,
+    sp.Min: Resolution._extreme,
+    sp.floor: Resolution._floor,
+    sp.ceiling: Resolution._ceiling,
+    sp.Mod: Resolution._remainder,
+    sp.atan2: Resolution._direction,
+    sp.asin: Resolution._arcsine,
+    sp.acos: Resolution._arccosine,
+    sp.atan: Resolution._arctangent,
+    sp.acot: Resolution._arccotangent,
+    sp.asec: Resolution._reciprocal,
+    sp.acsc: Resolution._reciprocal,
+    sp.asinh: Resolution._hyperbolic,
+    sp.acosh: Resolution._hyperbolic,
+    sp.atanh: Resolution._hyperbolic,
+    sp.Pow: Resolution._power,
+    sp.log: Resolution._logarithm,
+    sp.tan: Resolution._pole,
+    sp.sec: Resolution._pole,
+    sp.cot: Resolution._pole,
+    sp.csc: Resolution._pole,
+}

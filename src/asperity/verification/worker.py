@@ -1,0 +1,128 @@
+"""A process of its own that decides identities, so that it can be ended when the time is up.
+
+It is no copy of this process, which may have threads, but a fresh interpreter; it ends with this one.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from typing import Any
+
+from ..errors import InputError
+from .verdict import Verdict
+
+# A start takes about a second; beyond this it has failed.
+START_SECONDS = 120.0
+# So long after the limit the process ends itself, should nobody have ended it.
+GRACE = 5.0
+_COMMAND = "import sys; sys.path[:] = {path!r}; from asperity.verification.worker import serve; serve({handle})"
+
+
+class _Worker:
+    def __init__(self) -> None:
+        self.connection, theirs = Pipe()
+        command = _COMMAND.format(path=sys.path, handle=theirs.fileno())
+        # a session of its own, so that an interrupt reaches this process alone
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", command],
+            pass_fds=[theirs.fileno()],
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        theirs.close()
+        self.owner = os.getpid()
+        if not self.connection.poll(START_SECONDS) or self.connection.recv() != "ready":
+            self.end()
+            raise RuntimeError("the process that verifies identities did not start; pass time_limit=None")
+
+    def end(self) -> None:
+        self.connection.close()
+        if self.owner == os.getpid():
+            self.process.kill()
+            self.process.wait()
+
+
+_lock = threading.Lock()
+_worker: _Worker | None = None
+
+
+def decide_in_time(claims: list[Any], relations: list[Any], seconds: float) -> Verdict:
+    """The verdict of `identity.decide`, or *undecided* after so many seconds."""
+    global _worker
+    try:
+        question = pickle.dumps((claims, relations, seconds))
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InputError(
+            f"lhs, rhs: expected expressions that can be pickled ({error}); pass time_limit=None"
+        ) from error
+    with _lock:
+        if _worker is None or _worker.owner != os.getpid() or _worker.process.poll() is not None:
+            if _worker is not None:
+                _worker.end()
+            _worker = _Worker()
+        try:
+            _worker.connection.send_bytes(question)
+            answer = _worker.connection.recv() if _worker.connection.poll(seconds) else None
+        except BaseException as error:
+            _worker.end()
+            _worker = None
+            if isinstance(error, EOFError | OSError):
+                raise RuntimeError("the process that verifies identities has ended; pass time_limit=None") from error
+            raise
+        if answer is None:
+            _worker.end()
+            _worker = None
+            return Verdict("undecided", f"the time limit of {seconds:g} s was reached")
+    kind, content = answer
+    if kind == "verdict":
+        return Verdict(*content)
+    raise InputError(content) if kind == "input" else RuntimeError(content)
+
+
+@atexit.register
+def _end() -> None:
+    if _worker is not None:
+        _worker.end()
+
+
+def serve(handle: int) -> None:
+    """Answer one question after the other, until nobody asks."""
+    from .identity import decide
+
+    connection: Connection[Any, Any] = Connection(handle)
+    import flint  # noqa: F401
+    import sympy  # noqa: F401
+
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    connection.send("ready")
+    while True:
+        try:
+            message = connection.recv_bytes()
+        except EOFError:
+            return
+        try:
+            claims, relations, seconds = pickle.loads(message)
+        except Exception as error:
+            connection.send(("input", f"lhs, rhs: expected expressions of sympy ({error}); pass time_limit=None"))
+            continue
+        signal.setitimer(signal.ITIMER_REAL, seconds + GRACE)
+        try:
+            found = decide(claims, relations)
+            answer: tuple[str, Any] = (
+                "verdict",
+                (found.answer, found.evidence, dict(found.counterexample), found.values),
+            )
+        except InputError as error:
+            answer = "input", str(error)
+        except Exception as error:
+            answer = "error", f"{type(error).__name__}: {error}"
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        connection.send(answer)
