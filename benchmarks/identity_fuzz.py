@@ -30,8 +30,8 @@ DIGITS = 50
 SAME = mpmath.mpf(10) ** -38
 # An argument this close to a jump stands on it.
 ON_A_JUMP = mpmath.mpf(10) ** -40
-POINTS = 120
-SECONDS = 5.0
+POINTS = 80
+SECONDS = 10.0
 
 X, Y = sp.symbols("x y", real=True)
 N, K = sp.Symbol("n", integer=True), sp.Symbol("k", integer=True, even=True)

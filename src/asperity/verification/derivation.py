@@ -10,8 +10,8 @@ Imported only by functions, because it imports sympy.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from itertools import pairwise
+from dataclasses import dataclass, field, replace
+from itertools import pairwise, product
 from typing import Any
 
 import sympy as sp
@@ -32,6 +32,8 @@ DEPTH = 8
 LARGEST_NUMBER = 60
 NUMBER_BITS = 256
 
+# Half the lengths of such intervals; on a long one a place is found at which both sides are known.
+NEAR = (sp.Rational(1, 64), sp.Integer(4))
 # A symbol of this beginning is half of an integer, which is not halved again.
 HALF = "half of "
 
@@ -39,6 +41,7 @@ EXPANSION = "expansion"
 NORMAL_FORM = "polynomial normal form"
 SQUARES = "neither side is negative, and the polynomial normal forms of the squares agree"
 DERIVATIVE = "the derivative of the difference vanishes on a connected domain, and so does the difference at one point"
+INSIDE = "one function of equal things"
 ALGEBRAIC = "algebraic numbers"
 ANGLES = "the sine of the difference is 0, and the difference is small"
 SIGN = "the sign of the difference"
@@ -56,6 +59,8 @@ class Derivation:
     relation : {"==", "<=", "<"}
     refute : callable
         Looks for a counterexample on a part, among so many points.
+    spreads : bool
+        Whether what is not proved at one value of a symbol is tried on an interval around it.
     """
 
     left: Any
@@ -63,6 +68,7 @@ class Derivation:
     relation: str
     refute: Refute
     routes: list[str] = field(default_factory=list)
+    spreads: bool = True
     reason: str = "no proof among the routes known"
     _parts: int = 0
 
@@ -134,13 +140,36 @@ class Derivation:
             places += [difference, *slopes, *arguments, *box.symbols]
         pieces = self._pieces(box, places) if depth < DEPTH else None
         if pieces is None:
-            self._give_up()
+            if not self._is_proved_around(domain):
+                self._give_up()
             return None
         for piece in pieces:
             found = self._tried(piece, depth + 1)
             if found is not None or self._failed:
                 return found
         return None
+
+    def _is_proved_around(self, domain: Domain) -> bool:
+        """Whether the claim is proved on an open neighbourhood of a part where a symbol has a value."""
+        fixed = [s for s, v in domain.values.items() if s in domain.original and not s.is_integer and v.is_number]
+        for symbol, reach in product(fixed if self.spreads else [], NEAR):
+            value = domain.values[symbol]
+            near = replace(
+                domain,
+                symbols=(*domain.symbols, symbol),
+                inequalities=(
+                    *domain.inequalities,
+                    Inequality({symbol: sp.Integer(1)}, reach - value, strict=True),
+                    Inequality({symbol: sp.Integer(-1)}, reach + value, strict=True),
+                ),
+                values={s: v for s, v in domain.values.items() if s != symbol},
+            )
+            there = Derivation(self.left, self.right, self.relation, lambda *_: None, spreads=False)
+            there._tried(near, DEPTH - 1)
+            if not there._failed:
+                self.routes += there.routes
+                return True
+        return False
 
     def _route(self, left: Any, right: Any, part: Part) -> str | None:
         if self.relation == "==":
@@ -247,6 +276,8 @@ def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -
         return _equal_numbers(difference)
     if all(part.is_nonnegative(side) for side in (left, right)) and vanishes(left**2 - right**2, part.parameters):
         return SQUARES
+    if _equal_inside(left, right, part, differentiate):
+        return INSIDE
     if differentiate:
         for symbol in sorted(difference.free_symbols, key=str):
             if _is_constant_along(difference, symbol, part) and _vanishes_somewhere(
@@ -254,6 +285,14 @@ def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -
             ):
                 return DERIVATIVE
     return None
+
+
+def _equal_inside(left: Any, right: Any, part: Part, differentiate: int) -> bool:
+    """Whether both are one function of things that are found equal."""
+    if left.func != right.func or len(left.args) != len(right.args) or not (left.is_Function or left.is_Pow):
+        return False
+    pairs = [(a, b) for a, b in zip(left.args, right.args, strict=True) if a != b]
+    return len(pairs) == 1 and derive_equality(*pairs[0], part, differentiate) is not None
 
 
 def _is_constant_along(difference: Any, symbol: Any, part: Part) -> bool:

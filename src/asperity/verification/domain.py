@@ -29,6 +29,8 @@ FARTHEST = 1e4
 DIGITS = (9, 17, 40)
 # So many points are tried for one that is found, before the conditions are taken for empty.
 ATTEMPTS = 40
+# So often a symbol is given the value of another, or its negative.
+TOGETHER = 0.15
 # Domains with more faces, and integers with more values, are not taken apart.
 FACES = 200
 VALUES = 24
@@ -208,6 +210,14 @@ class Domain:
     def points(self, rng: np.random.Generator, count: int) -> Iterator[dict[Any, Any]]:
         """Exact points, simple ones first, as values of the original symbols; each meets every condition."""
         found = 0
+        if len(self.symbols) == 1 and count > len(SPECIAL):
+            # all of them, for at each of them a function may jump
+            (symbol,) = self.symbols
+            bounds = self.interval(symbol)
+            for value in map(sp.sympify, SPECIAL):
+                whole = self._whole({symbol: value}) if _is_inside(value, bounds) else None
+                if whole is not None:
+                    yield whole
         for attempt in range(ATTEMPTS * count):
             point = self._point(rng, simple=attempt < 4 * count and found < count // 2)
             if point is not None:
@@ -220,11 +230,21 @@ class Domain:
         point: dict[Any, Any] = {}
         for position, symbol in enumerate(self.symbols):
             bounds = self.polyhedron.bounds(position, point)
-            value = _number(symbol, bounds, simple, rng)
+            value = None
+            if point and rng.random() < TOGETHER:
+                # as large as another, up to the sign
+                value = list(point.values())[rng.integers(len(point))] * int(rng.choice([-1, 1]))
+                value = value if _is_inside(value, bounds) and has_properties(symbol, value) else None
+            if value is None:
+                value = _number(symbol, bounds, simple, rng)
             if value is None:
                 return None
             point[symbol] = value
-        point |= {s: value.xreplace(point) for s, value in self.values.items()}
+        return self._whole(point)
+
+    def _whole(self, point: Mapping[Any, Any]) -> dict[Any, Any] | None:
+        """The values of the original symbols, None where they do not meet every condition."""
+        point = {**point, **{s: value.xreplace(dict(point)) for s, value in self.values.items()}}
         whole = {s: point[s] for s in self.original}
         return whole if self.allows(whole) else None
 
@@ -238,9 +258,19 @@ class Domain:
             return False
 
 
+# Properties that a value must be known to have; sympy does not know all others of every number.
+_DECISIVE = {
+    "integer", "noninteger", "even", "odd", "rational", "irrational", "prime", "composite", "real", "positive",
+    "negative", "nonnegative", "nonpositive", "zero", "nonzero",
+}  # fmt: skip
+
+
 def has_properties(symbol: Any, value: Any) -> bool:
     """Whether a number has the properties that a symbol carries: even, say, or not zero."""
-    return all(getattr(value, f"is_{name}") in (given, None) for name, given in symbol.assumptions0.items())
+    return all(
+        (known := getattr(value, f"is_{name}")) == given or (known is None and name not in _DECISIVE)
+        for name, given in symbol.assumptions0.items()
+    )
 
 
 def _is_false(condition: Any, point: Mapping[Any, Any]) -> bool:
@@ -250,6 +280,12 @@ def _is_false(condition: Any, point: Mapping[Any, Any]) -> bool:
         return True
     except Unclear:
         return False
+
+
+def _is_inside(value: Any, bounds: tuple[Any, Any, bool, bool]) -> bool:
+    low, high, low_closed, high_closed = bounds
+    above = bool(low < value) or (low_closed and low == value)
+    return above and (bool(value < high) or (high_closed and value == high))
 
 
 def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng: np.random.Generator) -> Any:
@@ -272,10 +308,7 @@ def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng:
         number = sp.Integer(round(value) if rng.random() < 0.5 else int(rng.integers(-3, 4)))
         if symbol.is_even is not None and symbol.is_even != number.is_even:
             number += 1
-        inside = (low < number or (low_closed and low == number)) and (
-            number < high or (high_closed and number == high)
-        )
-        return number if bool(inside) else None
+        return number if _is_inside(number, bounds) else None
     for digits in DIGITS:
         exact = sp.Rational(np.format_float_positional(value, digits, unique=False, fractional=False))
         if bool(low < exact) and bool(exact < high):

@@ -9,8 +9,9 @@ from ..errors import InputError
 from .verdict import Verdict, every
 
 TIME_LIMIT = 10.0
-# Points at which both sides are compared before a proof is sought.
+# Points at which both sides are compared before a proof is sought, of an equality and of an inequality.
 POINTS = 24
+MORE_POINTS = 60
 
 
 def verify(
@@ -156,7 +157,7 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
     search = Search(left, right, relation, domain)
     derivation = Derivation(left, right, relation, search.refutation)
     expands = relation == "==" and expands_to_zero(left - right)
-    found = search.refutation(domain, POINTS, until_defined=expands)
+    found = search.refutation(domain, POINTS if relation == "==" else MORE_POINTS, until_defined=expands)
     if expands and found is None and search.defined:
         return Verdict("proved", EXPANSION)
     if not search.tried:

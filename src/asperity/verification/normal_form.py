@@ -11,6 +11,7 @@ Imported only by functions, because it imports sympy.
 
 from __future__ import annotations
 
+from collections.abc import Set
 from math import comb, lcm
 from typing import Any
 
@@ -59,10 +60,12 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
 class Parameters:
     """What stands for the symbols of a domain; filled as expressions are met, so that all of them share it.
 
-    Without ``half_angles`` every angle is a pair (c, s): less is known then, but polynomials stay short.
+    Without ``half_angles`` every angle is a pair (c, s): less is known then, but polynomials stay short. ``positive``
+    are expressions that are known to be so.
     """
 
-    def __init__(self, domain: Domain, half_angles: bool) -> None:
+    def __init__(self, domain: Domain, half_angles: bool, positive: Set[Any] = frozenset()) -> None:
+        self._positive = positive
         self._domain = domain
         self._half_angles = half_angles
         self._numbers: dict[Any, Any] = {}
@@ -188,7 +191,11 @@ class Parameters:
             return None
         if e.base.is_Rational and e.base > 0:
             return e.exp * sp.Add(*(k * sp.log(p) for p, k in sp.factorrat(e.base).items()))
-        is_positive = e.base.is_positive or (e.base.is_Symbol and bool(self._interval(e.base)[0] >= 0))
+        is_positive = (
+            e.base.is_positive
+            or e.base in self._positive
+            or (e.base.is_Symbol and bool(self._interval(e.base)[0] >= 0))
+        )
         return e.exp * sp.log(e.base) if is_positive else None
 
     def _alternating(self, exponent: Any) -> Any:

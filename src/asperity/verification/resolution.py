@@ -258,6 +258,8 @@ class Resolution:
             raise Undefined
         if signs == ZERO:
             return self._power_of_zero(e)
+        if signs == POSITIVE:
+            self._part.positive_bases.add(base)
         if exponent.is_Rational and exponent.q == 2 and base.free_symbols and sp.count_ops(base) < LARGEST:
             return self._root_of_product(e)
         return e
@@ -290,7 +292,8 @@ class Resolution:
         total, rest = sp.Integer(0), sp.Integer(1)
         for factor in sp.Mul.make_args(sp.factor(e.args[0])):
             base, times = factor.as_base_exp()
-            signs = self._signs(base)
+            # none is 0 where the logarithm is defined
+            signs = self._signs(base) - {0}
             if times.is_Rational and signs == POSITIVE:
                 total += times * sp.log(base)
             elif times.is_Integer and signs == NEGATIVE:

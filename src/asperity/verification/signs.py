@@ -41,7 +41,9 @@ class Part:
             # everything would hold on it
             raise ValueError("expected a part with points in it")
         self.domain = domain
-        self.plain, self.parameters = Parameters(domain, half_angles=False), Parameters(domain, half_angles=True)
+        self.positive_bases: set[Any] = set()
+        self.plain = Parameters(domain, half_angles=False, positive=self.positive_bases)
+        self.parameters = Parameters(domain, half_angles=True, positive=self.positive_bases)
         self._known: dict[Any, Signs] = {}
         self._thorough: dict[Any, Signs] = {}
         self._given: dict[Any, Signs] | None = None
@@ -250,10 +252,10 @@ class Part:
 
 
 def is_infinite(e: Any) -> bool:
-    """Whether a part of it, which every value needs, is undefined or infinite."""
+    """Whether a part of it, which every value needs, is undefined, infinite or imaginary."""
     if isinstance(e, _CONTAINERS):
         return False
-    return e in (sp.zoo, sp.nan, sp.oo, -sp.oo) or isinstance(e, sp.AccumBounds) or any(map(is_infinite, e.args))
+    return e in (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or isinstance(e, sp.AccumBounds) or any(map(is_infinite, e.args))
 
 
 # Functions that are continuous wherever they are defined, and analytic inside.
