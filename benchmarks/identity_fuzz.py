@@ -161,8 +161,16 @@ FUNCTIONS: dict[Any, Any] = {
 
 
 def compared(claim: Claim, point: dict[Any, Any]) -> bool | None:
-    """Whether the relation holds at a point, None where a side is not real or the judge is unsure."""
-    with mpmath.workdps(DIGITS):
+    """Whether the relation holds at a point, None where a side is not real or the judge is unsure.
+
+    A difference is looked at again in four times as many digits, because terms may cancel.
+    """
+    first = _compared(claim, point, DIGITS)
+    return _compared(claim, point, 4 * DIGITS) if first is False else first
+
+
+def _compared(claim: Claim, point: dict[Any, Any], digits: int) -> bool | None:
+    with mpmath.workdps(digits):
         try:
             numbers = {s: value(sp.sympify(v), {}) for s, v in point.items()}
             if not all(truth(relation, numbers) for relation in claim.domain):

@@ -20,7 +20,7 @@ from .balls import Unclear, Undefined, evaluate
 from .domain import Domain, tightened
 from .normal_form import vanishes
 from .polyhedron import Inequality
-from .resolution import Resolution
+from .resolution import Nowhere, Resolution
 from .signs import NOT_NEGATIVE, POSITIVE, Part, is_continuous, is_infinite
 from .verdict import Verdict
 from .zeros import zeros
@@ -96,6 +96,9 @@ class Derivation:
         except sp.polys.polyerrors.BasePolynomialError as error:
             self._give_up(f"sympy's polynomials do not serve: {error}")
             return None
+        except Unclear:
+            self._give_up("two numbers could not be told apart")
+            return None
 
     def _on(self, domain: Domain, depth: int) -> Verdict | None:
         """A refutation on an open part, or None: then it is proved there, unless `_failed` is set."""
@@ -125,7 +128,7 @@ class Derivation:
         resolution = Resolution(part)
         try:
             left, right = resolution.resolved(left), resolution.resolved(right)
-        except Undefined:
+        except Nowhere:
             return None
         route = self._route(left, right, part)
         if route is not None:
@@ -280,8 +283,9 @@ def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -
         return INSIDE
     if differentiate:
         for symbol in sorted(difference.free_symbols, key=str):
-            if _is_constant_along(difference, symbol, part) and _vanishes_somewhere(
-                difference, symbol, part, differentiate - 1
+            along = part.along(symbol)
+            if _is_constant_along(difference, symbol, along) and _vanishes_somewhere(
+                difference, symbol, along, differentiate - 1
             ):
                 return DERIVATIVE
     return None
@@ -307,7 +311,7 @@ def _is_constant_along(difference: Any, symbol: Any, part: Part) -> bool:
 def _resolves_to_zero(slope: Any, part: Part) -> bool:
     try:
         return vanishes(Resolution(part).resolved(slope), part.parameters)
-    except Undefined:
+    except Nowhere:
         return False
 
 
@@ -322,16 +326,26 @@ def _vanishes_somewhere(difference: Any, symbol: Any, part: Part, differentiate:
         there = difference.xreplace({symbol: place})
         if face is None or face.polyhedron.is_empty or is_infinite(there):
             continue
+        on_face = Part(face)
+        if not all(_is_met(condition, symbol, place, on_face) for condition in part.domain.conditions):
+            continue
         if is_end and not is_continuous(difference, part, (symbol, place)):
             continue
-        on_face = Part(face)
         try:
             resolved = Resolution(on_face).resolved(there)
-        except Undefined:
+        except Nowhere:
             continue
         if derive_equality(resolved, sp.Integer(0), on_face, differentiate) is not None:
             return True
     return False
+
+
+def _is_met(condition: Any, symbol: Any, place: Any, on_face: Part) -> bool:
+    """Whether a condition holds at every point of a face."""
+    values = dict(on_face.domain.values)
+    difference = (condition.lhs - condition.rhs).xreplace(values).xreplace({symbol: place})
+    bare = Part(replace(on_face.domain, conditions=()))
+    return all(condition.func(sp.Integer(sign), 0) is sp.true for sign in bare.signs(difference))
 
 
 _PLACES = (

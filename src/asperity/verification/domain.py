@@ -200,7 +200,7 @@ class Domain:
     def has_allowed_values(self) -> bool:
         """Whether the values of the fixed symbols have the properties that the symbols carry, and meet conditions."""
         fixed = {s: v for s, v in self.values.items() if not v.free_symbols}
-        if not all(has_properties(symbol, value) for symbol, value in fixed.items()):
+        if any(lacks_properties(symbol, value) for symbol, value in fixed.items()):
             return False
         decided = [c for c in self.conditions if c.free_symbols and c.free_symbols <= set(fixed)]
         return not any(_is_false(condition, fixed) for condition in decided)
@@ -271,6 +271,11 @@ def has_properties(symbol: Any, value: Any) -> bool:
         (known := getattr(value, f"is_{name}")) == given or (known is None and name not in _DECISIVE)
         for name, given in symbol.assumptions0.items()
     )
+
+
+def lacks_properties(symbol: Any, value: Any) -> bool:
+    """Whether a number is known not to have one of them."""
+    return any(getattr(value, f"is_{name}") is (not given) for name, given in symbol.assumptions0.items())
 
 
 def _is_false(condition: Any, point: Mapping[Any, Any]) -> bool:

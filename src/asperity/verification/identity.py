@@ -85,9 +85,14 @@ def verify(
 
 def decide(claims: list[tuple[Any, Any, str]], relations: list[Any]) -> Verdict:
     """The verdict on claims (left, right, "==", "<=" or "<"), all on the same assumptions."""
+    from .balls import Unclear
+
     verdicts = []
     for claim in claims:
-        verdicts.append(_decided(*claim, relations))
+        try:
+            verdicts.append(_decided(*claim, relations))
+        except Unclear:
+            verdicts.append(Verdict("undecided", "two numbers could not be told apart"))
         if verdicts[-1].answer == "refuted":
             break
     return every(*verdicts)
@@ -150,6 +155,8 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
     from .refutation import Search
 
     relations = [sp.sympify(given).replace(lambda e: e.is_Float, lambda e: sp.Rational(e)) for given in assumptions]
+    # the variable of an integral may bear the name of another
+    left, right = (side.replace(sp.Integral, lambda *parts: sp.Integral(*parts).as_dummy()) for side in (left, right))
     symbols = set(left.free_symbols | right.free_symbols).union(*(given.free_symbols for given in relations))
     real = {symbol: _as_real(sp, symbol) for symbol in symbols}
     domain = Domain.of(real.values(), [given.xreplace(real) for given in relations])

@@ -11,15 +11,14 @@ from typing import Any
 import sympy as sp
 
 from ..errors import InputError
-from .balls import Undefined
 from .derivation import derive_equality
 from .domain import Domain
 from .polyhedron import Inequality
-from .resolution import Resolution
+from .resolution import Nowhere, Resolution
 from .signs import Part, is_continuous, is_infinite
 
 # Where the derivative of an expression made of these is undefined, so is what sympy writes for it.
-_SMOOTH = (sp.sin, sp.cos, sp.tan, sp.cot, sp.exp, sp.log, sp.sinh, sp.cosh, sp.tanh, sp.asin, sp.acos, sp.atan)
+_SMOOTH = {sp.sin, sp.cos, sp.tan, sp.cot, sp.exp, sp.sinh, sp.cosh, sp.tanh, sp.atan}
 _ENTIRE = {sp.exp, sp.sin, sp.cos, sp.sinh, sp.cosh}
 
 
@@ -46,7 +45,8 @@ def prepared(e: Any, domain: Domain) -> Any:
 
 def _derivative(e: Any) -> Any:
     functions = {f.func for f in e.expr.atoms(sp.Function)}
-    return e.doit() if functions <= set(_SMOOTH) else e
+    rational = all(power.exp.is_Integer for power in e.expr.atoms(sp.Pow))
+    return e.doit() if functions <= _SMOOTH and rational else e
 
 
 def _integral(e: Any, domain: Domain) -> Any:
@@ -90,17 +90,20 @@ def _definite(integrand: Any, variable: Any, low: Any, high: Any, domain: Domain
         inside = replace(
             cell, symbols=(*cell.symbols, t), inequalities=(*cell.inequalities, *filter(None, bounds_here))
         )
+        values = dict(cell.values)
         if inside.polyhedron.is_empty:
-            # no length
+            # no length: the integral is 0, and so must be the difference
+            at_end = antiderivative.xreplace({t: low}).xreplace(values)
+            if is_infinite(at_end) or not is_continuous(at_end, Part(cell)):
+                return None
             continue
         part = Part(inside)
-        values = dict(cell.values)
         here, derivative = antiderivative.xreplace(values), sp.diff(antiderivative, t).xreplace(values)
         try:
             resolution = Resolution(part)
             here = resolution.resolved(here)
             equal = derive_equality(resolution.resolved(f.xreplace(values)), resolution.resolved(derivative), part)
-        except Undefined:
+        except Nowhere:
             return None
         if equal is None or not is_continuous(here, part):
             return None

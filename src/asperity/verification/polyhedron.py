@@ -12,7 +12,7 @@ from typing import Any
 
 import sympy as sp
 
-from .balls import evaluate
+from .balls import Unclear, Undefined, evaluate
 
 # Enough to compare any two numbers that a user writes as ends of intervals and that differ.
 BITS = 2000
@@ -63,14 +63,17 @@ class Inequality:
 
 
 def sign_of(number: Any) -> int:
-    """The sign of an exact number; a number that cannot be told from 0 in many digits is refused as unclear."""
+    """The sign of an exact number; `Unclear` is raised of one that cannot be told from 0, or is not real."""
     if number.is_Rational or number.is_infinite:
         return int(sp.sign(number))
-    for bits in (100, BITS):
-        ball = evaluate(number, {}, bits).ball
-        if ball > 0 or ball < 0:
-            return 1 if ball > 0 else -1
-    return evaluate(sp.nsimplify(sp.simplify(number)), {}, BITS).sign
+    try:
+        for bits in (100, BITS):
+            ball = evaluate(number, {}, bits).ball
+            if ball > 0 or ball < 0:
+                return 1 if ball > 0 else -1
+        return evaluate(sp.simplify(number), {}, BITS).sign
+    except Undefined as error:
+        raise Unclear from error
 
 
 class Polyhedron:

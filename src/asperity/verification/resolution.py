@@ -21,6 +21,10 @@ PIECES = 40
 LARGEST = 120
 
 
+class Nowhere(Exception):
+    """The expression is defined at no point of the part."""
+
+
 class Resolution:
     """Resolves expressions on one part.
 
@@ -39,9 +43,9 @@ class Resolution:
         self._done: dict[Any, Any] = {}
 
     def resolved(self, e: Any) -> Any:
-        """The expression without what could be resolved; `Undefined` is raised if it is defined nowhere."""
+        """The expression without what could be resolved; `Nowhere` is raised if it is defined nowhere."""
         if is_infinite(e):
-            raise Undefined
+            raise Nowhere
         if not e.args or isinstance(e, sp.Integral | sp.Sum | sp.Product | sp.Derivative | sp.Subs | sp.Limit):
             return e
         if e not in self._done:
@@ -51,7 +55,7 @@ class Resolution:
                 args = [self.resolved(argument) for argument in e.args]
                 again = e if tuple(args) == e.args else e.func(*args)
                 if is_infinite(again):
-                    raise Undefined
+                    raise Nowhere
                 rule = _RULES.get(again.func)
                 self._done[e] = rule(self, again) if rule is not None else again
         return self._done[e]
@@ -147,7 +151,7 @@ class Resolution:
                 return e
             if truth:
                 return self.resolved(branch)
-        raise Undefined
+        raise Nowhere
 
     def _truth(self, condition: Any) -> bool | None:
         if condition in (sp.true, sp.false):
@@ -245,17 +249,17 @@ class Resolution:
         """What must not be negative."""
         for expression in expressions:
             if self._signs(expression, limit=True) <= NEGATIVE:
-                raise Undefined
+                raise Nowhere
 
     def _power(self, e: Any) -> Any:
         base, exponent = e.base, e.exp
         if exponent.is_Integer:
             if exponent < 0 and self._signs(base, limit=True) <= ZERO:
-                raise Undefined
+                raise Nowhere
             return e
         signs = self._signs(base, limit=True)
         if exponent.is_Rational and signs <= NEGATIVE:
-            raise Undefined
+            raise Nowhere
         if signs == ZERO:
             return self._power_of_zero(e)
         if signs == POSITIVE:
@@ -267,7 +271,7 @@ class Resolution:
     def _power_of_zero(self, e: Any) -> Any:
         signs = self._signs(e.exp)
         if signs <= NEGATIVE:
-            raise Undefined
+            raise Nowhere
         if len(signs) == 1:
             return sp.Integer(0 if signs == POSITIVE else 1)
         self.undetermined.append(e.exp)
@@ -286,7 +290,7 @@ class Resolution:
 
     def _logarithm(self, e: Any) -> Any:
         if self._signs(e.args[0], limit=True) <= NOT_POSITIVE:
-            raise Undefined
+            raise Nowhere
         if sp.count_ops(e.args[0]) > LARGEST:
             return e
         total, rest = sp.Integer(0), sp.Integer(1)

@@ -223,8 +223,23 @@ class Part:
                 return ANY
         return found
 
+    def along(self, symbol: Any) -> Part:
+        """The part without the conditions that may cut a line on which one symbol varies into pieces."""
+        values = dict(self.domain.values)
+        kept = tuple(
+            condition
+            for condition in self.domain.conditions
+            if not isinstance(condition, sp.Ne)
+            and (difference := (condition.lhs - condition.rhs).xreplace(values)).is_polynomial(symbol)
+            and sp.degree(difference, symbol) <= 1
+        )
+        return self if kept == self.domain.conditions else Part(replace(self.domain, conditions=kept))
+
     def _by_derivative(self, e: Any, depth: int) -> Signs:
         """Positive at the lower end and growing, say, for every symbol in turn."""
+        if self.domain.conditions:
+            # a line from the end may leave where they hold
+            return Part(replace(self.domain, conditions=()))._by_derivative(e, depth)
         if not e.free_symbols or sp.count_ops(e) > LARGEST:
             return ANY
         for symbol in sorted(e.free_symbols, key=str):

@@ -25,10 +25,13 @@ def zeros(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
     """
     if not e.has(symbol):
         return [] if e.is_zero is False or (e.is_number and _differs_from_zero(e)) else None
-    places = _places(e, symbol, low, high)
-    if places is None or len(places) > MOST:
+    try:
+        places = _places(e, symbol, low, high)
+        if places is None or len(places) > MOST:
+            return None
+        inside = [place for place in places if sign_of(place - low) > 0 and sign_of(high - place) > 0]
+    except (Undefined, Unclear):
         return None
-    inside = [place for place in places if sign_of(place - low) > 0 and sign_of(high - place) > 0]
     return sorted(inside, key=lambda place: sp.N(place, 50))
 
 
@@ -87,6 +90,8 @@ def _of_factor(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
 
 def _of_polynomial(e: Any, symbol: Any) -> list[Any] | None:
     polynomial = sp.Poly(e, symbol)
+    if polynomial.degree() < 1 or not _differs_from_zero(polynomial.LC()):
+        return None
     if polynomial.degree() == 1:
         a, b = polynomial.all_coeffs()
         return [sp.together(-b / a)]
