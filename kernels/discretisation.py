@@ -42,9 +42,10 @@ def discretise(
         ``"exact"``: laws of isometries, to rounding, plus a bound for beams of a polygonal wall that were not
         resolved, or for kinks of a composition left out near grazing. ``"quadrature"``:
         Gauss rules, refined until two levels differ by the tolerance or the work exceeds about a second; the error
-        is that difference. ``"qmc"``: rays from 8 independently scrambled Sobol sequences; the error is from their
-        spread; in a basis that is mirror-symmetric, as the law is, each ray counts with its mirror image.
-        ``"monte-carlo"``: independent rays; the error is from the variance of the counts. ``"auto"`` takes the first
+        is that difference. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random shifts of one; the
+        error is from their spread; in a basis that is mirror-symmetric, as the law is, each ray counts with its mirror
+        image. ``"monte-carlo"``: independent rays; the error is from the variance of the counts. The error of sampled
+        matrices is a 95 % quantile. ``"auto"`` takes the first
         of these that the law has, except that quadrature in the entry point comes after ``"qmc"`` for driven laws
         without a wall. Of a wall without closed form it takes what promises the tolerance soonest: isometries of few
         pieces; as many rays as the tolerance needs, where that is less than ``samples``; isometries of many pieces;

@@ -54,7 +54,7 @@ def distance(
     first, second : Law or KernelMatrix
         Of a law and a matrix, the law is discretised on the bins of the matrix.
     order : float
-        p of the Wasserstein distance W_p, at least 1. Angles are measured in radians.
+        p of the Wasserstein distance W_p, a finite number of at least 1. Angles are measured in radians.
     kind : {"rows", "sup", "joint", "pseudometric"}
         ``"rows"``: W_p(P(theta, .), Q(theta, .)), averaged over sin(theta)/2 d theta as its p-th power.
         ``"sup"``: its supremum over theta.
@@ -79,12 +79,15 @@ def distance(
     *Laws.* Rows are exact where they consist of atoms; densities are resolved on cells; both these and the nodes in
     the incoming angle are refined until two levels agree. The difference of the levels is the error, an estimate.
 
-    *Matrices* are kernels between the middle angles of their cells. Their errors are added, those of empirical
-    matrices by resampling. That distance can be far below that of the laws if these vary within cells: two
-    involutions may have the same matrix.
+    *Matrices* are kernels between the middle angles of their cells. By the triangle inequality the distance is wrong by
+    no more than both matrices are; how far empirical ones are from their laws is resampled. The interval holds in about
+    95 % of cases for a sample against its own law, and in more for two samples or laws that differ, since noise in
+    rows that differ cancels, by an amount that the counts do not tell. The distance of matrices can be far below that
+    of the laws if these vary within cells: two involutions may have the same matrix.
 
     *Joint* distances of matrices are exact up to 4 million pairs of occupied cells (160 MB); beyond, cells are merged,
-    and the error says what that may have done. Laws are compared on 128 bins.
+    and the error says what that may have done. At orders of a few dozen and more, p-th powers of all but the longest
+    ways are lost in rounding, and the result is the middle of a bracket. Laws are compared on 128 bins.
 
     *The pseudometric* is the sum over k, l >= 0 of 2^(-k-l-2) times the difference of the means of
     cos(k theta) cos(l theta') under the flux measures, with the rest of the sum in the error; it metrises their weak

@@ -52,9 +52,9 @@ def estimate(
     Returns
     -------
     KernelMatrix
-        With the raw ``counts`` for Bins and the sampling error in ``error``, from the variance of multinomial
-        counts, or from the spread of 8 batches for weighted pairs and for bases without cells. The truncation to the
-        basis is not part of it.
+        With the raw ``counts`` for Bins and in ``error`` the 95 % quantile of the sampling error, from the variance of
+        multinomial counts, or from the spread of 8 batches for weighted pairs and for bases without cells. The
+        truncation to the basis is not part of it.
 
     Raises
     ------

@@ -41,7 +41,9 @@ class KernelMatrix:
     basis : Basis
         The basis, of n functions.
     error : Estimate
-        Frobenius error of ``symmetric``, in its ``.value`` (and, being all that is known, in its ``.error`` too).
+        The Frobenius error of ``symmetric``, in its ``.value`` and, being all that is known, in its ``.error`` too. Of
+        kind ``"bound"`` the distance from the exact matrix is within it; of kind ``"estimate"`` in 95 of 100 cases: of
+        a sampled matrix it is the 95 % quantile of that distance over the rays.
     counts : ndarray of int64, shape (n, n), optional
         Raw counts of sampled pairs (incoming bin, outgoing bin), before any symmetrisation.
     replicates : tuple of arrays

@@ -7,13 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..checks import Floats
-from ..estimates import NORMAL_95
 from .cell_rows import distance_of_rows, stochastic_rows
 from .counting import Counts
 from .matrix import KernelMatrix
 
 # Resamples whose mean is the noise floor, good to a tenth or so, and whose spread is in the error.
 RESAMPLES = 32
+# How many of their standard deviations above the mean the upper limit of 95 % is: more than the 1.65 of normal ones,
+# as the spread is that of 32; the largest of many rows has a longer tail.
+DEVIATIONS, DEVIATIONS_OF_SUPREMUM = 1.96, 2.5
 SEED = 0
 # Counts held at a time.
 CHUNK = 2**22
@@ -100,4 +102,4 @@ def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup:
         found = np.concatenate([between(rows_of_counts(counts, own), own) for counts in draws])
         mean += float(np.mean(found))
         variance += float(np.var(found, ddof=1))
-    return known + mean + NORMAL_95 * float(np.sqrt(variance))
+    return known + mean + (DEVIATIONS_OF_SUPREMUM if sup else DEVIATIONS) * float(np.sqrt(variance))

@@ -102,8 +102,8 @@ def test_rows_that_fall_short_are_kept_where_they_know_more_than_rays():
     law = ker.WallLaw(geo.dispersing_arcs(1 / 3))
     chosen, rays = (ker.discretise(law, ker.Legendre(24), method=how, tolerance=1e-9) for how in ("auto", "qmc"))
     assert chosen.method == "quadrature" and 1e-9 < float(chosen.error) < float(rays.error)
-    # the error of rays is a standard error
-    assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= float(chosen.error) + 2.0 * float(rays.error)
+    # the error of rays is a quantile of 95 %
+    assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= float(chosen.error) + 1.5 * float(rays.error)
 
 
 def test_a_look_at_some_rows_tells_a_chaotic_hollow_in_sums_and_in_the_other_convention_too():

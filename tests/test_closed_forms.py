@@ -259,13 +259,6 @@ def tie_distance(count: mpmath.mpf) -> float:
     return float(abs(count - mpmath.nint(count)) / max(1, abs(count) * mpmath.mpf(2) ** -40))
 
 
-def test_unresolvable_crossings_are_replaced_by_their_mean() -> None:
-    law = RectangularTeethLaw(1e8)
-    assert law.branches(1e-12)[0].tolist() == [0.75, 0.25]
-    x = (np.arange(1000) + 0.5) / 1000
-    assert np.mean(law.respond(x, 1e-12) < 1.0) == pytest.approx(0.25, abs=1e-3)
-
-
 @pytest.mark.parametrize("make", [TriangularTeethLaw, RectangularTeethLaw, CircularArcLaw])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
 def test_shapes_outside_their_range_are_refused(make: type[Law], value: float) -> None:
@@ -300,3 +293,26 @@ def test_respond_and_sample_broadcast() -> None:
     assert law.sample(1.0, np.random.default_rng(0)).shape == ()
     assert law.apply(lambda angle: np.stack([angle, angle**2], axis=-1), np.full((2, 3), 1.0)).shape == (2, 3, 2)
     assert law.apply(np.cos, np.empty(0)).shape == (0,)
+
+
+def test_the_law_of_a_crevice_is_that_of_every_float64_angle_however_many_its_crossings():
+    rng = np.random.default_rng(11)
+    for ratio in (0.3, 2.7, 1e3, 1e6, 1e8, 1e15):
+        near = 10.0 ** rng.uniform(-12.0, 0.0, 12)
+        theta = np.concatenate([near, np.pi - near, [1e-300, 5e-324, np.nextafter(np.pi, 0.0), 0.5 * np.pi]])
+        found = RectangularTeethLaw(ratio).branches(theta)[0][:, 1]
+        with mpmath.workdps(800):
+            turns = [mpmath.mpf(ratio) * mpmath.cos(mpmath.mpf(t)) / mpmath.sin(mpmath.mpf(t)) for t in theta.tolist()]
+            expected = [float(abs(turn - mpmath.nint(turn))) for turn in turns]
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-13)
+    assert RectangularTeethLaw(1e6).branches(1e-9)[0][0] == pytest.approx(0.9373850752, abs=1e-10)
+
+
+@pytest.mark.parametrize("theta", [0.3, 1e-3, math.pi - 1e-5, 1e-9])
+@pytest.mark.parametrize("ratio", [0.7, 30.0, 1e6, 1e12])
+def test_rays_into_a_crevice_have_the_law_and_the_parity_of_their_hits(ratio, theta):
+    law, x = RectangularTeethLaw(ratio), (np.arange(20_000) + 0.5) / 20_000
+    outgoing = law.respond(x, theta)
+    back = np.abs(outgoing - theta) <= 1e-12 * theta
+    assert np.mean(back) == pytest.approx(law.branches(theta)[0][1], abs=1e-4)
+    assert np.array_equal(law.hits(x, theta) % 2 == 0, back)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from net_theory import NET_OVER_SPREAD
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import InputError
-from net_theory import NET_OVER_SPREAD
 
 # <u, P u>/<u, u> with u = cos theta, from independent tracers and high-precision quadrature.
 TRIANGULAR_07 = 0.134541971359171

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+
+import mpmath
 import numpy as np
 import ot
 import pytest
@@ -283,3 +286,75 @@ def test_what_cannot_be_compared_is_refused():
         ker.distance(ker.discretise(law, ker.Legendre(4)), matrix)
     with pytest.raises(InputError, match="counts"):
         ker.difference_test(matrix, matrix)
+
+
+# ---- orders ------------------------------------------------------------------------------------------------------
+def precise_mean_turn(order):
+    """(int |pi - 2 theta|^p sin(theta)/2 d theta)^(1/p) in 30 digits."""
+    with mpmath.workdps(30):
+        places = [0, *(mpmath.mpf(k) / order for k in (1, 5, 20) if k < order), mpmath.pi / 2]
+        whole = mpmath.quad(lambda t: (mpmath.pi - 2 * t) ** order * mpmath.sin(t), places)
+        return float(whole ** (1 / mpmath.mpf(order)))
+
+
+@pytest.mark.parametrize("order", [3.5, 20, 100, 1000])
+def test_distances_of_high_order_are_numbers_with_errors_that_hold(order):
+    found = ker.distance(ker.specular(), ker.retroreflection(), order)
+    assert abs(found.value - precise_mean_turn(order)) <= found.error < 1e-3
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 7.5, 60.0, 1000.0, 1e6])
+def test_rows_of_high_order_agree_with_sums_in_many_digits(order):
+    rng = np.random.default_rng(4)
+    x, y = np.sort(rng.uniform(0.0, np.pi, (5, 6)), axis=1), np.sort(rng.uniform(0.0, np.pi, (5, 6)), axis=1)
+    equal = np.full((5, 6), 1 / 6)
+    found = wasserstein(Distributions.of_atoms(x, equal), Distributions.of_atoms(y, equal), order)
+    with mpmath.workdps(40):
+        sums = [
+            sum(mpmath.mpf(abs(a - b)) ** order for a, b in zip(*pair, strict=True)) / 6
+            for pair in zip(x, y, strict=True)
+        ]
+        expected = [float(whole ** (1 / mpmath.mpf(order))) for whole in sums]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("rise", [1e-9, 1e-6, 1e-4, 1e-3, 0.1])
+@pytest.mark.parametrize("order", [1.5, 2.0, 30.0, 1000.0])
+def test_slanted_pieces_of_high_order_are_integrated_in_full(order, rise):
+    # a uniform distribution on (1, 1 + rise) is moved to 0
+    mass = Distributions(np.array([[1.0, 1.0 + rise]]), np.array([[0.0, 1.0]]))
+    with mpmath.workdps(60):
+        one, end = mpmath.mpf(order) + 1, mpmath.mpf(1.0 + rise)
+        expected = float(((end**one - 1) / one / (end - 1)) ** (1 / mpmath.mpf(order)))
+    found = wasserstein(mass, Distributions.of_atoms(np.zeros((1, 1)), np.ones((1, 1))), order)
+    np.testing.assert_allclose(found, [expected], rtol=2e-13)
+
+
+@pytest.mark.parametrize("order", [3, 20, 50, 1000])
+def test_joint_distances_of_high_order_know_what_rounding_takes(order):
+    # permutations of four cells: equal masses, so that the best of all assignments is the distance
+    rng = np.random.default_rng(8)
+    n, middles = 4, None
+    pair = [
+        ker.KernelMatrix(np.eye(n)[rng.permutation(n)], ker.Bins(n), Estimate(0.0, 0.0, "bound", "given"))
+        for _ in range(2)
+    ]
+    middles = 0.5 * (pair[0].basis.edges[1:] + pair[0].basis.edges[:-1])
+    places = [[(middles[i], middles[int(np.argmax(matrix.array[i]))]) for i in range(n)] for matrix in pair]
+    powers = [
+        sum(mpmath.mpf(np.hypot(a[0] - b[0], a[1] - b[1])) ** order for a, b in zip(places[0], some, strict=True)) / n
+        for some in itertools.permutations(places[1])
+    ]
+    expected = float(min(powers) ** (1 / mpmath.mpf(order)))
+    found = ker.distance(*pair, order, "joint")
+    assert abs(found.value - expected) <= found.error + 1e-12 and np.isfinite(found.error)
+
+
+@pytest.mark.parametrize("order", [0.5, -1, 0, np.nan, np.inf, "two"])
+def test_orders_that_are_none_are_refused_by_distances_and_tests(order):
+    rng = np.random.default_rng(0)
+    pair = [empirical(ker.lambertian(), 500, 4, rng) for _ in range(2)]
+    for measure in (ker.distance, ker.difference_test):
+        with pytest.raises(InputError, match="order: expected"):
+            measure(*pair, order)
+    assert ker.difference_test(*pair, 1000.0).p_value > 0.05

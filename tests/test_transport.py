@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -356,3 +358,19 @@ def test_deep_crevices_converge_weakly_but_not_row_by_row():
     rows = ker.study_convergence(laws, limit, tolerance=5e-2)
     assert weak.distances[-1] < 0.2 * weak.distances[0]
     assert rows.distances[-1] > 0.5 * rows.distances[0]
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "bottle"])
+def test_the_resistance_of_a_wall_without_closed_form_meets_its_tolerance(kind):
+    # straight Bezier pieces are traced; the same polygon is known exactly by its beams
+    points = {
+        "zigzag": [(0, 0), (0.2, -0.4), (0.5, -0.1), (0.7, -0.6), (1, 0)],
+        "bottle": [(0, 0), (0.35, -0.3), (0.15, -0.8), (0.9, -0.7), (0.7, -0.3), (1, 0)],
+    }[kind]
+    ends = np.array(points, dtype=float)
+    pieces = [geo.Bezier([a, 0.5 * (a + b), b]) for a, b in itertools.pairwise(ends)]
+    exact = ker.resistance(ker.PolygonLaw(geo.Wall.from_vertices(points)))
+    coarse, fine = (ker.resistance(ker.WallLaw(geo.Wall(pieces)), tolerance) for tolerance in (1e-3, 3e-6))
+    for found in (coarse, fine):
+        assert abs(found.value - exact.value) <= found.error + exact.error
+    assert coarse.error <= 1e-3 and fine.error <= 3e-6

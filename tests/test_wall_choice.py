@@ -20,7 +20,7 @@ def test_a_rough_matrix_takes_few_rays_and_keeps_its_tolerance(basis):
     rough = ker.discretise(MUSHROOMS, basis, tolerance=1e-2)
     fine = ker.discretise(MUSHROOMS, basis, method="qmc")
     assert rough.samples < fine.samples and float(rough.error) <= 1e-2
-    assert np.linalg.norm(rough.symmetric - fine.symmetric) <= 3.0 * (float(rough.error) + float(fine.error))
+    assert np.linalg.norm(rough.symmetric - fine.symmetric) <= 2.0 * (float(rough.error) + float(fine.error))
 
 
 def test_a_look_that_finds_rays_too_few_changes_no_result():
@@ -36,8 +36,8 @@ def test_a_profile_of_many_pieces_takes_rays_for_a_rough_answer_and_isometries_f
     rough, exact = (ker.discretise(law, basis, tolerance=tolerance) for tolerance in (1e-2, 1e-9))
     assert (rough.method, exact.method) == ("qmc", "exact") and "exact_law" in vars(law)
     assert float(rough.error) <= 1e-2 and float(exact.error) <= 1e-9
-    # Student's distribution with 7 degrees of freedom has 6 standard errors in 2000
-    assert abs(rough.symmetric[1, 1] - exact.symmetric[1, 1]) <= 6.0 * float(rough.error)
+    # Student's distribution with 7 degrees of freedom exceeds 6 standard errors, 2.5 half widths, once in 2000 times
+    assert abs(rough.symmetric[1, 1] - exact.symmetric[1, 1]) <= 2.5 * float(rough.error)
 
 
 @pytest.mark.parametrize("method", ["qmc", "monte-carlo"])

@@ -1,0 +1,100 @@
+"""Intervals of 95 % hold in 95 % of repetitions: the campaign of benchmarks/coverage.py in small."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from benchmarks.coverage import (
+    MAXWELL,
+    SCATTERING,
+    TEETH,
+    Tally,
+    distance_once,
+    eigenvalue_once,
+    matrix_once,
+    pairs_once,
+    resistance_once,
+    tally,
+)
+from scipy.stats import binomtest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.kernels.counting import LEVEL, half_width
+from asperity.study import check_tracer
+
+REPEATS = 120
+# A coverage of 95 % gives a smaller p-value once in two thousand cases.
+RARE = 5e-4
+
+
+def is_calibrated(found: Tally) -> bool:
+    return binomtest(found.held, found.repeats, LEVEL).pvalue > RARE
+
+
+@pytest.mark.parametrize("symmetrise", [False, True])
+@pytest.mark.parametrize("basis", [ker.Bins(4), ker.Bins(24), ker.Legendre(6)], ids=repr)
+@pytest.mark.parametrize("method", ["monte-carlo", "qmc"])
+def test_errors_of_sampled_matrices_hold_in_95_of_100_cases(method: str, basis: ker.Basis, symmetrise: bool) -> None:
+    assert is_calibrated(tally(matrix_once(TEETH, basis, method, 2048, symmetrise), REPEATS))
+
+
+@pytest.mark.parametrize("law", [SCATTERING, MAXWELL], ids=repr)
+def test_errors_hold_against_matrices_that_are_known_by_hand(law: ker.Law) -> None:
+    assert is_calibrated(tally(matrix_once(law, ker.Legendre(4), "monte-carlo", 2048, False), REPEATS))
+
+
+def test_errors_hold_where_most_counts_are_none_or_one() -> None:
+    # 24 rays for 24 cells each: normal counts would have a fourth of the variance of the squared error
+    assert is_calibrated(tally(matrix_once(MAXWELL, ker.Bins(24), "monte-carlo", 576, False), REPEATS))
+
+
+@pytest.mark.parametrize("invariant", [True, False])
+@pytest.mark.parametrize("basis", [ker.Bins(8), ker.Legendre(4)], ids=repr)
+def test_errors_of_pairs_hold_in_95_of_100_cases(basis: ker.Basis, invariant: bool) -> None:
+    found = tally(pairs_once(basis, 4000, invariant, False), REPEATS)
+    # weights by nearest angles make estimates more even than independent batches know
+    assert is_calibrated(found) or (not invariant and found.coverage > LEVEL)
+
+
+@pytest.mark.parametrize(("method", "which"), [("monte-carlo", "gap"), ("qmc", "slem")])
+def test_sampling_errors_of_eigenvalues_hold_in_95_of_100_cases(method: str, which: str) -> None:
+    assert is_calibrated(tally(eigenvalue_once(TEETH, ker.Legendre(6), method, 4096, which), REPEATS))
+
+
+@pytest.mark.parametrize("kind", ["rows", "sup"])
+def test_distances_of_a_sample_from_its_own_law_hold_in_95_of_100_cases(kind: str) -> None:
+    found = tally(distance_once(1, kind, True, 1), REPEATS)
+    assert is_calibrated(found) or found.coverage > LEVEL
+    assert found.ratio < 1.6
+
+
+@pytest.mark.parametrize(("alike", "sampled"), [(True, 2), (False, 1), (False, 2)])
+def test_other_distances_of_samples_hold_at_least_as_often(alike: bool, sampled: int) -> None:
+    assert tally(distance_once(1, "rows", alike, sampled), 60).coverage >= LEVEL
+
+
+def test_resistances_by_rays_hold_in_95_of_100_cases() -> None:
+    assert is_calibrated(tally(partial(resistance_once, rays=2**14), REPEATS))
+
+
+def test_the_mean_number_of_collisions_of_a_study_holds_in_95_of_100_cases() -> None:
+    wall = geo.focusing_arcs(1.2)
+
+    def once(rng: np.random.Generator) -> tuple[float, float]:
+        found = check_tracer(wall, rng)
+        # Kac: the length of the hollows over that of their openings, 1.2/sin(1.2)
+        return abs(found.mean_collisions.value - 1.2 / np.sin(1.2)), found.mean_collisions.error
+
+    assert is_calibrated(tally(once, 60))
+
+
+def test_the_half_width_of_parts_is_students_where_they_vary_in_one_direction() -> None:
+    parts = [np.array([[value, 0.0], [0.0, 0.0]]) for value in (1.0, 2.0, 4.0, 3.0, 5.0, 2.0, 1.0, 6.0)]
+    mean = np.mean(parts, axis=0)
+    # t of 7 degrees of freedom, 97.5 %: 2.364624
+    assert half_width(mean, parts) == pytest.approx(
+        2.364624 * np.std([p[0, 0] for p in parts], ddof=1) / 8**0.5, rel=1e-6
+    )
