@@ -14,7 +14,7 @@ from .collision_drawing import collision_path, draw_collision, draw_configuratio
 from .configuration import ConfigurationSpace
 from .container import Container
 from .curve import Curve
-from .cylinder import CylinderCollision, collide_cylinder, collide_modified
+from .cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
 from .disk import Disk
 from .drawing import draw_wall
 from .hollow import Hollow
@@ -50,6 +50,7 @@ __all__ = [
     "CylinderCollision",
     "Disk",
     "Hollow",
+    "ModifiedCollision",
     "NamedWall",
     "RigidCollision",
     "RollingCharts",

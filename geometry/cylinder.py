@@ -11,8 +11,9 @@ from ..checks import Floats, positive_number, whole_number
 from . import rolling
 from .blocks import in_blocks
 from .charts import RollingCharts
+from .configuration import ConfigurationSpace
 from .disk import Disk
-from .rigid import check_kinds, checked_states
+from .rigid import check_kinds, checked_states, collide
 from .rigid_tables import ground_of, rounding_of_places, shares
 from .tracing import MAX_COLLISIONS, Outcomes
 from .wall import Wall
@@ -120,26 +121,72 @@ def collide_cylinder(
     return CylinderCollision(*results)
 
 
-def collide_modified(
-    disk: Disk, wall: Wall, scale: float, position: ArrayLike, velocity: ArrayLike, spacing: float
-) -> CylinderCollision:
-    """The modified law K~ = eta o K_cyl o eta^(-1): the cylinder's collision in the coordinates of the true disk.
+@dataclass(frozen=True)
+class ModifiedCollision(Outcomes):
+    """What became of the disks, the first axis of every array running over them.
 
-    The disk flies until its lowest satellite comes to the level of the tops, its path there is straightened, it
-    collides on the cylinder, and eta takes the outcome back to height 0. Where one satellite takes part, K differs
-    from K~ by the bending of the path during the contact alone, which is of the order of spacing.
+    Attributes
+    ----------
+    position : array of shape (n, 2)
+        (y1', y3') = (x1, alpha), straightened, where the lowest satellite is back at the level of the tops, unfolded;
+        where the disk did not come back the last position of the true disk.
+    velocity : array of shape (n, 3)
+        Outgoing (v1, v2, omega).
+    contacts : array of int, shape (n,)
+    two_satellites : array of bool, shape (n,)
+        Whether more than one satellite touched the wall.
+    inside : array of bool, shape (n,)
+        Where the map is that of the paper: the disk came back, alpha is in Z before and after, so that one satellite
+        alone is within the depth of the wall, and v2 > J^(-1/2) sin(rho/2) for unit velocities, so that eta is one to
+        one. There K~ is an involution. Elsewhere the values are what the same formulas give, and nothing is claimed.
+    status : array of int, shape (n,)
+        Values of `Status`, those of the true collision.
+    """
+
+    position: Floats
+    velocity: Floats
+    contacts: NDArray[np.int64]
+    two_satellites: NDArray[np.bool_]
+    inside: NDArray[np.bool_]
+    status: NDArray[np.uint8]
+
+
+def collide_modified(
+    disk: Disk,
+    wall: Wall,
+    scale: float,
+    position: ArrayLike,
+    velocity: ArrayLike,
+    spacing: float | None = None,
+    *,
+    max_contacts: int = MAX_COLLISIONS,
+    threads: int | None = None,
+) -> ModifiedCollision:
+    """The modified law K~ = eta^(-1) o K o eta: the true collision in the coordinates of the cylinder.
+
+    A state of the cylinder is (x1, alpha) at height 0. The same disk, bent, has its lowest satellite at the level of
+    the tops; eta takes it back along its path to height 0, the true disk collides, and eta^(-1) follows it until its
+    lowest satellite leaves the level of the tops, and straightens that. As the scale tends to 0, K~ tends to K_cyl,
+    the law of `collide_cylinder` (Lemma 5.2 (iii)). Where alpha is nearest to k rho, K_cyl is to be taken at
+    alpha - k rho: the cylinder's line x1 + alpha is unrolled, the satellite is not.
 
     Parameters
     ----------
-    disk, wall, scale, position, velocity, spacing
-        As in `collide`; the spacing is to be given.
+    disk, wall, scale, position, velocity, spacing, max_contacts, threads
+        As in `collide`; the position is that on the cylinder.
 
     Returns
     -------
-    CylinderCollision
-        ``time`` is that on the cylinder.
+    ModifiedCollision
+        Its mask ``inside`` says where the map is defined as in the paper.
 
-    Source: Rudzis 2022, section 5.2 (eq. 4.75 for eta, the signs of section 5.2 corrected).
+    Raises
+    ------
+    InputError
+        As in `collide`.
+
+    Source: Rudzis 2022, section 5.2 (eq. 4.75 for eta, the signs of section 5.2 corrected; Lemma 4.13 corrected for
+    the velocities at which eta is one to one).
 
     Examples
     --------
@@ -149,20 +196,31 @@ def collide_modified(
     >>> notch = geo.Wall.from_vertices([(0, 0), (0, -0.5), (1, -0.5), (1, 0)])
     >>> disk = geo.Disk(mass=1.0, inertia=1.0)
     >>> out = collide_modified(disk, notch, 0.001, [[0.00025, 0.0]], [[0.0, -2.0, 0.0]], spacing=np.pi / 32)
-    >>> out.position.tolist(), out.velocity.tolist(), out.time.tolist()
-    ([[0.00025, 0.0]], [[0.0, 2.0, 0.0]], [0.0005])
+    >>> out.position.tolist(), out.velocity.tolist(), out.inside.tolist()
+    ([[0.00025, 0.0]], [[0.0, 2.0, 0.0]], [True])
     """
-    charts = RollingCharts(spacing)
+    space = ConfigurationSpace(wall, disk, scale, spacing)
+    charts = space.charts
     at, moving = checked_states(position, velocity)
-    landed = _landing(charts, at[:, 1], moving)
-    low = np.stack([at[:, 0] + moving[:, 0] * landed, moving[:, 1] * landed, at[:, 1] + moving[:, 2] * landed], axis=-1)
-    start = charts.straighten(low)[:, [0, 2]]
-    # the line x1 + alpha is unrolled: beside the satellite S_k it is k spacing farther, on the wall it is not
-    lap = charts.nearest(low[:, 2]) * charts.spacing
-    out = collide_cylinder(disk, wall, scale, start - np.stack([np.zeros_like(lap), lap], axis=-1), moving)
-    back = charts.transfer(out.position, out.velocity) + np.stack([np.zeros_like(lap), lap], axis=-1)
-    back.setflags(write=False)
-    return CylinderCollision(back, out.velocity, out.time, out.contacts, out.status)
+    start = charts.transfer(at, moving)
+    true = collide(disk, wall, scale, start, moving, space.spacing, max_contacts=max_contacts, threads=threads)
+    back = true.escaped
+    out = np.array(true.position)
+    out[back] = _straightened(charts, true.position[back], -true.velocity[back])
+    floor = np.sin(0.5 * charts.spacing) / np.sqrt(disk.inertia)
+    inside = back & space.is_single(at[:, 1]) & space.is_single(out[:, 1])
+    for w in (moving, true.velocity):
+        inside = inside & (np.abs(w[:, 1]) > floor * np.sqrt(disk.inner(w, w)))
+    for array in (out, inside):
+        array.setflags(write=False)
+    return ModifiedCollision(out, true.velocity, true.contacts, true.two_satellites, inside, true.status)
+
+
+def _straightened(charts: RollingCharts, position: Floats, velocity: Floats) -> Floats:
+    """eta^(-1): down along the velocity until the lowest satellite is at the level of the tops, straightened."""
+    time = _landing(charts, position[:, 1], velocity)
+    low = np.stack([position[:, 0], np.zeros(len(time)), position[:, 1]], axis=-1) + time[:, None] * velocity
+    return charts.straighten(low)[:, [0, 2]]
 
 
 def _landing(charts: RollingCharts, alpha: Floats, velocity: Floats) -> Floats:

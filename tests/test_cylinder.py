@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from benchmarks import modified_law
 
 from asperity import geometry as geo
 from asperity.errors import InputError
@@ -57,22 +58,64 @@ def test_the_flight_time_is_the_length_of_the_foreshortened_ray():
 
 
 @pytest.mark.parametrize("name", ["triangular", "focusing"])
-def test_the_modified_law_is_shadowed_by_the_true_disk_with_order_one_in_the_spacing(name):
+def test_the_modified_law_follows_that_of_the_cylinder_with_order_one_in_the_spacing(name):
     disk, wall = geo.Disk(1.0, 0.6), WALLS[name]
     scales = np.array([1e-4, 1e-5, 1e-6, 1e-7])
     spacings, errors, strays = [], [], []
     for scale in scales:
         spacing = Satellites.around(scale, scale * wall.depth).spacing
         position, velocity = states(wall, scale, 2000, disk=disk)
-        true = geo.collide(disk, wall, scale, position, velocity)
-        shadow = geo.collide_modified(disk, wall, scale, position, velocity, spacing)
-        error = np.abs(true.velocity - shadow.velocity).max(axis=1)
+        # on Z^0, where the cylinder's line is the satellite's
+        position[:, 1] -= spacing * np.rint(position[:, 1] / spacing)
+        modified = geo.collide_modified(disk, wall, scale, position, velocity)
+        straight = geo.collide_cylinder(disk, wall, scale, position, velocity)
+        error = np.abs(modified.velocity - straight.velocity).max(axis=1)
         spacings.append(spacing)
         errors.append(np.median(error))
         strays.append(np.mean(error > 0.1))
     slope = np.polyfit(np.log(spacings), np.log(errors), 1)[0]
     assert abs(slope - 1.0) < 0.1
     assert strays[-1] < 0.5 * strays[0] and strays[-1] < 0.02
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_the_modified_law_is_the_true_one_conjugated_by_eta(name):
+    disk, wall, scale = geo.Disk(1.0, 0.6), WALLS[name], 1e-4
+    position, velocity = states(wall, scale, 500, disk=disk)
+    modified = geo.collide_modified(disk, wall, scale, position, velocity)
+    charts = geo.ConfigurationSpace(wall, disk, scale).charts
+    true = geo.collide(disk, wall, scale, charts.transfer(position, velocity), velocity)
+    np.testing.assert_array_equal(modified.velocity, true.velocity)
+    inside = modified.inside
+    landed = charts.transfer(modified.position[inside], modified.velocity[inside])
+    np.testing.assert_allclose(landed, true.position[inside], atol=1e-15)
+
+
+def test_states_outside_the_domain_of_the_modified_law_are_flagged():
+    # a wide crevice, so that what comes down on the middle of the bottom hits nothing else
+    wall = geo.Wall.from_vertices([(0, 0), (0.01, -1), (0.99, -1), (1, 0)])
+    disk, scale, spacing = geo.Disk(1.0, 0.5), 1e-6, np.pi / 20
+    gap = np.arcsin(scale / (2 * np.sin(spacing / 2)))  # adjacent satellites differ by the depth
+    alpha = np.array([0.0, spacing / 2 - 1.2 * gap, spacing / 2 - 0.8 * gap, spacing, 0.0, 0.0])
+    # rolling, but for the last ones hardly sinking
+    up = np.array([1.0, 1.0, 1.0, 1.0, *(np.sin(spacing / 2) / np.sqrt(0.5) * np.array([1.01, 0.99]))])
+    velocity = np.sqrt(1 - up**2)[:, None] * disk.frame[2] - up[:, None] * disk.frame[1]
+    position = np.stack([np.full(6, 0.5 * scale), alpha], axis=-1)
+    inside = geo.collide_modified(disk, wall, scale, position, 3.0 * velocity, spacing).inside
+    assert inside.tolist() == [True, True, False, True, True, False]
+
+
+@pytest.mark.parametrize("wall", modified_law.WALLS.values(), ids=modified_law.WALLS)
+def test_the_modified_law_tends_to_the_cylinders_and_undoes_itself_inside(wall):
+    rng = np.random.default_rng(3)
+    found = [modified_law.measured(wall, modified_law.DISK, scale, 1500, rng) for scale in (1e-2, 1e-4, 1e-6)]
+    distances = [m.distance for m in found]
+    assert distances[0] > 2.0 * distances[1] > 4.0 * distances[2]
+    assert distances[2] + found[2].distance_error < 0.02 and found[2].inside > 0.85
+    # positions of the size of the scale are known to EPS times the radius, velocities on arcs accordingly
+    assert all(m.defect < 1e-13 and m.mismatches == 0.0 for m in found)
+    # and outside it does not: that is what the mask is for
+    assert found[0].mismatches_outside > 0.0
 
 
 def test_bad_input_is_refused():
