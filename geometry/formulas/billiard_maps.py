@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...checks import Floats
-from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, verified, verify
+from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, holds, verified, verify
 from ...verification.entry import Code
 from .trials import generator
 
@@ -38,7 +38,8 @@ def reflection(q: Floats, p: Floats) -> tuple[Floats, Floats]:
 def billiard_map(q: Floats, p: Floats) -> tuple[Floats, Floats]:
     """Phi: fly to the other end of the chord, then reflect."""
     time = -2 * np.sum(q * p / AXES**2, axis=0) / np.sum(p**2 / AXES**2, axis=0)
-    return reflection(q + time * p, p)
+    # forward in time only
+    return reflection(q + np.maximum(time, 0.0) * p, p)
 
 
 def reversal(q: Floats, p: Floats) -> tuple[Floats, Floats]:
@@ -120,7 +121,10 @@ def invariant_measure(density: Code) -> Verdict:
     after = _in_coordinates(t, angle)
     jacobian = np.abs(columns[0][0] * columns[1][1] - columns[1][0] * columns[0][1])
     before = density(angle) * _speed(t)
-    return agreement(density(after[1]) * _speed(after[0]) * jacobian / before, 1.0, 1e-5, t=t, angle=angle)
+    return every(
+        agreement(density(after[1]) * _speed(after[0]) * jacobian / before, 1.0, 1e-5, t=t, angle=angle),
+        holds(density(angle) > 0, "densities are positive", angle=angle),
+    )
 
 
 def _speed(t: Floats) -> Floats:

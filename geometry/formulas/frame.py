@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ...verification import Formula, Verdict, convention, erratum, every, verified, verify
 from ...verification.entry import Code
 from ..kinetics import direction, foreshortening, frame_rows
@@ -43,7 +45,8 @@ def sign_of_the_rolling_direction(chi: Code) -> Verdict:
     from .. import symbolic as sym
 
     frame = sp.Matrix([*frame_rows(sym.m, sym.J, sp)[:2], chi(sym.m, sym.J, sp)])
-    return verify((frame * sym.metric.applyfunc(sp.sqrt)).det(), 1)
+    turned = verify((frame * sym.metric.applyfunc(sp.sqrt)).det(), 1)
+    return every(turned, verify(frame * sym.metric * frame.T, sp.eye(3)))
 
 
 @verified(
@@ -56,7 +59,8 @@ def sign_of_the_rolling_direction(chi: Code) -> Verdict:
         frame_rows,
     ),
     perturbed=lambda m, J, xp: [frame_rows(m, m, xp)[0], *frame_rows(m, J, xp)[1:]],
-    reason="The Gram matrix is the identity for all m and J. Either sign of χ will do.",
+    reason="The Gram matrix is the identity for all m and J, which either sign of χ would do. The signs are those in "
+    "which the contact's velocity, the vertical one and the rolling momentum are multiples of the components.",
 )
 def the_frame_is_orthonormal(frame_of: Code) -> Verdict:
     import sympy as sp
@@ -64,7 +68,11 @@ def the_frame_is_orthonormal(frame_of: Code) -> Verdict:
     from .. import symbolic as sym
 
     frame = sp.Matrix(frame_of(sym.m, sym.J, sp))
-    return verify(frame * sym.metric * frame.T, sp.eye(3))
+    w = sp.Matrix([sym.v1, sym.v2, sym.omega])
+    m, J = sym.m, sym.J
+    contact, momentum = sym.v1 + sym.omega, J * sym.omega - m * sym.v1
+    shown = sp.Matrix([contact / sp.sqrt(1 / m + 1 / J), sp.sqrt(m) * sym.v2, momentum / sp.sqrt(m + J)])
+    return every(verify(frame * sym.metric * frame.T, sp.eye(3)), verify(frame * sym.metric * w, shown))
 
 
 @verified(
@@ -76,8 +84,8 @@ def the_frame_is_orthonormal(frame_of: Code) -> Verdict:
         r"G(\theta, \psi) = \cos\theta\sin\psi\,\chi_\perp + \sin\theta\sin\psi\,\hat e_2 + \cos\psi\,\chi", direction
     ),
     perturbed=lambda theta, psi, xp: [xp.sin(psi), xp.cos(psi) * xp.sin(theta), xp.cos(psi) * xp.cos(theta)],
-    reason="Its image has length 1 and its Gram determinant is sin²ψ. The perturbed chart takes the equator for the "
-    "pole, and has the density of latitude.",
+    reason="Its image has length 1, its Gram determinant is sin²ψ, and it takes (0, π/2), (π/2, π/2), (0, 0) to χ⊥, "
+    "ê₂, χ. The perturbed chart takes the equator for the pole, and has the density of latitude.",
 )
 def chart_of_the_half_sphere(components: Code) -> Verdict:
     import sympy as sp
@@ -86,7 +94,13 @@ def chart_of_the_half_sphere(components: Code) -> Verdict:
 
     chart = sym.frame.T * sp.Matrix(components(sym.theta, sym.psi, sp))
     area = sym.volume_density(chart, [sym.theta, sym.psi])
-    return every(verify(sym.inner(chart, chart), 1), verify(area, sp.sin(sym.psi), sym.ANGLES))
+    quarter = sp.pi / 2
+    axes = [components(*angles, sp) for angles in ((0, quarter), (quarter, quarter), (0, 0))]
+    return every(
+        verify(sym.inner(chart, chart), 1),
+        verify(area, sp.sin(sym.psi), sym.ANGLES),
+        verify(sp.Matrix(axes), sp.eye(3)),
+    )
 
 
 @convention(
@@ -145,15 +159,28 @@ def invariant_measure(density: Code) -> Verdict:
     statement="Incoming −w(θ, ψ) and outgoing w(θ′, π − ψ) have the same component along χ, whatever θ′ is.",
     printed=Formula(r"\delta_{\pi - \psi}(d\psi')", lambda psi, xp: xp.pi - psi),
     perturbed=lambda psi, xp: psi,
-    reason="The component is cos ψ, and the velocity is reversed in between. So ψ turns into π − ψ and not into ψ.",
+    reason="The component is cos ψ, and the velocity is reversed in between. So ψ turns into π − ψ and not into ψ, and "
+    "the outgoing velocity points up.",
 )
 def flip_of_the_polar_angle(flip: Code) -> Verdict:
     import sympy as sp
 
     from .. import symbolic as sym
 
-    outgoing = sym.G.subs({sym.theta: sp.Symbol("theta'", real=True), sym.psi: flip(sym.psi, sp)})
-    return verify(sym.inner(-sym.G, sym.chi), sym.inner(outgoing, sym.chi))
+    theta_out, offset = sp.symbols("theta' offset", real=True)
+
+    def outgoing(angle: Any) -> Any:
+        return sym.G.subs({sym.theta: angle, sym.psi: flip(sym.psi, sp)}, simultaneous=True)
+
+    # where the angle follows an isometry the velocity does, too: the library's matrices
+    isometries = [
+        verify(sym.branch_matrix(sign, offset) * -sym.G, outgoing(sign * sym.theta + offset)) for sign in (1, -1)
+    ]
+    return every(
+        verify(sym.inner(-sym.G, sym.chi), sym.inner(outgoing(theta_out), sym.chi)),
+        verify(sym.inner(outgoing(theta_out), sym.e2_hat), sp.sin(theta_out) * sp.sin(sym.psi)),
+        *isometries,
+    )
 
 
 @verified(
@@ -194,4 +221,5 @@ def masses_without_loss(normalised: Code) -> Verdict:
     from .. import symbolic as sym
 
     mass, inertia = normalised(sym.m, sym.J)
-    return verify(sym.no_slip, sym.no_slip.subs({sym.m: mass, sym.J: inertia}, simultaneous=True))
+    same_law = verify(sym.no_slip, sym.no_slip.subs({sym.m: mass, sym.J: inertia}, simultaneous=True))
+    return every(same_law, verify(mass, 1))

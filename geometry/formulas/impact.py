@@ -49,7 +49,8 @@ def impulsive_torque(torque: Code) -> Verdict:
     kind="numeric",
     printed=Formula(r"\beta\in(-\pi/2, \pi/2)", lambda: (-np.pi / 2, np.pi / 2)),
     corrected=Formula(r"\beta\in(-\pi, \pi]", lambda: (-np.pi, np.pi)),
-    reason="A vertical side of a tooth has β = π/2 + α, and overhangs come close to π. No formula uses the range.",
+    reason="A vertical side of a tooth has β = π/2 + α, and the lower side of a cap comes as close to -π and π as one "
+    "likes. No formula uses the range.",
 )
 def range_of_the_arm(interval: Code) -> Verdict:
     from ..mushroom import mushrooms
@@ -60,10 +61,13 @@ def range_of_the_arm(interval: Code) -> Verdict:
         tangent = piece.tangent(np.linspace(0.01, 0.99, 50))
         normals.append(tangent[:, 1] * -1 + 1j * tangent[:, 0])
     k = np.concatenate(normals)[:, np.newaxis]
-    alpha = np.linspace(-0.1, 0.1, 21)
+    alpha = np.append(np.linspace(-0.1, 0.1, 21), [-1e-4, 1e-4])
     beta = np.angle(1j * np.exp(1j * alpha) / k)
     beta = np.where(beta == -np.pi, np.pi, beta)
-    return holds((low < beta) & (beta <= high), "contacts on mushrooms", beta=beta)
+    return every(
+        holds((low < beta) & (beta <= high), "contacts on mushrooms", beta=beta),
+        agreement([beta.min(), beta.max()], [low, high], 2e-4),
+    )
 
 
 @convention(
@@ -142,7 +146,9 @@ def angular_momentum(momentum: Code) -> Verdict:
     w1, w2 = sp.symbols("omega1 omega2", real=True)
     before = [(m1, j1, x, v, w1), (m2, j2, y, u, w2)]
     after = [_struck(body, c, (s * p[0], s * p[1])) for body, s in zip(before, (1, -1), strict=True)]
-    return verify(momentum(after), momentum(before))
+    # of bodies that turn at rest it is the sum of their spins
+    resting = [(M, J, x, (0, 0), omega) for M, J, x, _, omega in before]
+    return every(verify(momentum(after), momentum(before)), verify(momentum(resting), j1 * w1 + j2 * w2))
 
 
 def _cross(a: Any, b: Any) -> Any:
@@ -184,7 +190,14 @@ def energy_of_the_heavy_body(bound: Code) -> Verdict:
     s = 2 * np.sum(own * w * change, axis=0) / np.sum((own + own**2 / other) * change**2, axis=0)
     taken = s**2 * np.sum(own**2 / other * change**2, axis=0)
     whole = np.sum(own * w**2, axis=0)
-    return no_excess(taken / whole, bound(ratio[0], ratio[1]), 1e-12, mass_ratio=ratio[0], inertia_ratio=ratio[1])
+    # head on, w' = (own - other)/(own + other) w: the share taken is 4 ratio/(1 + ratio)^2
+    light = np.array([1e-7, 1e-6])
+    head_on = 4 * light / (1 + light) ** 2
+    return every(
+        no_excess(taken / whole, bound(ratio[0], ratio[1]), 1e-12, mass_ratio=ratio[0], inertia_ratio=ratio[1]),
+        agreement(head_on / bound(light, 1e-3 * light), 1.0, 1e-5, mass_ratio=light),
+        agreement(head_on / bound(1e-3 * light, light), 1.0, 1e-5, inertia_ratio=light),
+    )
 
 
 @verified(

@@ -42,17 +42,22 @@ def satellites_of_the_turned_disk(satellite: Code) -> Verdict:
     ),
     perturbed=lambda spacing: 1 - spacing**2,
     reason="The lowest satellite is within ρ/2 of the vertical, so the disk sinks at most ε + 1 − cos(ρ/2). That is "
-    "less than 2ρ² if ε < 15/8 ρ², which holds for small ε.",
+    "less than 2ρ² if ε ≤ 15/8 ρ², for which 2 is the best constant; for ε of smaller order than ρ² it is 1/8.",
     kind="numeric",
 )
 def inner_disk_is_clear_of_the_wall(radius: Code) -> Verdict:
     rng = np.random.default_rng(3)
     spacing = 2 * np.pi / rng.integers(12, 2000, 500)
-    depth = 1.8 * spacing**2
+    depth = 15 / 8 * spacing**2
     bar = rng.uniform(-0.5, 0.5, (500, 400)) * spacing[:, None]
+    bar[:, 0] = 0.5 * spacing
     # tops at height -1, bottoms at -1 - depth: the centre whose lowest satellite lies at a bottom
     centre = -1 - depth + np.min(np.cos(bar), axis=1)
-    return no_excess(-1.0, centre - radius(spacing), spacing=spacing, depth=depth)
+    left = centre - radius(spacing) + 1
+    # 1 - cos(rho/2) is rho^2/8 - rho^4/384 + ...
+    return every(
+        no_excess(0.0, left, 1e-15, spacing=spacing), no_excess(left, spacing**4 / 384, 1e-15, spacing=spacing)
+    )
 
 
 @verified(

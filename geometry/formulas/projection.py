@@ -60,7 +60,11 @@ def angle_of_the_axis(axis: Code) -> Verdict:
 
     from .. import symbolic as sym
 
-    return verify(sym.inner(axis(sym.J, sp), sym.chi), 1 / sp.sqrt(1 + sym.m / sym.J))
+    direction = axis(sym.J, sp)
+    return every(
+        verify(sym.inner(direction, sym.chi), 1 / sp.sqrt(1 + sym.m / sym.J)),
+        verify(sym.inner(direction, direction), 1),
+    )
 
 
 @convention(
@@ -137,13 +141,14 @@ def scaled_region(region: Code) -> Verdict:
 )
 def covering_by_squares(factor: Code) -> Verdict:
     rng = generator()
-    m, J = masses(rng, 200)
+    m, J = masses(rng)
     step = factor(m, J) / np.sqrt(m + J)  # of alpha, in units of eps; x1 goes back as much
-    x1, alpha = rng.uniform(0, 1, (2, 200))
-    j, k = np.meshgrid(np.arange(-60, 61), np.arange(-60, 61), indexing="ij")
-    turn = k[..., np.newaxis] * step
-    over, above = x1 + alpha - j[..., np.newaxis], alpha - turn
-    times = np.sum((over >= 0) & (over < 1) & (above >= 0) & (above < 1), axis=(0, 1))
+    x1, alpha = rng.uniform(-40, 40, (2, m.size))
+    # half of them next to the edges
+    alpha[::2] = np.rint(alpha[::2]) + np.where(np.arange(m.size // 2) % 2, 1e-9, -1e-9)
+    number = np.arange(-120, 121)[:, np.newaxis]
+    over, above = x1 + alpha - number, alpha - number * step
+    times = np.sum((over >= 0) & (over < 1), axis=0) * np.sum((above >= 0) & (above < 1), axis=0)
     return holds(times == 1, "points are covered once", m=m, J=J)
 
 

@@ -17,7 +17,7 @@ from ...verification import (
     verified,
     verify,
 )
-from ...verification.entry import Code, Entry
+from ...verification.entry import Code
 from .. import rolling
 from .trials import generator, masses, unit_velocities
 
@@ -38,19 +38,31 @@ def acceleration_of_the_contact(acceleration: Code) -> Verdict:
     eps = sp.Symbol("epsilon", positive=True)
     path = rolling.satellite(x1 + t * v1, x2 + t * v2, bar + t * omega, eps, sp)
     square = sum(sp.diff(part, t, 2) ** 2 for part in path)
-    return verify(square, acceleration(eps, omega) ** 2)
+    return verify(sp.sqrt(sp.simplify(square)), acceleration(eps, omega))
 
 
-constants_of_the_claims = Entry(
+@verified(
     id="S5.24",
     section="5.3.4",
     equation="Claims 5.7.1, 5.7.2",
-    statement="The fractions 2/5, 3/5, 4/5 of the claims, and the sum s₂ of step 3.",
-    printed=Formula(r"\tfrac25,\ \tfrac35,\ \tfrac45"),
-    status="verified",
-    kind="by reading",
-    reason="They are steps of a proof, and no formula that could be evaluated apart from it. The row rests on reading.",
+    statement="The fractions 2/5, 3/5, 4/5 of the claims: of a distance that two paths of bounded acceleration each "
+    "miss by a fifth at most, what both miss, what is left beside both, and what is left beside one.",
+    kind="numeric",
+    printed=Formula(r"\tfrac25,\ \tfrac35,\ \tfrac45", lambda: (2 / 5, 3 / 5, 4 / 5)),
+    perturbed=lambda: (2 / 5, 4 / 5, 4 / 5),
+    reason="A path of row S5.23 misses the straight one by εω²t²/2, which eq. 5.143 makes a fifth; the worst "
+    "directions are found by search. The claims are reconstructed from this fifth; the sum s₂ of step 3 rests on "
+    "reading.",
 )
+def constants_of_the_claims(fractions: Code) -> Verdict:
+    rng = generator()
+    # along a flight of length and time 1, with the acceleration for which the miss is a fifth
+    acceleration = 2 / 5
+    turn = rng.uniform(0, 2 * np.pi, (2, 4000))
+    turn[:, :4] = np.pi * np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
+    first, second = 0.5 * acceleration * np.exp(1j * turn)
+    found = np.abs(first + second).max(), np.abs(1 + first + second).min(), np.abs(1 + first).min()
+    return agreement(fractions(), found, 1e-12)
 
 
 @erratum(
@@ -146,26 +158,36 @@ def denominator_of_the_estimate(bound: Code) -> Verdict:
     m, J = masses(rng)
     direction = np.where(rng.random(m.size) < 0.1, 0.0, rng.uniform(0, 2 * np.pi, m.size))
     along = m * np.cos(direction) / np.sqrt(m) / np.sqrt(m + J)
-    return no_excess(bound(m, J), np.sqrt(1 - along**2), 1e-12, m=m, J=J)
+    root = np.sqrt(1 - along**2)
+    level = direction == 0
+    return every(
+        no_excess(bound(m, J), root, 1e-12, m=m, J=J),
+        agreement(bound(m, J)[level], root[level], 1e-12, m=m[level], J=J[level]),
+    )
 
 
 @erratum(
     id="S5.28",
     section="5.3.4",
     equation="last line of Lemma 5.7",
-    statement="A lower bound f(s) of how far a curve of curvature at most κ goes in the time s, exact to first order.",
+    statement="A lower bound f(s) of how far a path of acceleration at most κ goes in the time s from unit speed.",
     kind="numeric",
     printed=Formula(r"f(s) = s^2 - \kappa s^2/2", lambda s, kappa: s**2 - kappa * s**2 / 2),
     corrected=Formula(r"f(s) = s - \kappa s^2/2", lambda s, kappa: s - kappa * s**2 / 2),
-    reason="A circle is the worst case. In the same line the sum is 11/12 s₃, so it is at most s₃ and not equal to "
-    "it, and p(0) stands for p'(0).",
+    reason="It is attained by braking on a line, where only the acceleration is bounded; at unit speed the best bound "
+    "is (2/κ) sin(κs/2), of a circle. In the same line the sum is 11/12 s₃, so it is at most s₃, and p(0) is p'(0).",
 )
 def distance_along_a_curve(bound: Code) -> Verdict:
     kappa = np.array([1.0, 3.0, 10.0])[:, np.newaxis]
     s = np.geomspace(1e-4, 1, 200) / kappa
     chord = 2 / kappa * np.sin(kappa * s / 2)
+    direction = generator().uniform(0, 2 * np.pi, s.shape)
+    path = np.abs(s + 0.5 * kappa * np.exp(1j * direction) * s**2)
+    braking = np.abs(s + 0.5 * kappa * -1.0 * s**2)
     return every(
-        no_excess(bound(s, kappa), chord, 1e-15, s=s), agreement(bound(s, kappa)[:, 0] / chord[:, 0], 1.0, 1e-3)
+        no_excess(bound(s, kappa), chord, 1e-15, s=s),
+        no_excess(bound(s, kappa), path, 1e-15, s=s),
+        agreement(bound(s, kappa), braking, 1e-15, s=s),
     )
 
 
@@ -173,7 +195,7 @@ def distance_along_a_curve(bound: Code) -> Verdict:
     id="S5.29",
     section="5.3.4",
     equation="3.139",
-    statement="12/5 + 24√10 is at most 79, and with the first step at most 80.",
+    statement="12/5 + 24√10 is at most 79, and with the first step at most 80, and no less whole number will do.",
     kind="numeric",
     printed=Formula(
         r"\tfrac{12}5 + 24\sqrt{10} \le 79,\quad 1 + \tfrac{12}5 + 24\sqrt{10} \le 80", lambda: (79.0, 80.0)
@@ -184,7 +206,8 @@ def distance_along_a_curve(bound: Code) -> Verdict:
 )
 def sum_of_the_constants(bounds: Code) -> Verdict:
     total = 12 / 5 + 24 * np.sqrt(10)
-    return no_excess([total, 1 + total], bounds())
+    # the least whole numbers above the sums
+    return agreement(bounds(), np.ceil([total, 1 + total]), 0.0)
 
 
 @erratum(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, verified, verify
+from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, holds, verified, verify
 from ...verification.entry import Code
 from ..named import dispersing_arcs, focusing_arcs, rectangular_teeth, triangular_teeth
 from ..tracing import trace
@@ -71,7 +71,10 @@ def reflection_preserves_the_flux(density: Code) -> Verdict:
         (xx, tx, same_x), (xt, tt, same_t) = differences(wall, STEP, 0.0), differences(wall, 0.0, STEP)
         same = same_x & same_t
         found = (np.abs(xx * tt - xt * tx) * density(trace(wall, x, theta).theta) / density(theta))[same]
-        return agreement(found, 1.0, DIFFERENTIATED, x=x[same], theta=theta[same])
+        return every(
+            agreement(found, 1.0, DIFFERENTIATED, x=x[same], theta=theta[same]),
+            holds(density(theta) > 0, "densities are positive", theta=theta),
+        )
 
     return every(*(check(wall) for wall in (focusing_arcs(0.8), dispersing_arcs(0.5))))
 

@@ -108,8 +108,8 @@ def wall_that_is_felt_as_given(point: Code) -> Verdict:
     factor = foreshortening(sym.m, sym.J, sp)
     felt1, felt2 = factor * x1, x2
     given1, given2 = point(x1, x2, factor)
-    # up to scale: the two points lie on one line through the origin
-    return verify(felt1 * given2, felt2 * given1)
+    # up to scale: the points felt are those of the given wall, each times the factor
+    return verify([factor * given1, factor * given2], [felt1, felt2])
 
 
 @verified(

@@ -19,7 +19,7 @@ TRACED = 1e-9
 # Rays this near to a change of N may round to either side of it.
 UNDECIDED = 1e-9
 # The place of a ray that enters beside a corner, and how far from the corner it hits.
-BESIDE_THE_CORNER, NEAR = 1e-9, 1e-3
+BESIDE_THE_CORNER, NEAR = 1e-9, 1e-5
 
 
 def first_hit(x: Any, theta: Any, xi: float) -> Any:
@@ -134,7 +134,16 @@ def hits_on_an_arc(step_and_number: Code) -> Verdict:
         gamma = first_hit(x, theta, xi)
         hits = trace(focusing_arcs(xi), x, theta).collisions
         decided = ~undecided(theta, gamma, xi)
-        return agreement(step_and_number(theta, gamma, xi)[1][decided], hits[decided], 0.0, x=x[decided])
+        step, number = step_and_number(theta, gamma, xi)
+        # the direction after the first hit, by reflection, and the other end of the chord along it
+        place, moving = np.exp(1j * gamma), -np.exp(1j * (theta + np.pi / 2))  # from the bottom, counter-clockwise
+        moving = moving - 2 * np.real(moving * np.conj(place)) * place
+        following = place - 2 * np.real(moving * np.conj(place)) * moving
+        return every(
+            agreement(number[decided], hits[decided], 0.0, x=x[decided]),
+            agreement(np.abs(following / place - np.exp(1j * step)), 0.0, TRACED, x=x, theta=theta),
+            holds((np.abs(step) > 0) & (np.abs(step) <= np.pi), "steps are less than a turn"),
+        )
 
     return every_arc(check)
 
@@ -221,7 +230,13 @@ def range_of_the_arccosine(condition: Code) -> Verdict:
         x, theta = rays()
         return holds(condition(theta, first_hit(x, theta, xi)), "rays", x=x, theta=theta)
 
-    return every_arc(check)
+    # a ray hits the arc at gamma from inside if it moves along the outward normal there, and only then
+    rng = np.random.default_rng(5)
+    theta, gamma = rng.uniform(0, np.pi, RAYS), rng.uniform(-np.pi / 2, np.pi / 2, RAYS)
+    gamma[::4], gamma[1::4] = theta[::4] + 1e-4, theta[1::4] - 1e-4
+    gamma[2::8], gamma[3::8] = theta[2::8] - np.pi - 1e-4, theta[3::8] - np.pi + 1e-4
+    outward = np.sin(theta) * np.cos(gamma) - np.cos(theta) * np.sin(gamma) > 0
+    return every(every_arc(check), holds(condition(theta, gamma) == outward, "directions", theta=theta, gamma=gamma))
 
 
 @erratum(
@@ -297,4 +312,5 @@ def elliptical_tooth_function(function: Code) -> Verdict:
     factor = foreshortening(sym.m, sym.J, sp)
     # the point (factor x, t) of the foreshortened wall lies on the circle of period factor eps
     off_centre = (function(centre, root, factor) - factor * centre) ** 2 + (factor * (x - eps / 2)) ** 2
-    return verify(off_centre, (factor * radius) ** 2)
+    # at the ends of the cell the root is the height of the centre, and the function vanishes
+    return every(verify(off_centre, (factor * radius) ** 2), verify(function(centre, centre, factor), 0))

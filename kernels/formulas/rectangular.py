@@ -11,18 +11,19 @@ from ...geometry.kinetics import foreshortening
 from ...verification import Formula, Verdict, agreement, erratum, verify
 from ...verification.entry import Code
 from ..rectangular import RectangularTeethLaw, crevice_retro
+from .shares import SHARE_ERROR, share
 
-ENTRIES = 2000
-# A frequency over ENTRIES equally spaced rays changes at a handful of places.
-FREQUENCY_ERROR = 5.0 / ENTRIES
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
 
 
 def share_of_specular(height_to_width: float, theta: Any, low: float) -> Any:
     """How many of the rays that enter between ``low`` and 1 leave specularly, by tracing."""
-    x = low + (1.0 - low) * (np.arange(ENTRIES) + 0.5) / ENTRIES
-    out = trace(rectangular_teeth(height_to_width), x[:, None], theta).theta
-    return np.mean(np.abs(out + theta - np.pi) < np.abs(out - theta), axis=0)
+
+    def is_specular(x: Any, theta: Any) -> Any:
+        out = trace(rectangular_teeth(height_to_width), x, theta).theta
+        return np.abs(out + theta - np.pi) < np.abs(out - theta)
+
+    return share(is_specular, theta, low)
 
 
 def compared_with_tracing(probability: Code, low: float) -> Verdict:
@@ -31,7 +32,7 @@ def compared_with_tracing(probability: Code, low: float) -> Verdict:
     ratios = np.array(HEIGHTS_TO_WIDTHS)
     found = [probability(ratio, theta) for ratio in ratios]
     traced = [share_of_specular(ratio, theta, low) for ratio in ratios]
-    return agreement(found, traced, FREQUENCY_ERROR, height_to_width=ratios[:, None], theta=theta)
+    return agreement(found, traced, SHARE_ERROR, height_to_width=ratios[:, None], theta=theta)
 
 
 def crossings(height_to_width: float, theta: Any) -> Any:

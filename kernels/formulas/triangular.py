@@ -11,11 +11,12 @@ from ...geometry.kinetics import foreshortening
 from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
 from ...verification.entry import Code
 from ..triangular import TriangularTeethLaw
+from .shares import SHARE_ERROR, share
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
 ENTRIES = 2000
-# A frequency over ENTRIES equally spaced rays changes at a handful of places.
-FREQUENCY_ERROR = 5.0 / ENTRIES
+# How near to the angles where N changes, and to the tips.
+EDGE, TIP = 1e-4, 1e-9
 # Rounding of a ray between straight sides, with up to twenty bounces.
 TRACED = 1e-11
 # Of a midpoint sum over angles at which the law has kinks.
@@ -137,7 +138,15 @@ def number_of_hits(most: Code) -> Verdict:
     def check(psi: float) -> Verdict:
         _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
         missing = most(psi, theta) - traced.collisions
-        return holds((missing == 0) | (missing == 1), "rays", theta=theta)
+        # beside multiples of psi/2, where N changes, the rays next to the two tips
+        edges = psi / 2 * np.arange(1, np.floor((np.pi - psi) / psi) + 1)
+        beside = np.concatenate([[0.1 * psi], edges - EDGE, edges + EDGE])
+        beside = beside[beside < (np.pi - psi) / 2]
+        extreme = trace(triangular_teeth(psi), np.array([[TIP], [1 - TIP]]), beside).collisions.max(axis=0)
+        return every(
+            holds((missing == 0) | (missing == 1), "rays", theta=theta),
+            agreement(most(psi, beside), extreme, 0.0, theta=beside),
+        )
 
     return every_apex(check)
 
@@ -158,10 +167,11 @@ def number_of_hits(most: Code) -> Verdict:
 )
 def probability_of_fewer_hits(probability: Code) -> Verdict:
     def check(psi: float) -> Verdict:
-        _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
-        frequency = np.mean(traced.collisions == most_hits(psi, theta) - 1, axis=0)
-        named = agreement(share_of_fewer(psi, theta), frequency, FREQUENCY_ERROR, theta=theta)
-        return every(named, agreement(probability(psi, theta), frequency, FREQUENCY_ERROR, theta=theta))
+        theta = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)[1]
+        wall = triangular_teeth(psi)
+        found = share(lambda x, theta: trace(wall, x, theta).collisions == most_hits(psi, theta) - 1, theta)
+        named = agreement(share_of_fewer(psi, theta), found, SHARE_ERROR, theta=theta)
+        return every(named, agreement(probability(psi, theta), found, SHARE_ERROR, theta=theta))
 
     return every_apex(check)
 
@@ -218,7 +228,18 @@ def flux_of_triangular_teeth(law: Code) -> Verdict:
         # a symmetric law has <f, P g> = <P f, g>
         forward = np.mean(z * np.sum(probability * np.cos(angle) ** 3, axis=-1))
         backward = np.mean(z**3 * np.sum(probability * np.cos(angle), axis=-1))
-        return every(agreement(square, 1 / 3, FLUX_ERROR), agreement(forward, backward, FLUX_ERROR))
+        # that it is the law of these teeth and of no others: the outcomes of traced rays, and how often they occur
+        x, some, traced = rays_between(psi, 0.05, np.pi - 0.05, 7)
+        probability, angle = law(psi, some)
+        apart = np.abs(traced.theta[..., None] - angle)
+        nearest = np.argmin(np.where(probability > 0, apart, np.inf), axis=-1)
+        occurs = np.stack([np.mean(nearest == i, axis=0) for i in range(probability.shape[-1])], axis=-1)
+        return every(
+            agreement(square, 1 / 3, FLUX_ERROR),
+            agreement(forward, backward, FLUX_ERROR),
+            agreement(np.min(apart, axis=-1), 0.0, TRACED, x=x[:, None], theta=some),
+            agreement(probability, occurs, 5.0 / ENTRIES),
+        )
 
     return every_apex(check)
 
@@ -259,7 +280,9 @@ def apex_angle_of_foreshortened_teeth(angle: Code) -> Verdict:
     kind="numeric",
 )
 def cells_within_one_period(condition: Code) -> Verdict:
-    psi, ratio, half_angle = np.linspace(0.1, 3.0, 59), np.linspace(0.05, 4.0, 59), np.linspace(0.1, np.pi / 2, 59)
+    beside = np.array([-1e-4, 1e-4])
+    psi = np.append(np.linspace(0.1, 3.0, 57), 2 * np.arctan(0.5) + beside)
+    ratio, half_angle = np.append(np.linspace(0.05, 4.0, 57), 2 + beside), np.linspace(0.1, np.pi / 2, 59)
     triangular, rectangular = condition(psi, ratio)
     within = [
         np.array([wall(value).depth <= 1.0 for value in values])
