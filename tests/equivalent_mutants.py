@@ -56,10 +56,6 @@ EQUIVALENT_IN_THE_LIBRARY = {
     "triangular.TriangularTeethLaw._most_hits: return np.maximum(np.ceil(2.0 * theta / self.angle), -1.0)": _GUARD,
     "triangular.TriangularTeethLaw._turned: return np.where(np.mod(count, -2.0) == 0.0, np.pi + theta - turn, "
     "turn - theta)": _EVEN_MODULUS,
-    "rectangular._resolvable: return np.where((crossings <= RESOLVABLE_CROSSINGS) | True, crossings, MEAN_CROSSINGS)": (
-        "angles with more than 2^48 crossings, which tests/test_closed_forms.py looks at"
-    ),
-    "rectangular.crevice_retro: crossings = _resolvable(np.asarray(-2.0 * height_to_width / np.abs(np.tan(theta))))": (
-        "the distance to the nearest even number is even"
-    ),
+    "circular.CircularArcLaw._rotation: return (right, base, chord, np.maximum(np.ceil((self.half_angle + base "
+    "- chord) / (2.0 * chord)), -1.0))": _GUARD,
 }
