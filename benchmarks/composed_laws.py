@@ -40,6 +40,11 @@ class Function:
     breaks: Floats
 
 
+# Towards grazing, and towards pi/2 where the involution below comes from there.
+NEAR = np.pi * 0.4 ** np.arange(2.0, 24.0)
+GRADED = NEAR, np.pi - NEAR, 0.5 * np.pi - NEAR, 0.5 * np.pi + NEAR
+
+
 @dataclass(frozen=True)
 class Rule:
     """How fine the reference's integrals are."""
@@ -50,8 +55,7 @@ class Rule:
 
     def grid(self, breaks: Floats) -> tuple[Floats, Floats]:
         """Nodes and weights of sin(theta)/2 d theta on (0, pi)."""
-        near = np.pi * 0.5 ** np.arange(2.0, 12.0)
-        edges = np.concatenate((np.linspace(0.0, np.pi, self.panels + 1), breaks, near, np.pi - near))
+        edges = np.concatenate((np.linspace(0.0, np.pi, self.panels + 1), breaks, *GRADED))
         edges = np.unique(np.clip(edges, 0.0, np.pi))
         edges = edges[np.append(True, np.diff(edges) > 1e-13)]
         x, w = np.polynomial.legendre.leggauss(self.nodes)

@@ -39,6 +39,8 @@ FIRST_KINKS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
 # Rows are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 BISECTIONS = 60
+# A map is mostly singular where it jumps, as a square root if it comes from grazing or goes there.
+GRADING = 0.25 ** np.arange(1.0, 17.0)
 # A measure-preserving map keeps measures of intervals; rounding of the map and of the measure stays below this.
 JUMP_TOLERANCE = 1e-9
 JUMP_PROBES = 4096
@@ -177,8 +179,10 @@ def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> F
 
 def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """<e_i, e_j o T> for a measure-preserving map T, whose jumps are found first; the error as for a density."""
-    jumps = jumps_of_map(map_angle)
-    edges = np.unique(np.concatenate((basis.edges, jumps)))
+    ends = np.concatenate(([0.0], jumps_of_map(map_angle), [np.pi]))
+    width = np.diff(ends)[:, None] * GRADING
+    graded = (ends[:-1, None] + width).ravel(), (ends[1:, None] - width).ravel()
+    edges = np.unique(np.concatenate((basis.edges, ends, *graded)))
     return _until_settled(_map_levels(map_angle, basis, edges), tolerance)
 
 
