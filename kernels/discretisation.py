@@ -41,11 +41,11 @@ def discretise(
     method : {"auto", "exact", "quadrature", "qmc", "monte-carlo"}
         ``"exact"``: laws of isometries, to rounding, plus a bound for beams of a polygonal wall that were not
         resolved, or for kinks of a composition left out near grazing. ``"quadrature"``:
-        Gauss rules, refined until two levels differ by the tolerance or the work exceeds about a second; the error
-        is that difference. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random shifts of one; the
-        error is from their spread; in a basis that is mirror-symmetric, as the law is, each ray counts with its mirror
-        image. ``"monte-carlo"``: independent rays; the error is from the variance of the counts. The error of sampled
-        matrices is a 95 % quantile. ``"auto"`` takes the first
+        Gauss rules, refined until their error meets the tolerance or the work exceeds some seconds; what the error is
+        estimated from stands in its ``method``. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random
+        shifts of one; the error is from their spread; in a basis that is mirror-symmetric, as the law is, each ray
+        counts with its mirror image. ``"monte-carlo"``: independent rays; the error is from the variance of the
+        counts. The error of sampled matrices is a 95 % quantile. ``"auto"`` takes the first
         of these that the law has, except that quadrature in the entry point comes after ``"qmc"`` for driven laws
         without a wall. Of a wall without closed form it takes what promises the tolerance soonest: isometries of few
         pieces; as many rays as the tolerance needs, where that is less than ``samples``; isometries of many pieces;
@@ -76,7 +76,8 @@ def discretise(
     Notes
     -----
     A composition is discretised as the operator that it is: the result is the Galerkin matrix of the product, not
-    the product of Galerkin matrices, which differs unless the basis is invariant.
+    the product of Galerkin matrices, which differs unless the basis is invariant. Compositions are simplified by the
+    algebra first: isometries are moved through mirror-symmetric laws, scatterings joined, mixtures multiplied out.
 
     Examples
     --------
