@@ -156,7 +156,8 @@ def test_bins_of_circular_arcs_are_symmetric_and_stochastic_to_rounding(half_ang
     assert matrix.symmetry_defect() < 1e-13 and matrix.stochastic_defect() < 2e-13 + 1e-14 / half_angle
     sampled = ker.discretise(ker.CircularArcLaw(half_angle), ker.Bins(100), method="qmc", samples=2**17)
     distance = np.linalg.norm(sampled.symmetric - matrix.symmetric)
-    assert 0.5 < distance / float(sampled.error) / np.sqrt(NET_OVER_SPREAD) < 2.0
+    # a half width of 95 % of the norm of many differences
+    assert 0.4 < distance / float(sampled.error) < 1.0
 
 
 def test_unsymmetric_bases_see_the_same_arcs() -> None:
