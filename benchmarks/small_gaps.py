@@ -1,14 +1,14 @@
 """Gaps of shallow walls, their verdicts and their essential edges, held against references of other makings.
 
-``python -m benchmarks.small_gaps`` prints a row a wall and convention. Two judges, neither of which knows slopes,
-divided differences or the form's bounds:
+``python -m benchmarks.small_gaps`` prints a row a wall and convention. Two judges, neither of which knows of the
+distribution of slopes, of divided differences or of the form's bounds:
 
 - *50 digits*: rays are followed in 50 digits, from the entry point to the curve and off it by reflecting a vector, for
   walls whose rays, but for the grazing ones, meet them once. E (f(theta') - f(theta))^2 / (2 E f^2) of cos(theta) or
   cos(theta)^2 - 1/3 is at least the gap; its excess over the gap, and the grazing rays left out, are of order s^4 ln s
   of it for slopes up to s, and 200 s^4 is allowed.
-- *rays*: for steeper walls half a million rays are followed by the tests' textbook tracer; the least value of the same
-  form on polynomials is an upper bound of the gap but for its sampling error, and close to it.
+- *rays*: for steeper walls a quarter of a million rays are followed by the tests' textbook tracer; the least value of
+  the same form on polynomials is an upper bound of the gap but for its sampling error, and close to it.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ from asperity.spectral.essential import essential_edge
 
 DIGITS = 50
 # Of the slope to the fourth: what the precise judge allows, and up to which slope it is asked.
-ALLOWED, PRECISE = 200.0, 5e-3
+ALLOWED, PRECISE = 200.0, 1.1e-2
 # Nodes in the angle and on each curve.
 ANGLES, ENTRIES = 16, 12
 # Of the plain judge: nets of points, for their spread, and polynomials.
-NETS, POINTS, DEGREES = 8, 2**16, 24
+NETS, POINTS, DEGREES = 8, 2**15, 24
 # The share of the gap that so many polynomials miss where eigenfunctions are not smooth, at grazing and near the half
 # angle of arcs: walls of slopes below 1/2, and others.
 MISSED, MISSED_STEEP = 5e-3, 0.1
@@ -176,11 +176,11 @@ def _root(x: object) -> object:
 
 def cases(small: bool = False) -> Iterator[Case]:
     """All walls, or a few for the tests."""
-    for curvature in CURVATURES[1:7:2] if small else CURVATURES:
+    for curvature in CURVATURES[1:6:4] if small else CURVATURES:
         yield _bumps(curvature)
-    for half_angle in HALF_ANGLES[1:6:2] if small else HALF_ANGLES:
+    for half_angle in HALF_ANGLES[1:6:4] if small else HALF_ANGLES:
         yield _arcs(half_angle)
-    for depth in DEPTHS[:3:2] if small else DEPTHS:
+    for depth in DEPTHS[1:2] if small else DEPTHS:
         yield _parabolas(depth)
         yield _ellipses(0.1 * depth)
         yield _skew(depth)
@@ -268,10 +268,18 @@ def _sampled_gap(case: Case, frame: str) -> tuple[float, float]:
         u, x = Sobol(2, rng=np.random.default_rng(net)).random(POINTS).T
         theta = np.arccos(1.0 - 2.0 * u)
         out = _followed(table_of(case.wall), x, theta)
+        # on flat tops reflection is specular
+        for a, b, height, _ in case.curves:
+            if height(0.5 * (a + b)) == 0.0:
+                top = (x > a) & (x < b)
+                out[top] = np.pi - theta[top]
+        # rays that the judge loses in corners, some in a million, are left out
+        x, theta, out = x[np.isfinite(out)], theta[np.isfinite(out)], out[np.isfinite(out)]
         change = _legendre(np.pi - out if frame == "specular" else out) - _legendre(theta)
-        form = 0.5 * change.T @ change / POINTS
-        # the law is mirror-symmetric: even and odd functions apart
-        values.append(min(np.linalg.eigvalsh(form[k::2, k::2])[0] for k in (0, 1)))
+        form = 0.5 * change.T @ change / len(theta)
+        # of mirror-symmetric laws even and odd functions apart
+        parts = (slice(0, None, 2), slice(1, None, 2)) if case.wall.is_mirror_symmetric else (slice(None),)
+        values.append(min(np.linalg.eigvalsh(form[part, part])[0] for part in parts))
     return float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(NETS))
 
 
@@ -284,7 +292,8 @@ def _legendre(theta: Floats) -> Floats:
 def _followed(table, x, theta):  # type: ignore[no-untyped-def]
     out = np.empty_like(x)
     for k in range(x.size):
-        out[k] = follow(table, x[k], theta[k])[0]
+        angle, label = follow(table, x[k], theta[k])
+        out[k] = angle if label > 0 else np.nan
     return out
 
 

@@ -15,6 +15,7 @@ from .eigenvalues import Spectrum, spectrum
 from .essential import EssentialEdge, essential_edge
 from .gap_routes import enclosed_gap, rough_gap
 from .ideal_parts import ideal_spectrum, without_identity
+from .oscillations import held_against_oscillations
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .relaxation import largest_modulus
 from .separation import lambertian_share
@@ -190,6 +191,8 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     if small is not None and small.error <= tolerance:
         return small
     found = _by_matrices(law, tolerance, matrices, edge).cut_at_zero()
+    if found.verdict == "isolated" and found.kind == "estimate":
+        found = held_against_oscillations(law, found)
     return small if small is not None and small.error < found.error else found
 
 

@@ -1,0 +1,178 @@
+"""Gaps of nearly specular walls: digits that no cancellation takes away, essential edges that are 0, verdicts."""
+
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import pytest
+from benchmarks.small_gaps import cases, held
+from scipy.linalg import eigh
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.spectral.essential import essential_edge, grazing_symbol
+from asperity.spectral.grazing import grazing_limit
+from asperity.spectral.oscillations import held_against_oscillations
+from asperity.spectral.shallow import shallow_gap
+from asperity.spectral.verdict import SpectralGap
+from textbook_tracer import follow, table_of
+
+
+def parabola(depth):
+    return geo.Wall([geo.Bezier([(0, 0), (0.5, -depth), (1, 0)])])
+
+
+@pytest.mark.parametrize("case", list(cases(small=True)), ids=lambda case: case.name)
+def test_small_gaps_hold_against_rays_in_fifty_digits(case):
+    rows = list(held(case))
+    assert rows
+    for row in rows:
+        assert row.is_confirmed, row
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e-6, 1e-4, 1e-3])
+def test_uniform_sines_of_the_slope_have_the_gap_of_the_series(size):
+    """4 E sin^2 + 2 E sin^4 with sin(slope) uniform, in 50 digits; the rest of the series is of order s^4 ln s."""
+    with mp.workdps(50):
+        sine = {"arcs": mp.sin(mp.mpf(size)), "bumps": mp.mpf(size) / 2}
+        exact = {name: float(4 * s**2 / 3 + 2 * s**4 / 5) for name, s in sine.items()}
+    laws = {"arcs": ker.CircularArcLaw(size), "bumps": ker.WallLaw(geo.dispersing_arcs(size))}
+    for name, law in laws.items():
+        gap = spec.spectral_gap(law.in_specular_frame())
+        assert gap.verdict == "isolated" and gap.value - gap.error > 0.0
+        assert abs(gap.value - exact[name]) <= gap.error <= 1e-6 * gap.value
+
+
+@pytest.mark.parametrize("law", [ker.CircularArcLaw(1e-2), ker.WallLaw(geo.dispersing_arcs(2e-2))], ids=str)
+def test_the_form_agrees_with_enclosures_where_both_have_digits(law):
+    turned = law.in_specular_frame()
+    form, enclosed = spec.spectral_gap(turned, tolerance=1e-5), spec.enclosures(turned, 2, tolerance=1e-10)[1]
+    assert "1 - lambda" in form.method and form.error < 0.01 * form.value
+    assert abs(form.value - (1.0 - enclosed.value)) <= form.error + enclosed.width
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        *(ker.WallLaw(geo.dispersing_arcs(k)) for k in (1e-9, 1e-6, 3e-6, 1e-5, 0.1, 2.0)),
+        *(ker.CircularArcLaw(xi) for xi in (1e-8, 1e-7, 0.5, 1.57)),
+        ker.WallLaw(parabola(1e-7)),
+        ker.WallLaw(geo.triangular_teeth(3.1)),
+    ],
+    ids=str,
+)
+def test_sides_that_are_neither_vertical_nor_overhanging_let_nothing_graze(law):
+    limit = grazing_limit(law)
+    assert limit.root == limit.error == 0.0 and limit.resolved
+
+
+def test_the_edge_of_a_shallow_wall_is_its_share_of_flat_tops():
+    for share in (0.0, 0.25, 0.999):
+        top = [geo.Segment((0, 0), (share, 0))] if share else []
+        depth = 1e-6 * (1.0 - share)
+        wall = geo.Wall([*top, geo.Bezier([(share, 0), (0.5 * (1 + share), -depth), (1, 0)])])
+        edge = essential_edge(ker.WallLaw(wall))
+        assert abs(edge.low - share) <= 1e-15 and abs(edge.high - share) <= 1e-15
+
+
+def test_a_traced_side_that_grazing_rays_leave_steeply_has_the_limit_that_its_shape_tells():
+    """E[sin(theta)/sin(theta')] of traced rays falls like theta at a corner, like its root at a smooth top."""
+    for wall, exponent in ((geo.focusing_arcs(0.7), 1.0), (geo.dispersing_arcs(0.7), 0.5)):
+        x, means = (np.arange(4000) + 0.5) / 4000, []
+        for theta in (1e-3, 1e-5, 1e-7):
+            traced = geo.trace(wall, x, np.full(x.size, theta))
+            means.append(float((np.sin(theta) / np.sin(traced.theta))[traced.escaped].mean()))
+        slopes = -np.diff(np.log10(means)) / 2.0
+        assert np.all(np.abs(slopes - exponent) < 0.15), (wall, slopes)
+
+
+def test_a_vertical_side_of_a_shallow_hollow_is_looked_at_from_its_own_scale():
+    """Half ellipses of depth d turn from the vertical within d^2: rays at 1e-3 would not graze them."""
+    limits = [
+        grazing_symbol(ker.WallLaw(geo.Wall([geo.Arc((0.5, 0), (0.5, depth), np.pi, 2 * np.pi)])))
+        for depth in (0.4, 0.1, 0.02)
+    ]
+    roots = [limit.root for limit in limits]
+    assert all(limit.error < 1e-3 for limit in limits) and roots == sorted(roots, reverse=True)
+
+
+def test_a_limit_above_the_norm_is_no_limit(monkeypatch):
+    from asperity.spectral import grazing
+
+    def growing(law, angle, end, parts):
+        return np.array([1.0 + 0.1 * end, 0.2]), 1e-9
+
+    monkeypatch.setattr(grazing, "_row", growing)
+    law = ker.InvolutionLaw(lambda theta: np.pi - theta)
+    limit = grazing.grazing_limit(law)
+    assert not limit.resolved and limit.error == 1.0
+
+
+def test_what_cannot_be_told_is_undecided(monkeypatch):
+    from asperity.spectral import grazing
+
+    monkeypatch.setattr(grazing, "_row", lambda law, angle, end, parts: (np.array([2.0, 0.0]), 1e-9))
+    wall = geo.Wall([geo.Arc((0.5, 0), (0.5, 0.35), np.pi, 2 * np.pi)])
+    gap = spec.spectral_gap(ker.WallLaw(wall), tolerance=0.5)
+    assert gap.verdict == "undecided" and gap.error >= gap.value - 1e-12
+    assert any("no limit that can be told" in line for line in gap.evidence)
+
+
+def test_no_gap_is_negative():
+    gap = SpectralGap(-4.3e-8, 7e-8, "estimate", "", "undecided", (), "specular").cut_at_zero()
+    assert gap.value - gap.error >= 0.0 and gap.value + gap.error == pytest.approx(2.7e-8)
+    assert "never negative" in gap.evidence[-1]
+    sure = SpectralGap(1e-3, 1e-6, "estimate", "", "isolated", (), "specular")
+    assert sure.cut_at_zero() is sure
+
+
+def test_a_share_of_identity_scales_the_gap():
+    arc, share = ker.CircularArcLaw(1.2), 1e-12
+    for law, eigenvalue in (
+        ((1.0 - share) * ker.retroreflection() + share * arc, 0.3670253152),
+        (((1.0 - share) * ker.specular() + share * arc).in_specular_frame(), 0.311346443),
+    ):
+        gap = spec.spectral_gap(law, tolerance=1e-5 * share)
+        assert gap.verdict == "isolated" and gap.error <= 1e-5 * share
+        # weights of a sum are known to a rounding of 1
+        assert abs(gap.value - share * (1.0 - eigenvalue)) <= gap.error + 2e-9 * share + 1e-16
+
+
+def bent_teeth(depth, bend):
+    """Triangular teeth whose sides are parabolas that leave the straight line by this much in the middle."""
+    left, right = [(0, 0), (0.25, -depth / 2 - bend), (0.5, -depth)], [(0.5, -depth), (0.75, -depth / 2 - bend), (1, 0)]
+    return geo.Wall([geo.Bezier(left), geo.Bezier(right)])
+
+
+def test_facets_that_hardly_bend_are_left_to_other_means():
+    """Fast oscillations come back nearly whole: 4 h is not the gap there."""
+    law, arc = ker.WallLaw(bent_teeth(0.025, 1e-6)), ker.CircularArcLaw(1e-3)
+    assert shallow_gap(law.in_specular_frame(), essential_edge(law)) is None
+    assert shallow_gap(arc.in_specular_frame(), essential_edge(arc)) is not None
+
+
+@pytest.mark.parametrize("depth, of_slow_functions", [(0.025, 0.03), (1.0, 0.2)])
+def test_a_gap_of_slow_functions_is_held_against_fast_oscillations(depth, of_slow_functions):
+    """The textbook tracer finds the quotient of the oscillation that the evidence names."""
+    wall = bent_teeth(depth, 1e-4)
+    law = ker.WallLaw(wall)
+    claimed = SpectralGap(of_slow_functions, 1e-6, "estimate", "slow functions", "isolated", (), law.frame)
+    found = held_against_oscillations(law, claimed)
+    assert found.verdict == "undecided" and found.value - found.error == 0.0
+    t = float(found.evidence[-1].split("t = ")[1].split(",")[0])
+    rng, table = np.random.default_rng(3), table_of(wall)
+    theta = np.arccos(rng.uniform(-1.0, 1.0, 20_000))
+    rays = [(follow(table, x, angle), angle) for x, angle in zip(rng.random(theta.size), theta, strict=True)]
+    pairs = np.array([(angle, out) for (out, label), angle in rays if label])
+    waves = np.exp(1j * t * pairs)
+    parts = np.stack([waves.real, waves.imag])
+    change = parts[..., 1] - parts[..., 0]
+    quotient = eigh(0.5 * change @ change.T / len(pairs), np.cov(parts[..., 0]), eigvals_only=True)[0]
+    assert quotient <= 1.5 * (found.value + found.error) and found.value + found.error < 0.1 * claimed.value
+
+
+def test_a_true_gap_stands_against_oscillations():
+    law = ker.CircularArcLaw(0.3)
+    gap = spec.spectral_gap(law, tolerance=1e-3)
+    assert held_against_oscillations(law, gap) is gap and gap.verdict == "isolated"
