@@ -119,10 +119,10 @@ class Grazed:
 @lru_cache(maxsize=REMEMBERED)
 def _limit_of_wall(law: CircularArcLaw | WallLaw) -> GrazingLimit:
     """The gaps in both conventions and the diffusivity ask for the same limit."""
-    return _limit(law, _grazed(law.wall) if isinstance(law, WallLaw) else Grazed(scale=1.0))
+    return _limit(law, grazed(law.wall) if isinstance(law, WallLaw) else Grazed(scale=1.0))
 
 
-def _grazed(wall: Wall) -> Grazed:
+def grazed(wall: Wall) -> Grazed:
     """The hollows of a wall whose sides are vertical, or overhang, where grazing rays meet them."""
     from ..geometry.hollow import flat_tops, hollows_between
 
@@ -170,17 +170,17 @@ def _straight_depth(side: Curve) -> float:
     return float(np.hypot(*(side.point(high) - side.point(0.0))))
 
 
-def _limit(law: Law, grazed: Grazed) -> GrazingLimit:
-    if not any(grazed.parts):
-        return GrazingLimit(grazed.flat * SWAP, 0.0, 0.0)
+def _limit(law: Law, where: Grazed) -> GrazingLimit:
+    if not any(where.parts):
+        return GrazingLimit(where.flat * SWAP, 0.0, 0.0)
     rows: list[list[tuple[Floats, float]]] = []
-    for angle in (1.0 if grazed.scale is None else grazed.scale) * ANGLES:
-        rows.append([_row(law, angle, end, grazed.parts[end]) for end in (0, 1)])
-        settled = len(rows) >= FEWEST_ANGLES and grazed.scale is not None
+    for angle in (1.0 if where.scale is None else where.scale) * ANGLES:
+        rows.append([_row(law, angle, end, where.parts[end]) for end in (0, 1)])
+        settled = len(rows) >= FEWEST_ANGLES and where.scale is not None
         if settled and all(np.ptp([row[end][0].sum() for row in rows[-FEWEST_ANGLES:]]) <= SETTLED for end in (0, 1)):
             break
     found = _extrapolated(rows)
-    matrix = found.matrix + grazed.flat * SWAP
+    matrix = found.matrix + where.flat * SWAP
     limit = GrazingLimit(matrix, found.error, found.entry_error, found.error < UNKNOWN)
     if limit.resolved and limit.root <= NORM + limit.error + EPS * NORM:
         return limit

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..errors import AccuracyError
 from ..kernels import Law
 from ..kernels.measure import SINE
 from .verdict import SpectralGap
@@ -34,7 +35,10 @@ def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:
     slightly bent this still holds for such t as are not too large, while the essential spectrum is gone: a matrix in
     slow functions knows nothing of it. A few thousand rays show such t; that they show none is no proof.
     """
-    frequency, quotient, spread = _least_quotient(law)
+    try:
+        frequency, quotient, spread = _least_quotient(law)
+    except AccuracyError as reason:
+        return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {reason}"))
     most = quotient + SIGMAS * spread
     if most >= found.value - found.error:
         return found

@@ -31,7 +31,7 @@ PANELS, NODES, DEGREES = 32, 12, 12
 ANGLE_PANELS, ANGLE_NODES = 4, 24
 # The factor by which fast oscillations shrink is looked at in steps of this share of the fastest of them, up to so many
 # turns of the piece that turns least; pieces that turn more than this ratio less than the steepest slope are refused.
-STEP, TURNS, LEAST_TURN = 0.2, 30.0, 0.1
+STEP, TURNS, LEAST_TURN = 0.2, 30.0, 0.01
 # Fast oscillations must shrink by this multiple of the gap, and are those by so much faster than its eigenfunction.
 APART, FASTER = 1.25, 1.5
 # An error above this share of the gap is of no use.

@@ -12,10 +12,10 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.spectral.essential import essential_edge, grazing_symbol
-from asperity.spectral.grazing import grazing_limit
+from asperity.spectral.grazing import grazed, grazing_limit
 from asperity.spectral.oscillations import held_against_oscillations
 from asperity.spectral.shallow import shallow_gap
-from asperity.spectral.verdict import SpectralGap
+from asperity.spectral.verdict import SpectralGap, isolated
 from textbook_tracer import follow, table_of
 
 
@@ -74,6 +74,8 @@ def test_the_edge_of_a_shallow_wall_is_its_share_of_flat_tops():
         wall = geo.Wall([*top, geo.Bezier([(share, 0), (0.5 * (1 + share), -depth), (1, 0)])])
         edge = essential_edge(ker.WallLaw(wall))
         assert abs(edge.low - share) <= 1e-15 and abs(edge.high - share) <= 1e-15
+        limit = grazing_symbol(ker.WallLaw(wall))
+        assert np.allclose(limit.matrix, [[0.0, share], [share, 0.0]], rtol=0.0, atol=1e-15) and limit.error == 0.0
 
 
 def test_a_traced_side_that_grazing_rays_leave_steeply_has_the_limit_that_its_shape_tells():
@@ -89,10 +91,9 @@ def test_a_traced_side_that_grazing_rays_leave_steeply_has_the_limit_that_its_sh
 
 def test_a_vertical_side_of_a_shallow_hollow_is_looked_at_from_its_own_scale():
     """Half ellipses of depth d turn from the vertical within d^2: rays at 1e-3 would not graze them."""
-    limits = [
-        grazing_symbol(ker.WallLaw(geo.Wall([geo.Arc((0.5, 0), (0.5, depth), np.pi, 2 * np.pi)])))
-        for depth in (0.4, 0.1, 0.02)
-    ]
+    walls = {depth: geo.Wall([geo.Arc((0.5, 0), (0.5, depth), np.pi, 2 * np.pi)]) for depth in (0.4, 0.1, 0.02)}
+    assert all(0.01 * depth**2 < grazed(wall).scale < depth**2 for depth, wall in walls.items())
+    limits = [grazing_symbol(ker.WallLaw(wall)) for wall in walls.values()]
     roots = [limit.root for limit in limits]
     assert all(limit.error < 1e-3 for limit in limits) and roots == sorted(roots, reverse=True)
 
@@ -145,6 +146,16 @@ def bent_teeth(depth, bend):
     return geo.Wall([geo.Bezier(left), geo.Bezier(right)])
 
 
+def test_the_better_of_two_gaps_is_reported(monkeypatch):
+    from asperity.spectral import gap as module
+
+    law = ker.CircularArcLaw(1e-3).in_specular_frame()
+    poor = SpectralGap(1e-6, 1e-5, "estimate", "a matrix", "undecided", (), law.frame)
+    monkeypatch.setattr(module, "_by_matrices", lambda *arguments: poor)
+    gap = spec.spectral_gap(law, tolerance=1e-18)
+    assert gap.verdict == "isolated" and gap.error < 1e-5 * gap.value
+
+
 def test_facets_that_hardly_bend_are_left_to_other_means():
     """Fast oscillations come back nearly whole: 4 h is not the gap there."""
     law, arc = ker.WallLaw(bent_teeth(0.025, 1e-6)), ker.CircularArcLaw(1e-3)
@@ -170,6 +181,31 @@ def test_a_gap_of_slow_functions_is_held_against_fast_oscillations(depth, of_slo
     change = parts[..., 1] - parts[..., 0]
     quotient = eigh(0.5 * change @ change.T / len(pairs), np.cov(parts[..., 0]), eigvals_only=True)[0]
     assert quotient <= 1.5 * (found.value + found.error) and found.value + found.error < 0.1 * claimed.value
+
+
+def test_gaps_of_laws_go_through_the_check_by_oscillations(monkeypatch):
+    from asperity.spectral import gap as module
+
+    law = ker.WallLaw(bent_teeth(1.0, 1e-4))
+    claimed = SpectralGap(0.2, 1e-6, "estimate", "slow functions", "isolated", (), law.frame)
+    monkeypatch.setattr(module, "_by_matrices", lambda *arguments: claimed)
+    assert spec.spectral_gap(law).verdict == "undecided"
+
+
+def test_facets_of_a_shallow_wall_must_bend_enough():
+    """Slopes within 0.6 % of 0.01 come back in step at t = 100 pi, where 1 - |E exp(2 i t phi)| is below the gap."""
+    slope, turn = 0.01, 0.012 * 0.01
+    for bend, accepted in ((turn / 16, False), (20 * turn / 16, True)):
+        law = ker.WallLaw(bent_teeth(slope / 2, bend)).in_specular_frame()
+        assert (shallow_gap(law, essential_edge(law)) is not None) == accepted
+
+
+def test_a_gap_that_may_be_zero_is_not_called_isolated():
+    law = ker.henyey_greenstein(0.9)
+    found = spec.spectrum(ker.discretise(law, ker.Legendre(8)), k=4)
+    edge = essential_edge(law)
+    assert isolated(found, 0.5 * found.gap, "", edge, "paper") is not None
+    assert isolated(found, found.gap, "", edge, "paper") is None
 
 
 def test_a_true_gap_stands_against_oscillations():
