@@ -37,8 +37,8 @@ def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:
     """
     try:
         frequency, quotient, spread = _least_quotient(law)
-    except AccuracyError as reason:
-        return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {reason}"))
+    except AccuracyError as lost:
+        return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {lost}"))
     most = quotient + SIGMAS * spread
     if most >= found.value - found.error:
         return found
