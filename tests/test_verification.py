@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import time
 
 import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from benchmarks import identity_fuzz
 from flint import ctx
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -139,6 +141,163 @@ def test_an_enclosure_contains_the_value(number):
             low, high = (mpmath.mpf(end.str(75, radius=False)) for end in (ball.lower(), ball.upper()))
         assert low <= exact <= high
         assert high - low < 1e-50
+
+
+n, even, odd = sp.Symbol("n", integer=True), sp.Symbol("k", even=True), sp.Symbol("l", odd=True)
+p, q = sp.symbols("p q", positive=True)
+t = sp.Symbol("t", real=True)
+pi, half = sp.pi, sp.Rational(1, 2)
+
+# What is elementary: (left, right or the assumptions of a relation, assumptions).
+PROVED = {
+    "acos(cos) on its first piece": (sp.acos(sp.cos(x)), x, [x >= 0, x <= pi]),
+    "acos(cos) on its third piece": (sp.acos(sp.cos(x)), x - 2 * pi, [x >= 2 * pi, x <= 3 * pi]),
+    "acos(cos) on two pieces": (sp.acos(sp.cos(x)), sp.Abs(x), [x >= -pi, x <= pi]),
+    "acos(cos) of another angle": (sp.acos(sp.cos(3 * x + 1)), 3 * x + 1, [x > 0, x < half]),
+    "asin(sin) on its eighth piece": (sp.asin(sp.sin(x)), x - 6 * pi, [x > 11 * pi / 2, x < 13 * pi / 2]),
+    "atan(tan)": (sp.atan(sp.tan(x)), x - pi, [x > pi / 2, x < 3 * pi / 2]),
+    "asin(cos)": (sp.asin(sp.cos(x)), x - 3 * pi / 2, [x > pi, x < 2 * pi]),
+    "acot(cot)": (sp.acot(sp.cot(x)), x, [x > 0, x < pi / 2]),
+    "cases that the domain settles": (sp.Piecewise((1, x < 0), (2, x < 1), (3, True)), 2, [x >= 0, x < 1]),
+    "cases in other words": (sp.Piecewise((x, x > 0), (-x, True)), sp.Abs(x), []),
+    "a sum of maximum and minimum": (sp.Min(x, y) + sp.Max(x, y), x + y, []),
+    "a root where one symbol is larger": (sp.sqrt((x**2 - y**2) ** 2), x**2 - y**2, [x > y, y > 0]),
+    "atan2": (sp.atan2(p * sp.sin(x), p * sp.cos(x)), x, [x > -pi, x <= pi]),
+    "twice acos, where both are defined": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= 0]),
+    "complementary arcs, where both are defined": (sp.asin(x) + sp.acos(x), pi / 2, []),
+    "a sum of arctangents under a condition": (
+        sp.atan(x) + sp.atan(y), sp.atan((x + y) / (1 - x * y)), [x > 0, y > 0, x * y < 1],
+    ),
+    "Machin's formula": (4 * sp.atan(sp.Rational(1, 5)) - sp.atan(sp.Rational(1, 239)), pi / 4, []),
+    "nested roots": (sp.sqrt(2 + sp.sqrt(3)), (sp.sqrt(6) + sp.sqrt(2)) / 2, []),
+    "an integral": (sp.Integral(t * sp.sin(t), (t, 0, x)), sp.sin(x) - x * sp.cos(x), []),
+    "an integral to infinity": (sp.Integral(sp.exp(-t), (t, 0, sp.oo)), 1, []),
+    "an integral up to a singular end": (sp.Integral(1 / sp.sqrt(t), (t, 0, 1)), 2, []),
+    "an integral between symbols": (sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x > 0]),
+    "steps": (sp.floor(x), 0, [x >= 0, x < 1]),
+    "an odd number": (sp.floor(odd / 2), (odd - 1) / 2, []),
+    "the parity of an integer": (sp.Abs(sp.sin(pi * n / 2)), (1 - (-1) ** n) / 2, []),
+    "few integers": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 1, n <= 3]),
+    "logarithms where both are defined": (sp.log(x**2), 2 * sp.log(x), []),
+    "powers": (p ** (x + y), p**x * p**y, []),
+    "the sine below its argument": (sp.sin(x) <= x, [x >= 0], ()),
+    "a Taylor polynomial below the sine": (x - x**3 / 6 <= sp.sin(x), [x >= 0], ()),
+    "the exponential above its tangent": (1 + x <= sp.exp(x), None, ()),
+    "geometric and arithmetic mean": (2 * sp.sqrt(p * q) <= p + q, None, ()),
+    "Jordan's inequality": (2 * x / pi <= sp.sin(x), [x >= 0, x <= pi / 2], ()),
+}  # fmt: skip
+REFUTED = {
+    "a power of 0 at 0": (0**x, 0, [x >= 0]),
+    "a difference of 1e-25": (x, x + sp.Rational(1, 10**25), []),
+    "a decimal difference of 1e-25": (x, x + 1e-25, []),
+    "a difference of 1e-25 between numbers": (1, 1 + sp.Rational(1, 10**25), []),
+    "cases at the end": (sp.Piecewise((1, x < 0), (2, x < 1), (3, True)), 2, [x >= 0, x <= 1]),
+    "twice acos, on the other side": (2 * sp.acos(x), sp.acos(2 * x**2 - 1), [x >= -1, x <= 1]),
+    "complementary arctangents, but for 0": (sp.atan(x) + sp.atan(1 / x), pi / 2, [sp.Ne(x, 0)]),
+    "one integer of four": (n**3 - 6 * n**2 + 11 * n, 6, [n >= 0, n <= 3]),
+    "an integral": (sp.Integral(sp.sqrt(1 - t**2), (t, 0, 1)), pi / 5, []),
+    "the sine below its argument, everywhere": (sp.sin(x) <= x, None, ()),
+    "a square above a small number": (x**2 >= sp.Rational(1, 10**25), None, ()),
+    "on the diagonal": (sp.sign(x**2 - y**2) ** 2, 1, []),
+    "a strict inequality with equality at one point": (sp.Lt(sp.sin(x), x), [x >= 0], ()),
+}
+
+
+@pytest.mark.parametrize("name", PROVED)
+def test_what_is_elementary_is_proved(name):
+    verdict = verify(*PROVED[name])
+    assert verdict.answer == "proved", verdict
+
+
+@pytest.mark.parametrize("name", REFUTED)
+def test_what_fails_anywhere_is_refuted(name):
+    verdict = verify(*REFUTED[name])
+    assert verdict.answer == "refuted", verdict
+    assert verdict.values[0] != verdict.values[1] or "strict" in name
+
+
+def test_the_singular_ends_of_an_integral_are_not_passed_over():
+    # divergent, and 0 where it has no length
+    assert verify(sp.Integral(1 / t, (t, -1, 1)), 0).answer == "undecided"
+    assert verify(sp.Integral(1 / t, (t, x, 2 * x)), sp.log(2), [x >= 0]).answer != "proved"
+
+
+@pytest.mark.parametrize(
+    ("lhs", "rhs", "assumptions"),
+    [
+        (sp.sqrt(-1 - x**2), x, []),
+        (sp.acos(x), sp.acos(x), [x > 1]),
+        (sp.log(x), sp.log(-x), []),
+        (sp.sqrt(x) * sp.sqrt(-1 - x), x, []),
+    ],
+)
+def test_what_is_defined_nowhere_is_an_error(lhs, rhs, assumptions):
+    with pytest.raises(InputError, match="defined and real"):
+        verify(lhs, rhs, assumptions)
+
+
+@pytest.mark.parametrize("assumptions", [[n > 0, n < 1], [2 * n > 1, n < 1], [even > 0, even < 2], [n > x, x > n]])
+def test_a_domain_without_points_is_an_error(assumptions):
+    with pytest.raises(InputError, match="no point"):
+        verify(n * even * x, 0, assumptions)
+
+
+def test_a_counterexample_has_the_values_that_its_symbols_may_have():
+    for assumptions in ([], [n > 2], [n < -3], [n > sp.Rational(1, 2), n < sp.Rational(7, 2)]):
+        place = verify(sp.cos(n), sp.cos(n + x), assumptions).counterexample
+        assert sp.sympify(place["n"]).is_integer
+
+
+def test_the_time_limit_holds_and_the_next_question_is_answered():
+    # a million terms, if they were written out
+    long = (1 + m + J + eps + rho + x + y) ** 40 * (1 - m) ** 30
+    start = time.perf_counter()
+    verdict = verify(long + sp.gamma(m + 1), long + m * sp.gamma(m), time_limit=0.5)
+    assert verdict.answer == "undecided" and "time limit" in verdict.evidence
+    assert time.perf_counter() - start < 30.0
+    assert verify(sp.sin(x) ** 2, 1 - sp.cos(x) ** 2).answer == "proved"
+
+
+def test_questions_that_cannot_be_asked_are_refused_in_words():
+    class Own(sp.Function):
+        """Known here alone."""
+
+    with pytest.raises(InputError, match="time_limit=None"):
+        verify(Own(x), x)
+    assert verify(Own(x), Own(x + 1), time_limit=None).answer == "undecided"
+    with pytest.raises(InputError, match="positive number of seconds"):
+        verify(x, x, time_limit=0)
+    with pytest.raises(InputError, match="assumptions are the second"):
+        verify(x <= 1, [x < 0], [x > -1])
+    with pytest.raises(InputError, match="two sides, or a relation"):
+        verify(x)
+    with pytest.raises(InputError, match="imaginary unit"):
+        verify(sp.I * x, x)
+
+
+def test_no_verdict_of_a_random_campaign_is_false():
+    outcomes = [identity_fuzz.run(seed) for seed in range(16)]
+    assert not [one for one in outcomes if "FALSE" in one[3]], outcomes
+    # and most are decided
+    assert sum(one[3] in ("proved", "refuted", "error") for one in outcomes) >= 12
+
+
+@pytest.mark.parametrize(
+    ("answer", "fault"), [("proved", "FALSE proof"), ("refuted", "FALSE refutation"), ("error", "FALSE error")]
+)
+def test_the_campaign_would_find_a_false_verdict(monkeypatch, answer, fault):
+    def liar(*_, **__):
+        if answer == "error":
+            raise InputError("nothing there")
+        return Verdict(answer, "a lie", {"x": "1/2"} if answer == "refuted" else {})
+
+    monkeypatch.setattr(identity_fuzz, "verify", liar)
+    claims = [
+        identity_fuzz.Claim("a lie", sp.sin(identity_fuzz.X), right, "==", (identity_fuzz.X > 0,))
+        for right in (sp.sin(identity_fuzz.X), sp.sin(identity_fuzz.X) + sp.Rational(1, 10**25))
+    ]
+    found = [identity_fuzz.judged(claim, 0)[2] for claim in claims]
+    assert fault in found
 
 
 def test_matrices_are_compared_entry_by_entry_and_shapes_must_agree():

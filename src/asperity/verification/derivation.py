@@ -21,7 +21,7 @@ from .domain import Domain, tightened
 from .normal_form import vanishes
 from .polyhedron import Inequality
 from .resolution import Nowhere, Resolution
-from .signs import NOT_NEGATIVE, POSITIVE, Part, is_continuous, is_infinite
+from .signs import NOT_NEGATIVE, POSITIVE, Part, is_continuous, is_infinite, is_muddled
 from .verdict import Verdict
 from .zeros import zeros
 
@@ -41,6 +41,7 @@ EXPANSION = "expansion"
 NORMAL_FORM = "polynomial normal form"
 SQUARES = "neither side is negative, and the polynomial normal forms of the squares agree"
 DERIVATIVE = "the derivative of the difference vanishes on a connected domain, and so does the difference at one point"
+CONDITION = "a condition, an equation"
 INSIDE = "one function of equal things"
 ALGEBRAIC = "algebraic numbers"
 ANGLES = "the sine of the difference is 0, and the difference is small"
@@ -117,6 +118,9 @@ class Derivation:
             return None
         values = dict(box.values)
         left, right = (side.xreplace(values) for side in (self.left, self.right))
+        if is_muddled(left) or is_muddled(right):
+            self._give_up("sympy does not know a power of 0")
+            return None
         if is_infinite(left) or is_infinite(right):
             return None
         part = Part(box)
@@ -141,7 +145,7 @@ class Derivation:
             slopes = [sp.diff(difference, symbol) for symbol in box.symbols]
             arguments = [f.args[0] for f in sorted(difference.atoms(sp.Function), key=str)]
             places += [difference, *slopes, *arguments, *box.symbols]
-        pieces = self._pieces(box, places) if depth < DEPTH else None
+        pieces = self._pieces(box, places, resolution.undetermined) if depth < DEPTH else None
         if pieces is None:
             if not self._is_proved_around(domain):
                 self._give_up()
@@ -179,15 +183,15 @@ class Derivation:
             return derive_equality(left, right, part)
         difference = right - left
         allowed = POSITIVE if self.relation == "<" else NOT_NEGATIVE
-        if part.thorough_signs(difference) <= allowed:
+        if part.thorough_signs(difference) <= allowed or _signs_of_steps(difference, part) <= allowed:
             return SIGN
         if self.relation == "<=" and derive_equality(left, right, part) is not None:
             return NORMAL_FORM
         return None
 
     @staticmethod
-    def _pieces(domain: Domain, places: list[Any]) -> list[Domain] | None:
-        """The part cut at the zeros of the first expression that can be cut at."""
+    def _pieces(domain: Domain, places: list[Any], undetermined: list[Any]) -> list[Domain] | None:
+        """The part cut at the zeros of the first of the places that can be cut at, or by the sign of what decides."""
         for e in dict.fromkeys(factor for place in places for factor in sp.Mul.make_args(place)):
             symbols = [s for s in domain.symbols if e.has(s)]
             if len(symbols) == 1 and e.free_symbols <= set(symbols):
@@ -207,11 +211,35 @@ class Derivation:
                 assert opposite is not None
                 pieces = [domain.where(linear), domain.where(opposite), domain.on(linear)]
                 return [piece for piece in pieces if piece is not None]
+        for e in dict.fromkeys(undetermined):
+            if len(e.free_symbols & set(domain.symbols)) > 1:
+                # what is found with the sign of e as a condition
+                return [
+                    replace(domain, conditions=(*domain.conditions, relation(e, 0, evaluate=False)))
+                    for relation in (sp.Gt, sp.Lt, sp.Eq)
+                ]
         for symbol in domain.symbols:
-            if symbol.is_integer and symbol.is_even is None and not str(symbol).startswith(HALF):
+            if symbol.is_integer and symbol.is_even is None and not symbol.name.startswith(HALF):
                 halves = [(sp.Dummy(f"{HALF}{symbol}", integer=True), rest) for rest in (0, 1)]
                 return [domain.replaced(symbol, 2 * half + rest, half) for half, rest in halves]
         return None
+
+
+def _signs_of_steps(difference: Any, part: Part) -> frozenset[int]:
+    """The signs of an expression in which a whole part is its argument less a number from 0 to 1, 1 excluded."""
+    steps = sorted(difference.atoms(sp.floor), key=str)
+    if len(steps) != 1 or steps[0].args[0].has(sp.floor):
+        return frozenset({-1, 0, 1})
+    (step,) = steps
+    fraction = sp.Dummy("f", real=True)
+    bounds = (
+        Inequality({fraction: sp.Integer(1)}, sp.Integer(0), strict=True),
+        Inequality({fraction: sp.Integer(-1)}, sp.Integer(1), strict=True),
+    )
+    domain = part.domain
+    wider = replace(domain, symbols=(*domain.symbols, fraction), inequalities=(*domain.inequalities, *bounds))
+    inside = Part(wider).thorough_signs(difference.xreplace({step: step.args[0] - fraction}))
+    return inside | part.thorough_signs(difference.xreplace({step: step.args[0]}))
 
 
 def _linear_factor(e: Any) -> Inequality | None:
@@ -279,6 +307,8 @@ def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -
         return _equal_numbers(difference)
     if all(part.is_nonnegative(side) for side in (left, right)) and vanishes(left**2 - right**2, part.parameters):
         return SQUARES
+    if any(vanishes(difference - share * g, part.plain) for g in _zero(part) for share in _SHARES):
+        return CONDITION
     if _equal_inside(left, right, part, differentiate):
         return INSIDE
     if differentiate:
@@ -291,6 +321,15 @@ def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -
     return None
 
 
+_SHARES = (1, -1, sp.S.Half, -sp.S.Half, 2, -2)
+
+
+def _zero(part: Part) -> list[Any]:
+    """What is 0 on the part by a condition."""
+    values = dict(part.domain.values)
+    return [(c.lhs - c.rhs).xreplace(values) for c in part.domain.conditions if isinstance(c, sp.Eq)]
+
+
 def _equal_inside(left: Any, right: Any, part: Part, differentiate: int) -> bool:
     """Whether both are one function of things that are found equal."""
     if left.func != right.func or len(left.args) != len(right.args) or not (left.is_Function or left.is_Pow):
@@ -301,7 +340,7 @@ def _equal_inside(left: Any, right: Any, part: Part, differentiate: int) -> bool
 
 def _is_constant_along(difference: Any, symbol: Any, part: Part) -> bool:
     slope = sp.diff(difference, symbol)
-    if is_infinite(slope) or slope.has(sp.Derivative, sp.Subs, sp.DiracDelta):
+    if is_muddled(slope) or is_infinite(slope) or slope.has(sp.Derivative, sp.Subs, sp.DiracDelta):
         return False
     return is_continuous(difference, part) and (
         vanishes(slope, part.parameters) or vanishes(slope, part.plain) or _resolves_to_zero(slope, part)
@@ -324,7 +363,7 @@ def _vanishes_somewhere(difference: Any, symbol: Any, part: Part, differentiate:
     for place, is_end in [(end, True) for end in (low, high) if end.is_finite] + [(p, False) for p in inside]:
         face = part.domain.face(symbol, place)
         there = difference.xreplace({symbol: place})
-        if face is None or face.polyhedron.is_empty or is_infinite(there):
+        if face is None or face.polyhedron.is_empty or is_muddled(there) or is_infinite(there):
             continue
         on_face = Part(face)
         if not all(_is_met(condition, symbol, place, on_face) for condition in part.domain.conditions):

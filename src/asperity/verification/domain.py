@@ -31,6 +31,8 @@ DIGITS = (9, 17, 40)
 ATTEMPTS = 40
 # So often a symbol is given the value of another, or its negative.
 TOGETHER = 0.15
+# So often it is given a special one, once simple ones have been tried.
+OFTEN = 0.2
 # Domains with more faces, and integers with more values, are not taken apart.
 FACES = 200
 VALUES = 24
@@ -207,24 +209,32 @@ class Domain:
 
     # ---- points
 
-    def points(self, rng: np.random.Generator, count: int) -> Iterator[dict[Any, Any]]:
-        """Exact points, simple ones first, as values of the original symbols; each meets every condition."""
-        found = 0
-        if len(self.symbols) == 1 and count > len(SPECIAL):
-            # all of them, for at each of them a function may jump
-            (symbol,) = self.symbols
-            bounds = self.interval(symbol)
-            for value in map(sp.sympify, SPECIAL):
-                whole = self._whole({symbol: value}) if _is_inside(value, bounds) else None
-                if whole is not None:
-                    yield whole
+    def points(self, rng: np.random.Generator, count: int, most: int = 0) -> Iterator[dict[Any, Any]]:
+        """Exact points as values of the original symbols; each meets every condition.
+
+        Half of the first ``count`` are simple; then come special ones if they are many, and others, up to ``most``.
+        """
+        found, specials = 0, len(self.symbols) == 1 and count // 2 > len(SPECIAL)
         for attempt in range(ATTEMPTS * count):
-            point = self._point(rng, simple=attempt < 4 * count and found < count // 2)
+            simple = attempt < 4 * count and found < count // 2
+            point = self._point(rng, simple)
             if point is not None:
                 found += 1
                 yield point
-            if found >= count:
+            if specials and found == count // 2:
+                specials = False
+                yield from self._special_points()
+            if found >= max(count, most):
                 return
+
+    def _special_points(self) -> Iterator[dict[Any, Any]]:
+        """Where a function may jump."""
+        (symbol,) = self.symbols
+        bounds = self.interval(symbol)
+        for value in map(sp.sympify, SPECIAL):
+            whole = self._whole({symbol: value}) if _is_inside(value, bounds) else None
+            if whole is not None:
+                yield whole
 
     def _point(self, rng: np.random.Generator, simple: bool) -> dict[Any, Any] | None:
         point: dict[Any, Any] = {}
@@ -302,11 +312,12 @@ def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng:
         return ends[rng.integers(len(ends))]
     if simple:
         for _ in range(20):
-            value = sp.sympify(SPECIAL[rng.integers(len(SPECIAL))]) if rng.random() < 0.3 else (
-                int(rng.choice([-1, 1])) * SIMPLE[rng.integers(len(SIMPLE))]
-            )  # fmt: skip
+            value = int(rng.choice([-1, 1])) * SIMPLE[rng.integers(len(SIMPLE))]
             if bool(low < value) and bool(value < high) and has_properties(symbol, value):
                 return value
+    special = sp.sympify(SPECIAL[rng.integers(len(SPECIAL))])
+    if rng.random() < OFTEN and _is_inside(special, bounds) and has_properties(symbol, special):
+        return special
     value = _between(float(low), float(high), rng)
     if symbol.is_integer:
         # small ones, or as far out as other numbers

@@ -31,6 +31,9 @@ def prepared(e: Any, domain: Domain) -> Any:
         If it is written with the imaginary unit otherwise than in exponents and polynomials.
     """
     e = e.replace(sp.frac, lambda x: x - sp.floor(x))
+    # sympy would write 0**(-x) as a power of infinity, whatever the sign of x
+    e = e.replace(lambda part: part.is_Pow and part.base == 0, lambda part: _power_of_zero(part.exp))
+    e = e.replace(lambda part: part.is_Pow and part.base is sp.zoo, lambda part: _power_of_zero(-part.exp))
     e = e.replace(sp.Mod, lambda x, y: x - y * sp.floor(x / y))
     e = e.replace(lambda part: isinstance(part, sp.Derivative), _derivative)
     e = e.replace(lambda part: isinstance(part, sp.Integral), lambda part: _integral(part, domain))
@@ -41,6 +44,10 @@ def prepared(e: Any, domain: Domain) -> Any:
             raise InputError(f"{e}: expected a real expression, got one with the imaginary unit")
         e = real
     return e
+
+
+def _power_of_zero(exponent: Any) -> Any:
+    return sp.Piecewise((sp.Integer(0), exponent > 0), (sp.Integer(1), sp.Eq(exponent, 0)), evaluate=False)
 
 
 def _derivative(e: Any) -> Any:

@@ -54,7 +54,7 @@ class Search:
     def refutation(self, part: Domain, count: int, until_defined: bool = False) -> Verdict | None:
         """The first counterexample among some points of a part, or among those up to one where both are defined."""
         before = self.defined
-        for point in part.points(self._rng, MORE * count):
+        for point in part.points(self._rng, count, MORE * count):
             found = self._at(point)
             if found is not None or self.defined - before >= (1 if until_defined else count):
                 return found
@@ -80,7 +80,7 @@ class Search:
                     "refuted",
                     "counterexample, by ball arithmetic",
                     {str(symbol): str(value) for symbol, value in point.items()},
-                    _shown(left, right),
+                    self._shown(point, bits),
                 )
             if left.exact is not None and left.exact == right.exact:
                 break
@@ -95,13 +95,14 @@ class Search:
             return False
         return sign != 0 if self.relation == "==" else sign > 0 if self.relation == "<=" else sign >= 0
 
-
-def _shown(left: Value, right: Value) -> tuple[str, str]:
-    """Both values, with as many digits as it takes to tell them apart."""
-    digits = SHOWN
-    with ctx.workprec(MOST_BITS):
+    def _shown(self, point: dict[Any, Any], bits: int) -> tuple[str, str]:
+        """Both values, with as many digits as it takes to tell them apart."""
+        digits = SHOWN
         while True:
-            shown = tuple(side.ball.mid().str(digits, radius=False) for side in (left, right))
-            if shown[0] != shown[1] or digits > MOST_BITS:
-                return shown[0], shown[1]
-            digits *= 2
+            with ctx.workprec(bits):
+                sides = [evaluate(side, point, bits).ball.mid() for side in (self.left, self.right)]
+                left, right = (side.str(digits, radius=False) for side in sides)
+            # equal sides refute a strict inequality
+            if left != right or self.relation == "<" or bits >= MOST_BITS:
+                return left, right
+            bits, digits = 2 * bits, 2 * digits

@@ -13,7 +13,7 @@ from typing import Any
 import sympy as sp
 
 from .balls import Unclear, Undefined, evaluate
-from .signs import NEGATIVE, NOT_NEGATIVE, NOT_POSITIVE, POSITIVE, ZERO, Part, is_infinite
+from .signs import NEGATIVE, NOT_NEGATIVE, NOT_POSITIVE, POSITIVE, ZERO, Part, is_infinite, is_muddled
 
 BITS = 128
 # A function with more pieces than this on one part is left as it is.
@@ -54,6 +54,10 @@ class Resolution:
             else:
                 args = [self.resolved(argument) for argument in e.args]
                 again = e if tuple(args) == e.args else e.func(*args)
+                if is_muddled(again):
+                    # left as it is
+                    self._done[e] = e
+                    return e
                 if is_infinite(again):
                     raise Nowhere
                 rule = _RULES.get(again.func)

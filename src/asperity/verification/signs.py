@@ -51,7 +51,7 @@ class Part:
     def signs(self, e: Any) -> Signs:
         """The signs that e may have where it is defined; a superset of those that it has."""
         if e not in self._known:
-            self._known[e] = self._signs(e)
+            self._known[e] = self._signs(e) & self._facts().get(e, ANY)
         return self._known[e]
 
     def is_positive(self, e: Any) -> bool:
@@ -69,8 +69,6 @@ class Part:
                 return frozenset({sign_of(e)})
             except (Undefined, Unclear):
                 return ANY
-        if e in self._facts():
-            return self._facts()[e]
         if e.is_Mul:
             return _product([self.signs(factor) for factor in e.args])
         if e.is_Pow and e.exp.is_Integer:
@@ -120,6 +118,9 @@ class Part:
 
     def _of_sum(self, e: Any) -> Signs:
         """From bounds of the terms: products of sines lie between -1 and 1, others have a sign."""
+        found = self._of_root_and_rest(e)
+        if found is not None:
+            return found
         lows, highs, strict_ones = zip(*(self._bounds(term) for term in e.args), strict=True)
         try:
             for sign, ends in ((1, lows), (-1, highs)):
@@ -132,6 +133,16 @@ class Part:
             pass
         return ANY
 
+    def _of_root_and_rest(self, e: Any) -> Signs | None:
+        """The sign of the root where it is larger than the rest."""
+        for term in e.args:
+            share, root = term.as_coeff_Mul(rational=True)
+            if root.is_Pow and root.exp == sp.S.Half:
+                rest = e - term
+                if self.signs(sp.expand(share**2 * root.base - rest**2)) == POSITIVE:
+                    return POSITIVE if share > 0 else NEGATIVE
+        return None
+
     def _bounds(self, term: Any) -> tuple[Any, Any, bool]:
         """Bounds of a term, and whether one of them, 0, is not reached."""
         if term.is_number:
@@ -141,6 +152,9 @@ class Part:
         if all(base.func in (sp.sin, sp.cos) and times.is_Integer and times > 0 for base, times in factors):
             low = 0 if all(times % 2 == 0 for _, times in factors) else -1
             return *sorted([share * low, share]), False
+        if rest.func in _RANGES:
+            low, high = _RANGES[rest.func]
+            return *sorted([share * low, share * high], key=float), rest.func is not sp.acos
         signs = self.signs(term)
         return (
             sp.Integer(0) if signs <= NOT_NEGATIVE else -sp.oo,
@@ -229,7 +243,7 @@ class Part:
         kept = tuple(
             condition
             for condition in self.domain.conditions
-            if not isinstance(condition, sp.Ne)
+            if isinstance(condition, sp.Gt | sp.Ge | sp.Lt | sp.Le)
             and (difference := (condition.lhs - condition.rhs).xreplace(values)).is_polynomial(symbol)
             and sp.degree(difference, symbol) <= 1
         )
@@ -266,9 +280,18 @@ class Part:
         return ANY
 
 
+# Of these all but the arc cosine stay inside.
+_RANGES = {sp.acos: (sp.S.Zero, sp.pi), sp.atan: (-sp.pi / 2, sp.pi / 2), sp.tanh: (-sp.S.One, sp.S.One)}
+
+
+def is_muddled(e: Any) -> bool:
+    """Whether it holds what sympy makes of 0**(-x), infinity to the power of x, which is 0 where x is negative."""
+    return any(power.base is sp.zoo and power.free_symbols for power in e.atoms(sp.Pow))
+
+
 def is_infinite(e: Any) -> bool:
     """Whether a part of it, which every value needs, is undefined, infinite or imaginary."""
-    if isinstance(e, _CONTAINERS):
+    if isinstance(e, _CONTAINERS) or is_muddled(e):
         return False
     return e in (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or isinstance(e, sp.AccumBounds) or any(map(is_infinite, e.args))
 
