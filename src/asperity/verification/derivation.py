@@ -62,16 +62,24 @@ class Derivation:
         Looks for a counterexample on a part, among so many points.
     spreads : bool
         Whether what is not proved at one value of a symbol is tried on an interval around it.
+
+    Attributes
+    ----------
+    routes : list of str
+        How the parts were proved, those on which a side is defined.
+    reason : str
+        Why no proof was found.
     """
 
     left: Any
     right: Any
     relation: str
     refute: Refute
-    routes: list[str] = field(default_factory=list)
     spreads: bool = True
-    reason: str = "no proof among the routes known"
-    _parts: int = 0
+    routes: list[str] = field(default_factory=list, init=False)
+    reason: str = field(default="no proof among the routes known", init=False)
+    _parts: int = field(default=0, init=False)
+    _failed: bool = field(default=False, init=False)
 
     def verdict(self, domain: Domain) -> Verdict | None:
         """Proved or refuted, or None with a `reason`."""
@@ -84,8 +92,6 @@ class Derivation:
             if found is not None or self._failed:
                 return found
         return Verdict("proved", "; ".join(dict.fromkeys(self.routes)) or "defined nowhere on the domain")
-
-    _failed: bool = False
 
     def _give_up(self, reason: str | None = None) -> None:
         self._failed = True
@@ -252,7 +258,7 @@ def _linear_factor(e: Any) -> Inequality | None:
     return None
 
 
-def _cut(domain: Domain, symbol: Any, cuts: list[Any]) -> list[Domain]:
+def _cut(domain: Domain, symbol: Any, cuts: list[Any]) -> list[Domain] | None:
     pieces = []
     for low, high in pairwise([None, *cuts, None]):
         piece = domain
@@ -261,8 +267,10 @@ def _cut(domain: Domain, symbol: Any, cuts: list[Any]) -> list[Domain]:
         if high is not None:
             piece = piece.where(tightened(Inequality({symbol: sp.Integer(-1)}, high, strict=True)))
         # an integer may have few values left
-        cells = piece.cells() if symbol.is_integer else None
-        pieces += [piece] if cells is None else cells
+        cells = piece.cells() if symbol.is_integer else [piece]
+        if cells is None:
+            return None
+        pieces += cells
     points = [domain.fixed(symbol, cut) for cut in cuts]
     return pieces + [point for point in points if point is not None]
 
@@ -285,6 +293,7 @@ def boxed(domain: Domain) -> Domain:
 
 
 def expands_to_zero(difference: Any) -> bool:
+    """Whether multiplying out shows that it is 0 wherever it is defined."""
     return bool(sp.expand(difference, power_exp=False, log=False) == 0)
 
 

@@ -40,6 +40,8 @@ class Part:
         if domain.polyhedron.is_empty:
             # everything would hold on it
             raise ValueError("expected a part with points in it")
+        if any(one.coefficients and not one.strict for one in domain.inequalities):
+            raise ValueError("expected an open part")
         self.domain = domain
         self.positive_bases: set[Any] = set()
         self.plain = Parameters(domain, half_angles=False, positive=self.positive_bases)
@@ -54,14 +56,9 @@ class Part:
             self._known[e] = self._signs(e) & self._facts().get(e, ANY)
         return self._known[e]
 
-    def is_positive(self, e: Any) -> bool:
-        return self.signs(e) == POSITIVE
-
     def is_nonnegative(self, e: Any) -> bool:
+        """Whether e is nowhere negative on the part."""
         return self.signs(e) <= NOT_NEGATIVE
-
-    def is_nonzero(self, e: Any) -> bool:
-        return 0 not in self.signs(e)
 
     def _signs(self, e: Any) -> Signs:
         if not e.free_symbols:

@@ -181,7 +181,7 @@ def _of_sine_and_cosine(e: Any, pair: list[Any], symbol: Any, low: Any, high: An
     s, c = sp.Dummy(), sp.Dummy()
     flat = sp.expand(e.xreplace({sine: s, cosine: c}))
     a, b = flat.coeff(s), flat.coeff(c)
-    if sp.expand(flat - a * s - b * c) != 0 or not (a.is_number and b.is_number):
+    if sp.expand(flat - a * s - b * c) != 0 or not (a.is_number and b.is_number and _differs_from_zero(a)):
         return None
     angles = _periodic([sp.atan(-b / a)], sp.pi, sine.args[0], symbol, low, high)
     if angles is None:
