@@ -1,6 +1,6 @@
 """How a formula is verified: identities by proof, numbers by measurement, and the entry that holds both.
 
-Names are imported when they are first used; sympy and mpmath only when an identity is asked about.
+Names are imported when they are first used; sympy and flint only when an identity is asked about.
 """
 
 from __future__ import annotations

@@ -128,7 +128,7 @@ class Parameters:
             return self._opaque.setdefault(e, sp.Dummy("o"))
         parts = [self._rebuilt(part) for part in e.args]
         if e.is_Pow and parts[1].is_Rational and not parts[1].is_Integer:
-            return _power(parts[0], parts[1])
+            return _power(self._on_circles(parts[0]), parts[1])
         if e.is_Pow and e.base == -1 and e.exp.is_integer:
             return self._alternating(e.exp)
         if e.is_Pow and not parts[1].is_Rational:
@@ -141,6 +141,16 @@ class Parameters:
         if e.is_Function:
             return e.func(*(sp.factor(part) for part in parts))
         return e.func(*parts)
+
+    def _on_circles(self, e: Any) -> Any:
+        """The same value, with no more than the first power of every sine."""
+        if not self.circles or not e.is_polynomial(*(sine for _, sine in self.circles.values())):
+            return e
+        for cosine, sine in self.circles.values():
+            if e.has(sine):
+                terms = sp.Poly(e, sine).terms()
+                e = sp.Add(*(c * sine ** (k % 2) * (1 - cosine**2) ** (k // 2) for (k,), c in terms))
+        return sp.expand(e)
 
     def _sine_and_cosine(self, argument: Any) -> tuple[Any, Any]:
         terms = _terms(argument)

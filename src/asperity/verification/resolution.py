@@ -257,11 +257,15 @@ class Resolution:
 
     def _power(self, e: Any) -> Any:
         base, exponent = e.base, e.exp
-        if exponent.is_Integer:
-            if exponent < 0 and self._signs(base, limit=True) <= ZERO:
-                raise Nowhere
+        if exponent.is_Integer and exponent > 0:
             return e
         signs = self._signs(base, limit=True)
+        if 0 in signs and len(signs) > 1 and (exponent.is_negative or not exponent.is_Rational):
+            self.limits.append(base)
+        if exponent.is_Integer:
+            if signs <= ZERO:
+                raise Nowhere
+            return e
         if exponent.is_Rational and signs <= NEGATIVE:
             raise Nowhere
         if signs == ZERO:

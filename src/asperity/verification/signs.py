@@ -83,8 +83,8 @@ class Part:
             found = ANY & self._on_box(e, self.box())
         if found == ANY and e.is_Add:
             found = self._of_sum(e)
-        if found == ANY:
-            found = self._between_zeros(e)
+        if found in (ANY, NOT_NEGATIVE, NOT_POSITIVE):
+            found &= self._between_zeros(e)
         if found == ANY and sp.count_ops(e) < LARGEST:
             found = _of_product(_without_roots(self.parameters.factored(e)))
         return found

@@ -27,7 +27,7 @@ class Verdict:
     evidence : str
         How the answer was found, in words and numbers.
     counterexample : mapping from str to values, optional
-        The point at which a refuted formula fails.
+        The point at which a refuted formula fails; of `verify` exact numbers as text, such as ``8/3`` or ``pi/2``.
     values : tuple of str, optional
         Both sides at the counterexample.
 
