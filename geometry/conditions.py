@@ -1,7 +1,8 @@
 """The conditions on a wall's geometry: pieces join, do not cross, and lie in y <= 0 over one period.
 
 (Rudzis 2022, section 1.3.1, conditions B1-B5.) Joints are made exact here: neighbouring pieces share their joint to
-the bit, the path runs from exactly (0, y0) to exactly (period, y0), and heights within rounding of 0 become 0.
+the bit, the path runs from exactly (0, y0) to exactly (period, y0), heights within rounding of 0 become 0, and those
+within rounding of the greatest height become that.
 """
 
 from __future__ import annotations
@@ -9,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import Floats
 from ..errors import WallError
 from ..rounding import EPS
 from .crossings import find_crossing
-from .curve import Curve
+from .curve import Curve, Point
 from .segment import Segment
 
 # Two pieces join if their ends are this close, relative to the wall's size: what ten digits typed by hand allow.
@@ -24,15 +26,15 @@ JOIN_TOLERANCE = 1e-9
 # of a few dozen operations, each of which rounds by eps/2.
 SNAP_TOLERANCE = 64.0 * EPS
 
-# A piece touches y = 0 at its top, not at its end, if the parameter of the top is this far from 0 and from 1: the
-# height near a top is quadratic, so an end point's rounding of eps moves the top by the square root of eps.
+# A piece touches the level of the tops at its own top, not at its end, if the parameter of the top is this far from 0
+# and from 1: the height near a top is quadratic, so an end point's rounding of eps moves the top by its square root.
 TOUCH_MARGIN = 1e-7
 
 Pieces = tuple[Curve, ...]
 
 
 def canonical_path(given: Sequence[Curve], period: float) -> Pieces:
-    """Return the pieces of the wall with exact joints, cut where they touch y = 0, or raise a WallError."""
+    """Return the pieces with exact joints, cut where they touch the level of their tops, or raise a WallError."""
     pieces = _curves(given, "pieces")
     starts, ends = _end_points(pieces)
     size = _size(starts, ends, period)
@@ -42,10 +44,16 @@ def canonical_path(given: Sequence[Curve], period: float) -> Pieces:
     base = starts[0, 1] if rounding[0] <= rounding[-1] else ends[-1, 1]
     base_slack = min(rounding[0], rounding[-1]) + abs(ends[-1, 1] - starts[0, 1])
     vertices = np.concatenate([[(0.0, base)], joints, [(period, base)]])
-    vertices = _snapped(vertices, np.concatenate([[base_slack], slack, [base_slack]]), period, size)
+    slack = np.concatenate([[base_slack], slack, [base_slack]])
+    vertices = _snapped(vertices, slack, period, size)
     pieces = _pinned(pieces, vertices, size, "")
     _check_heights(pieces, vertices, size, "")
-    return tuple(part for piece in pieces for part in _cut_at_touching(piece, SNAP_TOLERANCE * size[1]))
+    limit = SNAP_TOLERANCE * size[1]
+    level, near = _level(pieces, vertices, limit + slack)
+    if np.any(vertices[near, 1] != level):
+        vertices[near, 1] = level
+        pieces = _pinned(pieces, vertices, size, "")
+    return tuple(part for piece in pieces for part in _cut_at_touching(piece, level, limit))
 
 
 def canonical_island(given: Sequence[Curve], period: float, size: Floats, index: int) -> Pieces:
@@ -74,17 +82,19 @@ def check_open_wall(pieces: Pieces, islands: Sequence[Pieces], period: float, si
             if xmin < -slack or xmax > period + slack:
                 raise WallError(
                     f"piece {i}{owner} leaves the cell 0 <= x <= {period:g} (it spans {xmin:g} <= x <= {xmax:g}); "
-                    "in a wall that is open (y0 < 0 or islands) the pieces of a cell must stay in it: "
+                    "in a wall with islands the pieces of a cell must stay in it: "
                     "roll the cell, that is, start it at another joint, or cut the piece at the cell's side"
                 )
 
 
-def check_crossings(pieces: Pieces, islands: Sequence[Pieces], period: float, depth: float) -> None:
-    """Raise a WallError if pieces cross; touching is allowed."""
-    found = find_crossing(pieces, period, depth, islands)
+def check_crossings(
+    pieces: Pieces, islands: Sequence[Pieces], period: float, depth: float, origin: Point, numbers: Sequence[int]
+) -> None:
+    """Raise a WallError if pieces cross; touching is allowed. ``numbers`` and ``origin`` are for the message."""
+    found = find_crossing(pieces, period, depth, islands, numbers)
     if found is None:
         return
-    x, y = found.place
+    x, y = (found.place[0] + origin[0]) % period, found.place[1] + origin[1]
     place = f"({x:.6g}, {y:.6g})"
     if len(found.labels) < 2:
         one = found.labels[0] if found.labels else "a piece"
@@ -202,15 +212,24 @@ def _check_heights(pieces: Pieces, vertices: Floats, size: Floats, label: str) -
         )
 
 
-def _cut_at_touching(piece: Curve, limit: float) -> list[Curve]:
-    """Cut a curved piece where its tops touch y = 0, because hollows end there."""
+def _level(pieces: Pieces, vertices: Floats, slack: Floats) -> tuple[float, NDArray[np.bool_]]:
+    """Return the greatest height of the path, at most 0, and which vertices have it within their slack."""
+    tops = [y for piece in pieces if not isinstance(piece, Segment) for y in piece.turning_values(1)]
+    highest = min(max([float(vertices[:, 1].max()), *tops]), 0.0)
+    near = vertices[:, 1] >= highest - slack
+    # of a vertex, which was given, and the top of a curve, which was computed, the former
+    return float(vertices[near, 1].max(initial=-np.inf)) if near.any() else highest, near
+
+
+def _cut_at_touching(piece: Curve, level: float, limit: float) -> list[Curve]:
+    """Cut a curved piece where its tops touch the level of all tops, because hollows end there."""
     if not isinstance(piece, Segment):
         for top in piece.turning_points(1):
             x, y = (float(v) for v in piece.point(top))
-            if TOUCH_MARGIN < top < 1.0 - TOUCH_MARGIN and y >= -limit:
+            if TOUCH_MARGIN < top < 1.0 - TOUCH_MARGIN and y >= level - limit:
                 before, after = piece.split(top)
-                first, rest = before.pinned(piece.start, (x, 0.0)), after.pinned((x, 0.0), piece.end)
-                return [first, *_cut_at_touching(rest, limit)]
+                first, rest = before.pinned(piece.start, (x, level)), after.pinned((x, level), piece.end)
+                return [first, *_cut_at_touching(rest, level, limit)]
     return [piece]
 
 

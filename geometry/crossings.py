@@ -52,13 +52,17 @@ class _Loop:
 
 
 def find_crossing(
-    pieces: Sequence[Curve], period: float, depth: float, islands: Sequence[Sequence[Curve]]
+    pieces: Sequence[Curve],
+    period: float,
+    depth: float,
+    islands: Sequence[Sequence[Curve]],
+    numbers: Sequence[int],
 ) -> Crossing | None:
-    """Return the worst crossing of the pieces of a canonical wall and its islands, or None."""
+    """Return the worst crossing of the pieces of a canonical wall, which have these numbers, and its islands."""
     import shapely
 
     size = (period, depth if depth > 0.0 else period)
-    labels = [f"piece {i}" for i in range(len(pieces))]
+    labels = [f"piece {i}" for i in numbers]
     labels += [f"piece {i} of island {k}" for k, loop in enumerate(islands) for i in range(len(loop))]
     path = _flatten(pieces, size, 0)
     loops = [_close(path, _copies(path.points))]

@@ -13,7 +13,7 @@ from .blocks import in_blocks
 from .charts import RollingCharts
 from .configuration import ConfigurationSpace
 from .disk import Disk
-from .rigid import check_kinds, checked_states, collide
+from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops
 from .rigid_tables import ground_of, rounding_of_places, shares
 from .tracing import MAX_COLLISIONS, Outcomes
 from .wall import Wall
@@ -103,6 +103,7 @@ def collide_cylinder(
     eps = positive_number("scale", scale)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
+    start = at_the_tops(wall, eps, at, moving)
     n = len(at)
     out_position, out_velocity, time = np.empty_like(at), np.empty_like(moving), np.empty(n)
     contacts, status = np.empty(n, np.int64), np.empty(n, np.uint8)
@@ -111,11 +112,12 @@ def collide_cylinder(
 
     def run(part: slice) -> None:
         roll_disks(
-            at[part], moving[part], masses, eps, wall.depth, slack, max_contacts, ground,
+            start[part], moving[part], masses, eps, wall.cell.depth, slack, max_contacts, ground,
             *(array[part] for array in results),
         )  # fmt: skip
 
     in_blocks(run, n, threads)
+    from_the_tops(wall, eps, at, start, moving, out_position, out_velocity, time, status)
     for array in results:
         array.setflags(write=False)
     return CylinderCollision(*results)

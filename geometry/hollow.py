@@ -18,9 +18,10 @@ class Hollow:
     Parameters
     ----------
     left, right : float
-        The opening is left < x < right on y = 0.
+        The opening is left < x < right on the level of the wall's highest points.
     first, last : int
-        ``wall.pieces[first:last]`` is the boundary of the hollow, in order, from (left, 0) to (right, 0).
+        ``wall.cell.pieces[first:last]`` is the boundary of the hollow, in order, from its left end to its right end;
+        a wall that begins at (0, 0) is its own ``cell``.
     """
 
     left: float

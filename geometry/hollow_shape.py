@@ -46,7 +46,7 @@ class HollowShape:
 
     @classmethod
     def of(cls, wall: Wall, hollow: Hollow) -> HollowShape:
-        """The shape of one hollow of a wall."""
+        """The shape of one hollow of a wall that is its own ``cell``."""
         pieces = wall.pieces[hollow.first : hollow.last]
         corner = np.array([hollow.left, 0.0])
         vertices = (wall.vertices[hollow.first : hollow.last + 1] - corner) / hollow.width
@@ -89,7 +89,7 @@ class HollowShape:
 
 
 def distinct_hollows(wall: Wall) -> list[tuple[HollowShape, list[Hollow]]]:
-    """The different shapes of a closed wall's hollows, each with the hollows that have it, in their order.
+    """The different shapes of a closed wall's hollows, each with the hollows of ``wall.cell`` that have it, in order.
 
     Examples
     --------
@@ -99,8 +99,9 @@ def distinct_hollows(wall: Wall) -> list[tuple[HollowShape, list[Hollow]]]:
     [(0.927295218002, 2)]
     """
     found: dict[tuple[str, ...], list[tuple[HollowShape, list[Hollow]]]] = {}
-    for hollow in wall.hollows:
-        shape = HollowShape.of(wall, hollow)
+    cell = wall.cell
+    for hollow in cell.hollows:
+        shape = HollowShape.of(cell, hollow)
         alike = found.setdefault(shape.kinds, [])
         for known, hollows in alike:
             if shape.same_as(known):

@@ -10,6 +10,7 @@ import numpy as np
 from ..checks import Floats
 from ..rounding import EPS
 from .arc import Arc
+from .cell import joined
 from .curve import Curve
 from .segment import Segment
 
@@ -37,10 +38,19 @@ def has_mirror_axis(wall: Wall) -> bool:
             any(_agree(loop[k:] + loop[:k], other, tolerance) for other in images for k in range(len(loop)))
             for loop in islands
         )
-    own = _steps(wall.pieces)
+    own = _steps(_closed_up(wall.pieces, tolerance))
     other = _mirrored(own)
     starts = np.flatnonzero(np.abs(own - other[0]).max(axis=(1, 2)) <= tolerance).tolist()
     return any(np.abs(np.roll(own, -k, axis=0) - other).max() <= tolerance for k in starts)
+
+
+def _closed_up(pieces: Sequence[Curve], tolerance: float) -> Sequence[Curve]:
+    """The pieces as a cycle: the last and the first one are one if they are parts of it, as of a flat top."""
+    if len(pieces) < 2:
+        return pieces
+    last, first = pieces[-1], pieces[0].moved(pieces[-1].end[0], 0.0)
+    whole = joined(last, first, tolerance)
+    return pieces if whole is None else (whole, *pieces[1:-1])
 
 
 def _with_bottom_starts(islands: Sequence[Sequence[Curve]]) -> list[tuple[Curve, ...]]:

@@ -75,6 +75,7 @@ class TracePlan:
 
 def plan_of(wall: Wall) -> TracePlan:
     """Read the plan off the tables that the tracer uses."""
+    wall = wall.cell
     scene = wall.scene
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     traced = sum(h.last - h.first for h in wall.hollows) if wall.closes else pieces

@@ -14,7 +14,7 @@ from .blocks import in_blocks
 from .disk import Disk
 from .rigid_tables import ground_of, ring_of, shares
 from .satellites import Satellites
-from .tracing import MAX_COLLISIONS, Outcomes
+from .tracing import MAX_COLLISIONS, Outcomes, Status
 from .wall import Wall
 
 
@@ -121,6 +121,7 @@ def collide(
     ring = ring_of(Satellites.around(eps, eps * wall.depth, spacing), eps, wall.scene)
     at, moving = checked_states(position, velocity)
     whole_number("max_contacts", max_contacts, 1)
+    start = at_the_tops(wall, eps, at, moving)
     n = len(at)
     out_position, out_velocity, time = np.empty_like(at), np.empty_like(moving), np.empty(n)
     contacts, two, status = np.empty(n, np.int64), np.empty(n, np.bool_), np.empty(n, np.uint8)
@@ -128,12 +129,41 @@ def collide(
     ground, masses = ground_of(wall.scene), shares(disk)
 
     def run(part: slice) -> None:
-        collide_disks(at[part], moving[part], masses, ring, max_contacts, ground, *(array[part] for array in results))
+        collide_disks(
+            start[part], moving[part], masses, ring, max_contacts, ground, *(array[part] for array in results)
+        )
 
     in_blocks(run, n, threads)
+    from_the_tops(wall, eps, at, start, moving, out_position, out_velocity, time, status)
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)
+
+
+def at_the_tops(wall: Wall, scale: float, position: Floats, velocity: Floats) -> Floats:
+    """Where disks at x2 = 0 would come to the level of the highest points, in the coordinates of ``wall.cell``.
+
+    Above that level nothing touches the wall, and the disk flies freely.
+    """
+    x, level = wall.origin
+    time = (scale * level / velocity[:, 1])[:, np.newaxis]
+    return np.asarray(position + time * velocity[:, [0, 2]] - [scale * x, 0.0])
+
+
+def from_the_tops(
+    wall: Wall, scale: float, position: Floats, start: Floats, velocity: Floats,
+    out_position: Floats, out_velocity: Floats, time: Floats, status: NDArray[np.uint8],
+) -> None:  # fmt: skip
+    """Turn places and times that began at ``start`` into those of disks that begin and end at x2 = 0."""
+    level = scale * wall.origin[1]
+    if wall.origin == (0.0, 0.0):
+        return
+    down = level / velocity[:, 1]
+    up = np.zeros_like(down)
+    np.divide(-level, out_velocity[:, 1], out=up, where=status == Status.ESCAPED)
+    out_position += position - start + down[:, np.newaxis] * velocity[:, [0, 2]]
+    out_position += up[:, np.newaxis] * out_velocity[:, [0, 2]]
+    time += down + up
 
 
 def check_kinds(disk: Disk, wall: Wall) -> None:

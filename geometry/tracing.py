@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,11 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .wall import Wall
 
+# Below the first angle, and where it flies more than so many periods between y = 0 and the highest points of a wall, a
+# ray's way there is reduced by whole periods before it is rounded: the rounding error else grows with it.
+FLAT, FAR = 2.0**-6, 2.0**6
+# pi to 65 digits.
+PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923, 10**64)
 # No limit in effect: rays are given up after 10^6 flights computed one by one (engine.MOST_STEPS), however many hits.
 MAX_COLLISIONS = 2**62
 
@@ -150,7 +156,8 @@ def trace(
     _check_wall(wall)
     x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
-    starts, incoming = x_all.flatten(), theta_all.flatten()
+    given, incoming = x_all.flatten(), theta_all.flatten()
+    starts = given if wall.origin == (0.0, 0.0) else entries(wall, given, incoming)
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
     scene = wall.scene
@@ -164,6 +171,8 @@ def trace(
         from .refinement import retrace
 
         retrace(scene, starts, incoming, max_collisions, out_x, out_theta, collisions, status)
+    if starts is not given:
+        out_x = given + (out_x - starts) + _climbs(wall, incoming, out_theta, status == Status.ESCAPED)
     shape = x_all.shape
     results = (out_x.reshape(shape), out_theta.reshape(shape), collisions.reshape(shape), status.reshape(shape))
     for array in results:
@@ -233,20 +242,86 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     incoming = number_between("theta", theta, 0.0, np.pi)
     limit = whole_number("max_collisions", max_collisions, 1)
     scene = wall.scene
-    base = np.floor(place / scene.cell) * scene.cell
+    entry = place
+    if wall.origin != (0.0, 0.0):
+        entry = float(entries(wall, np.array([place]), np.array([incoming]))[0])
+    base = np.floor(entry / scene.cell) * scene.cell
     left, right = scene.hollows[:, 0], scene.hollows[:, 1]
-    inside = np.flatnonzero((left < place - base) & (place - base < right) | scene.is_open)
+    inside = np.flatnonzero((left < entry - base) & (entry - base < right) | scene.is_open)
     if len(inside) == 0:
         # a flat top: entry, hit and exit are one point
-        return np.array([[place, 0.0]] * 3)
-    path = np.full((limit + 2, 2), np.nan)
-    trace_ray(
-        place - base, incoming, scene.hollows[inside[0]], scene.joints, scene.lines, scene.circles,
-        scene.ellipses, scene.beziers, scene.cell if scene.is_open else None, limit, path, None,
-    )  # fmt: skip
-    points = path[np.isfinite(path[:, 0])]
-    points[:, 0] += base
-    return np.asarray(points)
+        points = np.array([[entry, 0.0]] * 3)
+    else:
+        path = np.full((limit + 2, 2), np.nan)
+        trace_ray(
+            entry - base, incoming, scene.hollows[inside[0]], scene.joints, scene.lines, scene.circles,
+            scene.ellipses, scene.beziers, scene.cell if scene.is_open else None, limit, path, None,
+        )  # fmt: skip
+        points = path[np.isfinite(path[:, 0])]
+        points[:, 0] += base
+    return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, place, incoming, limit)
+
+
+def _in_coordinates_of(wall: Wall, points: Floats, x: float, theta: float, limit: int) -> Floats:
+    """A trajectory in ``wall.cell`` in the coordinates of the wall: from its entry at y = 0 on, and up to its exit."""
+    level = wall.origin[1]
+    ray = trace(wall, x, theta, max_collisions=limit)
+    moved = points + np.array([x - points[0, 0] + (level / np.tan(theta) if level else 0.0), level])
+    moved[0] = x, 0.0
+    if ray.escaped:
+        moved[-1] = float(ray.x), 0.0
+    return np.asarray(moved)
+
+
+def entries(wall: Wall, x: Floats, theta: Floats) -> Floats:
+    """Where rays that enter through y = 0 come to the level of the highest points, in the coordinates of ``wall.cell``.
+
+    Up to whole periods where a ray comes from far: there its way is reduced by them exactly, before it is rounded.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> low = geo.Wall.from_vertices([(0, -2), (0.5, -1), (1, -2)])
+    >>> entries(low, np.array([0.75, 0.75]), np.array([np.pi / 2, np.pi / 4])).round(12).tolist()
+    [0.25, -0.75]
+    """
+    left, level = wall.origin
+    if level == 0.0:
+        return np.asarray(x - left)
+    way = -level / np.tan(theta)
+    small = np.minimum(theta, np.pi - theta)
+    far = np.flatnonzero((small < FLAT) & (np.abs(way) > FAR * wall.period))
+    for k in far.tolist():
+        way[k] = _reduced_way(-level, float(theta[k]), wall.period)
+    return np.asarray(x - way - left)
+
+
+def _reduced_way(height: float, theta: float, period: float) -> float:
+    """height cot(theta) up to whole periods, for theta near 0 or pi: 1/theta is a quotient of whole numbers."""
+    exact = Fraction(theta) if theta < 1.0 else PI - Fraction(theta)
+    small = float(exact)
+    # cot(t) = 1/t - t/3 - t^3/45 - 2 t^5/945 - ..., the next term is below 1e-18 where t < FLAT
+    square = small * small
+    rest = small * (1.0 / 3.0 + square * (1.0 / 45.0 + square * (2.0 / 945.0)))
+    way = float(Fraction(height) / exact % Fraction(period)) - height * rest
+    return way if theta < 1.0 else -way
+
+
+def _climbs(wall: Wall, incoming: Floats, outgoing: Floats, escaped: NDArray[np.bool_]) -> Floats:
+    """How far rays move in x between y = 0 and the level of the highest points, before and after, together.
+
+    Rays that do not escape move before only: where they are last is below that level.
+    """
+    level = wall.origin[1]
+    if level == 0.0:
+        return np.zeros_like(incoming)
+    with np.errstate(over="ignore", invalid="ignore"):
+        before = level / np.tan(incoming)
+        after = -level / np.tan(outgoing)
+        # ways of opposite signs cancel, as those of a ray that goes back the way it came
+        difference = -level * (np.sin(incoming - outgoing) / np.sin(incoming)) / np.sin(outgoing)
+        both = np.where(before * after < 0.0, difference, before + after)
+    return np.asarray(np.where(escaped, both, before))
 
 
 def _check_wall(wall: Wall) -> None:

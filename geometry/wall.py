@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from os import PathLike
@@ -15,8 +15,9 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats, frozen, positive_number
 from ..errors import InputError, WallError
+from .cell import Cell, cell_of
 from .conditions import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
-from .curve import Curve
+from .curve import Curve, Point
 from .disk import Disk
 from .hollow import Hollow, flat_tops, hollows_between
 from .profile import Seam, vertices_of_profile
@@ -44,8 +45,8 @@ class Wall:
     Attributes
     ----------
     pieces : tuple of pieces
-        With exact joints: each piece starts to the bit where the one before ends. A curve that touches y = 0 with
-        its top is cut there, so there may be more pieces than were given.
+        With exact joints: each piece starts to the bit where the one before ends. A curve that touches the level of
+        the wall's highest points with its top is cut there, so there may be more pieces than were given.
 
     Raises
     ------
@@ -55,8 +56,11 @@ class Wall:
 
     Notes
     -----
-    The conditions are those of Rudzis 2022, section 1.3.1, except that any depth is allowed. A wall with y0 = 0 and
-    no islands ``closes`` (condition B5): every excursion below y = 0 stays in one of its ``hollows``.
+    The conditions are those of Rudzis 2022, section 1.3.1, except that any depth is allowed. A wall without islands
+    ``closes`` (conditions B5 and B5'): every excursion below the level of its highest points stays in one of its
+    ``hollows``. Its period may begin anywhere and its highest points may lie below y = 0: all that depends on the law
+    alone uses its ``cell``, which begins at one of them; places and angles of rays, pictures and files are in the
+    coordinates in which the wall was given.
 
     Examples
     --------
@@ -79,9 +83,12 @@ class Wall:
         size = wall_size(path, width)
         loops = tuple(canonical_island(loop, width, size, k) for k, loop in enumerate(islands))
         self._fill(path, width, loops)
+        if loops:
+            check_open_wall(path, loops, width, size)
+        numbers = range(len(path)) if self._cell is None else self._cell.numbers
+        check_crossings(self.cell.pieces, loops, width, self.cell.depth, self.origin, numbers)
         if not self.closes:
             check_open_wall(path, loops, width, size)
-        check_crossings(path, loops, width, self.depth)
 
     def _fill(self, pieces: tuple[Curve, ...], period: float, islands: tuple[tuple[Curve, ...], ...]) -> None:
         object.__setattr__(self, "pieces", pieces)
@@ -193,28 +200,69 @@ class Wall:
         return all(isinstance(p, Segment) for path in (self.pieces, *self.islands) for p in path)
 
     @cached_property
+    def _cell(self) -> Cell | None:
+        return cell_of(self)
+
+    @cached_property
     def closes(self) -> bool:
-        """Condition B5: the wall touches y = 0 at the period's ends and has no islands."""
-        return not self.islands and self.pieces[0].start[1] == 0.0
+        """Conditions B5, B5': no ray passes from cell to cell below the level of the wall's highest points.
+
+        It holds if there are no islands; it is not made use of where pieces would vanish by rounding in ``cell``.
+
+        Examples
+        --------
+        >>> Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).closes
+        True
+        """
+        return self._cell is not None
+
+    @cached_property
+    def cell(self) -> Wall:
+        """The same wall begun at one of its highest points and raised to y = 0; itself if it does not close.
+
+        Two pieces that are parts of one, which the given period cuts, are one piece here.
+
+        Examples
+        --------
+        >>> Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).cell.vertices.tolist()
+        [[0.0, 0.0], [0.5, -1.0], [1.0, 0.0]]
+        """
+        if self._cell is None or self._cell.pieces is self.pieces:
+            return self
+        wall = object.__new__(Wall)
+        wall._fill(self._cell.pieces, self.period, ())
+        return wall
+
+    @property
+    def origin(self) -> Point:
+        """Where the origin of ``cell`` lies in the coordinates of this wall.
+
+        Examples
+        --------
+        >>> Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).origin
+        (0.5, -0.2)
+        """
+        return (0.0, 0.0) if self._cell is None else self._cell.origin
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
         """Whether the periodic wall has a mirror axis, to rounding; with islands only x = period/2 is tried."""
         from .mirror import has_mirror_axis
 
-        return has_mirror_axis(self)
+        return has_mirror_axis(self.cell)
 
     @cached_property
     def flat_top(self) -> float:
-        """The total length of the pieces that run rightward along y = 0."""
-        return math.fsum(self.pieces[i].length for i in flat_tops(self.pieces, self.vertices))
+        """The total length of the pieces that run rightward along the level of the highest points."""
+        cell = self.cell
+        return math.fsum(cell.pieces[i].length for i in flat_tops(cell.pieces, cell.vertices))
 
     @cached_property
     def scene(self) -> Scene:
-        """The tables that the tracer reads, made on first use."""
+        """The tables that the tracer reads, of the ``cell`` and in its coordinates, made on first use."""
         from .scene import scene_of
 
-        return scene_of(self)
+        return scene_of(self.cell)
 
     def plan(self) -> TracePlan:
         """What the tracer will do with this wall and what it leaves out.
@@ -230,7 +278,18 @@ class Wall:
 
     @cached_property
     def hollows(self) -> tuple[Hollow, ...]:
-        """The openings on y = 0 with the pieces below each; empty for a wall that does not close."""
+        """The openings on the level of the highest points with the pieces of ``cell`` below each, from there on.
+
+        Left and right are in the coordinates of this wall, unfolded. Empty for a wall that does not close.
+
+        Examples
+        --------
+        >>> Wall.from_vertices([(0, -1), (0.5, 0), (1, -1)]).hollows
+        (Hollow(left=0.5, right=1.5, first=0, last=2),)
+        """
+        if self.cell is not self:
+            x = self.origin[0]
+            return tuple(replace(h, left=h.left + x, right=h.right + x) for h in self.cell.hollows)
         return hollows_between(flat_tops(self.pieces, self.vertices), self.vertices) if self.closes else ()
 
     def foreshorten(self, disk: Disk) -> Self:

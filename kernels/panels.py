@@ -74,7 +74,7 @@ class Panels(Basis):
         Parameters
         ----------
         wall : Wall
-            The wall; only ``wall.pieces`` is looked at.
+            The wall, or anything with ``pieces``; of a wall those of its ``cell`` are looked at.
         degree : int
             Degree on each panel.
         smallest : float
@@ -182,7 +182,7 @@ class Panels(Basis):
 
 
 def _single_arc_half_angle(wall: Any) -> float | None:
-    pieces = tuple(wall.pieces)
+    pieces = tuple(getattr(wall, "cell", wall).pieces)
     if len(pieces) != 1 or not getattr(pieces[0], "is_circular", False):
         return None
     half_angle = float(getattr(pieces[0], "half_span", 0.0))

@@ -37,7 +37,7 @@ class PolygonLaw(BranchLaw):
     Parameters
     ----------
     wall : Wall
-        Polygonal, and closing (condition B5).
+        Polygonal, and closing (conditions B5 and B5': it has no islands).
     tolerance : float
         Share of a hollow's flux that may stay unresolved.
     max_beams : int
@@ -87,8 +87,7 @@ class PolygonLaw(BranchLaw):
             raise InputError(f"wall: expected segments only, got {wall!r}; use WallLaw(wall), which traces curves")
         if not wall.closes:
             raise InputError(
-                f"wall: expected one that touches y = 0 at the ends of its period and has no islands, got {wall!r}; "
-                "use WallLaw(wall), which traces with periodic wrap"
+                f"wall: expected one without islands, got {wall!r}; use WallLaw(wall), which traces with periodic wrap"
             )
         positive_number("tolerance", self.tolerance)
         whole_number("max_beams", self.max_beams, 1)

@@ -81,7 +81,7 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
     predicted = ROWS_A_PIECE * FLIGHTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
-    overhangs = bool(np.any(np.diff(wall.vertices[:, 0]) < 0.0))
+    overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
     return bool(wall.closes) and not overhangs and predicted <= MOST_FLIGHTS
 
 

@@ -219,6 +219,7 @@ def _closed_form(wall: Wall) -> Law | None:
     """The sum of the laws of flat tops and hollows, by their share of the period, or None."""
     if not wall.closes:
         return None
+    wall = wall.cell
     terms: dict[Law, float] = {}
     level = wall.flat_top
     for hollow in wall.hollows:

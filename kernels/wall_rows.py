@@ -119,7 +119,7 @@ class WallRows:
     def __init__(
         self, wall: Wall, degree: int, edges: Floats, least_level: int = 0, most_flights: int = NO_LIMIT
     ) -> None:
-        self.wall = wall
+        self.wall = wall.cell
         self.degree = degree
         # of one row in one hollow; its error tells what it had to leave undone
         self.most_flights = most_flights

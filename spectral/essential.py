@@ -207,5 +207,5 @@ def _has_straight_pieces_below(wall: Wall) -> bool:
 
     if not wall.closes:
         return any(isinstance(piece, Segment) for piece in wall.pieces)
-    below = [piece for hollow in wall.hollows for piece in wall.pieces[hollow.first : hollow.last]]
+    below = [piece for hollow in wall.hollows for piece in wall.cell.pieces[hollow.first : hollow.last]]
     return any(isinstance(piece, Segment) for piece in below)

@@ -66,7 +66,8 @@ HITS = {Segment: _segment_hits, Arc: _arc_hits, Bezier: _bezier_hits}
 
 
 def _opens(wall, x):
-    return any(hollow.left < x < hollow.right for hollow in wall.hollows)
+    """Whether a wall that begins at a highest point, at y = 0, is open at x; above a lower one y = 0 is free."""
+    return wall.origin[1] < 0.0 or any(hollow.left < x < hollow.right for hollow in wall.hollows)
 
 
 def trace_plainly(wall, x, theta, limit=100_000, cells=25):
@@ -74,7 +75,9 @@ def trace_plainly(wall, x, theta, limit=100_000, cells=25):
     base = math.floor(x / wall.period) * wall.period
     p, v = [x - base, 0.0], [-math.cos(theta), -math.sin(theta)]
     pieces = [*wall.pieces, *(piece for island in wall.islands for piece in island)]
-    offsets = [0.0] if wall.closes else [k * wall.period for k in range(-cells, cells + 1)]
+    offsets = (
+        [0.0] if wall.closes and wall.origin == (0.0, 0.0) else [k * wall.period for k in range(-cells, cells + 1)]
+    )
     for bounce in range(limit):
         best, normal = math.inf, None
         for offset in offsets:

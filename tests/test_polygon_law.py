@@ -173,7 +173,8 @@ def test_walls_that_are_curved_or_open_are_refused_with_advice() -> None:
     with pytest.raises(InputError, match="WallLaw"):
         ker.PolygonLaw(geo.focusing_arcs(1.0))
     with pytest.raises(InputError, match="WallLaw"):
-        ker.PolygonLaw(geo.Wall.from_vertices([(0, -0.1), (0.5, 0), (1, -0.1)]))
+        plate = [geo.Segment((0.2, -0.1), (0.4, -0.1)), geo.Segment((0.4, -0.1), (0.2, -0.1))]
+        ker.PolygonLaw(geo.Wall([geo.Segment((0, -1), (1, -1))], islands=[plate]))
     with pytest.raises(InputError, match="wall"):
         ker.PolygonLaw(1.0)
 

@@ -304,6 +304,7 @@ def _matrix(law: Law, basis: Bins, tolerance: float, rng: np.random.Generator) -
 
 def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
     """Trace rays that enter the hollows with the invariant measure."""
+    wall = wall.cell
     widths = np.array([hollow.width for hollow in wall.hollows])
     lefts = np.array([hollow.left for hollow in wall.hollows])
     which = rng.choice(len(widths), CHECK_RAYS, p=widths / widths.sum())

@@ -92,7 +92,7 @@ class SceneWithout:
     """A wall whose rays are traced with other tables; it has what `trace` asks of a wall."""
 
     def __init__(self, wall: Wall, scene: Scene) -> None:
-        self.period, self.scene = wall.period, scene
+        self.period, self.origin, self.scene = wall.period, wall.origin, scene
 
 
 def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Saving]:

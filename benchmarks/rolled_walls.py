@@ -1,0 +1,153 @@
+"""Walls whose period begins anywhere and below y = 0, against the same walls begun at a highest point.
+
+``python -m benchmarks.rolled_walls`` prints a table: rays, collisions of disks and matrices of the rolled walls are
+those of the others, and some rays are followed by a textbook tracer in the coordinates of the rolled wall.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass, fields
+
+import numpy as np
+from tests.random_rolled_walls import Rolled, rays, rolled_wall, textbook_exit
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import AccuracyError
+
+WALLS, RAYS, JUDGED, DISKS = 200, 20_000, 40, 2_000
+# Rays that leave after more hits have places and angles that rounding has changed.
+MOST_HITS = 200
+# Angles agree to this; rounding grows along a ray, in a wall of bumps by a factor of up to ten a hit.
+SAME_ANGLE = 1e-6
+SCALE, SPACING = 1e-3, 2.0 * np.pi / 80
+# Rays flatter than this pass too many cells for the textbook tracer.
+STEEP = 0.3
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What came out for one wall; counts, but for the ratio of matrices and the property."""
+
+    rays: int
+    other_rays: int
+    judged: int
+    misjudged: int
+    disks: int
+    other_disks: int
+    matrix: float
+    facts: bool
+
+
+def compare(one: Rolled, number: int, most_rays: int, judged: int, disks: int, matrices: bool) -> Comparison:
+    """Compare a rolled wall with what it was made of."""
+    rng = np.random.default_rng([number, 17])
+    counted, other = _compare_rays(one, most_rays, rng)
+    found, wrong = _judge(one, judged, rng)
+    collided, apart = _compare_disks(one, disks, rng)
+    return Comparison(
+        counted, other, found, wrong, collided, apart, _compare_matrices(one) if matrices else 0.0, _same_facts(one)
+    )
+
+
+def _compare_rays(one: Rolled, count: int, rng: np.random.Generator) -> tuple[int, int]:
+    x, theta, entry = rays(one, count, rng)
+    here = geo.trace(one.wall, entry, theta, max_collisions=MOST_HITS)
+    there = geo.trace(one.rolled, x, theta, max_collisions=MOST_HITS)
+    out = here.escaped & there.escaped
+    place = here.x + one.shift[0] + one.drop / np.tan(here.theta)
+    size = 1.0 + np.abs(place) + one.drop / np.sin(np.where(out, here.theta, 1.0)) ** 2
+    apart = np.abs(here.theta - there.theta) + np.abs(place - there.x) / size > SAME_ANGLE
+    different = np.where(out, apart | (here.collisions != there.collisions), here.escaped != there.escaped)
+    return count, int(different.sum())
+
+
+def _judge(one: Rolled, count: int, rng: np.random.Generator) -> tuple[int, int]:
+    x, theta, _ = rays(one, count, rng, STEEP)
+    traced = geo.trace(one.rolled, x, theta, max_collisions=MOST_HITS)
+    judged, wrong = 0, 0
+    for i in np.flatnonzero(traced.escaped):
+        known = textbook_exit(one.rolled, float(x[i]), float(theta[i]))
+        if known is None:
+            continue
+        judged += 1
+        place, angle, hits = known
+        allowed = SAME_ANGLE * (1.0 + one.drop / np.sin(angle) ** 2)
+        same = abs(place - traced.x[i]) <= allowed and abs(angle - traced.theta[i]) <= SAME_ANGLE
+        wrong += not (same and hits == traced.collisions[i])
+    return judged, wrong
+
+
+def _compare_disks(one: Rolled, count: int, rng: np.random.Generator) -> tuple[int, int]:
+    if count == 0 or any(isinstance(piece, geo.Bezier) for piece in one.wall.pieces):
+        return 0, 0
+    scale = SCALE / max(one.rolled.depth, one.rolled.period)
+    velocity = rng.normal(size=(count, 3))
+    velocity[:, 1] = -np.abs(velocity[:, 1]) - 0.1
+    position = rng.random((count, 2)) * [scale * one.wall.period, SPACING]
+    flight = scale * one.drop / -velocity[:, 1]
+    start = position + flight[:, None] * velocity[:, [0, 2]] - [scale * one.shift[0], 0.0]
+    limit = {"spacing": SPACING, "max_contacts": MOST_HITS}
+    here = geo.collide(geo.Disk(), one.wall, scale, start, velocity, **limit)
+    there = geo.collide(geo.Disk(), one.rolled, scale, position, velocity, **limit)
+    out = here.escaped & there.escaped
+    climb = scale * one.drop / np.where(out, here.velocity[:, 1], 1.0)
+    place = here.position + [scale * one.shift[0], 0.0] + climb[:, None] * here.velocity[:, [0, 2]]
+    apart = np.abs(here.velocity - there.velocity).max(axis=1) > SAME_ANGLE
+    apart |= np.abs(place - there.position).max(axis=1) > SAME_ANGLE * (1.0 + climb / here.velocity[:, 1])
+    different = np.where(out, apart | (here.contacts != there.contacts), here.escaped != there.escaped)
+    return count, int(different.sum())
+
+
+def _compare_matrices(one: Rolled) -> float:
+    """The distance of the two laws' matrices over what their errors and rounding allow."""
+    basis, rng = ker.Legendre(8), np.random.default_rng(18)
+    try:
+        here, there = (
+            ker.discretise(ker.WallLaw(wall), basis, tolerance=1e-3, samples=2**16, rng=rng)
+            for wall in (one.wall, one.rolled)
+        )
+    except AccuracyError:
+        return 0.0
+    distance = float(np.linalg.norm(here.symmetric - there.symmetric))
+    return distance / (float(here.error) + float(there.error) + 1e-12)
+
+
+def _same_facts(one: Rolled) -> bool:
+    """Whether closing, symmetry, length, openings and flat tops are those of the other wall."""
+    wall, rolled = one.wall, one.rolled
+    widths = [sorted(hollow.width for hollow in each.hollows) for each in (wall, rolled)]
+    return (
+        wall.closes == rolled.closes
+        and wall.is_mirror_symmetric == rolled.is_mirror_symmetric
+        and len(widths[0]) == len(widths[1])
+        and bool(np.allclose(*widths, rtol=0.0, atol=1e-13 * wall.period))
+        and abs(wall.flat_top - rolled.flat_top) <= 1e-13 * wall.period
+        and abs(wall.arc_length - rolled.arc_length) <= 1e-12 * wall.arc_length
+        and abs(wall.cell.depth - rolled.cell.depth) <= 1e-13 * max(wall.period, wall.depth)
+    )
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.rolled_walls", description=__doc__)
+    parser.add_argument("--walls", type=int, default=WALLS)
+    parser.add_argument("--rays", type=int, default=RAYS, help="rays into every wall")
+    options = parser.parse_args()
+    kinds: dict[str, list[Comparison]] = {}
+    for number in range(options.walls):
+        one = rolled_wall(number)
+        found = compare(one, number, options.rays, JUDGED, DISKS, matrices=True)
+        shape = "polygons" if one.wall.is_polygonal else "with curves"
+        kinds.setdefault(f"{shape}, {'lowered' if one.drop else 'rolled'}", []).append(found)
+    print("| walls | number | rays | others | judged rays | wrong | disks | others | matrices: worst ratio | unlike |")
+    print("|" + "---|" * 10)
+    for kind, found in sorted(kinds.items()):
+        sums = [sum(getattr(row, field.name) for row in found) for field in fields(Comparison)[:6]]
+        worst, facts = max(row.matrix for row in found), sum(not row.facts for row in found)
+        print(f"| {kind} | {len(found)} | {' | '.join(map(str, sums))} | {worst:.2g} | {facts} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
