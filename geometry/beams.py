@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, frozen, number_between, whole_number
+from .blocks import interruptibly
 from .triangulation import triangulated
 
 TOLERANCE = 1e-13
@@ -133,8 +134,8 @@ def beams_of(
     triangulation = triangulated(hollow_vertices)
     width = triangulation.width
     halves = 1 if mirror_symmetric else 2
-    corners, real, whole, used, rounding, _, status = split_beams(
-        *triangulation.tables, tolerance, max_beams * halves // 2, halves
+    corners, real, whole, used, rounding, _, status = interruptibly(
+        lambda: split_beams(*triangulation.tables, tolerance, max_beams * halves // 2, halves)
     )
     rows, tags = pieces_of(corners, real, whole, used, width)
     if mirror_symmetric:

@@ -116,7 +116,7 @@ def collide_cylinder(
             *(array[part] for array in results),
         )  # fmt: skip
 
-    in_blocks(run, n, threads)
+    in_blocks(run, n, threads, stop=ground.stop)
     from_the_tops(wall, eps, at, start, moving, out_position, out_velocity, time, status)
     for array in results:
         array.setflags(write=False)

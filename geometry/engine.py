@@ -25,6 +25,7 @@ from .bezier_engine import bend_number, bezier_hit, bezier_value
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
 from .resolution import JOINT_ULPS
 from .skips import skip_crossings, skip_hops
+from .stop_engine import is_raised
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
 NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
@@ -328,11 +329,13 @@ def trace_ray(
 
 @_compile
 def trace_rays(
-    x, theta, hollows, joints, lines, circles, ellipses, beziers, pairs, grid, period, cell, limit,
+    x, theta, hollows, joints, lines, circles, ellipses, beziers, pairs, grid, period, cell, limit, stop,
     out_x, out_theta, bounces, status,
 ):  # fmt: skip
-    """Trace a block of rays; fills the four output arrays."""
+    """Trace a block of rays; fills the four output arrays, as far as it comes before ``stop`` is raised."""
     for i in range(x.shape[0]):
+        if is_raised(stop):
+            break
         base = math.floor(x[i] / cell) * cell
         place = x[i] - base
         h = opening_at(place, hollows)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, frozen, number_between, whole_number
+from .blocks import interruptibly
 from .triangulation import triangulated
 
 MAX_INTERVALS = 1_000_000
@@ -145,7 +146,7 @@ def exact_rows(
     limit = whole_number("max_intervals", max_intervals, 1)
     bounce_limit = whole_number("max_bounces", max_bounces, 1)
     tables = triangulated(hollow_vertices).tables
-    first, high, offset, tags = march(*tables, incoming, limit, bounce_limit)
+    first, high, offset, tags = interruptibly(lambda: march(*tables, incoming, limit, bounce_limit))
     low = np.concatenate([[0.0], high[:-1]])
     low[first[:-1]] = 0.0
     sign = tags[:, 0].astype(np.int8)

@@ -133,7 +133,7 @@ def collide(
             start[part], moving[part], masses, ring, max_contacts, ground, *(array[part] for array in results)
         )
 
-    in_blocks(run, n, threads)
+    in_blocks(run, n, threads, stop=ground.stop)
     from_the_tops(wall, eps, at, start, moving, out_position, out_velocity, time, status)
     for array in results:
         array.setflags(write=False)

@@ -14,10 +14,14 @@ from .contact_engine import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, first_in_hol
 from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
 from .flight_engine import compiled, flight, inlined, satellite_after, towards_line, turning
 from .opening_engine import last_hollow
+from .stop_engine import is_raised
 
 TOP = 7
 # Cells that one satellite may pass, and satellites that may pass the lowest point, in one flight.
 MOST_CELLS = 1_000_000
+
+# Cells, or satellites, between two looks at the flag that tells a disk to end: a power of 2.
+CELLS_A_LOOK = 1024
 
 # A time that no flight takes, but that is not infinite: bounds are multiplied by it.
 FOREVER = 1e30
@@ -87,7 +91,9 @@ def first_contact(own_kind, own_index, h, base, x, y, t, end, turn, motion, slac
         if h < 0 or code != CLEAR:
             return t, TOP, -1, -1, base, state, code
     came_from = ZERO
-    for _ in range(MOST_CELLS):
+    for cell in range(MOST_CELLS):
+        if cell & (CELLS_A_LOOK - 1) == CELLS_A_LOOK - 1 and is_raised(ground.stop):
+            break
         t, kind, index, state, code = first_in_hollow(
             h, own_kind, own_index, came_from, x - base, y, t, end, turned, turn, motion, slack, ground
         )
@@ -183,7 +189,9 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
     step = -1 if motion.spin > 0.0 else 1
     # numba's floor is a float
     j = -step * int(math.floor((reach + step * angle) / ring.spacing))  # noqa: RUF046
-    for _ in range(MOST_CELLS):
+    for count in range(MOST_CELLS):
+        if count & (CELLS_A_LOOK - 1) == CELLS_A_LOOK - 1 and is_raised(ground.stop):
+            break
         other = angle + j * ring.spacing
         away = other * motion.spin >= 0.0
         beyond = abs(other) - reach
@@ -275,7 +283,7 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, ground):
     sine, versed = turning(angle)
     x, y, height = place + sine / scale, versed / scale, 0.0
     own, below = (ZERO, NOTHING, NOTHING), (ZERO, NOTHING, 0.0)
-    while True:
+    while not is_raised(ground.stop):
         turn, motion = (sine, 1.0 - versed), flight(v1, v2, omega, scale)
         # by then it is back, or would be lower than it can be
         if v2 > 0.0:
@@ -309,6 +317,7 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, ground):
             x, y, n1, n2 = surface(hit[0], hit[1], x, touched[1], ground)
         height = y - versed / scale
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (sine, 1.0 - versed), disk)
+    return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
 
 
 @compiled
@@ -320,6 +329,8 @@ def collide_disks(
     scale, spacing = ring.scale, ring.spacing
     width = scale * ground.cell
     for i in range(position.shape[0]):
+        if is_raised(ground.stop):
+            break
         norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
         place = (position[i, 0] - math.floor(position[i, 0] / width) * width) / scale
         angle = position[i, 1] - spacing * round(position[i, 1] / spacing)
@@ -342,7 +353,7 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, ground):
     travel, turned, passed, contacts = 0.0, 0.0, 0.0, 0
     x, y = place, 0.0
     own = (ZERO, NOTHING, NOTHING)
-    while True:
+    while not is_raised(ground.stop):
         motion = flight(v1 + omega, v2, 0.0, 1.0)
         end = FOREVER
         if v2 > 0.0:
@@ -370,6 +381,7 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, ground):
         else:
             x, y, n1, n2 = surface(kind, index, x, y, ground)
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (0.0, 1.0), disk)
+    return travel, turned, passed, v1, v2, omega, contacts, BOUNCE_LIMIT
 
 
 @compiled
@@ -379,6 +391,8 @@ def roll_disks(
     """Collide a block of disks on the cylinder; fills the output arrays."""
     mass, inertia = disk
     for i in range(position.shape[0]):
+        if is_raised(ground.stop):
+            break
         norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
         place = (position[i, 0] + position[i, 1]) / scale
         travel, turned, time, v1, v2, omega, contacts[i], status[i] = roll_disk(

@@ -9,9 +9,11 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..checks import Floats
 from ..rounding import EPS
+from .blocks import new_flag
 from .disk import Disk
 from .satellites import Satellites
 
@@ -26,7 +28,10 @@ SLACK = 16.0 * EPS
 
 
 class Ground(NamedTuple):
-    """The wall: its period, whether satellites pass from cell to cell below its tops, and the tables of its scene."""
+    """The wall: its period, whether satellites pass from cell to cell below its tops, and the tables of its scene.
+
+    ``stop`` is the flag that ends a collision before its time.
+    """
 
     cell: float
     is_open: bool
@@ -34,6 +39,7 @@ class Ground(NamedTuple):
     joints: Floats
     lines: Floats
     arcs: Floats
+    stop: NDArray[np.int64]
 
 
 class Ring(NamedTuple):
@@ -60,7 +66,8 @@ def ground_of(scene: Scene) -> Ground:
     hollows[:, 7:9] += len(circles)
     lines = np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines
     arcs = [table for table in (circles, ellipses) if len(table)]
-    return Ground(scene.cell, scene.is_open, hollows, scene.joints, lines, np.concatenate(arcs) if arcs else none)
+    table = np.concatenate(arcs) if arcs else none
+    return Ground(scene.cell, scene.is_open, hollows, scene.joints, lines, table, new_flag())
 
 
 def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:

@@ -13,12 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, finite_array, finite_number, number_between, whole_number
 from ..errors import InputError
-from .blocks import in_blocks
+from .blocks import in_blocks, interruptibly, new_flag
 
 if TYPE_CHECKING:
     from .scene import Scene
     from .wall import Wall
 
+# Rays times pieces up to which rays are followed on the caller's own thread: with 10^6 flights each, of some 10 ns a
+# piece, they take a fraction of a second. Another thread costs 0.1 ms, as much as a few hundred flights.
+LITTLE_WORK = 16
 # Below the first angle, and where it flies more than so many periods between y = 0 and the highest points of a wall, a
 # ray's way there is reduced by whole periods before it is rounded: the rounding error else grows with it.
 FLAT, FAR = 2.0**-6, 2.0**6
@@ -161,16 +164,17 @@ def trace(
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
     scene = wall.scene
-    trace_block = _block_tracer(scene, max_collisions)
+    stop = new_flag()
+    trace_block = _block_tracer(scene, max_collisions, stop)
 
     def run(block: slice) -> None:
         trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], status[block])
 
-    in_blocks(run, len(starts), threads)
+    in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
     if np.any((status == Status.CORNER) | (status == Status.GRAZING)):
         from .refinement import retrace
 
-        retrace(scene, starts, incoming, max_collisions, out_x, out_theta, collisions, status)
+        interruptibly(lambda: retrace(scene, starts, incoming, max_collisions, out_x, out_theta, collisions, status))
     if starts is not given:
         out_x = given + (out_x - starts) + _climbs(wall, incoming, out_theta, status == Status.ESCAPED)
     shape = x_all.shape
@@ -180,7 +184,12 @@ def trace(
     return Trace(*results)
 
 
-def _block_tracer(scene: Scene, max_collisions: int) -> Callable[..., None]:
+def _work(scene: Scene) -> int:
+    """What a flight costs, in pieces; a Bezier piece counts for ten."""
+    return len(scene.joints) + (0 if scene.beziers is None else 10 * len(scene.beziers))
+
+
+def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) -> Callable[..., None]:
     """A function of x, theta and the four arrays to fill: closed forms where the scene has some, else the loop."""
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
@@ -188,7 +197,7 @@ def _block_tracer(scene: Scene, max_collisions: int) -> Callable[..., None]:
 
         trace_rays(
             x, theta, scene.hollows, scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers,
-            scene.pairs, scene.grid, scene.cell if scene.is_open else None, scene.cell, max_collisions, *results,
+            scene.pairs, scene.grid, scene.cell if scene.is_open else None, scene.cell, max_collisions, stop, *results,
         )  # fmt: skip
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
@@ -253,9 +262,11 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         points = np.array([[entry, 0.0]] * 3)
     else:
         path = np.full((limit + 2, 2), np.nan)
-        trace_ray(
-            entry - base, incoming, scene.hollows[inside[0]], scene.joints, scene.lines, scene.circles,
-            scene.ellipses, scene.beziers, scene.cell if scene.is_open else None, limit, path, None,
+        interruptibly(
+            lambda: trace_ray(
+                entry - base, incoming, scene.hollows[inside[0]], scene.joints, scene.lines, scene.circles,
+                scene.ellipses, scene.beziers, scene.cell if scene.is_open else None, limit, path, None,
+            )
         )  # fmt: skip
         points = path[np.isfinite(path[:, 0])]
         points[:, 0] += base

@@ -110,15 +110,18 @@ class HollowRows:
         return rows, stale
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Row]:
+        from ..geometry.blocks import interruptibly
         from ..geometry.piece_rules import gauss_tables
         from ..geometry.row_marching import march_rows
 
         seeds = [
             self._seeds(angle, least) for angle, least in zip(theta.tolist(), tolerances * self.width, strict=True)
         ]
-        found = march_rows(
-            theta, tolerances, self._bounds, self.degree, gauss_tables(), self.least_level,
-            np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
+        found = interruptibly(
+            lambda: march_rows(
+                theta, tolerances, self._bounds, self.degree, gauss_tables(), self.least_level,
+                np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
+            )
         )  # fmt: skip
         (nodes, widths), node_starts, pieces, piece_starts, errors, lost, rays, flights = found
         self.rays += int(rays.sum())
@@ -154,6 +157,7 @@ class HollowRows:
 
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among these and their neighbours whose rows have overlooked pieces."""
+        from ..geometry.blocks import interruptibly
         from ..geometry.row_following import find_overlooked
 
         place = np.searchsorted(self._theta, theta)
@@ -165,7 +169,7 @@ class HollowRows:
         pieces = tuple(np.concatenate([row[part] for row in rows]) for part in range(3))
         starts = np.cumsum([0, *(len(row.low) for row in rows)])
         least = np.array([row.width_that_matters for row in rows])
-        found = find_overlooked(angles, least, pieces, starts, linked, self._bounds, self.degree)
+        found = interruptibly(lambda: find_overlooked(angles, least, pieces, starts, linked, self._bounds, self.degree))
         owner, places, rays, flights = found
         self.rays, self.flights = self.rays + rays, self.flights + flights
         for angle, x in zip(angles[owner].tolist(), places.tolist(), strict=True):
