@@ -96,6 +96,12 @@ def check_crossings(
         return
     x, y = (found.place[0] + origin[0]) % period, found.place[1] + origin[1]
     place = f"({x:.6g}, {y:.6g})"
+    if found.is_slit:
+        raise WallError(
+            f"{found.labels[0]} and {found.labels[1]} run back on each other from {place} inside the solid: no ray "
+            "comes into a gap of zero width; end the path where it turns back, or give the gap a width (a plate of "
+            "zero thickness has free space on both sides)"
+        )
     if len(found.labels) < 2:
         one = found.labels[0] if found.labels else "a piece"
         raise WallError(f"{one} crosses itself or the neighbouring period near {place}; pieces may touch, not cross")

@@ -4,6 +4,9 @@ The wall over one period is closed by a path above y = 0 and the winding number 
 face that it cuts out of the plane. Around a crossing the winding number takes three consecutive values; around a
 touching it takes two. So pieces cross if and only if some face has a winding number other than 0 and 1. Faces that
 are thinner than the tolerance come from rounding and from flattening curves, and do not count.
+
+A path that turns back along itself is a plate of zero thickness where free space lies beside it. Where none does it is
+a slit of zero width in the solid: there is no free space on the left of the path, and no ray meets it.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..rounding import EPS
 from .curve import Curve
 from .segment import Segment
 
@@ -28,8 +32,17 @@ CURVED_THICKNESS = 4.0 * FLATTENING
 # (JOIN_TOLERANCE in conditions.py) on both sides of a touching.
 STRAIGHT_THICKNESS = 4e-9
 
+# Coordinates this close are the same, relative to the wall's size (SNAP_TOLERANCE in conditions.py).
+SAME_PLACE = 64.0 * EPS
+
 # Pieces this close to a crossing are named in the message.
 NEARBY = 1e-7
+
+# A path turns back where its directions before and after a joint are opposite to this, and for segments if their ends
+# are apart by no more than rounding of coordinates.
+TURNED_BACK = 1e-9
+# Where on the shorter of two pieces that lie on each other it is asked whether free space is beside them.
+ASKED = np.array([0.125, 0.5, 0.875])
 
 # Edges times faces in one block of the winding count: 32 MB of booleans.
 WINDING_BLOCK = 4_000_000
@@ -37,10 +50,20 @@ WINDING_BLOCK = 4_000_000
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where pieces cross: the place in the wall's coordinates and the labels of the pieces there."""
+    """Where pieces cross, or make a slit: the place in the wall's coordinates and the labels of the pieces there."""
 
     place: tuple[float, float]
     labels: tuple[str, ...]
+    is_slit: bool = False
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """Where a path turns back along itself: the place, the two pieces, and points beside both, left, then right."""
+
+    place: tuple[float, float]
+    pieces: tuple[int, int]
+    beside: Floats
 
 
 @dataclass(frozen=True)
@@ -70,7 +93,8 @@ def find_crossing(
     for island in islands:
         loops.append(_flatten(island, size, first))
         first += len(island)
-    if len(loops) == 1 and shapely.LinearRing(_without_repeats(loops[0].points)).is_simple:
+    turns = _turns((pieces, *islands), size)
+    if len(loops) == 1 and not turns and shapely.LinearRing(_without_repeats(loops[0].points)).is_simple:
         return None
     faces, thickness = _faces(loops)
     if not len(faces):
@@ -83,7 +107,57 @@ def find_crossing(
     for i in order[bad[order]]:
         if thickness[i] > CURVED_THICKNESS or _is_among_segments(faces[i], loops, straight):
             return _describe(faces[i], loops, labels, size)
+    for turn in turns:
+        beside = np.sum([_winding_numbers(loop.points, turn.beside) for loop in loops], axis=0)
+        if np.any(beside.reshape(2, -1).max(axis=0) < 1):
+            return Crossing(turn.place, tuple(labels[k] for k in turn.pieces), True)
     return None
+
+
+def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[_Turn]:
+    """Where paths turn back along themselves; the first path is open, the others are closed."""
+    found, first = [], 0
+    for number, path in enumerate(paths):
+        into, out = _directions(path)
+        follower = np.roll(out, -1, axis=0)
+        across = into[:, 0] * follower[:, 1] - into[:, 1] * follower[:, 0]
+        back = (np.sum(into * follower, axis=1) < 0.0) & (np.abs(across) <= TURNED_BACK)
+        back[-1] &= number > 0
+        for k in np.flatnonzero(back).tolist():
+            before, after = path[k], path[(k + 1) % len(path)]
+            width = _coincidence(before, after, abs(float(across[k])), size)
+            if width > 0.0:
+                short = min((before, after), key=lambda piece: piece.length)
+                points, along = short.point(ASKED) / size, short.tangent(ASKED) / size
+                left = along[:, ::-1] * [-1.0, 1.0] / np.hypot(along[:, 0], along[:, 1])[:, np.newaxis]
+                beside = np.concatenate([points + 2.0 * width * left, points - 2.0 * width * left])
+                found.append(_Turn(before.end, (first + k, first + (k + 1) % len(path)), beside))
+        first += len(path)
+    return found
+
+
+def _directions(path: Sequence[Curve]) -> tuple[Floats, Floats]:
+    """The unit vectors in which every piece comes to its end, and in which it leaves its start."""
+    chords = np.array([piece.end for piece in path]) - np.array([piece.start for piece in path])
+    straight = np.array([isinstance(piece, Segment) for piece in path])
+    chords[straight] /= np.hypot(chords[straight, 0], chords[straight, 1])[:, np.newaxis]
+    into, out = chords, chords.copy()
+    for k in np.flatnonzero(~straight).tolist():
+        into[k], out[k] = path[k].tangent(1.0), path[k].tangent(0.0)
+    return into, out
+
+
+def _coincidence(before: Curve, after: Curve, across: float, size: tuple[float, float]) -> float:
+    """How far apart two pieces may be that lie on each other from their joint on; 0 if they do not."""
+    if isinstance(before, Segment) and isinstance(after, Segment):
+        apart = across * min(before.length, after.length)
+        return STRAIGHT_THICKNESS if apart <= SAME_PLACE * max(size) else 0.0
+    import shapely
+
+    short, long = sorted((before, after), key=lambda piece: piece.length)
+    outline = long.stretched(1.0 / size[0], 1.0 / size[1]).flattened(FLATTENING)
+    middle = shapely.Point(short.point(0.5) / size)
+    return CURVED_THICKNESS if shapely.LineString(outline).distance(middle) <= CURVED_THICKNESS else 0.0
 
 
 def _without_repeats(points: Floats) -> Floats:

@@ -172,3 +172,31 @@ def _meetings(piece, p, v):
             tangent = piece.tangent(s)
             out.append((float((piece.point(s) - p) @ v), s, np.array([-tangent[1], tangent[0]])))
     return out
+
+
+def spiked_path(number: int) -> tuple[np.ndarray, bool]:
+    """Vertices of a graph below y = 0 with a spike of no width on one of its edges, and whether it goes up.
+
+    A spike that goes up from a graph stands in free space, a plate; one that goes down is a slit in the solid. Half of
+    them come back by a point between that is off the line by rounding.
+    """
+    rng = np.random.default_rng([number, 19])
+    count = int(rng.integers(2, 8))
+    x = np.concatenate([[0.0], np.sort(rng.uniform(0.05, 0.95, count)), [1.0]])
+    y = -rng.uniform(0.3, 1.0, count + 2)
+    y[0] = y[-1] = -rng.uniform(0.3, 1.0)
+    edge = int(rng.integers(count + 1))
+    share = float(rng.uniform(0.1, 0.9)) if rng.random() < 0.7 else 0.0
+    start = np.array([x[edge], y[edge]])
+    foot = start + share * (np.array([x[edge + 1], y[edge + 1]]) - start)
+    upward = bool(rng.random() < 0.5)
+    height = float(rng.uniform(0.01, 0.25)) * (1.0 if upward else -1.0)
+    # steeper than every edge: it leaves the graph on one side
+    steepest = np.abs(np.diff(y) / np.diff(x)).max()
+    aside = height * float(rng.uniform(-0.5, 0.5)) / steepest if 0 < edge < count else 0.0
+    tip = foot + np.array([aside, height])
+    middle = foot + float(rng.uniform(0.2, 0.8)) * (tip - foot)
+    spike = [tip, middle, foot] if rng.random() < 0.5 else [tip, foot]
+    before = [foot] if share > 0.0 else []
+    left, right = np.column_stack([x, y])[: edge + 1], np.column_stack([x, y])[edge + 1 :]
+    return np.vstack([left, *([p] for p in (*before, *spike)), right]), upward

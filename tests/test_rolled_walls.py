@@ -7,10 +7,11 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from benchmarks.rolled_walls import compare
+from benchmarks.rolled_walls import compare, is_taken_rightly
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.errors import WallError
 from asperity.geometry import Arc, Bezier, Segment
 from asperity.geometry.cell import first_top, joined
 from asperity.geometry.tracing import entries
@@ -119,3 +120,33 @@ def test_a_wall_whose_pieces_would_vanish_by_the_shift_stays_open():
     near = float(np.nextafter(0.1, 0.0))
     wall = geo.Wall.from_vertices([(0, -0.5), (0.1, -0.4), (near, -0.4), (0.3, -0.2), (0.7, 0), (1, -0.5)])
     assert not wall.closes and wall.cell is wall and wall.hollows == () and wall.scene.is_open
+
+
+def test_slits_of_no_width_are_refused_and_plates_accepted():
+    assert all(is_taken_rightly(number) for number in range(120))
+
+
+def _bezier_up_and_down():
+    up = Bezier([(0.5, -1.5), (0.4, -1), (0.5, -0.5)])
+    corners = [(0, 0), (0, -1.5), (0.5, -1.5)]
+    return [*map(Segment, corners, corners[1:]), up, up.reversed(), Segment((0.5, -1.5), (1, -1.5))]
+
+
+def test_curves_that_run_back_on_themselves_are_slits_or_plates():
+    curve = Bezier([(0, 0), (0.2, -0.5), (0.4, -0.9), (0.5, -1)])
+    bowl = Arc((0.5, 0), 0.5, math.pi, 2 * math.pi)
+    first, second = bowl.split(0.4)
+    there = second.split(0.5)[0]
+    rest = curve.split(0.5)[1].reversed()
+    for path in (
+        [curve, rest, Segment(rest.end, (1, 0))],
+        [first, there, there.reversed(), Segment(there.start, (1, 0))],
+    ):
+        with pytest.raises(WallError, match=r"run back on each other from .* zero width"):
+            geo.Wall(path)
+    plate = geo.Wall([*_bezier_up_and_down(), Segment((1, -1.5), (1, 0))])
+    assert plate.arc_length == pytest.approx(4.0 + 2.0 * _bezier_up_and_down()[2].length)
+    disk = [Arc((0.5, -0.5), 0.2, 0, math.pi), Arc((0.5, -0.5), 0.2, math.pi, 0)]
+    assert not geo.Wall([Segment((0, -1), (1, -1))], islands=[disk]).closes
+    with pytest.raises(WallError, match="piece 0 of island 0 and piece 1 of island 0 run back"):
+        geo.Wall([Segment((0, -0.1), (1, -0.1))], islands=[disk])
