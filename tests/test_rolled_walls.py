@@ -146,6 +146,9 @@ def test_curves_that_run_back_on_themselves_are_slits_or_plates():
             geo.Wall(path)
     plate = geo.Wall([*_bezier_up_and_down(), Segment((1, -1.5), (1, 0))])
     assert plate.arc_length == pytest.approx(4.0 + 2.0 * _bezier_up_and_down()[2].length)
+    # a plate that lies on the floor touches it, and has free space above
+    lying = [Segment((0.2, -1), (0.7, -1)), Segment((0.7, -1), (0.2, -1))]
+    assert geo.Wall([Segment((0, -1), (1, -1))], islands=[lying]).depth == 1.0
     disk = [Arc((0.5, -0.5), 0.2, 0, math.pi), Arc((0.5, -0.5), 0.2, math.pi, 0)]
     assert not geo.Wall([Segment((0, -1), (1, -1))], islands=[disk]).closes
     with pytest.raises(WallError, match="piece 0 of island 0 and piece 1 of island 0 run back"):
