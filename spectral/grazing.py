@@ -119,7 +119,11 @@ class Grazed:
 @lru_cache(maxsize=REMEMBERED)
 def _limit_of_wall(law: CircularArcLaw | WallLaw) -> GrazingLimit:
     """The gaps in both conventions and the diffusivity ask for the same limit."""
-    return _limit(law, grazed(law.wall) if isinstance(law, WallLaw) else Grazed(scale=1.0))
+    if isinstance(law, CircularArcLaw):
+        return _limit(law, Grazed(scale=1.0))
+    # the law of the cell is that of the wall, and its rays enter where its hollows are
+    cell = law.wall.cell
+    return _limit(law if cell is law.wall else WallLaw(cell), grazed(cell))
 
 
 def grazed(wall: Wall) -> Grazed:

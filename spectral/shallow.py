@@ -242,7 +242,7 @@ def _slopes_of_wall(wall: Wall) -> Slopes | None:
     if not wall.closes or len(wall.pieces) > MOST_PIECES:
         return None
     angles, weights, turns = [], [], [np.inf]
-    for piece in wall.pieces:
+    for piece in wall.cell.pieces:
         if isinstance(piece, Segment):
             angle, weight = _angles(piece, np.zeros(1)), np.array([piece.end[0] - piece.start[0]])
         else:
