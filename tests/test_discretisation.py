@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from net_theory import NET_OVER_SPREAD
 
 from asperity import geometry as geo
 from asperity import kernels as ker
