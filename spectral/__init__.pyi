@@ -6,7 +6,6 @@ from .diffusion import Diffusivity as Diffusivity
 from .diffusion import diffusivity as diffusivity
 from .eigenvalues import Spectrum as Spectrum
 from .eigenvalues import SpectrumErrors as SpectrumErrors
-from .eigenvalues import spectrum as spectrum
 from .enclosure import Enclosure as Enclosure
 from .enclosure import Enclosures as Enclosures
 from .enclosure import enclosures as enclosures
@@ -20,6 +19,7 @@ from .gap import spectral_gap as spectral_gap
 from .laplacian import LaplacianComparison as LaplacianComparison
 from .laplacian import laplacian_comparison as laplacian_comparison
 from .laplacian import mean_squared_slope as mean_squared_slope
+from .law_spectrum import spectrum as spectrum
 from .leading import LeadingEigenvalues as LeadingEigenvalues
 from .leading import leading_eigenvalues as leading_eigenvalues
 from .machine import Machine as Machine

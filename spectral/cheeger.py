@@ -9,7 +9,7 @@ import numpy as np
 
 from ..checks import Floats, frozen
 from ..errors import InputError
-from .eigenvalues import spectrum
+from .eigenvalues import matrix_spectrum
 
 if TYPE_CHECKING:
     from ..kernels import KernelMatrix
@@ -69,7 +69,7 @@ def conductance(matrix: KernelMatrix) -> Conductance:
     """
     if not matrix.basis.is_partition or matrix.size < 2:
         raise InputError(f"matrix: expected one in at least two bins, got {matrix.basis!r}")
-    found = spectrum(matrix, k=matrix.size)
+    found = matrix_spectrum(matrix, matrix.size)
     weights = np.asarray(matrix.weights)
     flux = 0.5 * (matrix.flux + matrix.flux.T)
     second = found.vectors[:, 1] / np.sqrt(weights)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..checks import Floats, frozen, whole_number
-from ..errors import AccuracyError, InputError
+from ..checks import Floats, frozen
+from ..errors import AccuracyError
 from ..estimates import NORMAL_95, Estimate
-from ..kernels import Basis, CollisionLaw, KernelMatrix, Law, Legendre, discretise
+from ..kernels import Basis, KernelMatrix
 from ..rounding import EPS
 from .parity import Parity, halves, outermost_by_parity
 from .sampling import sampling_errors, sampling_quantile
@@ -20,7 +20,8 @@ from .two_grids import two_grid_changes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DEFAULT_DEGREE = 48
+Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
+
 # A sampled matrix whose antisymmetric part has a z-score above this is not called reversible: under reversibility
 # the score is standard normal, and 5 is exceeded once in 3.5 million matrices.
 REVERSIBLE_Z = 5.0
@@ -71,7 +72,8 @@ class Spectrum:
     residuals : array of shape (k,)
         Norm of S v - lambda v; S is averaged with its mirror image where the eigenfunctions have parities.
     gap, slem : float
-        1 - the largest eigenvalue off the constants; the largest modulus there.
+        1 - the largest spectral value off the constants; the largest modulus there. Of a law its essential spectrum
+        counts, whatever a matrix shows; of a matrix its eigenvalues are all there is.
     gap_errors : SpectrumErrors
         The three errors of the gap, each of shape (1,).
     convention : str
@@ -86,7 +88,12 @@ class Spectrum:
         Of every eigenfunction under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric. In
         the other convention the odd eigenvalues have the opposite sign.
     completeness : str
-        What proves that no eigenvalue of the matrix has a larger modulus off the constants and is not listed.
+        What proves that no eigenvalue has a larger modulus off the constants and is not listed: of the matrix, or of
+        the law where the values are enclosed.
+    verdict : {"isolated", "essential edge", "no gap", "undecided"}
+        Of the gap of a law, as in `SpectralGap`; of a matrix alone nothing can be decided.
+    evidence : tuple of str
+        What the verdict rests on.
     """
 
     values: Floats
@@ -102,6 +109,8 @@ class Spectrum:
     matrix_error: float = 0.0
     parity: tuple[Parity, ...] = ()
     completeness: str = ""
+    verdict: Verdict = "undecided"
+    evidence: tuple[str, ...] = ()
 
     @property
     def intervals(self) -> Floats:
@@ -157,47 +166,17 @@ class Spectrum:
 
     def __repr__(self) -> str:
         numbers = f"k={len(self.values)}, gap={self.gap:.10g}, slem={self.slem:.10g}"
-        return f"Spectrum({numbers}, convention={self.convention!r})"
+        return f"Spectrum({numbers}, verdict={self.verdict!r}, convention={self.convention!r})"
 
 
-def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretisation: Any) -> Spectrum:
-    """Eigenvalues of a reversible kernel, largest moduli first chosen, then sorted descending.
-
-    Parameters
-    ----------
-    kernel : KernelMatrix, Law or CollisionLaw
-        A law is discretised first; ``basis=`` and further keywords go to `asperity.kernels.discretise` (default:
-        Legendre polynomials of degree below 48). A collision law has the eigenvalues of its P~ with both signs.
-    k : int
-        Number of eigenvalues; a matrix of fewer rows has fewer.
-
-    Returns
-    -------
-    Spectrum
+def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
+    """The k eigenvalues of largest modulus of a matrix, sorted descending: see `spectrum`.
 
     Raises
     ------
     AccuracyError
-        If the kernel is not symmetric within its error: its spectrum need not be real.
-
-    Notes
-    -----
-    The constant function is split off exactly, and even from odd functions where the law is mirror-symmetric. Small
-    matrices are solved by LAPACK's complete symmetric solver; of large ones Lanczos finds what is asked for, and
-    Cholesky factorisations prove that nothing was missed (`asperity.spectral.extremes`). Cost: O(n^3).
-
-    Examples
-    --------
-    Henyey-Greenstein scattering has the eigenvalues g^l:
-
-    >>> from asperity import kernels as ker, spectral as spec
-    >>> spec.spectrum(ker.henyey_greenstein(0.5), k=4).values.round(12).tolist()
-    [1.0, 0.5, 0.25, 0.125]
+        If the matrix is not symmetric within its error.
     """
-    whole_number("k", k, 1)
-    if isinstance(kernel, CollisionLaw):
-        return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), **discretisation), k)
-    matrix = matrix_of(kernel, **discretisation)
     check_reversible(matrix)
     constant = np.asarray(matrix.basis.constant)
     rest, names = outermost_by_parity(matrix.symmetric, halves(matrix.basis, matrix), constant, max(k - 1, 1))
@@ -234,6 +213,7 @@ def spectrum(kernel: KernelMatrix | Law | CollisionLaw, k: int = 10, **discretis
         matrix_error=0.0 if matrix.samples else float(matrix.error),
         parity=("none" if "none" in names or not names else "even", *(names[i] for i in chosen)),
         completeness=rest.method,
+        evidence=("one matrix: its basis was not refined",),
     )
 
 
@@ -248,18 +228,6 @@ def _errors(
         sampling=frozen(sampling_errors(matrix, vectors, values)),
         quantile=sampling_quantile(matrix),
     )
-
-
-def matrix_of(kernel: KernelMatrix | Law, **discretisation: Any) -> KernelMatrix:
-    """The kernel itself if it is a matrix; a law discretised, by default in Legendre polynomials."""
-    if isinstance(kernel, KernelMatrix):
-        if discretisation:
-            raise InputError(f"{', '.join(discretisation)}: only for laws; a KernelMatrix is discretised already")
-        return kernel
-    if not isinstance(kernel, Law):
-        raise InputError(f"kernel: expected a KernelMatrix, a Law or a CollisionLaw, got {kernel!r}")
-    basis = discretisation.pop("basis", None) or Legendre(DEFAULT_DEGREE)
-    return discretise(kernel, basis, **discretisation)
 
 
 def check_reversible(matrix: KernelMatrix) -> None:
@@ -280,29 +248,7 @@ def check_reversible(matrix: KernelMatrix) -> None:
     if refused:
         raise AccuracyError(
             f"the kernel is not symmetric with respect to sin(theta) d theta: {defect}; its spectrum need not be real. "
-            "Use (P + P.adjoint()) / 2 or P @ P.adjoint() if one of these is what you mean, or sample it better",
+            "Use (P + P.adjoint()) / 2 or P @ P.adjoint() if one of these is what you mean"
+            + ("" if defect.z_score is None else ", or sample it better"),
             float(defect),
         )
-
-
-def _both_signs(half: Spectrum, k: int) -> Spectrum:
-    """spectrum(K) = spectrum(P~) x {+1, -1}: the flip of psi has both eigenvalues. The gap stays that of P~."""
-    index = np.tile(np.arange(len(half.values)), 2)
-    values = np.concatenate([half.values, -half.values])
-    order = np.argsort(-np.abs(values), kind="stable")[:k]
-    order = order[np.argsort(-values[order], kind="stable")]
-    pick = index[order]
-    errors = half.errors
-    return replace(
-        half,
-        values=frozen(values[order]),
-        vectors=frozen(half.vectors[:, pick]),
-        residuals=frozen(half.residuals[pick]),
-        parity=tuple(half.parity[i] for i in pick),
-        errors=SpectrumErrors(
-            frozen(errors.algebraic[pick]),
-            frozen(errors.discretisation[pick]),
-            frozen(errors.sampling[pick]),
-            errors.quantile,
-        ),
-    )

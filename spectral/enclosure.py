@@ -3,20 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats, whole_number
-from ..errors import AccuracyError, InputError
+from ..errors import InputError
 from ..estimates import ErrorKind
-from ..kernels import Basis, Bins, CollisionLaw, DensityLaw, Law, Legendre, MatrixLaw, discretise
+from ..kernels import (
+    Basis,
+    Bins,
+    CollisionLaw,
+    Composition,
+    DensityLaw,
+    Law,
+    Legendre,
+    MatrixLaw,
+    Power,
+    discretise,
+)  # fmt: skip
+from ..kernels.algebra import made_of_isometries
 from ..kernels.measure import SINE
 from ..kernels.panel_rows import integrates_panels, traces_rows
 from ..rounding import EPS
 from .adapted_panels import adapted_trials
+from .contraction import refuse_unless_self_adjoint
 from .eigenvalues import check_reversible
 from .parity import Parity, halves, outermost_by_parity
 from .separation import Separation, rest_of_spectrum
@@ -139,7 +152,8 @@ def enclosures(
     Raises
     ------
     AccuracyError
-        If the law is not symmetric within its error.
+        If the law is not symmetric within its error. Of a law that is self-adjoint in the other convention only, the
+        message says what is true in this one.
 
     Notes
     -----
@@ -165,8 +179,36 @@ def enclosures(
         law = law.law
     if not isinstance(law, Law):
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
-    if law.reversible is False:
-        raise AccuracyError(f"{law!r} is not reversible: its spectrum need not be real", np.inf)
+    refuse_unless_self_adjoint(law)
+    power = as_power(law) if basis is None else None
+    if power is not None:
+        return _raised(enclosures(power[0], k, None, tolerance / power[1]), power[1])
+    return enclosed_trials(law, k, basis, tolerance).enclosures
+
+
+@dataclass(frozen=True)
+class EnclosedTrials:
+    """Enclosures with their trial functions, coefficients in ``basis``, shape (n, k)."""
+
+    enclosures: Enclosures
+    basis: Basis
+    vectors: Floats
+
+    @property
+    def worst(self) -> float:
+        """Half of the largest width."""
+        return 0.5 * max(item.width for item in self.enclosures)
+
+    @property
+    def indexed(self) -> bool:
+        """Whether all are."""
+        return all(item.label == "indexed" for item in self.enclosures)
+
+
+def enclosed_trials(
+    law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
+) -> EnclosedTrials:
+    """`enclosures` of a law that is self-adjoint, with the trial functions."""
     if basis is None and integrates_panels(law):
         trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
         basis, values, vectors, names = trials.basis, trials.values, trials.vectors, trials.parities
@@ -188,7 +230,49 @@ def enclosures(
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.rows} rows"
     exact = isinstance(law, DensityLaw)
     items = tuple(_enclosed(found, apart, order, place, names, exact) for place in range(len(values)))
-    return Enclosures(items, apart[1], law.frame, method)
+    return EnclosedTrials(Enclosures(items, apart[1], law.frame, method), basis, vectors)
+
+
+def as_power(law: Law) -> tuple[Law, int] | None:
+    """The law and the exponent of a power, also of one written as a product; None where powers tell nothing.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> g = ker.henyey_greenstein(0.5)
+    >>> as_power(g @ g) == as_power(g**2) == (g, 2), as_power(g) is None
+    (True, True)
+    """
+    if isinstance(law, Power) and law.exponent > 1:
+        base, exponent = law.law, law.exponent
+    elif isinstance(law, Composition) and len(law.laws) > 1 and all(part == law.laws[0] for part in law.laws):
+        base, exponent = law.laws[0], len(law.laws)
+    else:
+        return None
+    return (base, exponent) if base.reversible and not made_of_isometries(base) else None
+
+
+def _raised(found: Enclosures, exponent: int) -> Enclosures:
+    """Enclosures of the eigenvalues of a power, in order of their values."""
+    items = []
+    for item in found:
+        ends = [item.low**exponent, item.high**exponent]
+        if exponent % 2 == 0 and item.low < 0.0 < item.high:
+            ends.append(0.0)
+        slope = exponent * min(max(abs(item.low), abs(item.high)), 1.0) ** (exponent - 1)
+        items.append(
+            replace(
+                item, value=item.value**exponent, low=min(ends), high=max(ends), residual=slope * item.residual,
+                reason=f"power {exponent}; {item.reason}",
+            )
+        )  # fmt: skip
+    apart = replace(
+        found.separation,
+        radius=found.separation.radius**exponent,
+        reason=f"power {exponent}: {found.separation.reason}",
+    )
+    items.sort(key=lambda item: (item.index != 0, -item.value))
+    return replace(found, items=tuple(items), separation=apart, method=f"power {exponent}; {found.method}")
 
 
 def _first_that_separates(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache, reduce
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -15,17 +14,9 @@ from ..kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ..kernels.algebra import Rules, fold, made_of_isometries
 from ..kernels.ideal import LambertianLaw
 from ..kernels.phase_function import HenyeyGreensteinLaw
-from .grazing import REMEMBERED, SWAP, GrazingLimit, grazing_limit
+from .grazing import SWAP, GrazingLimit, grazing_limit
+from .straight_part import straight_part
 
-if TYPE_CHECKING:
-    from ..geometry import Wall
-
-# Entry points a short step apart leave by the same angle where all reflections are at straight pieces: rounding is
-# below this, and a curved piece turns the ray by the step over its radius, 1e-7 or more unless it is flat.
-STEP, SAME_ANGLE = 1e-7, 1e-11
-PROBE_ANGLES, PROBE_POINTS = 64, 1024
-# Of the share found by probes: four standard errors.
-SHARE_SIGMAS = 4.0
 ROUNDING = 1e-15
 
 
@@ -61,12 +52,14 @@ class EssentialEdge:
 class _Part:
     """What a law does to functions that oscillate fast, and to functions of grazing angles."""
 
+    # an interval for the top of what its isometries make, and <1, Q 1> of these
     kept: tuple[float, float]
     grazing: Floats
     error: float
     entry_error: float
     certain: bool
     notes: tuple[str, ...] = ()
+    share: float = 0.0
 
 
 def essential_edge(law: Law) -> EssentialEdge:
@@ -85,7 +78,7 @@ def essential_edge(law: Law) -> EssentialEdge:
     A law is taken apart into what is compact and two things that are not. *Isometries*, theta' = +-theta + c: for
     suitable large n all n c are nearly multiples of 2 pi, so that cos(n theta) times a slow function goes to
     cos(n theta) times another; the part of the law that consists of isometries, a sub-Markov operator Q, has all of
-    its spectrum in the essential spectrum, and <1, Q 1> <= sup <= largest row sum of Q. *Grazing rays*: see
+    its spectrum in the essential spectrum: `straight_part`. *Grazing rays*: see
     `grazing_limit`. Sums and products of laws have the sums and products of these symbols. That the remainder is
     compact is a theorem for densities and matrices; for curved walls it presumes that outgoing angles depend on the
     entry point by analytic pieces, so that the edge is an estimate.
@@ -127,7 +120,7 @@ def _leaf(law: Law) -> _Part:
         # an isometric law cannot enlarge anything: what its grazing limit is matters in sums with other walls only
         note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
         errors = (limit.error, limit.entry_error) if limit else (0.0, 0.0)
-        return _Part((1.0, 1.0), grazing, *errors, True, (note,))
+        return _Part((1.0, 1.0), grazing, *errors, True, (note,), 1.0)
     limit = grazing_limit(law)
     errors = (limit.error, limit.entry_error)
     how = f"-> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
@@ -141,71 +134,60 @@ def _leaf(law: Law) -> _Part:
     if isinstance(law, InvolutionLaw):
         reason = f"{law!r} is an involution: f + f o T is kept for every f"
         return _Part((0.0, 1.0), limit.matrix, *errors, True, (reason,))
-    kept = (0.0, 0.0)
+    kept, share = (0.0, 0.0), 0.0
     notes = [note]
     if isinstance(law, WallLaw):
-        kept = _straight_share(law)
-        if kept[1] > 0.0:
-            share = f"{kept[0]:.6g}" if kept[0] == kept[1] else f"{kept[0]:.4g} to {kept[1]:.4g}"
-            notes.append(f"a share {share} of the rays meets straight pieces only, an isometry")
-    return _Part(kept, limit.matrix, *errors, False, tuple(notes))
+        straight = straight_part(law)
+        kept, share = (straight.low, straight.high), straight.share
+        if straight.high > 0.0:
+            reach = f"{kept[0]:.6g}" if kept[0] == kept[1] else f"{kept[0]:.6g} to {kept[1]:.6g}"
+            notes.append(
+                f"a share {share:.4g} of the rays meets straight pieces only: isometries, whose part of the law has a "
+                f"spectrum up to {reach}"
+            )
+    return _Part(kept, limit.matrix, *errors, False, tuple(notes), share)
 
 
 def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:
+    share = sum(w * part.share for w, part in terms)
     return _Part(
-        (sum(w * part.kept[0] for w, part in terms), sum(w * part.kept[1] for w, part in terms)),
+        # positive operators: the sum reaches as far as any term, and as its share
+        (max(share, *(w * part.kept[0] for w, part in terms)), sum(w * part.kept[1] for w, part in terms)),
         sum((w * part.grazing for w, part in terms), np.zeros((2, 2))),
         sum(w * part.error for w, part in terms),
         sum(w * part.entry_error for w, part in terms),
         all(part.certain for _, part in terms),
         tuple(note for _, part in terms for note in part.notes),
+        share,
     )
 
 
 def _chain(parts: Sequence[_Part]) -> _Part:
-    return reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, 0.0, True))
+    whole = reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, 0.0, True, share=1.0))
+    if parts and all(part is parts[0] for part in parts):
+        # a power
+        low, high = parts[0].kept
+        whole = replace(whole, kept=(low ** len(parts), high ** len(parts)))
+    return whole
 
 
 def _product(first: _Part, second: _Part) -> _Part:
+    share = first.share * second.share
+    # what keeps all rays changes no norm
+    low = {(True, True): 1.0, (True, False): second.kept[0], (False, True): first.kept[0]}.get(
+        (first.kept[0] == 1.0, second.kept[0] == 1.0), share
+    )
     return _Part(
-        (first.kept[0] * second.kept[0], first.kept[1] * second.kept[1]),
+        (low, first.kept[1] * second.kept[1]),
         first.grazing @ second.grazing,
         # sums of rows are at most 1 but for the errors
         first.error + second.error + first.error * second.error,
         2.0 * (first.entry_error + second.entry_error + first.entry_error * second.entry_error),
         first.certain and second.certain,
         first.notes + second.notes,
+        share,
     )
 
 
 def _turned(part: _Part) -> _Part:
-    return _Part(part.kept, part.grazing @ SWAP, part.error, part.entry_error, part.certain, part.notes)
-
-
-@lru_cache(maxsize=REMEMBERED)
-def _straight_share(law: WallLaw) -> tuple[float, float]:
-    """Bounds of the top of the spectrum of the part of a wall's law that is made by straight pieces alone."""
-    wall = law.wall
-    if not _has_straight_pieces_below(wall):
-        share = wall.flat_top / wall.period
-        return share, share
-    angle = np.arccos(1.0 - 2.0 * (np.arange(PROBE_ANGLES) + 0.5) / PROBE_ANGLES)
-    entry = (np.arange(PROBE_POINTS) + 0.5) / PROBE_POINTS
-    x, theta = (part.ravel() for part in np.meshgrid(entry, angle))
-    here, there = (law.outcomes(place, theta)[0] for place in (x, x + STEP))
-    share = (np.abs(here - there) <= SAME_ANGLE).reshape(PROBE_ANGLES, PROBE_POINTS).mean(axis=1)
-    flat = wall.flat_top / wall.period
-    if np.all(share <= flat + 2.0 / PROBE_POINTS):
-        return flat, flat
-    spread = SHARE_SIGMAS * np.sqrt(0.25 / PROBE_POINTS)
-    mean, most = float(share.mean()), float(share.max())
-    return max(mean - spread / np.sqrt(PROBE_ANGLES), flat), min(most + spread, 1.0)
-
-
-def _has_straight_pieces_below(wall: Wall) -> bool:
-    from ..geometry import Segment
-
-    if not wall.closes:
-        return any(isinstance(piece, Segment) for piece in wall.pieces)
-    below = [piece for hollow in wall.hollows for piece in wall.cell.pieces[hollow.first : hollow.last]]
-    return any(isinstance(piece, Segment) for piece in below)
+    return replace(part, grazing=part.grazing @ SWAP)

@@ -7,20 +7,25 @@ from dataclasses import replace
 import numpy as np
 
 from ..checks import positive_number
-from ..errors import AccuracyError, InputError
-from ..kernels import Bins, CollisionLaw, InvolutionLaw, KernelMatrix, Law, MatrixLaw, Power, discretise
-from ..kernels.algebra import made_of_isometries
+from ..errors import InputError
+from ..kernels import CollisionLaw, KernelMatrix, Law
 from ..rounding import EPS
-from .eigenvalues import Spectrum, spectrum
+from .contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
+from .eigenvalues import Spectrum, matrix_spectrum
+from .enclosure import as_power
 from .essential import EssentialEdge, essential_edge
 from .gap_routes import enclosed_gap, rough_gap
 from .ideal_parts import ideal_spectrum, without_identity
+from .law_eigenvalues import law_eigenvalues
 from .oscillations import held_against_oscillations
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
-from .relaxation import largest_modulus
 from .separation import lambertian_share
 from .shallow import shallow_gap
-from .verdict import SpectralGap, Verdict, isolated, made_from
+from .theorems import gap_by_theorem
+from .verdict import SpectralGap, isolated, made_from
+
+# Eigenvalues among which the one of largest modulus is sought.
+MODULI = 3
 
 
 def spectral_gap(
@@ -49,6 +54,10 @@ def spectral_gap(
 
     Notes
     -----
+    A law P J in the convention in which it is not self-adjoint, as that of a wall without mirror symmetry in the
+    specular frame, need not have a real spectrum. There the value is 1 - the contraction factor of functions of mean
+    0, ||P J|| = slem of P, since J is unitary; method and evidence say so.
+
     First the structure of the law is asked. Laws made of isometries (polygonal walls, specular reflection,
     retroreflection) have no gap: 1 is in the essential spectrum, and whatever a grid shows is an artefact of the grid.
     Else `essential_edge` says how far the essential spectrum reaches, and Galerkin matrices, whose eigenvalues above
@@ -74,15 +83,14 @@ def spectral_gap(
         return _of_matrix(law)
     if not isinstance(law, Law):
         raise InputError(f"law: expected a Law, a CollisionLaw or a KernelMatrix, got {law!r}")
-    if law.reversible is False:
-        raise AccuracyError(
-            f"{law!r} is not symmetric with respect to sin(theta) d theta: its spectrum need not be real. "
-            "Use law @ law.adjoint() if that is what you mean",
-            np.inf,
-        )
-    if isinstance(law, Power) and law.exponent > 1 and law.law.reversible and not made_of_isometries(law):
-        return _of_power(law, tolerance, rng or np.random.default_rng(0))
-    return _by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng or np.random.default_rng(0)))
+    other = self_adjoint_elsewhere(law)
+    if other is not None:
+        return _contraction(law, other, tolerance, rng or np.random.default_rng(0))
+    refuse_unless_self_adjoint(law)
+    power = as_power(law)
+    if power is not None:
+        return _of_power(law, *power, tolerance, rng or np.random.default_rng(0))
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng or np.random.default_rng(0)))
 
 
 def gaps_in_both_conventions(
@@ -106,78 +114,72 @@ def gaps_in_both_conventions(
         raise InputError(f"law: expected a reversible and mirror-symmetric one, got {law!r}")
     matrices = SharedMatrices(rng or np.random.default_rng(0))
     other = law.in_specular_frame()
-    first, second = (_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
+    first, second = (gap_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
     return first, second
 
 
 def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
-    found = spectrum(matrix, k=EIGENVALUES)
+    found = matrix_spectrum(matrix, EIGENVALUES)
     method = made_from(found, "algebraic + two-grid + 1.96 x sampling error")
     evidence = ("one matrix: its basis was not refined",)
     return SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
 
 
-def _by_theorem(law: Law) -> SpectralGap | None:
-    """What the structure of a law tells without computing."""
-    if made_of_isometries(law) and law.reversible:
-        reason = (
-            "the law is a mixture of isometries theta' = +-theta + const: 1 belongs to its essential spectrum, "
-            "so no L^2 gap exists, and a gap on a grid is an artefact of the grid"
-        )
-        return _stated(law, 0.0, 0.0, "no gap", reason)
-    if isinstance(law, InvolutionLaw):
-        reason = "the law is an involution T: f + f o T is kept for every f, so 1 has infinite multiplicity"
-        return _stated(law, 0.0, 0.0, "no gap", reason)
-    ideal = ideal_spectrum(law)
-    if ideal is not None:
-        reason = (
-            f"the spectrum off the constants consists of two isolated eigenvalues of infinite multiplicity, "
-            f"{ideal.even:.12g} on even functions of cos(theta) and {ideal.odd:.12g} on odd ones"
-        )
-        if lambertian_share(law) == 1.0:
-            reason = "the law is Lambertian: of rank 1, its spectrum off the constants is 0"
-        return _stated(law, 1.0 - ideal.top, ideal.rounding, "isolated", reason)
-    if isinstance(law, MatrixLaw):
-        return _of_finite_rank(law)
-    share = lambertian_share(law)
-    if share > 0.0:
-        edge = essential_edge(law)
-        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * EPS:
-            reason = (
-                f"a Lambertian share a = {share:.6g} makes the gap at least a, and the essential spectrum reaches 1 - a"
-            )
-            return _stated(law, share, 4.0 * EPS, "essential edge", reason, *edge.reasons)
-    return None
-
-
-def _stated(law: Law, value: float, error: float, verdict: Verdict, *evidence: str) -> SpectralGap:
-    return SpectralGap(value, error, "bound", "structure of the law", verdict, evidence, law.frame)
-
-
-def _of_power(law: Power, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.random.Generator) -> SpectralGap:
     """The spectrum of P^n consists of the n-th powers of that of P: an even power turns its lower end up."""
-    exponent = law.exponent
-    base = spectral_gap(law.law, tolerance / exponent, rng)
-    top, error, kind = 1.0 - base.value, base.error, base.kind
-    evidence = [f"P: {base}", *base.evidence]
-    if exponent % 2 == 0:
-        modulus = largest_modulus(law.law)
-        if modulus.value > top:
-            top, error, kind = modulus.value, modulus.error, modulus.kind
-            evidence.append(f"the largest modulus off the constants is {modulus.value:.10g} +- {modulus.error:.2g}")
-    value = 1.0 - top**exponent
-    slope = exponent * min(top + error, 1.0) ** (exponent - 1)
-    method = f"power {exponent} of the spectrum of P; {base.method}"
-    return SpectralGap(value, slope * error, kind, method, base.verdict, tuple(evidence), law.frame)
+    ask = modulus_gap if exponent % 2 == 0 else spectral_gap
+    found = ask(base, tolerance / exponent, rng)
+    top = 1.0 - found.value
+    slope = exponent * min(abs(top) + found.error, 1.0) ** (exponent - 1)
+    method = f"power {exponent} of the spectrum of P; {found.method}"
+    return SpectralGap(
+        1.0 - top**exponent, slope * found.error, found.kind, method, found.verdict, (f"P: {found}", *found.evidence),
+        law.frame,
+    )  # fmt: skip
 
 
-def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
-    """A law that is constant on bins: its own bins hold every eigenvalue but 0, which has infinite multiplicity."""
-    found = spectrum(discretise(law, Bins(law.edges)), k=EIGENVALUES)
-    error = float(found.gap_errors.algebraic[0])
-    reason = f"the law is constant on {law.edges.size - 1} bins: beyond these its spectrum is 0"
-    method = made_from(found, "algebraic error; the basis is exact")
-    return SpectralGap(min(found.gap, 1.0), error, "bound", method, "isolated", (reason,), found.convention, found)
+def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None) -> SpectralGap:
+    """1 - slem, the distance from 1 of the largest modulus in the spectrum off the constants, as `spectral_gap` is.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> round(float(modulus_gap(ker.henyey_greenstein(-0.5))), 9)
+    0.5
+    """
+    ideal = ideal_spectrum(law)
+    if ideal is not None and ideal.top < 1.0:
+        found = spectral_gap(law, tolerance, rng)
+        return replace(found, value=1.0 - max(abs(ideal.even), abs(ideal.odd)))
+    upper = spectral_gap(law, tolerance, rng)
+    if upper.verdict == "no gap" or lambertian_share(law) == upper.value:
+        # of modulus 1, or as large as the rest of a law with a Lambertian share can be
+        return upper
+    listed = law_eigenvalues(law, MODULI, tolerance, rng)
+    place = int(np.argmin(listed.values))
+    least, error = -float(listed.values[place]), float(listed.errors.total()[place])
+    top = 1.0 - upper.value
+    edge = essential_edge(law)
+    if least + error < top - upper.error or least <= edge.high:
+        # the essential spectrum reaches no farther below than above: the parts of the law are positive operators
+        return upper
+    evidence = (*upper.evidence, f"the least eigenvalue is {-least:.10g} +- {error:.2g}")
+    method = f"least eigenvalue, {listed.basis!r}, {listed.method}"
+    if least - error > max(top + upper.error, edge.high):
+        return SpectralGap(1.0 - least, error, "estimate", method, "isolated", evidence, law.frame, listed)
+    low, high = max(top - upper.error, least - error), max(top + upper.error, least + error)
+    method = f"largest and least eigenvalue: {upper.method}; {method}"
+    return SpectralGap(
+        1.0 - 0.5 * (low + high), 0.5 * (high - low), "estimate", method, upper.verdict, evidence, law.frame, listed
+    )  # fmt: skip
+
+
+def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+    """1 - ||P J|| on functions of mean 0, for P J that is not self-adjoint where P is."""
+    found = modulus_gap(other, tolerance, rng)
+    evidence = (why_not_self_adjoint(other), what_is_true(), *found.evidence)
+    method = f"norm on functions of mean 0, 1 - slem of P, for P J is not known to be self-adjoint; {found.method}"
+    return SpectralGap(found.value, found.error, found.kind, method, found.verdict, evidence, law.frame)
 
 
 def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
@@ -185,7 +187,7 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     share, rest = without_identity(law)
     if share < 1.0:
         own = SharedMatrices(matrices.rng)
-        return _scaled(_by_theorem(rest) or _by_refinement(rest, tolerance / share, own), share)
+        return _scaled(gap_by_theorem(rest) or _by_refinement(rest, tolerance / share, own), share)
     edge = essential_edge(law)
     small = shallow_gap(law, edge)
     if small is not None and small.error <= tolerance:
@@ -219,7 +221,7 @@ def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: Ess
     reasons, top = (*edge.reasons, *evidence), 1.0 - found.gap
     if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
-        return _at_edge(law, edge, (*reasons, short), found)
+        return _at_edge(law, edge, (*reasons, short), found, steps.overshoot(edge.high))
     # two grids say nothing where refinement does not converge; the gap of a Galerkin matrix is never too small
     method = made_from(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
@@ -232,11 +234,12 @@ def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:
     return edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
 
 
-def _at_edge(law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Spectrum | None = None) -> SpectralGap:
+def _at_edge(
+    law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Spectrum | None = None, overshoot: float = 0.0
+) -> SpectralGap:
     method = "edge of the essential spectrum, from the law's action on grazing rays and its isometries"
-    return SpectralGap(
-        1.0 - edge.value, edge.error, "estimate", method, "essential edge", evidence, law.frame, found
-    )  # fmt: skip
+    error = max(edge.error, overshoot)
+    return SpectralGap(1.0 - edge.value, error, "estimate", method, "essential edge", evidence, law.frame, found)
 
 
 def _lower_bound(law: Law) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ import numpy as np
 from ..kernels import DensityLaw, Law, Legendre
 from ..kernels.panel_rows import has_costly_rows, integrates_panels, traces_rows
 from .adapted_panels import adapted_trials
-from .eigenvalues import spectrum
+from .eigenvalues import matrix_spectrum
 from .enclosure import enclosures
 from .essential import EssentialEdge
 from .refinement import EIGENVALUES, SharedMatrices
@@ -33,7 +33,7 @@ def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essent
     if tolerance < ROUGH or not traces_rows(law):
         return None
     for size, matrix_error in GLANCES:
-        found = spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), k=EIGENVALUES)
+        found = matrix_spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), EIGENVALUES)
         error = found.gap_error + (BEYOND_CHANGE - 1.0) * float(found.gap_errors.discretisation[0])
         how = f"algebraic + {BEYOND_CHANGE:.0f} x two-grid + {found.gap_errors.quantile:.3g} x sampling error"
         gap = isolated(found, error, how, edge, law.frame) if error <= tolerance else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..kernels import Basis, CircularArcLaw, KernelMatrix, Law, Legendre, Panels, SpecularFrame, discretise
 from ..kernels.reflection import is_mirror_symmetric
-from .eigenvalues import Spectrum, spectrum
+from .eigenvalues import Spectrum, matrix_spectrum
 from .essential import EssentialEdge
 
 # Eigenvalues that a gap carries along in its spectrum.
@@ -30,6 +30,8 @@ FEWEST_LEVELS = 3
 # Two refinements in a row must each shrink the change of the eigenvalue by this factor before it converges: at an
 # essential edge the change falls only like a power of 1/log(n), by less than this a doubling.
 SHRINKAGE = 2.0
+# Changes that shrink by less than this do not tell where they lead.
+STALLED = 0.6
 # A change below this share of the gap does not matter, whatever it does.
 NEGLIGIBLE = 1e-3
 # Changes below this many rounding errors say nothing about convergence.
@@ -80,6 +82,21 @@ class Refinement:
         change = abs(self.levels[self.chosen].gap - self.levels[self.chosen - 1].gap)
         return min(change + self.noise, self.finest.gap_error)
 
+    def overshoot(self, edge: float) -> float:
+        """How far beyond an edge the largest eigenvalue would come if its changes went on shrinking as they do.
+
+        0 where the last one is noise, and where they hardly shrink: towards the edge at grazing they fall like a power
+        of 1/log(n). After one change the next ones are taken to halve.
+        """
+        tops = 1.0 - np.array([level.gap for level in self.levels])
+        change = np.diff(tops)
+        if not change.size or change[-1] <= self.noise:
+            return 0.0
+        ratio = float(change[-1] / change[-2]) if change.size > 1 and change[-2] > 0.0 else 0.5
+        if ratio >= STALLED:
+            return 0.0
+        return max(float(tops[-1] + change[-1] * ratio / (1.0 - ratio)) - edge, 0.0)
+
     @property
     def how(self) -> str:
         """What the error is made of."""
@@ -127,7 +144,7 @@ def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essentia
     for basis, samples in _steps(law):
         wanted = max(MATRIX_SHARE * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
         matrix = matrices(law, basis, samples, wanted)
-        found = spectrum(matrix, k=EIGENVALUES)
+        found = matrix_spectrum(matrix, EIGENVALUES)
         levels.append(found)
         evidence.append(f"{basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
         steps = Refinement(tuple(levels), _converges(levels, tolerance), tuple(evidence))
@@ -137,6 +154,7 @@ def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essentia
         if (
             near_edge
             and len(levels) > 1
+            and steps.overshoot(edge.high) <= max(tolerance, edge.error)
             and (basis.size >= DEGREE_AT_EDGE and (samples >= SAMPLES_AT_EDGE or not matrix.samples))
         ):
             break

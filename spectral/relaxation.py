@@ -14,15 +14,14 @@ from ..estimates import ErrorKind, Estimate
 from ..kernels import DensityLaw, KernelMatrix, Law
 from ..kernels.measure import SINE
 from ..rounding import EPS
-from .eigenvalues import Spectrum, spectrum
-from .essential import essential_edge
-from .ideal_parts import ideal_spectrum
+from .eigenvalues import Spectrum, matrix_spectrum
+from .gap import modulus_gap
 
 Distance = Literal["L2", "total variation", "chi-square"]
 DISTANCES: tuple[Distance, ...] = ("L2", "total variation", "chi-square")
 
-# Eigenvalues among which the one of largest modulus is sought.
-SOUGHT = 6
+# Eigenvalues of a matrix among which the one of largest modulus is sought, and the error asked of a law's.
+SOUGHT, TOLERANCE = 6, 1e-5
 # Panels and nodes of the norm of a density.
 PANELS, NODES = 48, 16
 
@@ -135,24 +134,19 @@ def mixing_time(
 def largest_modulus(kernel: Law | KernelMatrix | Spectrum) -> Estimate:
     """The slem, sup of the modulus of the spectrum off the constants, with its error."""
     if isinstance(kernel, Law):
-        ideal = ideal_spectrum(kernel)
-        if ideal is not None:
-            return Estimate(max(abs(ideal.even), abs(ideal.odd)), ideal.rounding, "bound", "structure of the law")
-        edge = essential_edge(kernel)
-        if edge.low >= 1.0:
-            return Estimate(1.0, 0.0, edge.kind, "; ".join(edge.reasons))
-        found = spectrum(kernel, SOUGHT)
-    else:
-        edge = None
-        found = kernel if isinstance(kernel, Spectrum) else spectrum(kernel, SOUGHT)
-    modulus, width = np.abs(found.values[1:]), found.errors.total()[1:]
-    largest = int(np.argmax(modulus)) if modulus.size else 0
-    value, error = (float(modulus[largest]), float(width[largest])) if modulus.size else (0.0, np.inf)
-    if edge is not None and edge.high > value - error:
-        high = max(edge.high, value + error)
-        low = max(edge.low, value - error)
-        return Estimate(0.5 * (low + high), 0.5 * (high - low), "estimate", "eigenvalue or edge of essential spectrum")
-    return Estimate(value, error, "estimate", f"{found.basis!r}, {found.method}")
+        found = modulus_gap(kernel, TOLERANCE)
+        return Estimate(1.0 - found.value, found.error, found.kind, found.method)
+    listed = kernel if isinstance(kernel, Spectrum) else matrix_spectrum(kernel, SOUGHT)
+    modulus, width = np.abs(listed.values[1:]), listed.errors.total()[1:]
+    if not modulus.size:
+        return Estimate(0.0, np.inf, "estimate", f"{listed.basis!r}, {listed.method}")
+    largest = int(np.argmax(modulus))
+    if listed.slem > modulus[largest]:
+        # the edge of a law's essential spectrum
+        return Estimate(listed.slem, listed.gap_error, "estimate", f"{listed.verdict}: {listed.method}")
+    return Estimate(
+        float(modulus[largest]), float(width[largest]), "estimate", f"{listed.basis!r}, {listed.method}"
+    )  # fmt: skip
 
 
 def _steps(factor: float, target: float) -> int:

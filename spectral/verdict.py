@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from ..estimates import Estimate
-from .eigenvalues import Spectrum
+from .eigenvalues import Spectrum, Verdict
 from .essential import EssentialEdge
-
-Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 
 
 @dataclass(frozen=True)
@@ -22,7 +19,8 @@ class SpectralGap(Estimate):
     ----------
     verdict : {"isolated", "essential edge", "no gap", "undecided"}
         Whether the gap ends at an isolated eigenvalue, at an edge of the essential spectrum, is zero, or cannot be
-        told from the refinements made.
+        told from the refinements made. Of a law P J that is not self-adjoint, whose value is 1 - the norm on functions
+        of mean 0, the same of its singular values, the moduli in the spectrum of P; the method says "norm".
     evidence : tuple of str
         What the verdict rests on, line by line.
     convention : {"paper", "specular"}

@@ -106,7 +106,7 @@ def test_what_cannot_be_enclosed_is_refused():
     with pytest.raises(InputError, match="k: expected"):
         spec.enclosures(ker.lambertian(), 0)
     rotation = ker.MatrixLaw(np.roll(np.eye(8), 1, axis=1))
-    with pytest.raises(AccuracyError, match="not reversible"):
+    with pytest.raises(AccuracyError, match="not symmetric"):
         spec.enclosures(rotation, 2)
 
 
