@@ -178,8 +178,10 @@ def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generato
     """1 - ||P J|| on functions of mean 0, for P J that is not self-adjoint where P is."""
     found = modulus_gap(other, tolerance, rng)
     evidence = (why_not_self_adjoint(other), what_is_true(), *found.evidence)
-    method = f"norm on functions of mean 0, 1 - slem of P, for P J is not known to be self-adjoint; {found.method}"
-    return SpectralGap(found.value, found.error, found.kind, method, found.verdict, evidence, law.frame)
+    method = f"norm of P J on functions of mean 0, the slem of P; {found.method}"
+    return replace(
+        found, method=method, evidence=evidence, convention=law.frame, spectrum=None, self_adjoint=False
+    )  # fmt: skip
 
 
 def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:

@@ -16,6 +16,7 @@ from .essential import essential_edge
 from .gap import spectral_gap
 from .law_eigenvalues import DEGREES, discretisation_only, law_eigenvalues
 from .theorems import gap_by_theorem
+from .verdict import SpectralGap
 
 TOLERANCE = 1e-4
 
@@ -116,10 +117,14 @@ def _judged(law: Law, found: Spectrum, tolerance: float, rng: np.random.Generato
             outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
             return replace(found, verdict="isolated", evidence=(*evidence, outside))
         known = spectral_gap(law, tolerance, rng)
-    modulus = max(1.0 - known.value, found.slem)
+    return with_gap(found, known)
+
+
+def with_gap(found: Spectrum, known: SpectralGap) -> Spectrum:
+    """The eigenvalues of a matrix of a law, with the law's own gap."""
     return replace(
-        found, gap=known.value, gap_errors=discretisation_only(np.array([known.error])), slem=modulus,
-        verdict=known.verdict, evidence=known.evidence,
+        found, gap=known.value, gap_errors=discretisation_only(np.array([known.error])),
+        slem=max(1.0 - known.value, found.slem), verdict=known.verdict, evidence=known.evidence,
     )  # fmt: skip
 
 

@@ -20,19 +20,22 @@ class SpectralGap(Estimate):
     verdict : {"isolated", "essential edge", "no gap", "undecided"}
         Whether the gap ends at an isolated eigenvalue, at an edge of the essential spectrum, is zero, or cannot be
         told from the refinements made. Of a law P J that is not self-adjoint, whose value is 1 - the norm on functions
-        of mean 0, the same of its singular values, the moduli in the spectrum of P; the method says "norm".
+        of mean 0, the same of its singular values, the moduli in the spectrum of P.
     evidence : tuple of str
         What the verdict rests on, line by line.
     convention : {"paper", "specular"}
         The gap that the literature quotes is that of the specular convention (``law.in_specular_frame()``).
     spectrum : Spectrum or None
         The finest spectrum that was computed.
+    self_adjoint : bool
+        False of a law P J that is not known to be self-adjoint though P is: see ``verdict``.
     """
 
     verdict: Verdict
     evidence: tuple[str, ...]
     convention: str
     spectrum: Spectrum | None = None
+    self_adjoint: bool = True
 
     def cut_at_zero(self) -> SpectralGap:
         """The part of the interval at or above 0: the norm of a law is 1, so that no gap is negative."""
@@ -43,7 +46,8 @@ class SpectralGap(Estimate):
         return replace(self, value=0.5 * high, error=0.5 * high, evidence=(*self.evidence, cut))
 
     def __str__(self) -> str:
-        return f"{super().__str__()}, {self.verdict}, {self.convention} convention"
+        words = "" if self.self_adjoint else ", not known to be self-adjoint"
+        return f"{super().__str__()}, {self.verdict}, {self.convention} convention{words}"
 
 
 def made_from(found: Spectrum, how: str) -> str:

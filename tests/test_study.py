@@ -118,7 +118,7 @@ def test_the_consequences_are_those_of_the_library(arcs, teeth):
 def test_the_eigenvalues_and_enclosures_can_be_quoted(arcs, teeth):
     """Value, error, kind, method and convention of each, in the text and in JSON; 0.3670253152 is the reference."""
     text, read = arcs.summary(), arcs.as_dict()
-    assert "paper convention, estimate: Legendre(48)" in text and "of the matrix none is missing: all" in text
+    assert "paper convention, estimate: Panels(" in text and "completeness: the rest of the spectrum is within" in text
     listed = read["eigenvalues"]
     assert {"convention", "kind", "method", "values", "errors", "parity", "completeness"} <= set(listed)
     assert abs(listed["values"][1] - 0.3670253152) <= listed["errors"][1] and listed["parity"][:3] == [
@@ -147,11 +147,24 @@ def test_a_gap_that_was_not_decided_is_not_rounded_away(arcs):
     assert "paper convention: not decided; 0.7123 at the finest basis, error up to 0.71" in text
 
 
-def test_a_law_without_mirror_axis_has_no_specular_gap():
+def test_a_law_without_mirror_axis_is_said_not_to_be_self_adjoint_and_contracts_by_the_slem():
     wall = geo.Wall.from_vertices([(0, 0), (0.2, -0.4), (0.7, -0.1), (1, 0)])
     report = study_wall(wall, bins=8, tolerance=0.1)
-    assert report.specular_gap is None and report.as_dict()["gap"]["specular"] is None
-    assert "specular convention: not asked" in report.summary()
+    gap = report.as_dict()["gap"]["specular"]
+    assert (gap["self_adjoint"], gap["value"], gap["verdict"]) == (False, 0.0, "no gap")
+    assert "P_F is not known to be self-adjoint" in report.summary() and "mean 0 is 1 (no gap)" in report.summary()
+    curved = geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])])
+    report = study_wall(curved, bins=8, tolerance=0.05)
+    assert report.consequences.slem.value == 1.0 - report.specular_gap.value
+    assert "a step shrinks functions of mean 0 by the factor 0.62" in report.summary()
+
+
+def test_the_summary_lists_all_eigenvalues_by_modulus(arcs):
+    """The second largest modulus is that of the most negative one: facts 10."""
+    line = next(line for line in arcs.summary().splitlines() if line.startswith("spectrum"))
+    numbers = [float(part.split(" +- ")[0]) for part in line.split("modulus: ")[1].split(" (")[0].split(", ")]
+    assert len(numbers) == 10 and "the 10 of largest modulus" in line
+    assert np.all(np.diff(np.abs(numbers)) <= 0.0) and numbers[2] == pytest.approx(-0.311346443, abs=1e-3)
 
 
 def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):

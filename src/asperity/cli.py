@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from . import __version__
-from .errors import AsperityError
+from .errors import AccuracyError, AsperityError
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile (mirrored to make it periodic, or profile.txt:seam=step)."""
@@ -101,7 +101,8 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
     """The spectral gap of WALL's reflection law, with its error, its verdict and the evidence.
 
     The first line can be pasted into a paper: value, error, whether that is a bound or an estimate, verdict,
-    convention, method.
+    convention, method. In Feres' convention the law of a wall without mirror symmetry is not self-adjoint; the number
+    is 1 - its norm on functions of mean 0 then, and the lines below say so.
     """
     import json
 
@@ -113,14 +114,23 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
     found = spectral_gap(chosen, tolerance)
-    enclosed = enclosures(chosen, enclose) if enclose else None
+    enclosed, refusal = None, ""
+    if enclose:
+        try:
+            enclosed = enclosures(chosen, enclose)
+        except AccuracyError as reason:
+            refusal = str(reason)
     if as_json:
-        extra = {} if enclosed is None else {"enclosures": enclosures_as_list(enclosed)}
+        listed = None if enclosed is None else enclosures_as_list(enclosed)
+        extra: dict[str, Any] = {"enclosures": listed} if enclose else {}
+        extra |= {"refusals": {"enclosures": refusal}} if refusal else {}
         click.echo(json.dumps({**gap_as_dict(found), **extra}, indent=2, allow_nan=False))
         return
     click.echo("\n".join([quotation(found), *(f"  {line}" for line in found.evidence)]))
     if enclosed is not None:
         click.echo("\n".join(["enclosures:", *(f"  {line}" for line in enclosures_as_text(enclosed))]))
+    if refusal:
+        click.echo(f"enclosures refused: {refusal}")
 
 
 @main.command()

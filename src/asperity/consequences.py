@@ -104,6 +104,8 @@ def _slem(gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spec
     """
     if gap is None or specular_gap is None or found is None:
         return None
+    if not specular_gap.self_adjoint:
+        return Estimate(1.0 - specular_gap.value, specular_gap.error, specular_gap.kind, specular_gap.method)
     nearer = gap if gap.value <= specular_gap.value else specular_gap
     lowest = int(found.values.argmin())
     if -found.values[lowest] > 1.0 - nearer.value + nearer.error:

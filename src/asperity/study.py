@@ -16,9 +16,11 @@ from .consequences import Consequences, consequences_of
 from .errors import AccuracyError, FileExistsRefusal, InputError
 from .estimates import NORMAL_95, Estimate
 from .geometry import Disk, Wall, trace
-from .kernels import Bins, CollisionLaw, KernelMatrix, Law, Legendre, WallLaw, discretise
+from .kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
 from .kernels.measure import SINE
 from .spectral import Enclosures, SpectralGap, Spectrum, enclosures, gaps_in_both_conventions, spectral_gap, spectrum
+from .spectral.law_eigenvalues import law_eigenvalues
+from .spectral.law_spectrum import with_gap
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,9 +28,8 @@ if TYPE_CHECKING:
 BINS = 128
 TOLERANCE = 1e-3
 CHECK_RAYS = 2**16
-# Enough polynomials for the ten largest eigenvalues; the gap refines its own basis.
-SPECTRUM_BASIS, EIGENVALUES = Legendre(48), 10
-# Share of the tolerance that the matrix behind a spectrum may spend.
+EIGENVALUES = 10
+# Share of the tolerance that eigenvalues may spend.
 MATRIX_SHARE = 0.1
 # Eigenvalues that are enclosed, the constants' included: some seconds on a traced wall.
 ENCLOSED = 3
@@ -81,10 +82,11 @@ class Study:
     matrix : KernelMatrix
         P~ of the wall in bins.
     gap, specular_gap : SpectralGap or None
-        Of P~ in the paper's and in Feres' convention; the second only for mirror-symmetric walls, whose law is then
-        self-adjoint. None also where ``refusals`` says why.
+        Of P~ in the paper's and in Feres' convention; where the law is not known to be self-adjoint there, for want of
+        a mirror axis, ``specular_gap.self_adjoint`` is False, and it is 1 - the contraction factor of functions of mean
+        0. None where ``refusals`` says why.
     spectrum : Spectrum or None
-        Ten eigenvalues of P~; of the matrix in bins where the law has no gap.
+        The ten eigenvalues of P~ of largest modulus; of the matrix in bins where the law has no gap.
     enclosures : Enclosures or None
         Intervals that hold eigenvalues of P~ itself; None where ``refusals`` says why.
     collision : CollisionLaw
@@ -222,14 +224,14 @@ def study_wall(
         matrix = _matrix(law, basis, tolerance, rng)
         progress.update()
         specular_gap = None
-        if wall.is_mirror_symmetric:
+        if law.mirror_symmetric:
             try:
                 gap, specular_gap = gaps_in_both_conventions(law, tolerance, rng)
             except AccuracyError as reason:
                 gap = None
                 refusals |= {"gap": str(reason), "specular_gap": str(reason)}
         else:
-            gap = gap_of(law, "gap")
+            gap, specular_gap = gap_of(law, "gap"), gap_of(law.in_specular_frame(), "specular_gap")
         progress.update(2)
         found = None
         try:
@@ -281,8 +283,10 @@ def _spectrum(
 ) -> Spectrum:
     if gap is not None and gap.verdict == "no gap":
         # whatever the basis, these are numbers of the grid; those of the matrix that is shown and saved
-        return spectrum(matrix, k=EIGENVALUES)
-    return spectrum(law, EIGENVALUES, basis=SPECTRUM_BASIS, tolerance=MATRIX_SHARE * tolerance, rng=rng)
+        return with_gap(spectrum(matrix, k=EIGENVALUES), gap)
+    if gap is None:
+        return spectrum(law, EIGENVALUES, tolerance=MATRIX_SHARE * tolerance, rng=rng)
+    return with_gap(law_eigenvalues(law, EIGENVALUES, MATRIX_SHARE * tolerance, rng), gap)
 
 
 def _enclosures(law: WallLaw, gap: SpectralGap | None, tolerance: float) -> Enclosures:

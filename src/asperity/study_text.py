@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 # Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
 KAC_Z = 4.5
-SHOWN_EIGENVALUES = 8
 
 
 def summary_of(study: Study) -> str:
@@ -34,12 +33,7 @@ def summary_of(study: Study) -> str:
         lines += _tracer_lines(study.tracer)
     lines += _block("law P~", _matrix_lines(study.matrix))
     lines += [f"gap        {_gap_line(study, 'gap')}"]
-    if study.wall.is_mirror_symmetric:
-        lines += [f"           {_gap_line(study, 'specular_gap')}"]
-    else:
-        lines += [
-            "           specular convention: not asked, the cell has no mirror axis and P_F need not be self-adjoint"
-        ]
+    lines += [f"           {_gap_line(study, 'specular_gap')}"]
     lines += [
         *_block("spectrum", _spectrum_lines(study)),
         *_block("enclosed", _enclosure_lines(study)),
@@ -99,6 +93,8 @@ def _gap_line(study: Study, which: str) -> str:
     if gap is None:
         return f"refused: {study.refusals.get(which, 'not asked for')}"
     words = f"{gap.convention} convention: "
+    if not gap.self_adjoint:
+        return words + _contraction(gap, study.tolerance)
     if gap.verdict == "no gap":
         return words + "none (no gap): " + gap.evidence[0].split(":")[0]
     met = _met(gap.error <= study.tolerance, study.tolerance)
@@ -110,22 +106,35 @@ def _gap_line(study: Study, which: str) -> str:
     return f"{words} ({gap.kind}: {gap.method}), {met}"
 
 
+def _contraction(gap: SpectralGap, tolerance: float) -> str:
+    """What is true where there are no real eigenvalues to speak of."""
+    words = "P_F is not known to be self-adjoint, the cell has no mirror axis; "
+    if gap.verdict == "no gap":
+        return words + "its norm on functions of mean 0 is 1 (no gap)"
+    norm = Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method)
+    return (
+        f"{words}a step shrinks functions of mean 0 by the factor {rounded(norm)} at most, its norm there and the slem "
+        f"of P~ ({gap.kind}: {gap.method}), {_met(gap.error <= tolerance, tolerance)}"
+    )
+
+
 def _spectrum_lines(study: Study) -> list[str]:
     """Eigenvalues with their errors; then how they were found."""
     found = study.spectrum
     if found is None:
         return [f"refused: {study.refusals['spectrum']}"]
-    shown = [
-        rounded(number) + ("" if parity == "none" else f" {parity}")
-        for number, parity in zip(found.estimates()[:SHOWN_EIGENVALUES], found.parity, strict=False)
-    ]
+    numbers = found.estimates()
+    # the second largest modulus may be that of the most negative
+    order = sorted(range(len(numbers)), key=lambda i: (i > 0, -abs(numbers[i].value)))
+    shown = [rounded(numbers[i]) + ("" if found.parity[i] == "none" else f" {found.parity[i]}") for i in order]
     caution = ""
     if study.gap is not None and study.gap.verdict == "no gap":
         caution = "; they belong to the grid, for the law has no gap"
     method = found.estimates()[0].method
     return [
-        f"{', '.join(shown)} ({found.convention} convention, estimate: {method}{caution})",
-        f"of the matrix none is missing: {found.completeness}",
+        f"the {len(shown)} of largest modulus: {', '.join(shown)} ({found.convention} convention, estimate: {method}"
+        f"{caution})",
+        f"completeness: {found.completeness}",
     ]
 
 
@@ -199,6 +208,7 @@ def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
     """A gap as plain values, ready for JSON."""
     return {
         **estimate_as_dict(gap), "verdict": gap.verdict, "convention": gap.convention, "evidence": list(gap.evidence),
+        "self_adjoint": gap.self_adjoint,
     }  # fmt: skip
 
 
@@ -207,8 +217,9 @@ def quotation(gap: SpectralGap) -> str:
     from . import __version__
 
     number = "0" if gap.verdict == "no gap" else rounded(gap)
+    what = "spectral gap" if gap.self_adjoint else "not known to be self-adjoint: 1 - norm on functions of mean 0"
     return (
-        f"spectral gap {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; {gap.method}; "
+        f"{what} {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; {gap.method}; "
         f"asperity {__version__}"
     )
 
