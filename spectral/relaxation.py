@@ -21,7 +21,7 @@ Distance = Literal["L2", "total variation", "chi-square"]
 DISTANCES: tuple[Distance, ...] = ("L2", "total variation", "chi-square")
 
 # Eigenvalues of a matrix among which the one of largest modulus is sought, and the error asked of a law's.
-SOUGHT, TOLERANCE = 6, 1e-5
+SOUGHT, TOLERANCE = 6, 1e-4
 # Panels and nodes of the norm of a density.
 PANELS, NODES = 48, 16
 

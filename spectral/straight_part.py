@@ -65,7 +65,8 @@ def straight_part(law: WallLaw) -> StraightPart:
     Examples
     --------
     >>> from asperity import geometry as geo
-    >>> wall = geo.Wall([geo.Bezier([(0, 0), (0.5, -1), (1, 0)]), geo.Segment((1, 0), (2, 0))])
+    >>> bowl = geo.Bezier([(0, 0), (0.5, -1), (1, 0)])
+    >>> wall = geo.Wall([bowl, geo.Segment((1, 0), (2, 0))], period=2.0)
     >>> straight_part(WallLaw(wall))
     StraightPart(share=0.5, low=0.5, high=0.5)
     """
