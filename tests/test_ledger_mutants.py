@@ -12,16 +12,14 @@ from asperity.verification import Formula, agreement, verified
 from equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 ROWS = {entry.id: entry for entry in ledger.entries() if entry.check is not None}
-# the checks of these take seconds
-SLOW = {"S1.20", "S1.22", "S1.23", "S2.09", "S2.19", "S2.20", "S4.04", "S4.09", "S5.23"}
-SAMPLE = 3
+# How many mutants of a row are tried here; proofs take longer than numbers.
+SAMPLE = {"symbolic": 1, "numeric": 3}
 
 
 @pytest.mark.parametrize("entry", ROWS.values(), ids=ROWS)
 def test_a_check_refuses_wrong_formulas(entry):
     mutants = [mutant for mutant in mutants_of(entry) if (entry.id, mutant.label) not in EQUIVALENT]
-    count = 1 if entry.id in SLOW else SAMPLE
-    for mutant in mutants[:: max(1, len(mutants) // count)]:
+    for mutant in mutants[:: max(1, len(mutants) // SAMPLE[entry.kind])]:
         outcome = judged(entry, mutant)
         assert outcome.answer in ("refuted", "undecided", "raised"), outcome
 
@@ -103,5 +101,5 @@ def test_a_check_that_looks_at_nothing_accepts_what_is_wrong():
 def test_the_rows_see_the_librarys_formulas(function, rows):
     seen = {found.function: found for found in library([ROWS[row] for row in rows])}[function]
     assert [entry.id for entry in seen.rows] == rows
-    for change in changes(function)[::3]:
+    for change in changes(function)[::5]:
         assert change.label in EQUIVALENT_IN_THE_LIBRARY or noticed(seen, change) == rows[0], change.label
