@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from benchmarks.composed_laws import outcome
+from benchmarks.composed_laws import exchanged, outcome
 
 from asperity import kernels as ker
 from asperity import spectral as spec
@@ -87,3 +89,21 @@ def test_panels_report_what_dense_kinks_leave_out() -> None:
     found = outcome(15)
     assert found is not None
     assert 1e-4 < found[1].distance < found[1].reported < 0.1
+
+
+class Known(ker.Law):
+    """A map of which only the action on functions is known: half of (0, pi) turned round, the other half as it is."""
+
+    def _sample(self, theta: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        return exchanged(theta)
+
+    def _apply(self, function: Callable[[np.ndarray], np.ndarray], theta: np.ndarray) -> np.ndarray:
+        return np.asarray(function(exchanged(theta)))
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6])
+@pytest.mark.parametrize("basis", [ker.Bins(7), ker.Panels([0.0, 0.4, 2.0, np.pi], 2)], ids=repr)
+def test_errors_of_laws_known_by_their_action_hold(basis: ker.Basis, tolerance: float) -> None:
+    exact = ker.discretise(ker.InvolutionLaw(exchanged), basis).symmetric
+    found = ker.discretise(Known(), basis, tolerance=tolerance)
+    assert 1e-14 < np.linalg.norm(found.symmetric - exact) <= float(found.error) <= tolerance
