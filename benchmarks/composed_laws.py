@@ -16,7 +16,7 @@ import argparse
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -409,7 +409,7 @@ class Outcome:
 
 COARSE, FINE = Rule(40, 9, 2000), Rule(56, 12, 6000)
 # Crevices are followed less far where other teeth multiply the kinks.
-FEWER_CROSSINGS = 12
+FEWER_CROSSINGS = 24
 
 
 def reference(expression: Expression, basis: ker.Basis) -> tuple[Floats, float]:
@@ -420,12 +420,13 @@ def reference(expression: Expression, basis: ker.Basis) -> tuple[Floats, float]:
 
 def _by_rule(expression: Expression, basis: ker.Basis, rule: Rule) -> Floats:
     oscillations = basis.size if isinstance(basis, ker.Legendre) else 0
-    crossings = rule.crossings // (FEWER_CROSSINGS if "Triangular" in repr(expression.law) else 1)
-    rule = Rule(max(rule.panels, oscillations), rule.nodes, crossings + crossings % 2)
+    whole = Rule(max(rule.panels, oscillations), rule.nodes, rule.crossings)
     edges = np.empty(0) if oscillations else np.asarray(basis.edges[1:-1])
     last = Function(_functions(basis), edges)
     total = np.zeros((basis.size, basis.size))
     for weight, word in expression.words:
+        multiplied = any(isinstance(operator, Isometries) for operator in word)
+        rule = replace(whole, crossings=whole.crossings // FEWER_CROSSINGS * 2) if multiplied else whole
         function = last
         for operator in reversed(word):
             function = operator(function, rule)
