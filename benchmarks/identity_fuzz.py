@@ -163,25 +163,44 @@ FUNCTIONS: dict[Any, Any] = {
 def compared(claim: Claim, point: dict[Any, Any]) -> bool | None:
     """Whether the relation holds at a point, None where a side is not real or the judge is unsure.
 
-    A difference is looked at again in four times as many digits, because terms may cancel.
+    A difference is looked at again in more digits, because terms may cancel and a large number may stand in a sine.
     """
-    first = _compared(claim, point, DIGITS)
-    return _compared(claim, point, 4 * DIGITS) if first is False else first
+    sides = _sides(claim, point, DIGITS)
+    if sides is None:
+        return None
+    return _agree(claim, sides, DIGITS) or compared_in_more_digits(claim, point)
 
 
-def _compared(claim: Claim, point: dict[Any, Any], digits: int) -> bool | None:
+def compared_in_more_digits(claim: Claim, point: dict[Any, Any]) -> bool | None:
+    """The same in 200 digits, None unless 1000 digits give the same values."""
+    few, many = (_sides(claim, point, times * DIGITS) for times in (4, 20))
+    if few is None or many is None:
+        return None
+    if any(_far(a, b, 4 * DIGITS) for a, b in zip(few, many, strict=True)):
+        return None
+    return _agree(claim, few, 4 * DIGITS)
+
+
+def _sides(claim: Claim, point: dict[Any, Any], digits: int) -> tuple[Any, Any] | None:
+    """Both values, None where a relation of the domain does not hold or a side is not real."""
     with mpmath.workdps(digits):
         try:
             numbers = {s: value(sp.sympify(v), {}) for s, v in point.items()}
             if not all(truth(relation, numbers) for relation in claim.domain):
                 return None
-            a, b = (value(side, numbers) for side in (claim.left, claim.right))
+            return value(claim.left, numbers), value(claim.right, numbers)
         except (NotReal, Unsure, OverflowError, ZeroDivisionError, ValueError):
             return None
-        scale = mpmath.mpf(10) ** (-SAME * digits) * max(1, abs(a), abs(b))
-        if claim.relation == "==":
-            return bool(abs(a - b) <= scale)
-        return bool(a <= b + scale)
+
+
+def _far(a: Any, b: Any, digits: int) -> bool:
+    with mpmath.workdps(digits):
+        return bool(abs(a - b) > mpmath.mpf(10) ** (-SAME * digits) * max(1, abs(a), abs(b)))
+
+
+def _agree(claim: Claim, sides: tuple[Any, Any], digits: int) -> bool:
+    a, b = sides
+    return not _far(a, b, digits) or (claim.relation == "<=" and bool(a < b))
 
 
 # ---- claims
@@ -393,7 +412,10 @@ def judged(claim: Claim, seed: int) -> tuple[str, str, str, float]:
             answer = "out of time"
         if answer == "refuted" and verdict.counterexample:
             point = {s: sp.sympify(verdict.counterexample.get(str(s), 0)) for s in claim.symbols}
-            if not all(has_its_properties(s, v) for s, v in point.items()) or compared_at_more_digits(claim, point):
+            if (
+                not all(has_its_properties(s, v) for s, v in point.items())
+                or compared_in_more_digits(claim, point) is not False
+            ):
                 answer = "FALSE refutation"
         if answer == "proved" and broken:
             answer = "FALSE proof"
@@ -404,11 +426,6 @@ def judged(claim: Claim, seed: int) -> tuple[str, str, str, float]:
 
 def has_its_properties(symbol: Any, number: Any) -> bool:
     return (not symbol.is_integer or number.is_integer is True) and (not symbol.is_even or number.is_even is True)
-
-
-def compared_at_more_digits(claim: Claim, point: dict[Any, Any]) -> bool:
-    """Whether the values do not show that the claim fails at the point."""
-    return _compared(claim, point, 4 * DIGITS) is not False
 
 
 def run(seed: int) -> tuple[int, str, str, str, float]:

@@ -234,6 +234,19 @@ class Part:
                 return ANY
         return found
 
+    def _is_nowhere_constant(self, e: Any, slope: Any) -> bool:
+        """Whether a continuous function of one symbol is analytic, and its slope not 0 somewhere, so on no interval."""
+        roots = any(not power.exp.is_Integer for power in e.atoms(sp.Pow))
+        if len(e.free_symbols) != 1 or roots or e.has(*_NOT_ANALYTIC):
+            return False
+        for point in self.domain_points():
+            try:
+                if evaluate(slope, point, BITS).sign != 0:
+                    return True
+            except (Undefined, Unclear):
+                continue
+        return False
+
     def along(self, symbol: Any) -> Part:
         """The part without the conditions that may cut a line on which one symbol varies into pieces."""
         values = dict(self.domain.values)
@@ -270,15 +283,19 @@ class Part:
                 if slope is None:
                     slope = self.thorough_signs(sp.diff(e, symbol), depth - 1)
                 rising = _product([slope, frozenset({outward})])
+                moves = self._is_nowhere_constant(e, sp.diff(e, symbol))
                 if here <= NOT_NEGATIVE and rising <= NOT_NEGATIVE:
-                    return POSITIVE if POSITIVE in (here, rising) else NOT_NEGATIVE
+                    return POSITIVE if POSITIVE in (here, rising) or moves else NOT_NEGATIVE
                 if here <= NOT_POSITIVE and rising <= NOT_POSITIVE:
-                    return NEGATIVE if NEGATIVE in (here, rising) else NOT_POSITIVE
+                    return NEGATIVE if NEGATIVE in (here, rising) or moves else NOT_POSITIVE
         return ANY
 
 
 # Of these all but the arc cosine stay inside.
 _RANGES = {sp.acos: (sp.S.Zero, sp.pi), sp.atan: (-sp.pi / 2, sp.pi / 2), sp.tanh: (-sp.S.One, sp.S.One)}
+
+
+_NOT_ANALYTIC = (sp.asin, sp.acos, sp.acosh)
 
 
 def is_muddled(e: Any) -> bool:
