@@ -462,7 +462,7 @@ def table(found: list[tuple[int, str, str, str, float]]) -> str:
         counts = Counter(one[3] for one in ones)
         decided = sum(counts[answer] for answer in ("proved", "refuted", "error")) / max(len(ones), 1)
         numbers = " | ".join(str(counts[column]) for column in COLUMNS)
-        lines.append(f"| {name} | {len(ones)} | {numbers} | {100 * decided:.0f} % |")
+        lines.append(f"| {name} | {len(ones)} | {numbers} | {100 * decided:.1f} % |")
     return "\n".join(lines)
 
 
