@@ -12,6 +12,9 @@ from numba import njit
 
 # pi as the sum of two doubles
 PI, PI_REST = 3.141592653589793, 1.2246467991473532e-16
+# The largest double below PI: of the angles that leave, those that round to PI. Incoming angles are below PI, too, so
+# that every ray that leaves can be sent back.
+LAST_ANGLE = 3.1415926535897927
 HALF_PI, HALF_PI_REST = 0.5 * PI, 0.5 * PI_REST
 QUARTER_PI = 0.25 * PI
 
@@ -72,6 +75,13 @@ def sine_cosine(theta):
     large = 1.0 - (0.5 * u - u * u * q)
     cosine = small if steep else large
     return (large if steep else small), (cosine if off < 0.0 else -cosine)
+
+
+@_compile
+def mirrored(theta):
+    """pi - theta, at most `LAST_ANGLE`."""
+    angle = (PI - theta) + PI_REST
+    return angle if angle < LAST_ANGLE else LAST_ANGLE
 
 
 @_compile

@@ -21,7 +21,11 @@ _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 @_compile
 def arc_time(arc, own, px, py, vx, vy, stretch):
-    """Flight time to the front of one arc, or inf; second value: 1 where the ray is tangent within rounding."""
+    """Flight time to the front of one arc, or inf; 1 where the ray is tangent within rounding; and its height.
+
+    The height, in coordinates where the arc is a circle, is about the distance in front of the arc of a ray that comes
+    from there and meets it close by, and inf where the ray goes to the far side of a focusing arc.
+    """
     rx, ry = px - arc[0], stretch * (py - arc[1])
     wy = stretch * vy
     curvature = arc[4]
@@ -29,8 +33,8 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
     speed2 = vx * vx + wy * wy
     if own:
         if curvature <= 0.0 or b <= 0.0:
-            return np.inf, 0
-        return 2.0 * b / (curvature * speed2), 0
+            return np.inf, 0, np.inf
+        return 2.0 * b / (curvature * speed2), 0, np.inf
     f = arc[2] * rx + arc[3] * ry - 0.5 * curvature * (rx * rx + ry * ry)
     d = b * b + 2.0 * curvature * speed2 * f
     tangent = 0
@@ -38,13 +42,13 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
         tangent = 1
         d = 0.0
     if d < 0.0:
-        return np.inf, 0
+        return np.inf, 0, np.inf
     root = math.sqrt(d)
     if b >= 0.0:
         if curvature <= 0.0:
-            return np.inf, 0
-        return (b + root) / (curvature * speed2), tangent
-    return 2.0 * f / (root - b), tangent
+            return np.inf, 0, np.inf
+        return (b + root) / (curvature * speed2), tangent, np.inf
+    return 2.0 * f / (root - b), tangent, f
 
 
 @_compile

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from ..rounding import EPS
-from .resolution import JOINT_ULPS, TANGENT_ULPS
+from .resolution import JOINT_ULPS, NEARBY, TANGENT_ULPS
 
 ROOT_STEPS = 80
 
@@ -72,7 +72,8 @@ def contact_time(curve, bend, s, px, py, vx, vy):
 def bezier_hit(curve, own_s, px, py, vx, vy, slack):
     """First front hit of one Bezier piece: flight time (inf if none), parameter, 1 if it is tangent within rounding.
 
-    ``own_s`` < 0: the ray does not start on this piece.
+    ``own_s`` < 0: the ray does not start on this piece. A hit that lies within the slack of the start, before or behind
+    it, is not among them: the fourth value is its parameter, -1 if there is none.
     """
     share_slack = JOINT_ULPS * EPS
     # b(s) - p in the power basis; columns 0-7 hold x and y coefficients of 1, s, s^2, s^3
@@ -91,9 +92,9 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
             s = own_s - 0.5 * b1 / b2
             t = contact_time(curve, 6.0 * a3 * s + 2.0 * a2, s, px, py, vx, vy)
             if t > slack:
-                return t, s, 1
+                return t, s, 1, -1.0
         if disc < 0.0:
-            return best_t, best_s, 0
+            return best_t, best_s, 0, -1.0
         q = -0.5 * (b1 + math.copysign(math.sqrt(disc), b1))
         for root in range(2):
             bottom, top = (b2, q) if root == 0 else (q, b0)
@@ -108,7 +109,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
                 t = dx * vx + dy * vy
                 if slope <= 0.0 and 0.0 < t < best_t:
                     best_t, best_s = t, s
-        return best_t, best_s, 0
+        return best_t, best_s, 0, -1.0
     n = curve.shape[0]
     # g is a sum of products of numbers of this size
     spread = max(abs(vx), abs(vy)) * (abs(curve[0] - px) + abs(curve[1] - py) + curve_size(curve))
@@ -123,7 +124,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
             c2 = a1 / q
         if c1 > c2:
             c1, c2 = c2, c1
-    best_t, best_s, tangent = np.inf, 0.0, 0
+    best_t, best_s, tangent, near_s = np.inf, 0.0, 0, -1.0
     low, touches = 0.0, False
     value_low = a0
     for part in range(3):
@@ -149,10 +150,18 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
             dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
             dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
             t = dx * vx + dy * vy
-            if -slack <= t < best_t:
-                best_t, best_s, tangent = max(t, 0.0), s, 0
+            if t < best_t:
+                # the height in front of the curve is t times the sine of incidence, g' / |b'|
+                fall = -((3.0 * a3 * s + 2.0 * a2) * s + a1)
+                tx = (3.0 * curve[6] * s + 2.0 * curve[4]) * s + curve[2]
+                ty = (3.0 * curve[7] * s + 2.0 * curve[5]) * s + curve[3]
+                reach = slack * math.sqrt(tx * tx + ty * ty)
+                if abs(t) <= NEARBY * spread and abs(t) * fall <= reach:
+                    near_s = s
+                elif t > 0.0:
+                    best_t, best_s, tangent = t, s, 0
         low, value_low = high, value_high
-    return best_t, best_s, tangent
+    return best_t, best_s, tangent, near_s
 
 
 @_compile

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numba import njit
 
-from .angle_engine import PI, PI_REST, arcsine, sine_cosine
+from .angle_engine import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .closed_forms import CHAIN_COLUMNS, FAN, FAN_COLUMN, NONE
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
 
@@ -166,7 +166,7 @@ def trace_closed(x, theta, hollows, closed, cell, limit, out_x, out_theta, bounc
             i = first + j
             h = opening_at(x[i] - cell_of(x[i], cell), hollows)
             if h == FLAT_TOP:
-                out_x[i], out_theta[i], bounces[i], status[i] = x[i], PI - theta[i], 1, ESCAPED
+                out_x[i], out_theta[i], bounces[i], status[i] = x[i], mirrored(theta[i]), 1, ESCAPED
             elif h == TOP_CORNER or closed[h, 0] == NONE:
                 status[i] = UNDECIDED
             else:

@@ -15,8 +15,9 @@ import math
 import numpy as np
 
 from .arc_engine import on_arc
-from .engine import CORNER, ESCAPED, GRAZING, LINE, NO_PIECE, SIDE, near_end
+from .engine import CORNER, ESCAPED, GRAZING, near_end
 from .flight_engine import compiled, conic_after, inlined, line_after, satellite_after, towards_line, turning
+from .nearby_engine import LINE, NO_PIECE, SIDE
 
 # A contact is clear, or double precision does not settle it; the codes are those of the statuses of rays.
 CLEAR = ESCAPED

@@ -8,6 +8,8 @@ The formulas are stable by themselves; there is no epsilon that decides which pi
 * The side of a ray on which a joint V lies is the sign of c = (V - p) x v. A segment is hit from its free side exactly
   if c goes from >= 0 at its start to <= 0 at its end. Neighbours share the number c, so that no ray slips between them.
 * Arcs and Bezier pieces: see `arc_engine` and `bezier_engine`.
+* A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact places of the
+  joints, see `sides_engine`: not the other face of a plate without thickness, nor the other side of a sharp peak.
 * The hit point is put back on its piece, and the velocity is renormalised, once a bounce.
 """
 
@@ -19,16 +21,16 @@ import numpy as np
 from numba import njit
 
 from ..rounding import EPS
-from .angle_engine import direction_angle, sine_cosine
+from .angle_engine import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 from .arc_engine import arc_incidence, arc_reflect, arc_time, on_arc
 from .bezier_engine import bend_number, bezier_hit, bezier_value
+from .nearby_engine import BEZIER, CIRCLE, ELLIPSE, LID, LINE, NO_PIECE, SIDE, hit_nearby, line_time
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
-from .resolution import JOINT_ULPS
+from .resolution import JOINT_ULPS, NEARBY
 from .skips import skip_crossings, skip_hops
 from .stop_engine import is_raised
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
-NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
 # Flights followed one by one before a ray is given up: 20 to 100 ms. Hits in a run cost one flight together.
 MOST_STEPS = 1_000_000
@@ -43,26 +45,11 @@ _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 @_compile
-def corner_ahead(dx, dy, c, vx, vy, slack, bounces):
+def corner_ahead(dx, dy, vx, vy, slack, bounces):
     """Time to a joint within rounding of the ray's line, or inf where it is behind."""
     ahead = dx * vx + dy * vy
-    # a ray that has not been reflected yet is exact, and so is its distance from the joint
-    exact = bounces > 0 or abs(c) <= 4.0 * EPS * (abs(dx * vy) + abs(dy * vx))
-    return ahead if exact and ahead > slack else np.inf
-
-
-@_compile
-def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
-    """Flight time to the line that starts at joint j, and the share of it at the hit, negative from its end."""
-    share = c_before / (c_before - c_after)
-    near = j
-    if share > 0.5:
-        # from the nearer joint, and negative to say so, so that both ends keep their digits
-        share = c_after / (c_before - c_after)
-        near = j + 1
-    hx = joints[near, 0] + share * lines[j, 0]
-    hy = joints[near, 1] + share * lines[j, 1]
-    return (hx - px) * vx + (hy - py) * vy, share
+    # the corners of the opening are left behind for certain, however shallow the ray comes
+    return ahead if (bounces > 0 or dy != 0.0) and ahead > slack else np.inf
 
 
 @_compile
@@ -77,11 +64,12 @@ def near_end(piece, px, py, slack):
 
 
 @_compile
-def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time):
+def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, close, bounces, time):
     """Follow a ray through the cells of the grid to its first line before ``time``.
 
-    Returns the flight time (inf if none), the line, the share of it, and the time to the first corner on the way that
-    is met within rounding. Lines are listed in every cell that they nearly touch, so the walk's own rounding leaves
+    Returns the flight time (inf if none), the line, the share of it, the time to the first corner on the way that is
+    met within rounding, and whether lines are nearby (see `nearby_engine`). Lines are listed in every cell that they
+    nearly touch, so the walk's own rounding leaves
     out no line that the ray can meet; the signs at the joints are the same numbers in every cell.
     """
     columns, rows, base = int(hollow[17]), int(hollow[18]), int(hollow[19])
@@ -93,7 +81,7 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
     leave_x = ((column + 1 if vx > 0.0 else column) - x) * (hollow[15] / vx) if vx != 0.0 else np.inf
     leave_y = ((row + 1 if vy > 0.0 else row) - y) * (hollow[16] / vy) if vy != 0.0 else np.inf
     best, found, best_share = np.inf, -1, 0.0
-    corner_time = np.inf
+    corner_time, nearby = np.inf, False
     while True:
         cell = base + row * columns + column
         for entry in range(grid[cell], grid[cell + 1]):
@@ -101,19 +89,22 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
             dx, dy = joints[j, 0] - px, joints[j, 1] - py
             c_before = dx * vy - dy * vx
             if abs(c_before) <= slack and joints[j, 2] > 0.0:
-                corner_time = min(corner_time, corner_ahead(dx, dy, c_before, vx, vy, slack, bounces))
+                corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
             if joints[j, 3] <= 0.0:
                 # a joint between curves, listed for its corner
                 continue
             dx, dy = joints[j + 1, 0] - px, joints[j + 1, 1] - py
             c_after = dx * vy - dy * vx
             if abs(c_after) <= slack and joints[j + 1, 2] > 0.0:
-                corner_time = min(corner_time, corner_ahead(dx, dy, c_after, vx, vy, slack, bounces))
+                corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
             if c_before >= 0.0 >= c_after and c_before > c_after and j != own:
                 t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
                 # of two lines at one distance the first in the order of the wall is hit, as without a grid
-                if -slack <= t and (max(t, 0.0) < best or (max(t, 0.0) == best and j < found)):
-                    best, found, best_share = max(t, 0.0), j, share
+                if t > close:
+                    if t < best or (t == best and j < found):
+                        best, found, best_share = t, j, share
+                elif t >= -close:
+                    nearby = True
         if min(leave_x, leave_y) > min(best, time) + 2.0 * slack:
             break
         if leave_x < leave_y:
@@ -126,7 +117,7 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
             leave_y += step_y
             if row < 0 or row >= rows:
                 break
-    return best, found, best_share, corner_time
+    return best, found, best_share, corner_time, nearby
 
 
 @_compile
@@ -146,12 +137,12 @@ def trace_ray(
     circle_low, circle_high = int(hollow[5]), int(hollow[6])
     ellipse_low, ellipse_high = int(hollow[7]), int(hollow[8])
     bezier_low, bezier_high = int(hollow[9]), int(hollow[10])
-    slack = JOINT_ULPS * EPS * size
+    slack, close = JOINT_ULPS * EPS * size, NEARBY * size
     sine, cosine = sine_cosine(theta)
     px, py, vx, vy = x, 0.0, -cosine, -sine
     shift = 0.0
     bounces, steps = 0, 0
-    own_kind, own_index, own_s = LID, -1, -1.0
+    own_kind, own_index, own_s, flown = LID, -1, -1.0, 0.0
     third = -1
     if path is not None:
         path[0, 0], path[0, 1] = px, py
@@ -161,31 +152,35 @@ def trace_ray(
         kind, index, hit_s, tangent = NO_PIECE, -1, 0.0, 0
         time = np.inf
         corner_time = np.inf
+        nearby = False
 
         if circles is not None:
             for k in range(circle_low, circle_high):
                 own = own_kind == CIRCLE and own_index == k
-                t, touch = arc_time(circles[k], own, px, py, vx, vy, 1.0)
-                if -slack <= t < time:
-                    t = max(t, 0.0)
+                t, touch, _ = arc_time(circles[k], own, px, py, vx, vy, 1.0)
+                if abs(t) <= close and not own:
+                    nearby = True
+                elif 0.0 <= t < time:
                     if on_arc(circles[k], px + t * vx - circles[k, 0], py + t * vy - circles[k, 1], slack):
                         time, kind, index, tangent = t, CIRCLE, k, touch
         if ellipses is not None:
             for k in range(ellipse_low, ellipse_high):
                 own = own_kind == ELLIPSE and own_index == k
                 stretch = ellipses[k, 12]
-                t, touch = arc_time(ellipses[k], own, px, py, vx, vy, stretch)
-                if -slack <= t < time:
-                    t = max(t, 0.0)
+                t, touch, _ = arc_time(ellipses[k], own, px, py, vx, vy, stretch)
+                if abs(t) <= close and not own:
+                    nearby = True
+                elif 0.0 <= t < time:
                     qx, qy = px + t * vx - ellipses[k, 0], stretch * (py + t * vy - ellipses[k, 1])
                     if on_arc(ellipses[k], qx, qy, slack * max(1.0, stretch)):
                         time, kind, index, tangent = t, ELLIPSE, k, touch
         if beziers is not None:
             for k in range(bezier_low, bezier_high):
                 start_s = own_s if own_kind == BEZIER and own_index == k else -1.0
-                t, s, touch = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
+                t, s, touch, near_s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack)
                 if t < time:
                     time, kind, index, hit_s, tangent = t, BEZIER, k, s, touch
+                nearby = nearby or near_s >= 0.0
 
         # segments, by the signs of the joints: of all of them, or of those in the cells that the ray passes
         walking = False
@@ -195,36 +190,51 @@ def trace_ray(
             dx, dy = joints[joint_low, 0] - px, joints[joint_low, 1] - py
             c_before = dx * vy - dy * vx
             if abs(c_before) <= slack and joints[joint_low, 2] > 0.0:
-                corner_time = min(corner_time, corner_ahead(dx, dy, c_before, vx, vy, slack, bounces))
+                corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
             for j in range(joint_low + 1, joint_high):
                 dx, dy = joints[j, 0] - px, joints[j, 1] - py
                 c_after = dx * vy - dy * vx
                 if abs(c_after) <= slack and joints[j, 2] > 0.0:
-                    corner_time = min(corner_time, corner_ahead(dx, dy, c_after, vx, vy, slack, bounces))
+                    corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
                 if lines is not None:
                     if c_before >= 0.0 >= c_after and c_before > c_after and joints[j - 1, 3] > 0.0:
                         if own_kind != LINE or own_index != j - 1:
                             t, share = line_time(joints, lines, j - 1, c_before, c_after, px, py, vx, vy)
-                            if -slack <= t < time:
-                                time, kind, index, hit_s, tangent = max(t, 0.0), LINE, j - 1, share, 0
+                            if t > close:
+                                if t < time:
+                                    time, kind, index, hit_s, tangent = t, LINE, j - 1, share, 0
+                            elif t >= -close:
+                                nearby = True
                 c_before = c_after
         if grid is not None and walking:
             own = own_index if own_kind == LINE else -1
-            t, index_there, share, ahead = walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, bounces, time)
+            t, index_there, share, ahead, near = walk(
+                grid, hollow, joints, lines, own, px, py, vx, vy, slack, close, bounces, time
+            )
+            nearby = nearby or near
             corner_time = min(corner_time, ahead)
             if t < time:
                 time, kind, index, hit_s, tangent = t, LINE, index_there, share, 0
 
-        # the opening, an edge from right to left, and the sides of an open wall
+        if nearby:
+            t, near_kind, near_index, near_s, touch = hit_nearby(
+                hollow, joints, lines, circles, ellipses, beziers,
+                own_kind, own_index, own_s, px, py, vx, vy, flown, slack, close,
+            )  # fmt: skip
+            if t < time:
+                time, kind, index, hit_s, tangent = t, near_kind, near_index, near_s, touch
+
+        # the opening, an edge from right to left, and the sides of an open wall, unless a piece is met before; one that
+        # lies in the opening or in a side within rounding is
         if vy > 0.0:
             c_right, c_left = (right - px) * vy + py * vx, (left - px) * vy + py * vx
             t = max(-py / vy, 0.0)
-            if (c_right >= 0.0 >= c_left or period is not None) and own_kind != LID and t <= time:
+            if (c_right >= 0.0 >= c_left or period is not None) and own_kind != LID and (time - t) * vy > slack:
                 time, kind = t, LID
         if period is not None:
             if vx != 0.0:
                 t = ((right if vx > 0.0 else left) - px) / vx
-                if t < time:
+                if t < time and (kind == LID or (time - t) * abs(vx) > slack):
                     time, kind = max(t, 0.0), SIDE
 
         steps += 1
@@ -247,7 +257,7 @@ def trace_ray(
             return shift + px + time * vx, vx, vy, bounces, ESCAPED
         if tangent != 0:
             return shift + px, vx, vy, bounces, GRAZING
-        if bounces >= limit or steps // 2 > min(limit, MOST_STEPS):
+        if (bounces >= limit and kind != SIDE) or steps > MOST_STEPS:
             return shift + px, vx, vy, bounces, BOUNCE_LIMIT
         if itinerary is not None:
             side = 1 if kind == SIDE and vx > 0.0 else 0
@@ -263,6 +273,7 @@ def trace_ray(
                 own_kind, own_index, own_s = SIDE, -1, -1.0
                 third = -1
                 continue
+        flown = time
 
         if lines is not None and kind == LINE:
             near = index if hit_s >= 0.0 else index + 1
@@ -340,7 +351,7 @@ def trace_rays(
         place = x[i] - base
         h = opening_at(place, hollows)
         if h == FLAT_TOP:
-            out_x[i], out_theta[i], bounces[i], status[i] = x[i], math.pi - theta[i], 1, ESCAPED
+            out_x[i], out_theta[i], bounces[i], status[i] = x[i], mirrored(theta[i]), 1, ESCAPED
             continue
         if h == TOP_CORNER:
             out_x[i], out_theta[i], bounces[i], status[i] = x[i], theta[i] - math.pi, 0, CORNER
@@ -362,4 +373,5 @@ def trace_rays(
             grid,
         )
         out_x[i] = base + place
-        out_theta[i] = direction_angle(vx, vy)
+        angle = direction_angle(vx, vy)
+        out_theta[i] = min(angle, LAST_ANGLE) if status[i] == ESCAPED else angle

@@ -20,7 +20,7 @@ from .double_double import (
     wide,
 )
 
-ARC_COLUMNS = 22
+ARC_COLUMNS = 18
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -30,9 +30,10 @@ def refined_arcs(arcs):
     """The table of arcs that go through both joints exactly and subtend their span exactly.
 
     Columns: first joint (2), then pairs: normal there (2 x 2), curvature, chord direction (2 x 2), chord length; then
-    1 where the chord decides by position, stretch, stretched end y (2 unused), sign.
+    1 where the chord decides by position, stretch, last joint (2).
     """
-    table = np.zeros((arcs.shape[0], ARC_COLUMNS))
+    # at least one row, so that a wall without arcs has one to pass on
+    table = np.zeros((max(1, arcs.shape[0]), ARC_COLUMNS))
     for k in range(arcs.shape[0]):
         stretch = arcs[k, 12]
         x0, y0, x1, y1 = arcs[k, 13], arcs[k, 14], arcs[k, 15], arcs[k, 16]
@@ -57,14 +58,15 @@ def refined_arcs(arcs):
         row[12], row[13] = length
         row[14] = 1.0 if arcs[k, 7] > 0.0 else 0.0
         row[15] = stretch
+        row[16], row[17] = x1, y1
     return table
 
 
 @_compile
 def arc_hit(arc, own, px, py, vx, vy, error):
-    """Flight time to the front of one arc, inf if none; second value: time of a contact that is undecided, or inf.
+    """Flight time to the front of one arc, inf if none; time of a contact that is undecided, or inf; and the height.
 
-    ``error`` bounds the transversal error of the ray there.
+    The height is that of `arc_engine.arc_time`. ``error`` bounds the transversal error of the ray there.
     """
     nothing = (np.inf, 0.0)
     n0x, n0y, curvature = (arc[2], arc[3]), (arc[4], arc[5]), (arc[6], arc[7])
@@ -77,8 +79,9 @@ def arc_hit(arc, own, px, py, vx, vy, error):
     undecided = np.inf
     if own:
         if curvature[0] <= 0.0 or b[0] <= 0.0:
-            return nothing, undecided
+            return nothing, undecided, np.inf
         t = divide((2.0 * b[0], 2.0 * b[1]), bend)
+        height = np.inf
     else:
         r2 = multiply(curvature, dot(rx, ry, rx, ry))
         f = subtract(dot(n0x, n0y, rx, ry), (0.5 * r2[0], 0.5 * r2[1]))
@@ -93,18 +96,20 @@ def arc_hit(arc, own, px, py, vx, vy, error):
                 if t[0] > 0.0 and on_arc(arc, add(rx, multiply(t, vx)), add(ry, multiply(t, wy)), error):
                     undecided = t[0]
         if d[0] < 0.0:
-            return nothing, undecided
+            return nothing, undecided, np.inf
         root = square_root(d)
         if b[0] >= 0.0:
             if curvature[0] <= 0.0:
-                return nothing, undecided
+                return nothing, undecided, np.inf
             t = divide(add(b, root), bend)
+            height = np.inf
         else:
             t = divide((2.0 * f[0], 2.0 * f[1]), subtract(root, b))
+            height = f[0]
     slack = error * max(1.0, arc[15])
-    if t[0] < -slack or not on_arc(arc, add(rx, multiply(t, vx)), add(ry, multiply(t, wy)), slack):
-        return nothing, undecided
-    return t, undecided
+    if not on_arc(arc, add(rx, multiply(t, vx)), add(ry, multiply(t, wy)), slack):
+        return nothing, undecided, np.inf
+    return t, undecided, height
 
 
 @_compile
@@ -112,11 +117,25 @@ def on_arc(arc, qx, qy, slack):
     """Whether the point q on the full circle, measured from the first joint, belongs to the arc."""
     ex, ey = (arc[8], arc[9]), (arc[10], arc[11])
     if arc[14] > 0.0:
-        along = dot(qx, qy, ex, ey)[0]
+        along = dot(qx, qy, ex, ey)
         facing = (arc[4] - arc[6] * qy[0]) * ex[0] - (arc[2] - arc[6] * qx[0]) * ey[0]
-        return -slack <= along and subtract((along, 0.0), (arc[12], arc[13]))[0] <= slack and facing > 0.0
+        return -slack <= along[0] and subtract(along, (arc[12], arc[13]))[0] <= slack and facing > 0.0
     height = cross(ex, ey, qx, qy)[0]
     return height <= slack if arc[6] > 0.0 else height >= -slack
+
+
+@_compile
+def arc_height(arc, px, py):
+    """Distance of a place close to an arc from it, positive on its free side, and the unit normal there."""
+    n0x, n0y, curvature = (arc[2], arc[3]), (arc[4], arc[5]), (arc[6], arc[7])
+    stretch = wide(arc[15])
+    qx, qy = subtract(px, wide(arc[0])), multiply(stretch, subtract(py, wide(arc[1])))
+    nx = subtract(n0x, multiply(curvature, qx))
+    ny = multiply(stretch, subtract(n0y, multiply(curvature, qy)))
+    r2 = multiply(curvature, dot(qx, qy, qx, qy))
+    f = subtract(dot(n0x, n0y, qx, qy), (0.5 * r2[0], 0.5 * r2[1]))
+    size = square_root(dot(nx, ny, nx, ny))
+    return divide(f, size), divide(nx, size), divide(ny, size)
 
 
 @_compile

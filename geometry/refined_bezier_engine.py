@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 
+from .bezier_engine import curve_size
 from .double_double import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, square_root, subtract, wide
+from .resolution import NEARBY
 
 # Bisections: more than a double has digits and exponents before the point.
 ROOT_STEPS = 200
@@ -63,20 +67,24 @@ def bezier_coefficients(curve):
 
 
 @_compile
-def bezier_hit(curve, own_s, px, py, vx, vy, error):
-    """First front hit of one Bezier piece: time (inf if none), parameter, time of an undecided contact (or inf)."""
+def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
+    """First front hit of one Bezier piece: time (inf if none), parameter, time of an undecided contact (or inf).
+
+    The fourth value is the parameter of a hit within the slack of the start, which is not among the others, or -1.
+    """
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
     n = curve.shape[0]
     a0 = cross(subtract(ax0, px), subtract(ay0, py), vx, vy)
     a1, a2, a3 = cross(ax1, ay1, vx, vy), cross(ax2, ay2, vx, vy), cross(ax3, ay3, vx, vy)
     best_t, best_s, undecided = (np.inf, 0.0), (0.0, 0.0), np.inf
+    near_s = (-1.0, 0.0)
     if own_s[0] >= 0.0:
         b0 = cubic_slope(a1, a2, a3, own_s)
         b1 = add(multiply(multiply((3.0, 0.0), a3), own_s), a2)
         product = multiply(a3, b0)
         disc = subtract(multiply(b1, b1), (4.0 * product[0], 4.0 * product[1]))
         if disc[0] < 0.0:
-            return best_t, best_s, undecided
+            return best_t, best_s, undecided, near_s
         root = square_root(disc)
         q = add(b1, root if b1[0] >= 0.0 else negate(root))
         q = (-0.5 * q[0], -0.5 * q[1])
@@ -91,7 +99,8 @@ def bezier_hit(curve, own_s, px, py, vx, vy, error):
                 t = dot(dx, dy, vx, vy)
                 if cubic_slope(a1, a2, a3, s)[0] <= 0.0 and 0.0 < t[0] < best_t[0]:
                     best_t, best_s = t, s
-        return best_t, best_s, undecided
+        return best_t, best_s, undecided, near_s
+    size = abs(curve[0] - px[0]) + abs(curve[1] - py[0]) + curve_size(curve)
     # the critical points of g are needed as doubles only: g there changes in second order
     c1, c2 = 2.0, 2.0
     disc = subtract(multiply(a2, a2), multiply((3.0, 0.0), multiply(a3, a1)))
@@ -126,10 +135,15 @@ def bezier_hit(curve, own_s, px, py, vx, vy, error):
             dx = subtract(cubic(ax0, ax1, ax2, ax3, s), px)
             dy = subtract(cubic(ay0, ay1, ay2, ay3, s), py)
             t = dot(dx, dy, vx, vy)
-            if -error <= t[0] < best_t[0]:
-                best_t, best_s = t, s
+            if t[0] < best_t[0]:
+                tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
+                reach = slack * math.hypot(tx[0], ty[0])
+                if abs(t[0]) <= NEARBY * size and abs(t[0] * cross(tx, ty, vx, vy)[0]) <= reach:
+                    near_s = s
+                elif t[0] > 0.0:
+                    best_t, best_s = t, s
         low, value_low = high, value_high
-    return best_t, best_s, undecided
+    return best_t, best_s, undecided, near_s
 
 
 @_compile

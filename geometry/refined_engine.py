@@ -26,6 +26,7 @@ import math
 import numpy as np
 from numba import njit
 
+from ..rounding import EPS
 from .double_double import (
     LOCAL_ERROR,
     add,
@@ -44,6 +45,8 @@ from .double_double import (
 )
 from .refined_arc_engine import arc_hit, arc_place
 from .refined_bezier_engine import bezier_hit, bezier_place
+from .resolution import JOINT_ULPS
+from .sides_engine import in_front, orientation
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, LOST, UNSETTLED = 0, 1, 2, 3, 4, 5
 NO_PIECE, LID, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
@@ -85,6 +88,34 @@ def earlier(t, time):
 
 
 @_compile
+def meets(
+    t, height, joints, arcs, beziers, own_kind, own_index, own_s, kind, index, s, px, py, vx, vy, flown, slack, error
+):  # fmt: skip
+    """Whether a ray meets a piece after the time t; ``height`` is that of its start in front of the piece.
+
+    Within the slack of double precision the pieces' own places decide, so that both tracers go the same way.
+    """
+    if height > slack or own_kind in (LID, SIDE):
+        return height >= -error
+    if height < -slack:
+        return False
+    return in_front(
+        joints,
+        own_kind, own_index, arcs[own_index if own_kind == ARC else 0], beziers[own_index if own_kind == BEZIER else 0],
+        own_s,
+        kind, index, arcs[index if kind == ARC else 0], beziers[index if kind == BEZIER else 0], s,
+        px, py, vx[0], vy[0], flown, slack,
+    )  # fmt: skip
+
+
+@_compile
+def is_beside(joints, index, corner):
+    """Whether a corner lies on a line or on its free side: a ray that meets the line does not meet one behind it."""
+    x0, y0, x1, y1 = joints[index, 0], joints[index, 1], joints[index + 1, 0], joints[index + 1, 1]
+    return orientation(x0, y0, x1, y1, joints[corner, 0], joints[corner, 1]) >= 0.0
+
+
+@_compile
 def refined_ray(
     place, theta, hollow, joints, lines, pairs, arcs, first_ellipse, beziers, is_open, cell, limit, most_flights
 ):  # fmt: skip
@@ -99,6 +130,7 @@ def refined_ray(
     ellipse_low, ellipse_high = first_ellipse + int(hollow[7]), first_ellipse + int(hollow[8])
     bezier_low, bezier_high = int(hollow[9]), int(hollow[10])
     scale = cell + hollow[2]
+    slack = JOINT_ULPS * EPS * hollow[2]
     px, py = place, (0.0, 0.0)
     sine, cosine = sine_cosine(theta)
     vx, vy = negate(cosine), negate(sine)
@@ -108,7 +140,7 @@ def refined_ray(
     spread, norm = 1.0, 1.0
     step_j, step_a = 1.0, 1.0
     wraps, bounces, steps = 0, 0, 0
-    own_kind, own_index, own_s = LID, -1, (-1.0, 0.0)
+    own_kind, own_index, own_s, flown = LID, -1, (-1.0, 0.0), 0.0
     while True:
         # bound on the transversal error of the ray: on the segment, at a distance of up to one scale
         local = LOCAL_ERROR * min(norm * spread, step_j + step_a)
@@ -117,7 +149,7 @@ def refined_ray(
         error = 2.0 * scale * local
         kind, index, hit_s, edge_share = NO_PIECE, -1, (0.0, 0.0), (0.0, 0.0)
         time = (np.inf, 0.0)
-        corner_time, corner_width, graze_time = np.inf, 0.0, np.inf
+        corner_time, graze_time = np.inf, np.inf
 
         before = (0.0, 0.0)
         for j in range(joint_low, joint_high):
@@ -127,7 +159,7 @@ def refined_ray(
                 ahead = dot(dx, dy, vx, vy)[0]
                 width = WIDTH_MARGIN * half_ulp * abs(scale * j2 + ahead * a2) + (1.0 + ahead / scale) * error
                 if abs(after[0]) <= width and 0.0 < ahead < corner_time:
-                    corner_time, corner_width = ahead, width
+                    corner_time = ahead
             starts_here = j > joint_low and joints[j - 1, 3] > 0.0
             if starts_here and before[0] >= 0.0 >= after[0] and before[0] > after[0]:
                 if own_kind != LINE or own_index != j - 1:
@@ -137,36 +169,50 @@ def refined_ray(
                     dx = subtract(add(wide(joints[j - 1, 0]), multiply(share, hx)), px)
                     dy = subtract(add(wide(joints[j - 1, 1]), multiply(share, hy)), py)
                     t = dot(dx, dy, vx, vy)
-                    if -error <= t[0] and earlier(t, time):
+                    height = t[0] * (before[0] - after[0]) / lines[j - 1, 4]
+                    if earlier(t, time) and meets(
+                        t, height, joints, arcs, beziers, own_kind, own_index, own_s, LINE, j - 1, own_s,
+                        px, py, vx, vy, flown, slack, error,
+                    ):  # fmt: skip
                         time, kind, index, edge_share = t, LINE, j - 1, share
             before = after
 
         for table in range(2):
             low, high = (circle_low, circle_high) if table == 0 else (ellipse_low, ellipse_high)
             for k in range(low, high):
-                t, undecided = arc_hit(arcs[k], own_kind == ARC and own_index == k, px, py, vx, vy, error)
+                t, undecided, height = arc_hit(arcs[k], own_kind == ARC and own_index == k, px, py, vx, vy, error)
                 graze_time = min(graze_time, undecided)
-                if earlier(t, time):
+                if earlier(t, time) and meets(
+                    t, height, joints, arcs, beziers, own_kind, own_index, own_s, ARC, k, own_s,
+                    px, py, vx, vy, flown, slack * max(1.0, arcs[k, 15]), error * max(1.0, arcs[k, 15]),
+                ):  # fmt: skip
                     time, kind, index = t, ARC, k
         for k in range(bezier_low, bezier_high):
             start_s = own_s if own_kind == BEZIER and own_index == k else (-1.0, 0.0)
-            t, s, undecided = bezier_hit(beziers[k], start_s, px, py, vx, vy, error)
+            t, s, undecided, near_s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack, error)
             graze_time = min(graze_time, undecided)
             if earlier(t, time):
                 time, kind, index, hit_s = t, BEZIER, k, s
+            if near_s[0] >= 0.0 and meets(
+                (0.0, 0.0), 0.0, joints, arcs, beziers, own_kind, own_index, own_s, BEZIER, k, near_s,
+                px, py, vx, vy, flown, slack, error,
+            ):  # fmt: skip
+                time, kind, index, hit_s = (0.0, 0.0), BEZIER, k, near_s
 
-        if vy[0] > 0.0 and own_kind != LID:
+        # a piece that lies in the opening or in a side within rounding is met before them
+        if vy[0] > 0.0 and own_kind != LID and py[0] + time[0] * vy[0] > slack:
             t = divide(negate(py), vy)
             inside = is_open
             if not is_open:
                 c_right = add(multiply(subtract(wide(right), px), vy), multiply(py, vx))
                 c_left = add(multiply(subtract(wide(left), px), vy), multiply(py, vx))
                 inside = c_right[0] >= 0.0 >= c_left[0]
-            if inside and not earlier(time, t):
+            if inside:
                 time, kind = t, LID
         if is_open and vx[0] != 0.0:
             t = divide(subtract(wide(right if vx[0] > 0.0 else left), px), vx)
-            if earlier(t, time):
+            beyond = abs(vx[0]) * (time[0] - t[0])
+            if beyond > slack or (kind == LID and earlier(t, time)):
                 time, kind = t, SIDE
 
         steps += 1
@@ -195,8 +241,15 @@ def refined_ray(
         approach = dot(vx, vy, nx, ny)
         incidence = abs(approach[0])
         # a corner at the end of what is hit is as far away as the hit up to the width over the sine of incidence
-        if corner_time <= time[0] or (corner_time - time[0]) * incidence <= 2.0 * corner_width:
-            return px, (0.0, 0.0), bounces, CORNER, norm, local
+        for j in range(joint_low, joint_high if corner_time < np.inf else joint_low):
+            if joints[j, 2] > 0.0:
+                dx, dy = subtract(wide(joints[j, 0]), px), subtract(wide(joints[j, 1]), py)
+                ahead = dot(dx, dy, vx, vy)[0]
+                width = WIDTH_MARGIN * half_ulp * abs(scale * j2 + ahead * a2) + (1.0 + ahead / scale) * error
+                met = 0.0 < ahead and (ahead - time[0]) * incidence <= 2.0 * width
+                if met and abs(cross(dx, dy, vx, vy)[0]) <= width:
+                    if kind != LINE or is_beside(joints, index, j):
+                        return px, (0.0, 0.0), bounces, CORNER, norm, local
         flight = time[0] / scale
         j1 += flight * a1
         j2 += flight * a2
@@ -205,13 +258,14 @@ def refined_ray(
             x = add(qx, two_product(float(wraps), right - left))
             norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
             return x, direction_angle(vx, vy), bounces, ESCAPED, norm, local
-        if bounces >= limit or steps >= most_flights:
+        if (bounces >= limit and kind != SIDE) or steps >= most_flights:
             return px, (0.0, 0.0), bounces, BOUNCE_LIMIT, norm, local
         if kind == SIDE:
             py = qy
             px = wide(left if vx[0] > 0.0 else right)
             wraps += 1 if vx[0] > 0.0 else -1
         else:
+            flown = time[0]
             px, py = qx, qy
             twice = (2.0 * approach[0], 2.0 * approach[1])
             vx, vy = subtract(vx, multiply(twice, nx)), subtract(vy, multiply(twice, ny))

@@ -60,7 +60,7 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     refined_rays(
         np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64),
         scene.hollows, scene.joints, _rows(scene.lines, 7), _rows(scene.pairs, 10), arcs, len(circles),
-        _rows(scene.beziers, 14),
+        np.zeros((1, 14)) if scene.beziers is None else scene.beziers,
         scene.is_open, scene.cell, max_collisions, REFINED_FLIGHTS,
         result.x, result.theta, result.collisions, result.status, result.amplification, result.rounding,
     )  # fmt: skip
@@ -95,13 +95,15 @@ def retrace(
     flagged = np.flatnonzero((status == _CORNER) | (status == _GRAZING))
     if len(flagged) == 0:
         return
+    from .angle_engine import LAST_ANGLE
+
     refined = refined_trace(scene, x[flagged], theta[flagged], max_collisions)
     # a ray that is still inside after as many collisions as were asked for is settled, too
     limited = (refined.status == _BOUNCE_LIMIT) & (refined.collisions >= max_collisions)
     collisions[flagged[limited]], status[flagged[limited]] = refined.collisions[limited], _BOUNCE_LIMIT
     settled = refined.status == _SETTLED
     rays = flagged[settled]
-    out_x[rays], out_theta[rays] = refined.x[settled, 0], refined.theta[settled, 0]
+    out_x[rays], out_theta[rays] = refined.x[settled, 0], np.minimum(refined.theta[settled, 0], LAST_ANGLE)
     collisions[rays], status[rays] = refined.collisions[settled], _SETTLED
 
 

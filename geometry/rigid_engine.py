@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from .contact_engine import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, first_in_hollow, next_root
-from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, LINE, NO_PIECE, SIDE
+from .engine import BOUNCE_LIMIT, CORNER, ESCAPED
 from .flight_engine import compiled, flight, inlined, satellite_after, towards_line, turning
+from .nearby_engine import LINE, NO_PIECE, SIDE
 from .opening_engine import last_hollow
 from .stop_engine import is_raised
 

@@ -77,7 +77,8 @@ class Trace(Outcomes):
     x : array of float
         Where the ray left through y = 0, unfolded (not reduced to one period); elsewhere its last position.
     theta : array of float
-        Outgoing angle in (0, pi) of rays that escaped; elsewhere the direction (cos, sin) of the last finite
+        Outgoing angle of rays that escaped, in (0, pi): an angle that rounds to pi is the largest double below it;
+        elsewhere the direction (cos, sin) of the last finite
         velocity as an angle in [-pi, pi].
     collisions : array of int
         Number of collisions; a flat top counts as one.
