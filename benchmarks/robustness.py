@@ -1,7 +1,9 @@
-"""Rays aimed at corners and tangencies, and rays at grazing angles, against the double-double twin: every one of them.
+"""Rays aimed at corners and tangencies, and rays at grazing angles, against another tracer: every one of them.
 
-``python -m benchmarks.robustness`` traces a million of each on eleven walls and prints what became of them. The twin is
-judged in turn by the tests' tracer in 50 digits: on a thousand rays, and on every ray where twin and tracer disagree.
+``python -m benchmarks.robustness`` traces a million of each on eleven walls against the double-double twin, and a
+million rays aimed at the corners of random polygons of each kind in `POLYGONS` against the tests' brute-force tracer in
+31 digits, and prints what became of them. Twin and brute force are judged in turn by the tests' tracer in 50 digits: on
+a thousand rays, and on every ray where they and the tracer disagree.
 """
 
 from __future__ import annotations
@@ -11,12 +13,15 @@ import math
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from tests.brute_tracer import brute_trace
 from tests.precise_tracer import trace_precisely
 
 from asperity import geometry as geo
+from asperity.errors import WallError
 from asperity.geometry.double_double import EPS_DOUBLE_DOUBLE
 from asperity.geometry.refined_engine import LOST
 from asperity.geometry.refinement import RefinedTrace, refined_trace
@@ -61,9 +66,44 @@ WALLS: dict[str, geo.Wall] = {
         ],
         period=1.0,
     ),
+    "four arcs": geo.Wall(
+        [
+            geo.Arc(
+                (0.1546391703711259, -0.02041208723651003), 0.15598053185709104, 3.0103531934108654, 4.617960019657345
+            ),
+            geo.Arc(
+                (0.4178723959764181, -0.1979007325141735), 0.27882584942072397, 3.0618778250273615, 4.723808942654955
+            ),
+            geo.Arc(
+                (0.13104489827115823, -0.029936759920226264),
+                0.532645878892581,
+                -0.9950349420962289,
+                0.056233502659632895,
+            ),
+            geo.Arc(
+                (0.8314244154251915, 0.19555783647241926), 0.25818713198087906, -2.2822297626428414, -0.8593628909469517
+            ),
+        ],
+        period=1.0,
+    ),
 }
 
 
+# Random polygons of each kind, and what their peaks and plates are like: uniform in the logarithm.
+POLYGON_WALLS = 100
+PEAK_ANGLES = (1e-4, 0.1)
+PLATE_THICKNESS = (1e-17, 1e-12)
+# Every third plate has no thickness.
+THIN_SHARE = 1 / 3
+# Distances from a corner at which rays are aimed.
+BESIDE_CORNERS = (1e-17, 1e-9)
+FLOOR = -0.9
+# Sine of the shallowest of the rays at edges between itineraries.
+SHALLOWEST = 1e-3
+
+Point = tuple[float, float]
+# A wall and rays to the end, or to the judge's.
+Follow = Callable[[geo.Wall, Floats, Floats], RefinedTrace]
 # Rays of a kind: places and angles of so many on a wall.
 Rays = Callable[[geo.Wall, int, np.random.Generator], tuple[Floats, Floats]]
 COUNTED = ("rays", "lost", "flagged", "conditioned", "wrong")
@@ -94,6 +134,9 @@ def aimed_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Fl
     x = wall.period * rng.random(straight)
     theta = np.arctan2(-target[:, 1], x - target[:, 0])
     edges_x, edges_theta = _edges(wall, (count - straight + AIM_ULPS) // (AIM_ULPS + 1), rng)
+    if not len(edges_x):
+        # none among so few tries
+        edges_x, edges_theta = np.array([0.5 * wall.period]), np.array([1.0])
     copies = -(-(count - straight) // max(1, len(edges_x)))
     x = np.concatenate([x, np.repeat(edges_x, copies)[: count - straight]])
     theta = np.concatenate([theta, np.repeat(edges_theta, copies)[: count - straight]])
@@ -106,16 +149,165 @@ def grazing_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[
     return wall.period * rng.random(count), np.where(rng.random(count) < 0.5, theta, math.pi - theta)
 
 
-def judge(wall: geo.Wall, x: Floats, theta: Floats) -> Verdict:
-    """Compare the tracer with the twin on every ray."""
+def twin_trace(wall: geo.Wall, x: Floats, theta: Floats) -> RefinedTrace:
+    """The double-double twin as a judge."""
+    return refined_trace(wall.scene, x, theta, COLLISIONS)
+
+
+def brute_force(wall: geo.Wall, x: Floats, theta: Floats) -> RefinedTrace:
+    """The brute-force tracer of polygons as a judge."""
+    return brute_trace(wall, x, theta, COLLISIONS)
+
+
+def rays_beside_corners(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Two thirds of the rays at places on the wall's segments next to their ends, the rest as `aimed_rays`."""
+    chains = [wall.vertices, *wall.island_vertices]
+    start, end = (np.concatenate([chain[part] for chain in chains]) for part in (slice(-1), slice(1, None)))
+    straight = 2 * count // 3
+    chosen = rng.integers(len(start), size=straight)
+    corner, other = start[chosen], end[chosen]
+    back = rng.random(straight) < 0.5
+    corner, other = np.where(back[:, None], other, corner), np.where(back[:, None], corner, other)
+    along = (other - corner) / np.hypot(*(other - corner).T)[:, None]
+    target = corner + _log_uniform(BESIDE_CORNERS, rng, straight)[:, None] * along
+    target = np.where((target[:, 1] < -0.01)[:, None], target, [0.5 * wall.period, FLOOR])
+    x = wall.period * rng.random(straight)
+    # every other ray comes steeply, along the peaks and plates
+    steep = rng.random(straight) < 0.5
+    x[steep] = np.clip(target[steep, 0] + rng.normal(0.0, 0.05, steep.sum()), 1e-3 * wall.period, 0.999 * wall.period)
+    theta = np.clip(np.arctan2(-target[:, 1], x - target[:, 0]), 1e-12, math.pi - 1e-12)
+    rest_x, rest_theta = aimed_rays(wall, count - straight, rng)
+    # over an open wall these would pass a thousand cells
+    rest_theta = np.where(np.sin(rest_theta) < SHALLOWEST, 1.0, rest_theta)
+    return np.concatenate([x, rest_x]), np.concatenate([theta, rest_theta])
+
+
+def _log_uniform(limits: tuple[float, float], rng: np.random.Generator, count: int) -> Floats:
+    return np.exp(rng.uniform(*np.log(limits), count))
+
+
+def _slots(rng: np.random.Generator) -> Floats:
+    """The middles of 3 to 6 intervals of one width in [0, 1]."""
+    count = int(rng.integers(3, 7))
+    return (np.arange(count) + 0.5) / count
+
+
+def _ground(rng: np.random.Generator, feet: list[list[Point]]) -> geo.Wall:
+    """A wall of vertices from left to right between the edges of a hollow, or at the bottom of an open wall."""
+    level = 0.0 if rng.random() < 0.5 else float(rng.uniform(-0.9, -0.5))
+    points = [(0.0, level), *(point for foot in feet for point in foot), (1.0, level)]
+    return geo.Wall.from_vertices(_without_repeats(points))
+
+
+def _without_repeats(points: list[Point]) -> list[Point]:
+    return [point for k, point in enumerate(points) if k == 0 or point != points[k - 1]]
+
+
+def sharp_peaks(rng: np.random.Generator) -> geo.Wall:
+    """A polygon with sharp peaks, from 1e-4 to 0.1 radians, upright or leaning."""
+    feet = []
+    for x in _slots(rng).tolist():
+        bottom, top = float(rng.uniform(-1.0, -0.6)), float(rng.uniform(-0.5, -0.02))
+        half = (top - bottom) * math.tan(0.5 * float(_log_uniform(PEAK_ANGLES, rng, 1)[0]))
+        lean = float(rng.choice([0.0, rng.uniform(-0.04, 0.04)]))
+        feet.append([(x - half, bottom), (x + lean, top), (x + half, bottom)] if rng.random() < 0.7 else [(x, bottom)])
+    return _ground(rng, feet)
+
+
+def _thickness(rng: np.random.Generator) -> float:
+    return 0.0 if rng.random() < THIN_SHARE else float(_log_uniform(PLATE_THICKNESS, rng, 1)[0])
+
+
+def standing_plates(rng: np.random.Generator) -> geo.Wall:
+    """A polygon with plates on its ground, some of them at the side of an open cell."""
+    feet = []
+    for x in _slots(rng).tolist():
+        bottom, top = float(rng.uniform(-1.0, -0.6)), float(rng.uniform(-0.5, -0.02))
+        lean, thickness = float(rng.choice([0.0, rng.uniform(-0.04, 0.04)])), _thickness(rng)
+        plate = [(x, bottom), (x + lean, top), (x + lean + thickness, top), (x + thickness, bottom)]
+        feet.append(plate if rng.random() < 0.7 else [(x, bottom)])
+    if rng.random() < 0.3:
+        bottom = float(rng.uniform(-1.0, -0.6))
+        side = [(0.0, bottom), (0.0, -0.1), (0.0, bottom)]
+        points = [*side, *(point for foot in feet for point in foot), (1.0, bottom)]
+        return geo.Wall.from_vertices(_without_repeats(points))
+    return _ground(rng, feet)
+
+
+def _floor(rng: np.random.Generator, islands: list[list[Point]]) -> geo.Wall:
+    """Islands over a flat floor, between sides or none."""
+    floor = [(0.0, FLOOR), (1.0, FLOOR)]
+    path = [(0.0, 0.0), *floor, (1.0, 0.0)] if rng.random() < 0.5 else floor
+    pieces = [geo.Segment(a, b) for a, b in pairwise(path)]
+    loops = [[geo.Segment(a, b) for a, b in pairwise(_without_repeats([*loop, loop[0]]))] for loop in islands]
+    return geo.Wall(pieces, period=1.0, islands=loops)
+
+
+def floating_plates(rng: np.random.Generator) -> geo.Wall:
+    """Plates that float over a floor, lie on it or in the opening, upright, level or tilted."""
+    islands = []
+    for x in _slots(rng).tolist():
+        half, thickness = float(rng.uniform(0.02, 0.07)), _thickness(rng)
+        y = float(rng.choice([FLOOR, 0.0, *rng.uniform(-0.75, -0.15, 4)], p=[0.15, 0.05, 0.2, 0.2, 0.2, 0.2]))
+        angle = float(rng.choice([0.0, 0.5 * math.pi, rng.uniform(-1.5, 1.5)]))
+        tilt = (0.0, 1.0) if angle == 0.5 * math.pi else (math.cos(angle), math.sin(angle))
+        ex, ey = (1.0, 0.0) if y in (FLOOR, 0.0) else tilt
+        a, b = (x - half * ex, y - half * ey), (x + half * ex, y + half * ey)
+        # the other face lies below, but above it on the floor
+        down = -thickness if y == FLOOR else thickness
+        c, d = (b[0] + down * ey, b[1] - down * ex), (a[0] + down * ey, a[1] - down * ex)
+        islands.append([a, b, c, d])
+    return _floor(rng, islands)
+
+
+def sharp_islands(rng: np.random.Generator) -> geo.Wall:
+    """Triangles with a sharp tip, some of them with an edge or a tip on the floor."""
+    islands = []
+    for x in _slots(rng).tolist():
+        length, direction = float(rng.uniform(0.03, 0.07)), float(rng.uniform(0.0, 2.0 * math.pi))
+        half = length * math.tan(0.5 * float(_log_uniform(PEAK_ANGLES, rng, 1)[0]))
+        ex, ey = math.cos(direction), math.sin(direction)
+        y = float(rng.uniform(-0.75, -0.15))
+        loop = [
+            (x + length * ex, y + length * ey),
+            (x - length * ex - half * ey, y - length * ey + half * ex),
+            (x - length * ex + half * ey, y - length * ey - half * ex),
+        ]
+        if rng.random() < 0.3:
+            loop = [(x + half, FLOOR), (x - half, FLOOR), (x + 0.3 * length * ex, FLOOR + length)]
+        elif rng.random() < 0.3:
+            loop = [(x, FLOOR), (x - half, FLOOR + length), (x + half, FLOOR + length)]
+        islands.append(loop)
+    return _floor(rng, islands)
+
+
+POLYGONS: dict[str, Callable[[np.random.Generator], geo.Wall]] = {
+    "sharp peaks": sharp_peaks,
+    "standing plates": standing_plates,
+    "floating plates": floating_plates,
+    "sharp islands": sharp_islands,
+}
+
+
+def random_polygon(kind: str, rng: np.random.Generator) -> geo.Wall:
+    """A polygon of a kind in `POLYGONS` that `geo.Wall` accepts."""
+    while True:
+        try:
+            return POLYGONS[kind](rng)
+        except WallError:
+            continue
+
+
+def judge(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace) -> Verdict:
+    """Compare the tracer with another one on every ray."""
     traced = geo.trace(wall, x, theta, max_collisions=COLLISIONS)
-    twin = refined_trace(wall.scene, x, theta, COLLISIONS)
+    twin = follow(wall, x, theta)
     flagged = (traced.status == geo.Status.CORNER) | (traced.status == geo.Status.GRAZING)
     same, distance = _agree(traced, twin)
     other = np.flatnonzero(~same)
     # lost: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
     lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == LOST)
-    explained = _explained(wall, _part(traced, other), x[other], theta[other])
+    explained = _explained(wall, _part(traced, other), x[other], theta[other], follow)
     # the twin flags a ray where half an ulp of its angle meets a corner; one that misses it is not wrong
     for k in np.flatnonzero(~explained & (twin.status[other] != geo.Status.ESCAPED)):
         explained[k] = _is_precise(wall, traced, other[k], float(x[other[k]]), float(theta[other[k]]))
@@ -144,9 +336,9 @@ def measure_robustness(rays: int) -> dict[str, Verdict]:
     return found
 
 
-def wrong_twins(wall: geo.Wall, x: Floats, theta: Floats) -> int:
-    """How many of these rays the twin takes elsewhere than the tracer in 50 digits does."""
-    twin = refined_trace(wall.scene, x, theta, COLLISIONS)
+def wrong_twins(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace) -> int:
+    """How many of these rays a judge takes elsewhere than the tracer in 50 digits does."""
+    twin = follow(wall, x, theta)
     wrong = 0
     for k in np.flatnonzero(twin.status == geo.Status.ESCAPED):
         ray = trace_precisely(wall.scene, float(x[k]), float(theta[k]), COLLISIONS)
@@ -179,7 +371,7 @@ def _agree(traced: geo.Trace, twin: RefinedTrace) -> tuple[NDArray[np.bool_], Fl
     return near | limited | ((traced.status == twin.status) & ~gone), distance
 
 
-def _explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats) -> NDArray[np.bool_]:
+def _explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats, follow: Follow) -> NDArray[np.bool_]:
     """Which rays the twin takes where the tracer took them, once moved by a few ulps of the cell or of the angle."""
     result = np.zeros(len(x), np.bool_)
     ulps = [sign * 2.0**k for k in range(-2, int(math.log2(CONDITION_ULPS)) + 1) for sign in (-1.0, 1.0)]
@@ -190,7 +382,7 @@ def _explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats) -> N
             break
         place, angle = x[rest] + dx * EPS * wall.period, theta[rest]
         angle = np.clip(angle + dt * EPS, 0.5 * angle, 0.5 * (angle + math.pi))
-        result[rest] = _agree(_part(traced, rest), refined_trace(wall.scene, place, angle, COLLISIONS))[0]
+        result[rest] = _agree(_part(traced, rest), follow(wall, place, angle))[0]
     return result
 
 
@@ -221,25 +413,49 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=RAYS, help="rays of each kind on all walls together")
     parser.add_argument("--precise", type=int, default=PRECISE_RAYS, help="rays in 50 digits, besides all in dispute")
     options = parser.parse_args()
-    rays, precise = options.rays // len(WALLS), options.precise // (2 * len(WALLS))
     print(
         "| wall | rays | aimed | lost | flagged | conditioning | wrong | worst error/(eps derivative bounces) | "
-        "in 50 digits | twin wrong |"
+        "in 50 digits | judge wrong |"
     )
     print("|" + "---|" * 10)
     rng = np.random.default_rng(0)
+    rays, precise = options.rays // len(WALLS), options.precise // (2 * len(WALLS))
     for name, wall in WALLS.items():
         for kind, make in KINDS.items():
-            x, theta = make(wall, rays, rng)
-            v = judge(wall, x, theta)
-            sample = np.column_stack([x, theta])[:: -(-rays // max(1, precise))]
-            judged = np.concatenate([np.reshape(v.disagreements, (-1, 2)), sample])
-            twins = wrong_twins(wall, judged[:, 0], judged[:, 1])
-            print(
-                f"| {name} | {v.rays} | {kind} | {v.lost} | {v.flagged} | {v.conditioned} | {v.wrong} "
-                f"| {v.worst:.2g} | {len(judged)} | {twins} |",
-                flush=True,
-            )
+            _print_row(name, kind, [_judged(wall, make, rays, precise, twin_trace, rng)])
+    rays, precise = options.rays // POLYGON_WALLS, options.precise // POLYGON_WALLS
+    for name in POLYGONS:
+        rows = []
+        for number in range(POLYGON_WALLS):
+            own = np.random.default_rng([1, number])
+            wall = random_polygon(name, own)
+            rows.append(_judged(wall, rays_beside_corners, rays, precise, brute_force, own))
+        _print_row(f"{POLYGON_WALLS} random: {name}", "beside corners", rows)
+
+
+def _judged(
+    wall: geo.Wall, make: Rays, rays: int, precise: int, follow: Follow, rng: np.random.Generator
+) -> tuple[Verdict, int, int]:
+    """The verdict on rays of a wall, how many of them were traced in 50 digits, and how often the judge was wrong."""
+    x, theta = make(wall, rays, rng)
+    verdict = judge(wall, x, theta, follow)
+    sample = np.column_stack([x, theta])[:: -(-rays // max(1, precise))]
+    judged = np.concatenate([np.reshape(verdict.disagreements, (-1, 2)), sample])
+    return verdict, len(judged), wrong_twins(wall, judged[:, 0], judged[:, 1], follow)
+
+
+def _print_row(name: str, kind: str, rows: list[tuple[Verdict, int, int]]) -> None:
+    """Print the sums over some walls as a row of the table."""
+    verdicts = [row[0] for row in rows]
+    rays, *others = (sum(getattr(one, count) for one in verdicts) for count in COUNTED)
+    lost, flagged, conditioned, wrong = others
+    worst = max(one.worst for one in verdicts)
+    precise, twins = sum(row[1] for row in rows), sum(row[2] for row in rows)
+    print(
+        f"| {name} | {rays} | {kind} | {lost} | {flagged} | {conditioned} | {wrong} "
+        f"| {worst:.2g} | {precise} | {twins} |",
+        flush=True,
+    )
 
 
 if __name__ == "__main__":

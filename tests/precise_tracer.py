@@ -157,23 +157,29 @@ def trace_precisely(scene, x, theta, limit=2000):
             for row in table[int(hollow[k]) : int(hollow[k + 1])]
         ]
         curves = [] if scene.beziers is None else [_bezier(r) for r in scene.beziers[int(hollow[9]) : int(hollow[10])]]
-        bounces, itinerary = 0, []
+        bounces, itinerary, enters = 0, [], True
         while bounces <= limit:
             while True:
                 near = starts if len(starts) <= MANY_LINES else _candidates(scene, starts, p, v)
                 hits = [(*h, ("line", int(j))) for j in near for h in _line_hits(*_line(scene, j), p, v)]
                 hits += [(*h, ("arc", k)) for k, arc in enumerate(arcs) for h in _arc_hits(arc, p, v)]
                 hits += [(*h, ("curve", k)) for k, curve in enumerate(curves) for h in _bezier_hits(curve, p, v)]
+                # a ray meets the top of a plate in the opening, and a face in a side, where it starts
+                near = -NEAR * scene.cell if enters else NEAR * scene.cell
                 t, normal, piece = min(
-                    (h for h in hits if h[0] > NEAR * scene.cell), default=(mp.inf, None, None), key=lambda h: h[0]
+                    (h for h in hits if h[0] > near), default=(mp.inf, None, None), key=lambda h: h[0]
                 )
                 leave = -p[1] / v[1] if v[1] > 0 else mp.inf
                 # a plate of no thickness lies as high as the opening beside it
                 if leave < mp.inf and not (scene.is_open or left <= p[0] + leave * v[0] <= right):
                     leave = mp.inf
                 side = ((right if v[0] > 0 else left) - p[0]) / v[0] if scene.is_open and v[0] != 0 else mp.inf
+                # pieces lie in the cell, so that one that is met with a side, or with the opening, is met before
+                leave = leave if leave + NEAR * scene.cell < t else mp.inf
+                side = side if side + NEAR * scene.cell < t else mp.inf
                 if min(leave, t) <= side:
                     break
+                enters = True
                 # into the next cell: the wall is periodic, and the base counts the periods
                 step = right - left if v[0] > 0 else left - right
                 base += step
@@ -182,7 +188,7 @@ def trace_precisely(scene, x, theta, limit=2000):
                 return PreciseRay(base + p[0] + leave * v[0], mp.atan2(v[1], v[0]), bounces, tuple(itinerary))
             if normal is None:
                 return PreciseRay(None, None, bounces, tuple(itinerary))
-            p = (p[0] + t * v[0], p[1] + t * v[1])
+            p, enters = (p[0] + t * v[0], p[1] + t * v[1]), False
             size = mp.sqrt(normal[0] ** 2 + normal[1] ** 2)
             n = (normal[0] / size, normal[1] / size)
             w = 2 * (v[0] * n[0] + v[1] * n[1])
