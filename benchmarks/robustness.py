@@ -193,9 +193,9 @@ def _slots(rng: np.random.Generator) -> Floats:
 
 
 def _ground(rng: np.random.Generator, feet: list[list[Point]]) -> geo.Wall:
-    """A wall of vertices from left to right between the edges of a hollow, or at the bottom of an open wall."""
-    level = 0.0 if rng.random() < 0.5 else float(rng.uniform(-0.9, -0.5))
-    points = [(0.0, level), *(point for foot in feet for point in foot), (1.0, level)]
+    """A hollow of vertices from left to right, between upright sides or slopes."""
+    left, right = ([(x, float(rng.uniform(-0.9, -0.5)))] if rng.random() < 0.5 else [] for x in (0.0, 1.0))
+    points = [(0.0, 0.0), *left, *(point for foot in feet for point in foot), *right, (1.0, 0.0)]
     return geo.Wall.from_vertices(_without_repeats(points))
 
 
@@ -219,18 +219,13 @@ def _thickness(rng: np.random.Generator) -> float:
 
 
 def standing_plates(rng: np.random.Generator) -> geo.Wall:
-    """A polygon with plates on its ground, some of them at the side of an open cell."""
+    """A polygon with plates on its ground."""
     feet = []
     for x in _slots(rng).tolist():
         bottom, top = float(rng.uniform(-1.0, -0.6)), float(rng.uniform(-0.5, -0.02))
         lean, thickness = float(rng.choice([0.0, rng.uniform(-0.04, 0.04)])), _thickness(rng)
         plate = [(x, bottom), (x + lean, top), (x + lean + thickness, top), (x + thickness, bottom)]
         feet.append(plate if rng.random() < 0.7 else [(x, bottom)])
-    if rng.random() < 0.3:
-        bottom = float(rng.uniform(-1.0, -0.6))
-        side = [(0.0, bottom), (0.0, -0.1), (0.0, bottom)]
-        points = [*side, *(point for foot in feet for point in foot), (1.0, bottom)]
-        return geo.Wall.from_vertices(_without_repeats(points))
     return _ground(rng, feet)
 
 
@@ -244,8 +239,8 @@ def _floor(rng: np.random.Generator, islands: list[list[Point]]) -> geo.Wall:
 
 
 def floating_plates(rng: np.random.Generator) -> geo.Wall:
-    """Plates that float over a floor, lie on it or in the opening, upright, level or tilted."""
-    islands = []
+    """Plates that float over a floor, lie on it, in the opening or in a side, upright, level or tilted."""
+    islands = [[(0.0, -0.7), (0.0, -0.2)]] if rng.random() < 0.3 else []
     for x in _slots(rng).tolist():
         half, thickness = float(rng.uniform(0.02, 0.07)), _thickness(rng)
         y = float(rng.choice([FLOOR, 0.0, *rng.uniform(-0.75, -0.15, 4)], p=[0.15, 0.05, 0.2, 0.2, 0.2, 0.2]))

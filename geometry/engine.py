@@ -24,7 +24,7 @@ from ..rounding import EPS
 from .angle_engine import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 from .arc_engine import arc_incidence, arc_reflect, arc_time, on_arc
 from .bezier_engine import bend_number, bezier_hit, bezier_value
-from .nearby_engine import BEZIER, CIRCLE, ELLIPSE, LID, LINE, NO_PIECE, SIDE, hit_nearby, line_time
+from .nearby_engine import BEZIER, CIRCLE, DOUBTFUL, ELLIPSE, LID, LINE, NO_PIECE, SIDE, hit_nearby, line_time
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
 from .resolution import JOINT_ULPS, NEARBY
 from .skips import skip_crossings, skip_hops
@@ -222,6 +222,8 @@ def trace_ray(
                 own_kind, own_index, own_s, px, py, vx, vy, flown, slack, close,
             )  # fmt: skip
             if t < time:
+                if touch == DOUBTFUL:
+                    return shift + px, vx, vy, bounces, CORNER
                 time, kind, index, hit_s, tangent = t, near_kind, near_index, near_s, touch
 
         # the opening, an edge from right to left, and the sides of an open wall, unless a piece is met before; one that

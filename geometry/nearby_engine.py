@@ -17,6 +17,9 @@ from .sides_engine import BEZIER as CURVE
 
 NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
+# In place of a tangency.
+DOUBTFUL = 2
+
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 
@@ -99,11 +102,12 @@ def hit_nearby(
     hollow, joints, lines, circles, ellipses, beziers,
     own_kind, own_index, own_s, px, py, vx, vy, flown, slack, close,
 ):  # fmt: skip
-    """First hit of a piece nearby that the ray starts in front of: time (inf if none), kind, number, place, tangency.
+    """First hit of a piece nearby that the ray starts in front of: time (inf if none), kind, number, place, doubt.
 
-    The place is that of a line or of a Bezier piece as in the loop.
+    The place is that of a line or of a Bezier piece as in the loop. The doubt is the tangency, or `DOUBTFUL` where the
+    gap that the ray crosses is within the slack: doubles do not know where it goes on, in the apex of a wedge.
     """
-    time, found, number, place, tangent = np.inf, NO_PIECE, -1, 0.0, 0
+    time, found, number, place, doubt = np.inf, NO_PIECE, -1, 0.0, 0
     if lines is not None:
         for j in range(int(hollow[3]), int(hollow[4]) - 1):
             if joints[j, 3] <= 0.0 or (own_kind == LINE and own_index == j):
@@ -119,7 +123,8 @@ def hit_nearby(
                     own_kind, own_index, own_s, LINE, j, share, joints, circles, ellipses, beziers,
                     px, py, vx, vy, flown, slack,
                 ):  # fmt: skip
-                    time, found, number, place, tangent = max(t, 0.0), LINE, j, share, 0
+                    time, found, number, place = max(t, 0.0), LINE, j, share
+                    doubt = DOUBTFUL if height <= reach and own_kind not in (LID, SIDE) else 0
     if circles is not None:
         for k in range(int(hollow[5]), int(hollow[6])):
             if own_kind == CIRCLE and own_index == k:
@@ -129,7 +134,8 @@ def hit_nearby(
                 own_kind, own_index, own_s, CIRCLE, k, 0.0, joints, circles, ellipses, beziers,
                 px, py, vx, vy, flown, slack,
             )):  # fmt: skip
-                time, found, number, place, tangent = t, CIRCLE, k, 0.0, touch
+                time, found, number, place = t, CIRCLE, k, 0.0
+                doubt = touch if is_clear or own_kind in (LID, SIDE) else DOUBTFUL
     if ellipses is not None:
         for k in range(int(hollow[7]), int(hollow[8])):
             if own_kind == ELLIPSE and own_index == k:
@@ -139,7 +145,8 @@ def hit_nearby(
                 own_kind, own_index, own_s, ELLIPSE, k, 0.0, joints, circles, ellipses, beziers,
                 px, py, vx, vy, flown, slack,
             )):  # fmt: skip
-                time, found, number, place, tangent = t, ELLIPSE, k, 0.0, touch
+                time, found, number, place = t, ELLIPSE, k, 0.0
+                doubt = touch if is_clear or own_kind in (LID, SIDE) else DOUBTFUL
     if beziers is not None:
         for k in range(int(hollow[9]), int(hollow[10])):
             own = own_s if own_kind == BEZIER and own_index == k else -1.0
@@ -148,5 +155,6 @@ def hit_nearby(
                 own_kind, own_index, own_s, BEZIER, k, s, joints, circles, ellipses, beziers,
                 px, py, vx, vy, flown, slack,
             ):  # fmt: skip
-                time, found, number, place, tangent = 0.0, BEZIER, k, s, 0
-    return time, found, number, place, tangent
+                time, found, number, place = 0.0, BEZIER, k, s
+                doubt = 0 if own_kind in (LID, SIDE) else DOUBTFUL
+    return time, found, number, place, doubt

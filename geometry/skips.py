@@ -81,6 +81,9 @@ def skip_crossings(pair, nx, ny, px, py, vx, vy, slack, most):
             return px, py, vx, vy, 0
         count = room * away / step
     else:
+        if gap * away <= slack:
+            # next to the apex, where the gap is within rounding, doubles do not know the ray's place
+            return px, py, vx, vy, 0
         # the part ends on circles about the apex, whose curvature is that of the circle through the ray's place
         curvature = sine / gap
         d = along * along - ahead * curvature * (2.0 - ahead * curvature)

@@ -91,7 +91,9 @@ PLATES = {
     "in the opening": geo.Wall(
         FLOOR, period=1.0, islands=[[geo.Segment((0.2, 0.0), (0.7, 0.0)), geo.Segment((0.7, 0.0), (0.2, 0.0))]]
     ),
-    "at a side": geo.Wall.from_vertices([(0, -0.9), (0, -0.3), (0, -0.9), (1, -0.9)]),
+    "in a side": geo.Wall(
+        FLOOR, period=1.0, islands=[[geo.Segment((0.0, -0.9), (0.0, -0.3)), geo.Segment((0.0, -0.3), (0.0, -0.9))]]
+    ),
     "in a notch": geo.Wall.from_vertices([(0, 0), (0, -0.9), (0.4, -0.9), (0.5, -0.2), (0.4, -0.9), (1, -0.9), (1, 0)]),
     "an arc": geo.Wall(
         FLOOR,
@@ -194,6 +196,5 @@ def test_rays_that_leave_along_the_wall_can_be_sent_back(wall):
 
 
 def test_cells_passed_without_a_hit_do_not_count_as_collisions():
-    wall = geo.Wall.from_vertices([(0.0, -0.5), (0.5, -0.6), (1.0, -0.5)])
-    one = geo.trace(wall, 0.3, 0.01, max_collisions=1)
-    assert one.escaped and one.collisions == geo.trace(wall, 0.3, 0.01).collisions == 1
+    one = geo.trace(PLATES["on the floor"], 0.3, 0.01, max_collisions=1)
+    assert one.escaped and one.collisions == 1
