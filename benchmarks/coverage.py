@@ -20,10 +20,9 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.kernels import functional
 from asperity.kernels.circular import CircularArcLaw
-from asperity.kernels.sampling import DEFAULT_SAMPLES
 from asperity.spectral.sampling import sampling_errors, sampling_quantile
 
-REPEATS, RAYS = 1000, 4096
+REPEATS, RAYS, RESISTANCE_RAYS = 1000, 4096, 2**14
 TEETH, ARC = ker.TriangularTeethLaw(1.1), CircularArcLaw(1.2)
 SCATTERING, MAXWELL = ker.henyey_greenstein(0.6), ker.maxwell(0.4)
 PANELS = ker.Panels(np.linspace(0.0, np.pi, 5), 2)
@@ -148,7 +147,7 @@ class Rays(ker.DrivenLaw):
         return self.closed.respond(np.mod(x + self.seed * 0.6180339887498949, 1.0), theta)
 
 
-def resistance_once(rng: np.random.Generator, rays: int = DEFAULT_SAMPLES) -> tuple[float, float]:
+def resistance_once(rng: np.random.Generator, rays: int = RESISTANCE_RAYS) -> tuple[float, float]:
     """The error of the resistance of triangular teeth with a random apex angle, by rays."""
     closed = ker.TriangularTeethLaw(float(rng.uniform(0.3, 2.8)))
     with mock.patch.object(functional, "DEFAULT_SAMPLES", rays):
@@ -207,7 +206,8 @@ def distances(repeats: int) -> Iterator[tuple[str, Tally]]:
 
 def resistances(repeats: int) -> Iterator[tuple[str, Tally]]:
     """Resistances by rays."""
-    yield "resistance, qmc | triangular teeth, any angle | Directions() | 1048576", tally(resistance_once, repeats)
+    name = f"resistance, qmc | triangular teeth, any angle | Directions() | {RESISTANCE_RAYS}"
+    yield name, tally(resistance_once, repeats)
 
 
 SECTIONS = {
