@@ -11,10 +11,11 @@ from ..checks import Floats, whole_number
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
-# Products of two functions oscillate at most 2 n - 1 times as fast as cos(theta). On an interval of length h, Gauss
-# needs about n h / 2 nodes to follow them and DIGITS more to reach rounding; DEGREES a panel keep the rules short.
+# Products of two functions, times the weight, oscillate at most 2 n times as fast as cos(theta). On an interval of
+# length h, Gauss needs about n h / 2 nodes to follow them and DIGITS more to reach rounding (with 16 they are 1e-12
+# off, with 17 1e-13); DEGREES a panel keep the rules short.
 DEGREES_PER_PANEL = 16
-DIGITS = 16
+DIGITS = 18
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
