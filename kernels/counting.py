@@ -233,6 +233,7 @@ def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Flo
     that its variance is N Var k(x, x) + 2 N (N - 1) E k(x, y)^2. Without the first term, which rules where most counts
     are 0 or 1, counts would be taken for normal.
     """
+    number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs may be beyond int64
     share = counts / number[:, None]
     # without bias, as p^2 alone matters where counts are small
     square = np.maximum(share * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
