@@ -142,8 +142,9 @@ class Panels(Basis):
 
         ``moments`` has shape (..., panels, degree + 1).
         """
-        turned = np.matmul(np.moveaxis(moments, -2, 0), self._coefficients)
-        return np.asarray(np.moveaxis(turned, 0, -2).reshape((*moments.shape[:-2], self.size)))
+        flat = moments.reshape(-1, *moments.shape[-2:])
+        turned = np.matmul(np.moveaxis(flat, 1, 0), self._coefficients)
+        return np.asarray(np.moveaxis(turned, 0, 1).reshape((*moments.shape[:-2], self.size)))
 
     def legendre_series(self, vectors: Floats) -> Floats:
         """Coefficients in the panels' Legendre polynomials, (panels, degree + 1, k), from ``vectors``, (size, k)."""
