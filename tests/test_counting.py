@@ -1,0 +1,307 @@
+"""Matrices from counted pairs: small tables by hand, moments by enumeration, quantiles of known distributions."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.sparse import issparse
+from scipy.stats import binom, chi2, gamma, norm, t
+
+from asperity.errors import AccuracyError
+from asperity.kernels import Bins, Legendre, counting
+from asperity.kernels.counting import array_from_counts, array_from_sums, count_pairs, half_width, sum_products
+
+UNEVEN = Bins([0.0, np.pi / 3, np.pi])  # of measures 1/4 and 3/4
+COUNTS = np.array([[30, 10], [20, 100]])
+
+
+def test_pairs_are_counted_in_their_cells() -> None:
+    incoming, outgoing = np.array([[0.1, 0.2], [0.3, 2.0]]), np.array([[2.0, 3.0], [0.4, 2.5]])
+    table = count_pairs(UNEVEN, incoming, outgoing)
+    assert table.tolist() == [[1, 2], [0, 1]] and table.dtype == np.int64
+    assert count_pairs(Bins(3), np.array([3.0]), np.array([0.1])).tolist() == [[0, 0, 0], [0, 0, 0], [1, 0, 0]]
+    basis, theta, turned = Legendre(3), np.array([0.3, 1.0]), np.array([2.0, 2.9])
+    products = [np.outer(basis.evaluate(a), basis.evaluate(b)) for a, b in zip(theta, turned, strict=True)]
+    assert np.allclose(sum_products(basis, theta, turned), sum(products), rtol=1e-14, atol=1e-14)
+    weighted = sum_products(basis, theta, turned, np.array([2.0, -0.5]))
+    assert np.allclose(weighted, 2.0 * products[0] - 0.5 * products[1], rtol=1e-14, atol=1e-14)
+
+
+def test_rows_are_shares_and_fluxes_count_both_ways() -> None:
+    rows = array_from_counts([COUNTS], UNEVEN, symmetrise=False, independent=True)
+    # P = C_ij / N_i is heights S / heights, heights 2 and 2 / sqrt(3)
+    scale = np.array([[1.0, math.sqrt(3.0)], [1.0 / math.sqrt(3.0), 1.0]])
+    assert np.allclose(rows.symmetric * scale, [[0.75, 0.25], [1 / 6, 5 / 6]], rtol=1e-14)
+    both = array_from_counts([COUNTS], UNEVEN, symmetrise=True, independent=True)
+    # fluxes 30/160, 15/160 and 100/160, times heights on both sides
+    side = 15 / 160 * 4 / math.sqrt(3.0)
+    assert np.allclose(both.symmetric, [[30 / 160 * 4.0, side], [side, 100 / 160 * 4.0 / 3.0]], rtol=1e-14)
+    # the raw array is h_i h_j C_ij / N: 120, 40/sqrt(3), 80/sqrt(3), 400/3
+    defect = (40.0 / math.sqrt(3.0)) / math.sqrt(2) / math.sqrt(120**2 + (40**2 + 80**2) / 3 + (400 / 3) ** 2)
+    for found in (rows, both):
+        assert float(found.raw_defect) == pytest.approx(defect, rel=1e-14)
+        assert found.counts is not None and np.array_equal(found.counts, COUNTS) and found.replicates == ()
+        # 10 of 30 go one way: Z^2 = 10/3 with mean 1 and variance 2 - 2/30
+        tail = gamma.sf(10 / 3, 1.0 / (2 - 2 / 30), scale=2 - 2 / 30)
+        assert found.raw_defect.z_score == pytest.approx(norm.isf(tail), abs=0.05)
+
+
+def test_parts_are_the_replicates_of_their_mean() -> None:
+    parts = [np.array([[20, 20], [40, 80]]), np.array([[28, 12], [60, 60]]), np.array([[16, 24], [10, 110]])]
+    for symmetrise in (True, False):
+        found = array_from_counts(parts, UNEVEN, symmetrise=symmetrise, independent=False)
+        alone = [array_from_counts([p], UNEVEN, symmetrise=symmetrise, independent=True).symmetric for p in parts]
+        # all parts have the same sums of rows, so that the estimate is linear in them
+        assert np.allclose(found.symmetric, np.mean(alone, axis=0), rtol=1e-13)
+        for replicate, expected in zip(found.replicates, alone, strict=True):
+            assert np.allclose(replicate, expected, rtol=1e-12, atol=1e-13)
+            assert not replicate.flags.writeable
+        assert found.error == pytest.approx(half_width(found.symmetric, alone), rel=1e-12)
+        assert found.counts is not None and np.array_equal(found.counts, sum(parts))
+    assert np.array_equal(parts[0], [[20, 20], [40, 80]])
+    weighted = array_from_counts([p / 7.0 for p in parts], UNEVEN, symmetrise=True, independent=False)
+    assert weighted.counts is None
+    whole = array_from_counts(parts, UNEVEN, symmetrise=True, independent=False)
+    assert np.allclose(weighted.symmetric, whole.symmetric, rtol=1e-13)
+    assert weighted.error == pytest.approx(whole.error, rel=1e-12)
+
+
+@pytest.mark.parametrize("symmetrise", [False, True])
+def test_replicates_of_unequal_parts_are_influences(symmetrise: bool) -> None:
+    """With weights 1 + s on a part the estimate moves by s / k (replicate - estimate) to first order."""
+    rng = np.random.default_rng(3)
+    parts = [rng.integers(20, 60, size=(2, 2)).astype(float) for _ in range(4)]
+    found = array_from_counts(parts, UNEVEN, symmetrise=symmetrise, independent=False)
+    step = 1e-6
+    for k, replicate in enumerate(found.replicates):
+        moved = [
+            array_from_counts(
+                [part * (1.0 + sign * step * (j == k)) for j, part in enumerate(parts)],
+                UNEVEN,
+                symmetrise=symmetrise,
+                independent=False,
+            ).symmetric
+            for sign in (1.0, -1.0)
+        ]
+        influence = (moved[0] - moved[1]) / (2.0 * step)
+        assert np.allclose(influence, (replicate - found.symmetric) / 4.0, atol=1e-8)
+
+
+def test_the_z_score_of_parts_weighs_pairs_by_their_noise() -> None:
+    rng = np.random.default_rng(0)
+    drift = np.array([[50, 40, 10], [10, 50, 15], [10, 15, 50]])
+    parts = [drift + rng.integers(0, 9, size=(3, 3)) for _ in range(8)]
+    assert array_from_counts(parts, Bins(3), symmetrise=False, independent=False).raw_defect.z_score > 3.5
+    same = [part + part.T + np.triu(step, 1) - np.triu(step, 1).T for part, step in zip(parts, noise(), strict=True)]
+    assert abs(array_from_counts(same, Bins(3), symmetrise=False, independent=False).raw_defect.z_score) < 2.5
+    # a pair of cells with few counts has its say: 4 of 4 one way in every part, beside a busy and noisy pair
+    busy = [np.array([[9, 400 + s, 4], [400 - s, 9, 9], [0, 9, 9]]) for s in (11, -9, 14, -13, 8, -10, 12, -13)]
+    assert array_from_counts(busy, Bins(3), symmetrise=True, independent=False).raw_defect.z_score > 2.0
+
+
+def noise() -> list[np.ndarray]:
+    return list(np.random.default_rng(5).integers(-5, 6, size=(8, 3, 3)))
+
+
+def test_errors_of_rows_are_those_of_binomials() -> None:
+    # each row has one free share with variance p (1 - p) / N; with equal bins ||error||^2 = 2 (e_1^2 + e_2^2)
+    n = 10**7
+    counts = np.array([[3 * n, 7 * n], [7 * n, 3 * n]])
+    found = array_from_counts([counts], Bins(2), symmetrise=False, independent=True)
+    assert found.error == pytest.approx(math.sqrt(2 * 0.21 / (10 * n) * chi2.ppf(0.95, 2)), rel=1e-6)
+    # of measures w: ||error||^2 = sum of w_i e_i^2 / (w_1 w_2), here by a table with equal terms
+    counts = np.array([[3 * n, 7 * n], [21 * n, 9 * n]])
+    found = array_from_counts([counts], UNEVEN, symmetrise=False, independent=True)
+    variance = 0.25 * 0.21 / (10 * n) / (0.25 * 0.75)
+    assert found.error == pytest.approx(math.sqrt(variance * chi2.ppf(0.95, 2)), rel=1e-6)
+
+
+def test_errors_of_symmetrised_counts_are_those_of_a_multinomial() -> None:
+    n = 10**8
+    counts = np.array([[3 * n, n], [2 * n, 4 * n]])
+    found = array_from_counts([counts], UNEVEN, symmetrise=True, independent=True)
+    share = np.array([0.3, 0.3, 0.4])  # first diagonal place, both others together, second diagonal place
+    covariance = (np.diag(share) - np.outer(share, share)) / (10 * n)
+    # entries 4 p_1, (4/sqrt 3) p_2 / 2 twice, (4/3) p_3
+    form = np.diag([16.0, 16.0 / 3.0 / 4.0 * 2.0, 16.0 / 9.0])
+    mean, variance = np.trace(form @ covariance), 2.0 * np.trace(form @ covariance @ form @ covariance)
+    degrees = 2.0 * mean**2 / variance
+    assert found.error == pytest.approx(math.sqrt(mean / degrees * chi2.ppf(0.95, degrees)), rel=1e-6)
+
+
+def test_quantiles_of_norms_are_those_of_chi_squares() -> None:
+    for degrees in (1, 2, 5):
+        for scale in (1.0, 3.0):
+            found = counting._quantile(scale * degrees, 2.0 * scale**2 * degrees)
+            assert found == pytest.approx(math.sqrt(scale * chi2.ppf(0.95, degrees)), rel=1e-12)
+    assert counting._quantile(1.0, 2.0) == pytest.approx(1.959963984540054, rel=1e-12)
+    assert counting._quantile(4.0, 0.0) == 2.0 and counting._quantile(0.0, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("number", [2, 3, 4])
+def test_the_mean_of_the_squared_error_is_estimated_without_bias(number: int) -> None:
+    share, weight = np.array([0.2, 0.5, 0.3]), np.array([1.0, 3.0, 0.5])
+    mean = 0.0
+    for draws in itertools.product(range(3), repeat=number):
+        counts = np.bincount(draws, minlength=3)
+        estimate, _ = counting._squared_norms(counts[None], weight, np.array([number]))
+        mean += np.prod(share[list(draws)]) * float(estimate[0])
+    assert mean == pytest.approx(number * float(weight @ (share * (1.0 - share))), rel=1e-12)
+
+
+def test_a_single_pair_has_a_large_spread() -> None:
+    mean, variance = counting._squared_norms(np.array([[0, 1, 0]]), np.array([2.0, 5.0, 1.0]), np.array([1]))
+    assert mean[0] == 5.0 and variance[0] == 0.0
+
+
+def test_the_variance_of_the_squared_error_is_that_of_poisson_counts_in_small_cells() -> None:
+    # (C - m)^2 of a Poisson C has variance m + 2 m^2; c + 2 c (c - 1) estimates it without bias
+    counts, weight = np.array([[10**12, 1, 3, 7]]), np.array([0.0, 1.0, 2.0, 0.5])
+    mean, variance = counting._squared_norms(counts, weight, counts.sum(axis=1))
+    assert mean[0] == pytest.approx(1.0 + 6.0 + 3.5, rel=1e-9)
+    assert variance[0] == pytest.approx(1.0 + 4.0 * (3 + 12) + 0.25 * (7 + 84), rel=1e-9)
+
+
+def test_the_variance_of_four_draws_is_counted_by_hand() -> None:
+    # two and two: squares of shares are estimated as 1/6 each, so E k^2 = (1/3)^2, for 12 ordered pairs of draws, twice
+    mean, variance = counting._squared_norms(np.array([[2, 2]]), np.ones(2), np.array([4]))
+    assert mean[0] == pytest.approx(16 / 3 * 0.5) and variance[0] == pytest.approx(24 / 9)
+
+
+@pytest.mark.parametrize(("number", "share"), [(2000, 0.003), (2000, 0.5), (3000, 0.2)])
+def test_the_variance_of_the_squared_error_is_that_of_binomials(number: int, share: float) -> None:
+    first = np.arange(number + 1)
+    with np.errstate(all="raise", under="ignore"):
+        counts = np.stack([first, number - first], axis=1)
+        _, found = counting._squared_norms(counts, np.array([1.0, 2.0]), np.full(number + 1, number))
+    likely = binom.pmf(first, number, share)
+    square = 3.0 * (first - number * share) ** 2
+    exact = likely @ square**2 - (likely @ square) ** 2
+    assert likely @ found == pytest.approx(exact, rel=0.005)
+
+
+def test_parts_along_one_line_have_students_error() -> None:
+    rng = np.random.default_rng(1)
+    line, shares = rng.normal(size=(3, 3)), rng.normal(size=8)
+    parts = [2.0 + share * line for share in shares]
+    middle = np.mean(parts, axis=0)
+    exact = t.ppf(0.975, 7) * np.std(shares, ddof=1) / math.sqrt(8.0) * np.linalg.norm(line)
+    assert half_width(middle, parts) == pytest.approx(exact, rel=1e-10)
+    assert half_width(middle, [middle] * 8) == 0.0
+
+
+def test_parts_in_many_dimensions_have_the_root_mean_square() -> None:
+    parts = list(np.random.default_rng(2).normal(size=(8, 200, 200)))
+    middle = np.mean(parts, axis=0)
+    rms = math.sqrt(sum(float(np.sum((part - middle) ** 2)) for part in parts) / 56.0)
+    assert rms < half_width(middle, parts) < 1.02 * rms
+
+
+@pytest.mark.parametrize("number", [3, 8])
+def test_dimensions_are_the_ratio_of_traces_whose_means_wishart_gave(number: int) -> None:
+    differences = np.random.default_rng(4).normal(size=(number, 5)) * [3.0, 1.0, 1.0, 0.5, 0.2]
+    differences -= differences.mean(axis=0)
+    freedom = number - 1
+    covariance = differences.T @ differences / freedom
+    # E tr W^2 = (1 + 1/f) tr C^2 + (tr C)^2 / f and E (tr W)^2 = (tr C)^2 + 2 tr C^2 / f, solved for the two
+    table = [[1.0 + 1.0 / freedom, 1.0 / freedom], [2.0 / freedom, 1.0]]
+    of_square, squared = np.linalg.solve(table, [np.trace(covariance @ covariance), np.trace(covariance) ** 2])
+    assert counting._dimensions(differences) == pytest.approx(squared / of_square, rel=1e-10)
+    assert counting._dimensions(differences[:, :1]) == pytest.approx(1.0, rel=1e-10)
+    # the same in all directions that the parts allow: nothing is left of the trace of the square
+    for scale in (1.0, 1e-5, 1e5):
+        assert counting._dimensions(scale * (np.eye(number) - 1.0 / number)) > 1e12
+
+
+def test_half_widths_count_four_fifths_of_the_dimensions(monkeypatch) -> None:
+    from scipy.stats import f
+
+    parts = list(np.random.default_rng(6).normal(size=(8, 4, 4)))
+    middle = np.mean(parts, axis=0)
+    differences = np.array([(part - middle).ravel() for part in parts])
+    dimensions = 0.8 * counting._dimensions(differences)
+    square = float(np.sum(differences**2)) / 56.0
+    assert half_width(middle, parts) == pytest.approx(
+        math.sqrt(f.ppf(0.95, dimensions, 7 * dimensions) * square), rel=1e-10
+    )
+    assert 2**18 <= counting.MOST_COMPARED <= 2**22
+    # of large arrays some rows are compared: 16 entries of which 8 may be, so every second row
+    monkeypatch.setattr(counting, "MOST_COMPARED", 8)
+    some = 0.8 * counting._dimensions(np.array([(part - middle)[::2].ravel() for part in parts]))
+    assert half_width(middle, parts) == pytest.approx(math.sqrt(f.ppf(0.95, some, 7 * some) * square), rel=1e-10)
+
+
+def test_replicates_are_sparse_where_that_is_smaller_and_dropped_where_too_large(monkeypatch) -> None:
+    def kept(base: np.ndarray) -> tuple:
+        means = [base * (1.0 + step) for step in (-0.1, 0.1)]
+        found = counting._Replicates(base, 2)
+        for mean in means:
+            found.add(mean - base)
+        assert all(np.allclose(r.toarray() if issparse(r) else r, m) for r, m in zip(found.kept(), means, strict=False))
+        return found.kept()
+
+    assert 2**26 <= counting.LARGEST_REPLICATES <= 2**30
+    assert not any(issparse(part) for part in kept(np.ones((4, 4))))
+    assert all(issparse(part) for part in kept(np.eye(4)))  # a quarter is not zero
+    more = np.eye(4)
+    more[0, 1] = 1.0
+    assert not any(issparse(part) for part in kept(more))
+    monkeypatch.setattr(counting, "LARGEST_REPLICATES", 2 * 16 * 8)
+    assert len(kept(np.ones((4, 4)))) == 2
+    monkeypatch.setattr(counting, "LARGEST_REPLICATES", 2 * 16 * 8 - 1)
+    assert kept(np.ones((4, 4))) == ()
+
+
+@pytest.mark.parametrize(("symmetrise", "keeps"), [(True, True), (True, False), (False, True), (False, False)])
+def test_what_is_known_of_sums_is_put_in(symmetrise: bool, keeps: bool) -> None:
+    rng = np.random.default_rng(8)
+    basis = Bins([0.0, 0.7, 1.5, np.pi])
+    means = [np.eye(3) + 0.1 * rng.normal(size=(3, 3)) for _ in range(8)]
+    found = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=keeps)
+    constant = basis.constant
+    assert np.allclose(found.symmetric @ constant, constant, atol=1e-14)
+    assert np.allclose(constant @ found.symmetric, constant, atol=1e-14) == (keeps or symmetrise)
+    assert np.allclose(found.symmetric, found.symmetric.T, atol=1e-14) == symmetrise
+    # functions of mean 0 are left as they are, up to a constant where the adjoint is mended too
+    others = np.linalg.svd(constant[None])[2][1:]
+    raw = np.mean(means, axis=0)
+    wanted = 0.5 * (raw + raw.T) if symmetrise else raw
+    assert np.allclose(others @ found.symmetric @ others.T, others @ wanted @ others.T, atol=1e-14)
+    if not (keeps or symmetrise):
+        assert np.allclose(found.symmetric @ others.T, raw @ others.T, atol=1e-14)
+    assert len(found.replicates) == 8 and np.allclose(np.mean(found.replicates, axis=0), found.symmetric)
+    assert all(np.allclose(replicate @ constant, constant) for replicate in found.replicates)
+    inner = others @ (found.replicates[2] - found.symmetric) @ others.T
+    part = 0.5 * (means[2] + means[2].T) if symmetrise else means[2]
+    assert np.allclose(inner, others @ (part - wanted) @ others.T, atol=1e-14)
+    assert found.error == pytest.approx(half_width(found.symmetric, list(found.replicates)), rel=1e-12)
+    asymmetry = np.linalg.norm(raw - raw.T) / np.linalg.norm(raw) / 2.0
+    assert float(found.raw_defect) == pytest.approx(asymmetry, rel=1e-13) and found.counts is None
+    assert abs(found.raw_defect.z_score) < 3.0
+    drift = [mean + np.array([[0.0, 0.5, 0.0], [-0.5, 0.0, 0.0], [0.0, 0.0, 0.0]]) for mean in means]
+    assert array_from_sums(drift, basis, symmetrise=symmetrise, keeps_measure=keeps).raw_defect.z_score > 3.0
+
+
+def test_sums_that_vanish_are_no_error() -> None:
+    found = array_from_sums([np.zeros((2, 2))] * 3, Bins(2), symmetrise=True, keeps_measure=True)
+    assert np.allclose(found.symmetric @ Bins(2).constant, Bins(2).constant) and found.error < 1e-15
+    assert float(found.raw_defect) == 0.0 and found.raw_defect.z_score == 0.0
+
+
+def test_empty_bins_are_named_and_weighed() -> None:
+    with pytest.raises(AccuracyError, match=r"1 of 2 bins have no incoming pair \(bins 0\)") as caught:
+        array_from_counts([np.array([[0, 0], [3, 4]])], UNEVEN, symmetrise=False, independent=True)
+    assert caught.value.defect == pytest.approx(0.25)
+    # a single pair will do; with pairs counted both ways an outgoing pair is enough
+    array_from_counts([np.array([[0, 0], [3, 4]])], UNEVEN, symmetrise=True, independent=True)
+    array_from_counts([np.array([[0, 1], [3, 4]])], UNEVEN, symmetrise=False, independent=True)
+    for size, named in ((8, r"\(bins 0, 1, 2, 3, 4, 5, 6, 7\)"), (9, r"\(bins 0, 1, 2, 3, 4, 5, 6, 7, \.\.\.\)")):
+        counts = np.zeros((size + 1, size + 1), dtype=np.int64)
+        counts[-1, -1] = 5
+        for symmetrise in (False, True):
+            with pytest.raises(AccuracyError, match=named) as caught:
+                array_from_counts([counts], Bins(size + 1), symmetrise=symmetrise, independent=True)
+            assert caught.value.defect == pytest.approx(size / (size + 1.0))
