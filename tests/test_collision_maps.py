@@ -35,7 +35,7 @@ def test_specular_reflection_turns_the_vertical_share_alone() -> None:
 def test_velocities_along_the_wall_or_away_from_it_are_refused(up: float) -> None:
     K = ker.CollisionLaw(ker.specular(), DISK)
     with pytest.raises(InputError, match=r"v2 >= 0 at row \[1, 0\]"):
-        K.sample([[[1.0, -1.0, 0.0]], [[1.0, up, 0.0]]], np.random.default_rng(0))
+        K.sample([[[1.0, -1.0, 0.0]], [[1.0, up, 0.0]], [[1.0, up, 0.0]]], np.random.default_rng(0))
     for wrong in (3.0, [1.0, -1.0], [[1.0, -1.0, 0.0, 2.0]]):
         with pytest.raises(InputError, match="shape"):
             K.sample(wrong, np.random.default_rng(0))
