@@ -27,8 +27,8 @@ EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 # The tests that are to see a fault in a module; the quick ones first, since the first failure ends a run.
 TESTS = {
     "spectral/completeness.py": ("test_completeness.py",),
-    "spectral/enclosure.py": ("test_enclosures.py",),
-    "spectral/separation.py": ("test_enclosures.py",),
+    "spectral/enclosure.py": ("test_enclosure_intervals.py",),
+    "spectral/separation.py": ("test_separation.py",),
     "kernels/symmetry.py": ("test_symmetry.py",),
     "kernels/counting.py": ("test_counting.py",),
     "kernels/products.py": ("test_weights_and_bases.py",),
@@ -37,7 +37,7 @@ TESTS = {
     "kernels/collision.py": ("test_collision_maps.py",),
     "kernels/measure.py": ("test_weights_and_bases.py",),
     "geometry/disk.py": ("test_disk.py",),
-    "geometry/profile.py": ("test_wall_files.py",),
+    "geometry/profile.py": ("test_profiles.py",),
 }
 # Mutants of these kinds: exchanges of operators whose faults people make, not every operator by every other.
 KINDS = (

@@ -259,7 +259,8 @@ def _raised(found: Enclosures, exponent: int) -> Enclosures:
         ends = [item.low**exponent, item.high**exponent]
         if exponent % 2 == 0 and item.low < 0.0 < item.high:
             ends.append(0.0)
-        slope = exponent * min(max(abs(item.low), abs(item.high)), 1.0) ** (exponent - 1)
+        # lambda^n - rho^n is lambda - rho times a sum of products, in which lambda may be any of the spectrum
+        slope = sum(min(abs(item.value), 1.0) ** degree for degree in range(exponent))
         items.append(
             replace(
                 item, value=item.value**exponent, low=min(ends), high=max(ends), residual=slope * item.residual,

@@ -188,3 +188,18 @@ def test_the_norm_beyond_is_that_of_the_values_that_are_left():
     # of nothing that is left the bound is that of rounding: 2 n^2 u |S|_F^2
     whole = float(np.sum(values**2))
     assert norm_beyond(matrix, values) == pytest.approx(np.sqrt(2.0 * 49.0 * U * whole), rel=0.2, abs=0.0)
+
+
+def test_of_a_matrix_that_is_only_its_deflated_direction_nothing_is_left():
+    """The squared norm is a difference that rounding may make negative."""
+    assert Deflated.of(np.diag([1.0, 0.0]), np.array([1.0, 0.0])).frobenius == 0.0
+    for _ in range(50):
+        constant = orthogonal(5)[:, 0]
+        assert 0.0 <= Deflated.of(np.outer(constant, constant), constant).frobenius < 1e-6
+
+
+def test_values_that_rounding_makes_too_large_leave_the_bound_of_rounding():
+    matrix = Deflated.of(np.diag([0.5, 0.25]), None)
+    exact = np.sqrt(2.0 * 4.0 * U * 0.3125)
+    assert norm_beyond(matrix, np.array([0.5, 0.25 * (1.0 + 1e-9)])) == pytest.approx(exact, rel=1e-12, abs=0.0)
+    assert norm_beyond(matrix, np.array([1.0, 0.5])) == pytest.approx(exact, rel=1e-12, abs=0.0)

@@ -9,7 +9,6 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
-from asperity.spectral.separation import lambertian_share, rest_of_spectrum
 
 EPS = np.finfo(float).eps
 
@@ -84,20 +83,6 @@ def test_nothing_is_indexed_below_the_essential_spectrum():
 def test_a_matrix_law_has_finite_rank():
     found = spec.enclosures(ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]]), 2)
     assert 0.4 in found[1] and found[1].label == "indexed" and found[1].width < 1e-14
-
-
-@pytest.mark.parametrize("g", [0.3, 0.9, 0.9999])
-def test_the_hilbert_schmidt_remainder_bounds_the_next_eigenvalue(g):
-    apart = rest_of_spectrum(ker.henyey_greenstein(g), g ** np.arange(4.0), 1e-15, np.inf)
-    # g^4 is in the rest, and the remainder is not far above it
-    assert g**4 <= apart.radius < g**3
-
-
-def test_the_lambertian_share_of_sums_and_products():
-    diffuse, turned = ker.lambertian(), ker.specular()
-    assert lambertian_share(0.25 * diffuse + 0.75 * turned) == pytest.approx(0.25)
-    assert lambertian_share(turned @ diffuse) == 1.0
-    assert lambertian_share((0.5 * diffuse + 0.5 * turned) ** 3) == pytest.approx(0.875)
 
 
 def test_what_cannot_be_enclosed_is_refused():

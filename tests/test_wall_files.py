@@ -1,7 +1,6 @@
-"""Files: walls as TOML, profiles as text, and what the command line calls WALL."""
+"""Files: walls as TOML, and what the command line calls WALL."""
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -145,62 +144,6 @@ def test_missing_and_binary_files_are_input_errors(tmp_path):
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(InputError, match=r"binary\.toml: not a TOML file"):
         geo.load_wall(tmp_path / "binary.toml")
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "0 1\n1 2\n3 0\n",
-        "x, height\n0, 1\n1, 2\n3, 0\n",
-        "# a scan\n\n0\t1 # first\n1\t2\n3\t0",
-        "\ufeff0;1\r\n1;2\r\n3;0\r\n",
-    ],
-)
-def test_two_column_profiles_are_read(text, tmp_path):
-    file = tmp_path / "scan.txt"
-    file.write_text(text, encoding="utf-8")
-    x, height = geo.read_profile(file)
-    assert x.tolist() == [0, 1, 3] and height.tolist() == [1, 2, 0]
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("0 1\n1 2 3\n", "line 2: expected two numbers"),
-        ("x y\nfoo bar\n0 1\n1 2\n", "line 2"),
-        ("0 1\nx y\n", "line 2"),
-        ("0 1\n", "at least two rows"),
-        ("", "at least two rows"),
-    ],
-)
-def test_unsuitable_profile_files_are_refused_with_file_and_line(text, words, tmp_path):
-    file = tmp_path / "scan.csv"
-    file.write_text(text)
-    with pytest.raises(InputError, match=words) as caught:
-        geo.read_profile(file)
-    assert "scan.csv" in str(caught.value)
-
-
-def test_instrument_files_ask_for_the_extra(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
-    file = tmp_path / "scan.opd"
-    file.write_bytes(b"\xff\xfe\x00\x01" * 20)
-    with pytest.raises(InputError, match=r"asperity\[profiles\]"):
-        geo.read_profile(file)
-
-
-def test_instrument_files_are_read_with_the_extra(tmp_path):
-    topography = pytest.importorskip("SurfaceTopography")
-    heights = np.array([[0.0, 1.0, 2.0], [3.0, 1.0, 0.0], [2.0, 5.0, 1.0], [1.0, 0.0, 2.0]])
-    topography.Topography(heights, (2.0, 1.5), unit="um").to_netcdf(str(tmp_path / "map.nc"))
-    x, height = geo.read_profile(tmp_path / "map.nc")
-    assert x == pytest.approx([0.0, 0.5, 1.0, 1.5]) and height == pytest.approx(heights[:, 1])
-    assert geo.read_profile(tmp_path / "map.nc", row=2)[1] == pytest.approx(heights[:, 2])
-    with pytest.raises(InputError, match="row"):
-        geo.read_profile(tmp_path / "map.nc", row=3)
-    (tmp_path / "broken.opd").write_bytes(b"\xff\xfe\x00\x01" * 20)
-    with pytest.raises(InputError, match="SurfaceTopography cannot read it"):
-        geo.read_profile(tmp_path / "broken.opd")
 
 
 def test_walls_are_found_by_name_and_parameters():

@@ -1,0 +1,224 @@
+"""Measured profiles: from positions and heights to the vertices of a wall, and from files to positions and heights."""
+
+import sys
+from types import ModuleType, SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from asperity import geometry as geo
+from asperity.errors import InputError
+from asperity.geometry.profile import vertices_of_profile
+
+# ---- from positions and heights to vertices ----------------------------------------------------------------------
+EXACT = {
+    "two rows, mirrored": ([2, 3], [0, 4], "mirror", [[0, 0], [1, -4], [2, 0]]),
+    "two rows, a step": ([2, 3], [0, 4], "step", [[0, 0], [0, -4], [1, 0]]),
+    "top in the middle, mirrored": ([10, 11, 13], [2, 5, 4], "mirror", [[0, 0], [2, -1], [4, 0], [5, -3], [6, 0]]),
+    "top in the middle, a step": ([10, 11, 13], [2, 5, 4], "step", [[0, 0], [2, -1], [2, -3], [3, 0]]),
+    "the ends are level": ([0, 1, 2], [1, 0, 1], "step", [[0, 0], [1, -1], [2, 0]]),
+    "top at the end": ([0, 1, 3], [1, 0, 3], "step", [[0, 0], [0, -2], [1, -3], [3, 0]]),
+    "joints of a flat top": ([0, 1, 2, 4, 5], [3, 3, 3, 0, 3], "step", [[0, 0], [2, 0], [4, -3], [5, 0]]),
+    "joints of a flat top behind": ([0, 1, 2, 3, 4], [3, 0, 3, 3, 3], "step", [[0, 0], [1, -3], [2, 0], [4, 0]]),
+    "joints below the top stay": (
+        [0, 1, 2, 3, 4],
+        [1, 0, 0, 0, 1],
+        "step",
+        [[0, 0], [1, -1], [2, -1], [3, -1], [4, 0]],
+    ),
+    "two tops": ([0, 1, 2, 3, 5], [0, 7, 1, 7, 0], "step", [[0, 0], [1, -6], [2, 0], [4, -7], [5, 0]]),
+    "a height of -0": ([0, 1, 2, 3], [0.0, -0.0, -1, 0], "step", [[0, 0], [1, 0], [2, -1], [3, 0]]),
+    "level": ([1, 2, 4], [7, 7, 7], "step", [[0, 0], [3, 0]]),
+}
+
+
+@pytest.mark.parametrize("case", EXACT)
+def test_the_vertices_of_small_profiles_are_those_drawn_by_hand(case):
+    x, height, seam, vertices = EXACT[case]
+    found = vertices_of_profile(x, height, seam)
+    assert found.tolist() == vertices
+    assert not np.signbit(found[:, 0]).any() and not np.signbit(found[found[:, 1] == 0.0, 1]).any()
+
+
+def test_the_seam_is_a_mirror_where_nothing_is_said():
+    assert vertices_of_profile([0, 1], [0, 1]).tolist() == [[0, 0], [1, -1], [2, 0]]
+
+
+@given(st.lists(st.tuples(st.integers(1, 9), st.integers(-5, 5)), min_size=2, max_size=12))
+def test_a_period_has_the_heights_of_the_profile_and_of_its_mirror_image(rows):
+    """In whole numbers, so that nothing is rounded: the vertices without the flat joints, from any top on."""
+    x, height = np.cumsum([step for step, _ in rows]), np.array([value for _, value in rows])
+    vertices = vertices_of_profile(x, height, "mirror")
+    period = 2 * (x[-1] - x[0])
+    assert vertices[0].tolist() == [0, 0] and vertices[-1].tolist() == [period, 0]
+    assert np.all(np.diff(vertices[:, 0]) > 0) and np.all(vertices[:, 1] <= 0)
+    start = x[: len(x)][np.argmax(height)] if height.argmax() < len(x) else 0
+    at = start + np.arange(2 * period) / 2
+    folded = x[-1] - np.abs((at - x[0]) % period - (x[-1] - x[0]))
+    assert np.interp(at - start, vertices[:, 0], vertices[:, 1]) == pytest.approx(
+        np.interp(folded, x, height) - height.max(), abs=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("x", "height", "seam", "words"),
+    [
+        ([0, 3, 5, 2, 4], [0] * 5, "step", "got 5 at row 2 and 2 at row 3"),
+        ([0, 1, 1, 2], [0] * 4, "step", "got 1 at row 1 and 1 at row 2"),
+        ([[0, 1], [2, 3]], [[0, 1], [2, 3]], "step", r"got shapes \(2, 2\) and \(2, 2\)"),
+        ([0, 1, 2], [0, 1], "mirror", r"got shapes \(3,\) and \(2,\)"),
+        ([0], [0], "mirror", "at least 2"),
+        ([0, 1], [0, 1], "glue", "seam: expected 'mirror' or 'step', got 'glue'"),
+    ],
+)
+def test_unsuitable_profiles_are_refused_with_the_worst_rows(x, height, seam, words):
+    with pytest.raises(InputError, match=words):
+        vertices_of_profile(x, height, seam)
+
+
+# ---- columns of text ---------------------------------------------------------------------------------------------
+def test_two_rows_are_a_profile(tmp_path):
+    (tmp_path / "scan.txt").write_text("0 1\n2 5")
+    assert [part.tolist() for part in geo.read_profile(tmp_path / "scan.txt")] == [[0, 2], [1, 5]]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0 1\n1 2\n3 0\n",
+        "x, height\n0, 1\n1, 2\n3, 0\n",
+        "# a scan\n\n0\t1 # first\n1\t2\n3\t0",
+        "\ufeff0;1\r\n1;2\r\n3;0\r\n",
+        "\n# 5 5\nposition height # of a scan\n\n0 1\n# between # two\n\n1 2\n3 0\n\n",
+    ],
+)
+def test_two_column_profiles_are_read(text, tmp_path):
+    file = tmp_path / "scan.txt"
+    file.write_text(text, encoding="utf-8")
+    x, height = geo.read_profile(file)
+    assert x.tolist() == [0, 1, 3] and height.tolist() == [1, 2, 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("0 1\n1 2 3\n", "line 2: expected two numbers"),
+        ("x y\nfoo bar\n0 1\n1 2\n", "line 2"),
+        ("0 1\nx y\n", "line 2"),
+        ("0 1\n", "at least two rows"),
+        ("", "at least two rows of x and height, got 0"),
+        ("x y\n0 1\n", "at least two rows of x and height, got 1"),
+        ("# a\n0 1\n1 2\nx y\n3 4", "line 4: expected two numbers, x and height, got 'x y'"),
+        ("x y\nz w\n0 1\n1 2", "line 2"),
+        ("x 1\n0 1\n1 2", "line 1"),
+    ],
+)
+def test_unsuitable_profile_files_are_refused_with_file_and_line(text, words, tmp_path):
+    file = tmp_path / "scan.csv"
+    file.write_text(text)
+    with pytest.raises(InputError, match=words) as caught:
+        geo.read_profile(file)
+    assert "scan.csv" in str(caught.value)
+
+
+# ---- files of instruments ----------------------------------------------------------------------------------------
+def test_instrument_files_ask_for_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", None)
+    file = tmp_path / "scan.opd"
+    file.write_bytes(b"\xff\xfe\x00\x01" * 20)
+    with pytest.raises(InputError, match=r"asperity\[profiles\]"):
+        geo.read_profile(file)
+
+
+@pytest.fixture
+def instrument(monkeypatch):
+    """A stand-in for SurfaceTopography, whose one file is what the test puts there."""
+    package = ModuleType("SurfaceTopography")
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+
+    def gives(heights, positions):
+        scan = SimpleNamespace(heights=lambda: heights, positions=lambda: positions)
+        package.read_topography = lambda path: scan
+
+    return gives
+
+
+def test_line_scans_of_instruments_are_read_from_files_that_are_no_columns(instrument, tmp_path):
+    instrument(np.ma.array([1.0, 3.0, 2.0]), np.array([0.0, 0.5, 2.0]))
+    for name, content in (("scan.opd", b"\xff\xfe\x00"), ("scan.xyz", b"some words first\n1 2 3")):
+        (tmp_path / name).write_bytes(content)
+        x, height = geo.read_profile(tmp_path / name)
+        assert x.tolist() == [0.0, 0.5, 2.0] and height.tolist() == [1.0, 3.0, 2.0]
+        assert x.dtype == height.dtype == np.float64
+    # a file that says it is text is not given away
+    (tmp_path / "scan.TXT").write_text("1 2 3")
+    with pytest.raises(InputError, match=r"scan\.TXT, line 1"):
+        geo.read_profile(tmp_path / "scan.TXT")
+
+
+def test_of_a_map_one_row_along_x_is_taken(instrument, tmp_path):
+    heights = np.array([[0.0, 1.0, 2.0, 8.0, 6.0], [3.0, 1.0, 0.0, 9.0, 7.0]])
+    along = np.array([[0.0, 0.1, 0.2, 0.3, 0.4], [1.0, 1.1, 1.2, 1.3, 1.4]])
+    instrument(heights, (along, -along))
+    (tmp_path / "map.opd").write_bytes(b"\xff\xfe\x00")
+    assert [part.tolist() for part in geo.read_profile(tmp_path / "map.opd")] == [[0.2, 1.2], [2.0, 0.0]]
+    for row in range(5):
+        x, height = geo.read_profile(tmp_path / "map.opd", row=row)
+        assert x.tolist() == along[:, row].tolist() and height.tolist() == heights[:, row].tolist()
+    for row in (-1, 5):
+        with pytest.raises(InputError, match=f"row: expected a whole number from 0 to 4, got {row}"):
+            geo.read_profile(tmp_path / "map.opd", row=row)
+
+
+def test_undefined_heights_are_counted_and_refused(instrument, tmp_path):
+    instrument(np.ma.array([1.0, np.inf, 2.0, 4.0], mask=[True, False, False, False]), np.arange(4.0))
+    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match=r"scan\.opd: 2 of 4 heights are undefined"):
+        geo.read_profile(tmp_path / "scan.opd")
+
+
+@pytest.mark.parametrize(
+    ("failure", "words"), [(ValueError("first\nsecond"), r"\(first\)"), (ValueError(), r"\(ValueError\)")]
+)
+def test_what_a_reader_of_instruments_says_is_told_in_one_line(failure, words, monkeypatch, tmp_path):
+    package = ModuleType("SurfaceTopography")
+
+    def read_topography(path):
+        raise failure
+
+    package.read_topography = read_topography
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputError, match=rf"scan\.opd: SurfaceTopography cannot read it {words}"):
+        geo.read_profile(tmp_path / "scan.opd")
+
+
+def test_warnings_of_an_instruments_package_are_not_passed_on(monkeypatch, tmp_path):
+    import warnings
+
+    package = ModuleType("SurfaceTopography")
+
+    def read_topography(path):
+        warnings.warn("old format", DeprecationWarning, stacklevel=1)
+        return SimpleNamespace(heights=lambda: np.arange(3.0), positions=lambda: np.arange(3.0))
+
+    package.read_topography = read_topography
+    monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
+    (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
+    assert geo.read_profile(tmp_path / "scan.opd")[1].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_instrument_files_are_read_with_the_extra(tmp_path):
+    topography = pytest.importorskip("SurfaceTopography")
+    heights = np.array([[0.0, 1.0, 2.0], [3.0, 1.0, 0.0], [2.0, 5.0, 1.0], [1.0, 0.0, 2.0]])
+    topography.Topography(heights, (2.0, 1.5), unit="um").to_netcdf(str(tmp_path / "map.nc"))
+    x, height = geo.read_profile(tmp_path / "map.nc")
+    assert x == pytest.approx([0.0, 0.5, 1.0, 1.5]) and height == pytest.approx(heights[:, 1])
+    assert geo.read_profile(tmp_path / "map.nc", row=2)[1] == pytest.approx(heights[:, 2])
+    with pytest.raises(InputError, match="row"):
+        geo.read_profile(tmp_path / "map.nc", row=3)
+    (tmp_path / "broken.opd").write_bytes(b"\xff\xfe\x00\x01" * 20)
+    with pytest.raises(InputError, match="SurfaceTopography cannot read it"):
+        geo.read_profile(tmp_path / "broken.opd")

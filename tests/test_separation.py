@@ -1,0 +1,132 @@
+"""What lies beyond the listed eigenvalues: laws whose whole spectrum is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity import kernels as ker
+from asperity.spectral import separation
+from asperity.spectral.separation import lambertian_share, rest_of_spectrum
+
+EPS = float(np.finfo(float).eps)
+CONSTANTS = np.ones(1)
+
+
+# The power p of a phase function's g for which |g|^p comes nearest to .6 on a scale of logarithms.
+POWERS = {0.3: 1, -0.7: 1, 0.9: 5, 0.99: 51}
+
+
+# ---- the Hilbert-Schmidt remainder -------------------------------------------------------------------------------
+@pytest.mark.parametrize("g", [0.3, 0.9, -0.9, 0.9999])
+def test_the_remainder_bounds_the_next_eigenvalue_and_is_not_far_above(g):
+    apart = rest_of_spectrum(ker.henyey_greenstein(g), g ** np.arange(4.0), 1e-15, np.inf)
+    assert abs(g) ** 4 <= apart.radius < abs(g) ** 3
+    assert apart.kind == "bound"
+
+
+@pytest.mark.parametrize("listed", [1, 2, 5])
+@pytest.mark.parametrize("g", POWERS)
+def test_the_remainder_of_a_phase_function_is_that_of_its_geometric_series(g, listed):
+    """Of the eigenvalues g^l the sum of the powers 2 p from l = m on is that from 0 on times g^(2 p m)."""
+    power = POWERS[g]
+    apart = rest_of_spectrum(ker.henyey_greenstein(g), g ** np.arange(float(listed)), 0.0, np.inf)
+    whole = sum(abs(g) ** (2 * power * degree) for degree in range(4000))
+    assert apart.radius == pytest.approx(abs(g) ** listed * whole ** (0.5 / power), rel=1e-10)
+    name = "P:" if power == 1 else f"P^{power}:"
+    assert f"remainder of {name} {whole:.6g} less the squares of the {listed} listed" in apart.reason
+
+
+def test_a_listed_eigenvalue_counts_only_as_far_as_its_interval_is_sure():
+    """Of 1 and .5 with intervals of half width .25 at least .75 and .25 are sure; of .125 nothing is."""
+    law = ker.henyey_greenstein(0.5)
+    apart = rest_of_spectrum(law, np.array([1.0, -0.5, 0.125]), 0.25, np.inf)
+    assert apart.radius == pytest.approx(np.sqrt(4.0 / 3.0 - 0.75**2 - 0.25**2), rel=1e-12)
+
+
+def test_rounding_is_added_where_nothing_is_left():
+    """Of rank one, or with eighty of the eigenvalues listed: sixteen roundings of the sum."""
+    apart = rest_of_spectrum(ker.lambertian(), CONSTANTS, 0.0, np.inf)
+    assert apart.kind == "bound" and 16.0 * EPS <= apart.radius**2 <= 24.0 * EPS
+    g = 0.9
+    apart = rest_of_spectrum(ker.henyey_greenstein(g), g ** np.arange(80.0), 0.0, np.inf)
+    power, whole = POWERS[g], 1.0 / (1.0 - g**10)
+    assert 16.0 * EPS * (1.0 - 1e-6) <= apart.radius ** (2 * power) / whole <= 24.0 * EPS
+
+
+def test_the_difference_of_two_quadratures_counts_as_error(monkeypatch):
+    sums = {12: 2.0, 16: 1.5}
+    monkeypatch.setattr(separation, "_squared_norm", lambda law, nodes: sums[nodes])
+    law = ker.DensityLaw(lambda theta, theta_out: 0.5 * np.sin(theta_out))
+    apart = rest_of_spectrum(law, CONSTANTS, 0.0, np.inf)
+    assert apart.radius == pytest.approx(1.0, rel=1e-14) and apart.kind == "estimate"
+    # the finer one is the value
+    sums[12] = 1.25
+    assert rest_of_spectrum(law, CONSTANTS, 0.0, np.inf).radius == pytest.approx(np.sqrt(0.75), rel=1e-14)
+    sums.update({12: 2.0, 16: 2.5})
+    assert rest_of_spectrum(law, CONSTANTS, 0.0, np.inf).radius == pytest.approx(np.sqrt(2.0), rel=1e-14)
+
+
+def test_of_a_density_of_rank_two_the_second_eigenvalue_is_left():
+    """1 + cos cos'/2 has the eigenvalue 1/2 <cos^2> = 1/6 beside 1."""
+    law = ker.DensityLaw(lambda theta, out: 0.5 * np.sin(out) * (1.0 + 0.5 * np.cos(theta) * np.cos(out)))
+    assert rest_of_spectrum(law, CONSTANTS, 0.0, np.inf).radius == pytest.approx(1.0 / 6.0, rel=1e-11)
+
+
+@pytest.mark.parametrize("cut", [0.0, 0.3])
+def test_a_density_that_jumps_is_integrated_from_jump_to_jump(cut):
+    """Two states with the shares (1 - c)/2 and (1 + c)/2, the same one again with .6: eigenvalues 1 and .6.
+
+    A jump in the middle needs no breakpoint: the panels end there.
+    """
+
+    def density(theta, out):
+        same = (np.cos(theta) > cut) == (np.cos(out) > cut)
+        share = np.where(np.cos(out) > cut, 0.5 * (1.0 - cut), 0.5 * (1.0 + cut))
+        return 0.5 * np.sin(out) * (0.4 + np.where(same, 0.6 / share, 0.0))
+
+    law = ker.DensityLaw(density, [np.arccos(cut)] if cut else [])
+    assert law.reversible
+    assert rest_of_spectrum(law, CONSTANTS, 0.0, np.inf).radius == pytest.approx(0.6, rel=1e-10)
+
+
+# ---- laws of which the structure tells ---------------------------------------------------------------------------
+def test_laws_of_finite_rank_leave_nothing():
+    matrix = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])
+    uniform = ker.henyey_greenstein(0.0)
+    for law in (matrix, uniform):
+        apart = rest_of_spectrum(law, CONSTANTS, 0.0, 0.4)
+        assert apart.radius == 0.0 and apart.kind == "bound"
+
+
+def test_beyond_the_constants_a_lambertian_share_is_a_bound():
+    apart = rest_of_spectrum(ker.maxwell(0.25), CONSTANTS, 0.0, 0.4)
+    assert (apart.radius, apart.kind) == (0.75, "bound") and "a Lambertian share a = 0.25" in apart.reason
+
+
+@pytest.mark.parametrize(
+    ("next_value", "radius", "kind"), [(0.4, 0.75, "bound"), (0.75, 0.75, "bound"), (0.8, 0.8, "estimate")]
+)
+def test_beyond_other_eigenvalues_it_is_the_essential_edge_or_the_next_value(next_value, radius, kind):
+    """Of .25 Lambertian and .75 specular the essential spectrum ends at .75."""
+    apart = rest_of_spectrum(ker.maxwell(0.25), np.array([1.0, 0.75]), 0.0, next_value)
+    assert (apart.radius, apart.kind) == (radius, kind)
+    assert ("norm of the essential part, 0.75" in apart.reason) == (kind == "bound")
+
+
+def test_without_a_lambertian_share_the_next_value_is_an_estimate():
+    apart = rest_of_spectrum(ker.CircularArcLaw(1.2), CONSTANTS, 0.0, 0.4)
+    assert (apart.radius, apart.kind) == (0.4, "estimate")
+
+
+def test_the_lambertian_share_of_sums_and_products():
+    diffuse, turned = ker.lambertian(), ker.specular()
+    assert lambertian_share(diffuse) == 1.0 and lambertian_share(turned) == 0.0
+    assert lambertian_share(0.25 * diffuse + 0.75 * turned) == pytest.approx(0.25)
+    assert lambertian_share(turned @ diffuse) == 1.0
+    assert lambertian_share((0.5 * diffuse + 0.5 * turned) ** 3) == pytest.approx(0.875)
+    assert lambertian_share(ker.maxwell(0.5) @ ker.maxwell(0.25)) == pytest.approx(0.625)
+    assert lambertian_share(ker.maxwell(0.25).in_specular_frame()) == pytest.approx(0.25)
+    # the weights add up to 1 + 2e-16
+    shares = 0.1 * diffuse + 0.1 * diffuse + 0.4 * diffuse + 0.3 * diffuse + 0.1 * diffuse
+    assert lambertian_share(shares) == 1.0
