@@ -16,7 +16,7 @@ from .enclosure import as_power
 from .essential import EssentialEdge, essential_edge
 from .gap_routes import enclosed_gap, rough_gap
 from .ideal_parts import ideal_spectrum, without_identity
-from .law_eigenvalues import law_eigenvalues
+from .eigenvalue_routes import law_eigenvalues
 from .oscillations import held_against_oscillations
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .separation import lambertian_share

@@ -14,7 +14,7 @@ from .contraction import refuse_unless_self_adjoint
 from .eigenvalues import Spectrum, SpectrumErrors, matrix_spectrum
 from .essential import essential_edge
 from .gap import spectral_gap
-from .law_eigenvalues import DEGREES, discretisation_only, law_eigenvalues
+from .eigenvalue_routes import DEGREES, discretisation_only, law_eigenvalues
 from .theorems import gap_by_theorem
 from .verdict import SpectralGap
 

@@ -236,7 +236,6 @@ def test_bad_input_is_refused_with_advice(make, message):
     [
         ("S4.04", rolling.gap_radius),
         ("S4.12", rolling.roll_linear),
-        ("S4.13", rolling.bend),
         ("S4.16", rolling.straight_contact),
         ("S4.19", rolling.project),
         ("S5.09", rolling.transfer),
@@ -247,6 +246,11 @@ def test_bad_input_is_refused_with_advice(make, message):
 def test_the_ledger_checks_the_very_formula_that_the_charts_use(row, formula):
     (entry,) = ledger.selected([row])
     assert entry.right is formula
+
+
+def test_the_ledger_checks_the_bending_of_the_charts_at_the_size_of_the_disk():
+    (entry,) = ledger.selected(["S4.13"])
+    assert entry.right(0.3, -0.2, 0.1, np) == rolling.bend(0.3, -0.2, 0.1, 1, np)
 
 
 def test_the_symbolic_charts_are_the_maps_that_arrays_go_through():

@@ -58,7 +58,10 @@ def test_every_ray_is_right_to_rounding_times_its_condition(name):
     traced = geo.trace(wall, x, theta, max_collisions=2_000)
     twin = refined_trace(wall.scene, x, theta, 2_000)
     gone = traced.escaped & (twin.status == geo.Status.ESCAPED)
-    assert np.mean(traced.status == twin.status) == 1.0
+    # the twin gives up rays that pass very many cells of an open wall, which are no collisions
+    undecided = (twin.status == geo.Status.BOUNCE_LIMIT) & (twin.collisions < 2_000)
+    assert wall.scene.is_open or not undecided.any()
+    assert np.all((traced.status == twin.status) | undecided)
     error = np.abs((traced.theta - twin.theta[:, 0]) - twin.theta[:, 1])[gone]
     assert np.all(traced.collisions[gone] == twin.collisions[gone])
     assert np.all(error <= ERROR_UNITS * EPS * (twin.amplification * (1.0 + twin.collisions))[gone])

@@ -39,8 +39,8 @@ def test_a_ray_that_was_moved_is_wrong_and_no_conditioning_explains_it():
     wall, rng = geo.triangular_teeth(0.7), np.random.default_rng(1)
     x, theta = rng.random(50), np.arccos(1.0 - 2.0 * rng.random(50))
     traced = geo.trace(wall, x, theta)
-    assert robustness._explained(wall, traced, x, theta).all()
-    assert not robustness._explained(wall, traced, x, theta + 1e-9).any()
+    assert robustness._explained(wall, traced, x, theta, robustness.twin_trace).all()
+    assert not robustness._explained(wall, traced, x, theta + 1e-9, robustness.twin_trace).any()
 
 
 def test_shares_of_the_time_go_to_the_modules_that_spend_it():

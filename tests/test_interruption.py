@@ -46,7 +46,9 @@ def test_an_interrupt_ends_long_work_soon(name):
     call, hard = LONG_WORK[name]
     # the same call on harmless numbers compiles what is needed before the signal may come
     easy = call.replace("100_000", "10").replace("2**24", "2**10").replace("wall, 0.3", "few, [0.3] * 40")
-    program = f"{OPEN_WALL}\ntry:\n    {easy.format(angle='1.0')}\nexcept ValueError:\n    pass\n"
+    # a process started in the background ignores the signal, and so do its children
+    program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    program += f"{OPEN_WALL}\ntry:\n    {easy.format(angle='1.0')}\nexcept ValueError:\n    pass\n"
     program += "import time\nprint('ready', flush=True)\n"
     program += f"try:\n    {call.format(angle=hard)}\nexcept KeyboardInterrupt:\n    print(time.time())\n    raise\n"
     source = Path(__file__).resolve().parents[1] / "src"

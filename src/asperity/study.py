@@ -19,7 +19,7 @@ from .geometry import Disk, Wall, trace
 from .kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
 from .kernels.measure import SINE
 from .spectral import Enclosures, SpectralGap, Spectrum, enclosures, gaps_in_both_conventions, spectral_gap, spectrum
-from .spectral.law_eigenvalues import law_eigenvalues
+from .spectral.eigenvalue_routes import law_eigenvalues
 from .spectral.law_spectrum import with_gap
 
 if TYPE_CHECKING:
