@@ -28,6 +28,9 @@ SYMMETRY_TOLERANCE = 1e-9
 PANEL_COUNTS = (16, 32, 64, 128, 256, 512, 1024)
 GAUSS_NODES = 16
 CHECK_NODES = 8
+# Means of functions are settled where two rules differ by no more than this share of the function's largest value; each
+# panel is cut into so many parts at most. A function that jumps is not settled by these.
+SETTLED, MOST_PARTS = 1e-13, 8
 # Rows sampled from a tabulated cdf use this many cells on each panel.
 CELLS_PER_PANEL = 16
 PROBES = 24
@@ -158,11 +161,28 @@ class DensityLaw(Law):
         return total.reshape(theta.shape + total.shape[1:])
 
     def _apply_chunk(self, function: AngleFunction, theta: Floats) -> Floats:
-        outgoing, weight = self._row_quadrature(self.panels(theta), GAUSS_NODES)
+        found, height = self._means(function, theta, 1)
+        open_rows, parts = np.arange(theta.size), 2
+        while open_rows.size and parts <= MOST_PARTS:
+            # as many values at a time as with the coarsest panels
+            step = max(1, theta.size // parts)
+            starts = range(0, open_rows.size, step)
+            finer = [self._means(function, theta[open_rows[start : start + step]], parts) for start in starts]
+            value = np.concatenate([one for one, _ in finer])
+            height = max(height, *(most for _, most in finer))
+            change = np.abs(value - found[open_rows]).reshape(open_rows.size, -1).max(axis=1, initial=0.0)
+            found[open_rows] = value
+            open_rows = open_rows[change > SETTLED * height]
+            parts *= 2
+        return found
+
+    def _means(self, function: AngleFunction, theta: Floats, parts: int) -> tuple[Floats, float]:
+        """The means with each panel cut into so many parts, and the largest modulus of the function there."""
+        outgoing, weight = self._row_quadrature(split_rows(self.panels(theta), parts), GAUSS_NODES)
         weight = weight * self.density(theta[:, None], outgoing)
         weight /= np.sum(weight, axis=1, keepdims=True)
         value = np.asarray(function(outgoing), dtype=np.float64)
-        return np.asarray(np.einsum("ij,ij...->i...", weight, value))
+        return np.asarray(np.einsum("ij,ij...->i...", weight, value)), float(np.abs(value).max(initial=0.0))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         flat, draw = theta.reshape(-1), rng.random(theta.size)
@@ -231,6 +251,19 @@ class DensityLaw(Law):
         exact = np.cumsum(mass.sum(axis=-1), axis=-1)
         table = np.cumsum(_cell_masses(edges, self.density(probes[:, None], kept_inside(edges))), axis=-1)
         return float(np.max(np.abs(exact / exact[:, -1:] - table / table[:, -1:])))
+
+
+def split_rows(edges: Floats, parts: int) -> Floats:
+    """Edges in the last axis, with each interval cut into so many equal parts.
+
+    Examples
+    --------
+    >>> split_rows(np.array([0.0, 1.0, 3.0]), 2).tolist()
+    [0.0, 0.5, 1.0, 2.0, 3.0]
+    """
+    share = np.arange(parts) / parts
+    fine = (edges[..., :-1, None] + share * np.diff(edges, axis=-1)[..., None]).reshape(*edges.shape[:-1], -1)
+    return np.concatenate([fine, edges[..., -1:]], axis=-1)
 
 
 def _probes() -> Floats:

@@ -31,6 +31,7 @@ from .legendre import Legendre
 from .matrix import KernelMatrix
 from .matrix_algebra import frobenius_error
 from .net import PARTS, Net
+from .phase_function import HenyeyGreensteinLaw
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
 from .responses import responder
@@ -154,6 +155,8 @@ class MatrixMaker:
             found = _common([self._word_methods(word) for _, word in self._terms(law)])
         elif lists_branches(law):
             found = ("exact", "quadrature", *driven)
+        elif self._is_diagonal(law):
+            found = ("exact", "quadrature")
         elif isinstance(law, Combination):
             found = _common([self.methods(term) for _, term in law.terms_checked()])
         elif isinstance(law, SpecularFrame):
@@ -181,7 +184,14 @@ class MatrixMaker:
             return self._sum(law, method)
         return self.sampled(law, method)
 
+    def _is_diagonal(self, law: Law) -> bool:
+        return isinstance(law, HenyeyGreensteinLaw) and isinstance(self.basis, Legendre)
+
     def _exact(self, law: Law) -> KernelMatrix:
+        if isinstance(law, HenyeyGreensteinLaw) and self._is_diagonal(law):
+            diagonal = np.diag(law.g ** np.arange(float(self.basis.size)))
+            how = "eigenvalues g^l of the polynomials of degree l, to rounding"
+            return self._result(diagonal, "exact", EPS * self.basis.size**0.5, "bound", how)
         table = table_of(law)
         symmetric, omitted = self._isometric(law, self.basis)
         how, left = (

@@ -25,13 +25,17 @@ from ..kernels import (
     discretise,
 )  # fmt: skip
 from ..kernels.algebra import made_of_isometries
+from ..kernels.ideal import LambertianLaw
 from ..kernels.measure import SINE
 from ..kernels.panel_rows import integrates_panels, traces_rows
+from ..kernels.specular_frame import SpecularFrame
+from ..kernels.weighted_sum import Combination
 from ..rounding import EPS
 from .adapted_panels import adapted_trials
 from .contraction import refuse_unless_self_adjoint
 from .eigenvalues import check_reversible
 from .parity import Parity, halves, outermost_by_parity
+from .scattered_enclosure import ScatteredSpectrum, scattered_spectrum, scattered_words
 from .separation import Separation, rest_of_spectrum
 from .trials import Residuals, images, residuals
 
@@ -151,6 +155,9 @@ def enclosures(
 
     Raises
     ------
+    InputError
+        If the law is a composition with a density whose images have errors that are not known, or with a scattering too
+        near to a mirror.
     AccuracyError
         If the law is not symmetric within its error. Of a law that is self-adjoint in the other convention only, the
         message says what is true in this one.
@@ -180,6 +187,14 @@ def enclosures(
     if not isinstance(law, Law):
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     refuse_unless_self_adjoint(law)
+    words = scattered_words(law) if basis is None and not isinstance(law, DensityLaw) else None
+    if words is not None:
+        only = next(iter(words)) if len(words) == 1 else ()
+        if len(only) == 1 and isinstance(only[0], DensityLaw):
+            # a product of scatterings is one scattering
+            return replace(enclosures(only[0], k, None, tolerance), convention=law.frame)
+        return _of_scattered(scattered_spectrum(law, words, k, tolerance), law.frame)
+    _refuse_unknown_images(law)
     power = as_power(law) if basis is None else None
     if power is not None:
         return _raised(enclosures(power[0], k, None, tolerance / power[1]), power[1])
@@ -276,6 +291,48 @@ def _raised(found: Enclosures, exponent: int) -> Enclosures:
     return replace(found, items=tuple(items), separation=apart, method=f"power {exponent}; {found.method}")
 
 
+def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:
+    """Enclosures from eigenvalues of a matrix that the law is near to."""
+    reason = f"the law is a matrix in {found.degrees} Legendre polynomials within {found.distance:.2g}"
+    if found.essential > 0.0:
+        reason += f", beyond them the essential spectrum of modulus {found.essential:.6g}"
+    items = [Enclosure(1.0, 1.0, 1.0, "indexed", 0, 0.0, found.kind, f"P 1 = 1; {reason}", found.parities[0])]
+    for place in range(1, len(found.values)):
+        value, certain = float(found.values[place]), found.certain[place]
+        label: Label = "indexed" if certain else "contains-spectrum"
+        why = reason if certain else f"not indexed: another value, or the essential spectrum, may be as large; {reason}"
+        low, high = value - found.distance, min(value + found.distance, 1.0)
+        index = place if certain else None
+        items.append(Enclosure(value, low, high, label, index, found.distance, found.kind, why, found.parities[place]))
+    items.sort(key=lambda item: (item.index != 0, -item.value))
+    apart = Separation(found.essential + found.distance, found.kind, reason)
+    return Enclosures(tuple(items), apart, convention, "eigenvalues of a matrix that the law is near to")
+
+
+def _refuse_unknown_images(law: Law) -> None:
+    """Raise an InputError for chains with densities whose images have errors that nobody knows."""
+
+    def refused(part: Law, in_chain: bool) -> bool:
+        if isinstance(part, Combination):
+            return any(refused(term, in_chain) for _, term in part.terms)
+        if isinstance(part, SpecularFrame):
+            return refused(part.law, in_chain)
+        if isinstance(part, Power):
+            return refused(part.law, in_chain or as_power(part) is None)
+        if isinstance(part, Composition):
+            whole = as_power(part)
+            parts = part.laws if whole is None else (whole[0],)
+            return any(refused(one, in_chain or whole is None) for one in parts)
+        return in_chain and isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw)
+
+    if refused(law, False):
+        raise InputError(
+            f"law: the images of trial functions under {law!r} have no known error, for it is a composition with a "
+            "density that neither begins nor ends it as a Henyey-Greenstein scattering; spectrum(law) and "
+            "spectral_gap(law) take the matrix of the composition"
+        )
+
+
 def _first_that_separates(
     law: Law, found: Residuals, order: NDArray[np.intp], next_value: float
 ) -> tuple[int, Separation]:
@@ -323,7 +380,7 @@ def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
     if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
         # a density may have a peak that no product rule sees; its rows have panels of their own
         angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval)
-        image = images(law, basis.evaluate, angle, basis)
+        image, _ = images(law, basis.evaluate, angle, basis)
         symmetric = basis.evaluate(angle).T @ (weight[:, None] * image)
         return np.asarray(0.5 * (symmetric + symmetric.T))
     matrix = discretise(law, basis, tolerance=tolerance)

@@ -15,6 +15,7 @@ from ..kernels.measure import gauss_rule
 from ..kernels.phase_function import HenyeyGreensteinLaw
 from ..rounding import EPS
 from .essential import essential_edge
+from .oscillations import fast_top
 
 # The power P^p of a law with eigenvalues g^l is chosen so that g^p is about this: the sum of the squares that are left
 # out, x^(2 m)/(1 - x^2), is then below the last square that is kept, x^(2 m - 2), and rounding is not yet.
@@ -65,6 +66,10 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
     if edge.high >= next_value:
         reason = f"norm of the essential part, {edge.high:.6g}: " + "; ".join(edge.reasons)
         return Separation(edge.high, edge.kind, reason)
+    # the next value of slow functions is not that of the law where a law nearly keeps fast oscillations
+    fast = fast_top(law)
+    if fast is not None and fast[0] > next_value:
+        return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
     reason = f"next eigenvalue in the basis, with its residual; essential part at most {edge.high:.3g}"
     return Separation(next_value, "estimate", reason)
 

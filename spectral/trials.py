@@ -9,11 +9,12 @@ import numpy as np
 from ..checks import Floats
 from ..kernels import Basis, DensityLaw, Law, Legendre, Panels
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
-from ..kernels.density import GAUSS_NODES
+from ..kernels.density import GAUSS_NODES, split_rows
 from ..kernels.kernel_quadrature import GRAZING_EDGES
 from ..kernels.law import AngleFunction
 from ..kernels.measure import SINE, gauss_on_intervals
 from ..kernels.panel_rows import function_rows
+from ..kernels.weighted_sum import Combination
 from ..rounding import EPS
 
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
@@ -131,11 +132,14 @@ def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -
             images(law, lambda theta: expansion(basis, vectors, theta), angle[start : start + CHUNK_ROWS], basis)
             for start in starts
         ]
-        rest = np.concatenate(parts) - here * values
+        rest = np.concatenate([image for image, _ in parts]) - here * values
+        errors = np.concatenate([error for _, error in parts])
         found.append((weight @ (here * rest), weight @ (rest * rest)))
     (first, first_square), (second, second_square) = found
     norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
-    return Residuals(values + second, np.abs(second - first), norms, rows)
+    # an error e of the images adds at most ||e|| to either, for the trial functions are unit vectors
+    doubt = float(np.sqrt(weight @ errors**2))
+    return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, rows)
 
 
 def _first_panels(basis: Basis) -> tuple[Floats, Floats]:
@@ -161,7 +165,8 @@ class _TrialFunctions:
             found, errors = self.rows(theta, self.row_tolerance)
             return found, np.nan_to_num(errors)
         chunks = [theta[start : start + CHUNK_ROWS] for start in range(0, theta.size, CHUNK_ROWS)]
-        return np.concatenate([images(self.law, self, chunk, self.basis) for chunk in chunks]), np.zeros(theta.size)
+        parts = [images(self.law, self, chunk, self.basis) for chunk in chunks]
+        return np.concatenate([found for found, _ in parts]), np.concatenate([errors for _, errors in parts])
 
 
 def _integrals(
@@ -189,17 +194,33 @@ def _integrals(
     )
 
 
-def images(law: Law, function: AngleFunction, theta: Floats, basis: Basis) -> Floats:
-    """P f at the angles theta for functions f of the basis, with rows as fine as these functions need."""
+def images(law: Law, function: AngleFunction, theta: Floats, basis: Basis) -> tuple[Floats, Floats]:
+    """P f at the angles theta for functions f of the basis, and estimated errors of the worst, shape (angles,).
+
+    Rows of a density are cut at the edges of the basis and as fine as its functions need; the error is the difference
+    of two Gauss rules.
+    """
+    if isinstance(law, Combination):
+        terms = [(weight, images(term, function, theta, basis)) for weight, term in law.terms_checked()]
+        values, errors = (sum(weight * one[place] for weight, one in terms) for place in (0, 1))
+        return np.asarray(values), np.asarray(errors)
     if not isinstance(law, DensityLaw):
-        return law.apply(function, theta)
-    # a panel's Gauss rule follows polynomials in cos(theta) of a degree below its nodes over its width
-    parts = 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES))
-    panels = law.panels(theta)
-    share = np.arange(parts) / parts
-    fine = (panels[..., :-1, None] + share * np.diff(panels, axis=-1)[..., None]).reshape(*theta.shape, -1)
-    fine = np.concatenate([fine, panels[..., -1:]], axis=-1)
-    outgoing, weight = gauss_on_intervals(fine[:, :-1].ravel(), fine[:, 1:].ravel(), GAUSS_NODES)
+        return law.apply(function, theta), np.zeros(theta.size)
+    edges = law.panels(theta)
+    if isinstance(basis, Legendre):
+        # a panel's Gauss rule follows polynomials in cos(theta) of a degree below its nodes over its width
+        edges = split_rows(edges, 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES)))
+    else:
+        inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
+        edges = np.sort(np.concatenate([edges, inner], axis=1), axis=1)
+    finer, coarser = (
+        _means(law, function, theta, edges, nodes) for nodes in (GAUSS_NODES + MORE_NODES[1], GAUSS_NODES)
+    )
+    return finer, np.asarray(np.abs(finer - coarser).reshape(theta.size, -1).max(axis=1, initial=0.0))
+
+
+def _means(law: DensityLaw, function: AngleFunction, theta: Floats, edges: Floats, nodes: int) -> Floats:
+    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), nodes)
     outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)
     weight = weight * law.density(theta[:, None], outgoing)
     weight /= weight.sum(axis=1, keepdims=True)

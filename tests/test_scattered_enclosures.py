@@ -1,0 +1,61 @@
+"""Enclosures of compositions with scatterings, images of fast functions, and walls of nearly straight sides."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from benchmarks.scattered_enclosures import diagonal_case, judged, teeth_case
+from scipy.special import eval_legendre
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError
+from asperity.spectral.separation import rest_of_spectrum
+
+
+@pytest.mark.parametrize("make, numbers", [(diagonal_case, range(40)), (teeth_case, range(2))], ids=["words", "teeth"])
+def test_random_compositions_are_enclosed_and_indexed_as_known_otherwise(make, numbers):
+    for number in numbers:
+        found = judged(make(number))
+        assert found["without an eigenvalue"] == found["indexed falsely"] == 0, number
+
+
+def test_products_of_scatterings_are_narrow_and_indexed():
+    scattering, flip = ker.henyey_greenstein(0.5), ker.specular()
+    for law, exact in ((scattering @ scattering, 0.25), (flip @ scattering, -0.5)):
+        found = {item.index: item for item in spec.enclosures(law, 3)}
+        assert exact in found[1] and found[1].width < 1e-13
+
+
+@pytest.mark.parametrize("degree", [24, 39, 80])
+def test_images_of_fast_functions_are_accurate(degree):
+    angle = np.array([0.02, 0.7, 1.5, 2.9])
+    image = ker.henyey_greenstein(0.3).apply(lambda theta: eval_legendre(degree, np.cos(theta)), angle)
+    assert np.abs(image - 0.3**degree * eval_legendre(degree, np.cos(angle))).max() < 1e-13
+
+
+def test_a_composition_whose_images_have_no_known_error_is_refused():
+    arc, scattering = ker.CircularArcLaw(1.0), ker.henyey_greenstein(0.5)
+    with pytest.raises(InputError, match="no known error"):
+        spec.enclosures(arc @ scattering @ arc, 2)
+    with pytest.raises(InputError, match="has a scattering that leaves"):
+        near = ker.henyey_greenstein(0.96)
+        spec.enclosures(near @ ker.TriangularTeethLaw(0.7) @ near, 2, tolerance=1e-12)
+
+
+def test_the_next_value_of_slow_functions_is_held_against_fast_oscillations():
+    """Sides that bend by 1e-4 nearly keep cos(44 theta); an arc keeps no oscillation."""
+    left, right = [(0, 0), (0.25, -0.5001), (0.5, -1)], [(0.5, -1), (0.75, -0.5001), (1, 0)]
+    bent = ker.WallLaw(geo.Wall([geo.Bezier(left), geo.Bezier(right)]))
+    apart = rest_of_spectrum(bent, np.array([1.0, -0.88]), 1e-3, 0.7)
+    assert apart.radius == 1.0 and "fast oscillations" in apart.reason
+    assert rest_of_spectrum(ker.CircularArcLaw(1.2), np.array([1.0, 0.367]), 1e-3, 0.2).radius == 0.2
+
+
+def test_the_matrix_of_a_scattering_in_polynomials_is_exact_and_agrees_with_quadrature():
+    law, basis = ker.henyey_greenstein(0.6), ker.Legendre(8)
+    exact, quadrature = (ker.discretise(law, basis, method=method) for method in ("auto", "quadrature"))
+    assert exact.method == "exact" and quadrature.method == "quadrature"
+    assert np.abs(exact.symmetric - np.diag(0.6 ** np.arange(8.0))).max() <= float(exact.error)
+    assert np.abs(exact.symmetric - quadrature.symmetric).max() < 1e-12
