@@ -158,17 +158,19 @@ def _checked(matrix: KernelMatrix) -> tuple[Floats, float]:
 def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parity, ...]]:
     """Those off the constants by modulus, descending, with their parities."""
     inner = symmetric[1:, 1:]
+    values: Floats
+    names: list[Parity] = ["none"] * len(inner)
     if np.array_equal(inner, np.diag(np.diag(inner))):
         values = np.diag(inner)
-        names: list[Parity] = [("odd", "even")[place % 2] if mirrored else "none" for place in range(len(values))]  # type: ignore[misc]
+        if mirrored:
+            names = ["odd" if place % 2 == 0 else "even" for place in range(len(values))]
     elif mirrored:
         # what the law has between polynomials of either parity is error
         odd, even = (np.linalg.eigvalsh(inner[start::2, start::2]) for start in (0, 1))
-        values = np.append(odd, even)
-        names = ["odd"] * len(odd) + ["even"] * len(even)  # type: ignore[assignment]
+        values = np.asarray(np.append(odd, even), dtype=np.float64)
+        names[: len(odd)], names[len(odd) :] = ["odd"] * len(odd), ["even"] * len(even)
     else:
-        values = np.linalg.eigvalsh(inner)
-        names = ["none"] * len(values)
+        values = np.asarray(np.linalg.eigvalsh(inner), dtype=np.float64)
     order = np.argsort(-np.abs(values), kind="stable")
     return values[order], tuple(names[place] for place in order)
 
