@@ -15,7 +15,7 @@ from ..kernels.algebra import Rules, fold, made_of_isometries
 from ..kernels.ideal import LambertianLaw
 from ..kernels.phase_function import HenyeyGreensteinLaw
 from .grazing import SWAP, GrazingLimit, grazing_limit
-from .straight_part import straight_part
+from .straight_pieces import straight_part
 
 ROUNDING = 1e-15
 

@@ -11,12 +11,12 @@ from ..errors import InputError
 from ..kernels import CollisionLaw, KernelMatrix, Law
 from ..rounding import EPS
 from .contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
+from .eigenvalue_routes import law_eigenvalues
 from .eigenvalues import Spectrum, matrix_spectrum
 from .enclosure import as_power
 from .essential import EssentialEdge, essential_edge
 from .gap_routes import enclosed_gap, rough_gap
 from .ideal_parts import ideal_spectrum, without_identity
-from .eigenvalue_routes import law_eigenvalues
 from .oscillations import held_against_oscillations
 from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
 from .separation import lambertian_share

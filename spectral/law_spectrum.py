@@ -11,10 +11,10 @@ from ..checks import frozen, positive_number, whole_number
 from ..errors import InputError
 from ..kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from .contraction import refuse_unless_self_adjoint
+from .eigenvalue_routes import DEGREES, discretisation_only, law_eigenvalues
 from .eigenvalues import Spectrum, SpectrumErrors, matrix_spectrum
 from .essential import essential_edge
 from .gap import spectral_gap
-from .eigenvalue_routes import DEGREES, discretisation_only, law_eigenvalues
 from .theorems import gap_by_theorem
 from .verdict import SpectralGap
 
