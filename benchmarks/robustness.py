@@ -1,6 +1,6 @@
 """Rays aimed at corners and tangencies, and rays at grazing angles, against another tracer: every one of them.
 
-``python -m benchmarks.robustness`` traces a million of each on eleven walls against the double-double twin, and a
+``python -m benchmarks.robustness`` traces a million of each on twelve walls against the double-double twin, and a
 million rays aimed at the corners of random polygons of each kind in `POLYGONS` against the tests' brute-force tracer in
 31 digits, and prints what became of them. Twin and brute force are judged in turn by the tests' tracer in 50 digits: on
 a thousand rays, and on every ray where they and the tracer disagree.
