@@ -59,7 +59,7 @@ class LeastResistanceLaw(Law):
         """b, the end of the range where rays are split."""
         return _split_ends()
 
-    def outcomes(self, theta: Floats) -> tuple[Floats, Floats]:
+    def images(self, theta: Floats) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles, shape ``theta.shape + (2,)``: the specular one first."""
         x = np.asarray(theta, dtype=np.float64) - 0.5 * np.pi
         size = np.abs(x)
@@ -93,7 +93,7 @@ class LeastResistanceLaw(Law):
         fine = np.concatenate((edges, 0.5 * np.pi + _graded(self.split_ends), 0.5 * np.pi - _graded(self.split_ends)))
         fine = np.unique(fine)
         angle, mass = SINE.quadrature(fine, NODES)
-        probability, outgoing = self.outcomes(angle)
+        probability, outgoing = self.images(angle)
         return float(mass @ np.sum(probability * np.cos(outgoing - angle[:, None]), axis=1) / mass.sum())
 
     def flux(self, cells: Bins) -> Floats:
@@ -113,18 +113,18 @@ class LeastResistanceLaw(Law):
         split = 0.5 * (np.sin(3.0 * low) - np.sin(3.0 * high))
         away = np.where(middle < SPLIT_BEGINS, 0.0, np.where(middle < b, split, whole))
         theta, flux = middle + 0.5 * np.pi, np.zeros((cells.size, cells.size))
-        image = self.outcomes(theta)[1]
+        image = self.images(theta)[1]
         for target, mass in ((image[:, 0], whole - away), (image[:, 1], away)):
             np.add.at(flux, (cells.index(theta), cells.index(target)), mass)
             np.add.at(flux, (cells.index(np.pi - theta), cells.index(np.pi - target)), mass)
         return np.asarray(0.5 * (flux + flux.T))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        probability, outgoing = self.outcomes(theta)
+        probability, outgoing = self.images(theta)
         return np.where(rng.random(theta.shape) < probability[..., 0], outgoing[..., 0], outgoing[..., 1])
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        probability, outgoing = self.outcomes(theta)
+        probability, outgoing = self.images(theta)
         value = np.asarray(function(outgoing), dtype=np.float64)
         weight = probability.reshape(probability.shape + (1,) * (value.ndim - probability.ndim))
         return np.asarray(np.sum(weight * value, axis=theta.ndim))

@@ -72,7 +72,7 @@ def _(law: IntervalExchangeLaw, theta: Floats, edges: Floats) -> Parts:
 
 @parts_of.register
 def _(law: LeastResistanceLaw, theta: Floats, edges: Floats) -> Parts:
-    probability, outgoing = law.outcomes(theta)
+    probability, outgoing = law.images(theta)
     return np.zeros((theta.size, edges.size)), outgoing, probability
 
 

@@ -232,3 +232,30 @@ def test_the_record_of_a_matrix_is_that_of_its_law() -> None:
     assert matrix.law == "TriangularTeethLaw(angle=0.7)"
     assert (matrix.reversible, matrix.mirror_symmetric, matrix.frame) == (True, True, "paper")
     assert matrix.requested_tolerance == 1e-3 and matrix.tolerance_met and matrix.samples == 0
+
+
+EVERY_KIND = [
+    *LAWS,
+    ker.specular(),
+    ker.RectangularTeethLaw(0.8),
+    ker.IntervalExchangeLaw(ker.discretise(ker.lambertian(), ker.Bins(3))),
+    ker.LeastResistanceLaw(),
+    ker.MatrixLaw(ker.discretise(ker.lambertian(), ker.Bins(3))),
+    ker.WallLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.7), (0.9, -0.3), (1, 0)])),
+    0.4 * ker.TriangularTeethLaw(0.7) + 0.6 * ker.lambertian(),
+    ker.CircularArcLaw(1.2) ** 2,
+    ker.LeastResistanceLaw().in_specular_frame(),
+]
+
+
+@pytest.mark.parametrize("law", EVERY_KIND, ids=repr)
+@pytest.mark.parametrize("method", ["exact", "quadrature", "qmc", "monte-carlo"])
+def test_a_law_has_the_same_matrix_by_every_method_that_it_has(law: ker.Law, method: str) -> None:
+    best = ker.discretise(law, ker.Bins(4), tolerance=1e-4)
+    try:
+        found = ker.discretise(law, ker.Bins(4), method, 1e-4, samples=2**13, rng=np.random.default_rng(5))
+    except InputError as refusal:
+        assert "method" in str(refusal)
+        return
+    # a sampled error is a half width of 95 %, and here are many cases
+    assert np.linalg.norm(found.symmetric - best.symmetric) <= 3.0 * found.error.value + best.error.value
