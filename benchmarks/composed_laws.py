@@ -1,34 +1,50 @@
 """Reported errors of matrices of random compositions, mixtures, powers, frames and adjoints, against references.
 
 ``python -m benchmarks.composed_laws --count 2000`` draws laws and bases from seeds 0, 1, ... and prints how many of the
-reported errors hold, by method and by basis, and the cases where one does not hold or cannot be told.
+reported errors hold, by method and by basis, and the cases where one does not hold or cannot be told. Outcomes are kept
+in the file ``--record``, so that a run can be stopped and taken up again, or made in ranges (``--first``, ``--count``).
 
-The reference expands the expression into words without simplifying them and applies the laws of a word to the functions
-of the basis, from the last one back, as functions of any angle: rays into teeth and arcs by the formulas of single
-rays, scatterings by their eigenvalues. Every integral is a composite Gauss rule between all angles at which the
-integrand may not be smooth, which are carried along. It is done twice, coarsely and finely; twice the difference and
-rounding are its own error.
+The reference expands the expression into words and applies the laws of a word to the functions of the basis, from the
+last one back, as functions of any angle: rays into teeth and arcs by the formulas of single rays, scatterings by their
+eigenvalues, rectangular teeth one after the other by what they do to even and odd functions. Every integral is a
+composite Gauss rule between all angles at which the integrand may not be smooth, which are carried along; all but the
+rows of arcs in extended precision. It is done twice, coarsely and finely; twice the difference and rounding are its own
+error.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, field, replace
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import erfc
+from threadpoolctl import threadpool_limits
 
 from asperity import kernels as ker
 from asperity.errors import InputError
 
-Floats = NDArray[np.float64]
-# The reference's rounding for each function of the basis: sums of some ten thousand terms.
-ROUNDING = 5e-16
+# Extended precision where the processor has it, so that errors near rounding can be told; rows of arcs are in float64.
+Floats = NDArray[Any]
+Extended = np.longdouble
+PI = 4.0 * np.arctan(Extended(1.0))
+# The reference's rounding for each function of the basis, in units of the last place: sums of some ten thousand terms.
+ROUNDING = 25.0
 # Of matrices by rays the error is a spread, not a bound: how far beyond a wrong one would be.
 SAMPLES = 2**14
+# Values of functions held at a time.
+CHUNK = 2**20
 
 
 # ---- functions of the angle, and where they are not smooth ---------------------------------------------------------
@@ -41,27 +57,59 @@ class Function:
 
 
 # Towards grazing, and towards pi/2 where the involution below comes from there.
-NEAR = np.pi * 0.4 ** np.arange(2.0, 24.0)
-GRADED = NEAR, np.pi - NEAR, 0.5 * np.pi - NEAR, 0.5 * np.pi + NEAR
+NEAR = PI * Extended(0.4) ** np.arange(2, 26)
+GRADED = NEAR, PI - NEAR, PI / 2 - NEAR, PI / 2 + NEAR
 
 
 @dataclass(frozen=True)
 class Rule:
-    """How fine the reference's integrals are."""
+    """How fine the reference's integrals are: panels of (0, pi), Gauss nodes on each, crossings of a crevice and hits
+    of an arc that are told apart; and the type of its numbers.
+    """
 
     panels: int
     nodes: int
     crossings: int
+    hits: int
+    kind: type = Extended
 
     def grid(self, breaks: Floats) -> tuple[Floats, Floats]:
         """Nodes and weights of sin(theta)/2 d theta on (0, pi)."""
-        edges = np.concatenate((np.linspace(0.0, np.pi, self.panels + 1), breaks, *GRADED))
-        edges = np.unique(np.clip(edges, 0.0, np.pi))
-        edges = edges[np.append(True, np.diff(edges) > 1e-13)]
-        x, w = np.polynomial.legendre.leggauss(self.nodes)
-        half = 0.5 * np.diff(edges)[:, None]
-        angle = (0.5 * (edges[1:] + edges[:-1])[:, None] + half * x).ravel()
-        return angle, (half * w).ravel() * 0.5 * np.sin(angle)
+        regular = PI * np.arange(self.panels + 1, dtype=Extended) / self.panels
+        edges = np.unique(np.clip(np.concatenate((regular, breaks, *GRADED)), 0, PI))
+        angle, weight = (part.ravel() for part in nodes_between(edges[:-1], edges[1:], self.nodes))
+        return angle.astype(self.kind), (weight * np.sin(angle) / 2).astype(self.kind)
+
+    def moments(self, functions: Callable[[Floats], Floats], function: Function, breaks: Floats) -> Floats:
+        """Means of products of functions: shape (functions, functions)."""
+        angle, weight = self.grid(np.concatenate((function.breaks, breaks)))
+        size = function.evaluate(angle[:1]).shape[1] + functions(angle[:1]).shape[1]
+        step = max(CHUNK // size, 1)
+        parts = (slice(start, start + step) for start in range(0, angle.size, step))
+        return np.asarray(
+            sum(functions(angle[part]).T @ (weight[part, None] * function.evaluate(angle[part])) for part in parts)
+        )
+
+
+def nodes_between(low: Floats, high: Floats, number: int) -> tuple[Floats, Floats]:
+    """Gauss nodes in s, angle = low + (high - low) s^2 (3 - 2 s): square roots at the ends become smooth."""
+    node, weight = gauss(number)
+    s = (1 + node) / 2
+    width = (high - low)[:, None]
+    return low[:, None] + width * (s * s * (3 - 2 * s)), width * (3 * s * (1 - s) * weight)
+
+
+@cache
+def gauss(number: int) -> tuple[Floats, Floats]:
+    """Gauss nodes and weights on (-1, 1) in extended precision: float64 ones after two steps of Newton's method."""
+    x = np.polynomial.legendre.leggauss(number)[0].astype(Extended)
+    for _ in range(2):
+        table = np.polynomial.legendre.legvander(x, number)
+        slope = number * (table[:, -2] - x * table[:, -1]) / (1 - x * x)
+        x = x - table[:, -1] / slope
+    table = np.polynomial.legendre.legvander(x, number)
+    slope = number * (table[:, -2] - x * table[:, -1]) / (1 - x * x)
+    return x, 2 / ((1 - x * x) * slope**2)
 
 
 Operator = Callable[[Function, Rule], Function]
@@ -69,46 +117,63 @@ Operator = Callable[[Function, Rule], Function]
 
 def polynomials(number: int, angle: Floats) -> Floats:
     """Orthonormal Legendre polynomials in the cosine."""
-    return np.polynomial.legendre.legvander(np.cos(angle), number - 1) * np.sqrt(2.0 * np.arange(number) + 1.0)
+    norms = np.sqrt(2 * np.arange(number).astype(angle.dtype) + 1)
+    return np.asarray(np.polynomial.legendre.legvander(np.cos(angle), number - 1) * norms)
 
 
-def diagonal(eigenvalues: Floats) -> Operator:
+@dataclass(frozen=True)
+class Diagonal:
     """The operator with these eigenvalues on the first Legendre polynomials, and 0 on the others."""
 
-    def act(function: Function, rule: Rule) -> Function:
-        angle, weight = rule.grid(function.breaks)
-        moments = polynomials(eigenvalues.size, angle).T @ (weight[:, None] * function.evaluate(angle))
-        image = eigenvalues[:, None] * moments
-        return Function(lambda theta: polynomials(eigenvalues.size, theta) @ image, np.empty(0))
+    eigenvalues: Floats
 
-    return act
+    def __call__(self, function: Function, rule: Rule) -> Function:
+        size = self.eigenvalues.size
+        moments = rule.moments(lambda angle: polynomials(size, angle), function, np.empty(0))
+        image = self.eigenvalues[:, None] * moments
+
+        def evaluate(theta: Floats) -> Floats:
+            step, moments = max(CHUNK // (4 * size), 1), image.astype(theta.dtype)
+            parts = [theta[start : start + step] for start in range(0, theta.size, step)]
+            return np.concatenate([polynomials(size, part) @ moments for part in parts] or [moments[:0]])
+
+        return Function(evaluate, np.empty(0))
 
 
 def scattering(g: float) -> Operator:
     """Henyey-Greenstein: g^l on the polynomial of degree l."""
-    last = 1 if g == 0.0 else int(np.ceil(np.log(1e-18) / np.log(abs(g)))) + 1
-    return diagonal(g ** np.arange(last))
+    last = 1 if g == 0.0 else int(np.ceil(np.log(1e-19) / np.log(abs(g)))) + 1
+    return Diagonal(Extended(g) ** np.arange(last))
 
 
 def piecewise(array: Floats) -> Operator:
     """From bin to bin of equal measure, uniformly within the bin."""
-    size = len(array)
-    edges = np.arccos(1.0 - 2.0 * np.arange(size + 1) / size)
+    edges = equal_bins(len(array))
 
     def act(function: Function, rule: Rule) -> Function:
-        angle, weight = rule.grid(np.concatenate((function.breaks, edges)))
-        cell = np.clip(np.searchsorted(edges, angle) - 1, 0, size - 1)
-        means = np.zeros((size, function.evaluate(angle[:1]).shape[1]))
-        np.add.at(means, cell, size * weight[:, None] * function.evaluate(angle))
+        means = rule.moments(lambda angle: indicators(edges, angle), function, edges)
         image = array @ means
-        return Function(lambda theta: image[np.clip(np.searchsorted(edges, theta) - 1, 0, size - 1)], edges[1:-1])
+        return Function(lambda theta: indicators(edges, theta) @ image.astype(theta.dtype), edges[1:-1])
 
     return act
 
 
+def equal_bins(size: int) -> Floats:
+    """Edges of bins of equal measure."""
+    return np.arccos(1 - 2 * np.arange(size + 1, dtype=Extended) / size)
+
+
+def indicators(edges: Floats, angle: Floats) -> Floats:
+    """The functions of bins, normalised, shape (angles, bins)."""
+    cell = np.clip(np.searchsorted(edges.astype(angle.dtype), angle, side="right") - 1, 0, edges.size - 2)
+    # the difference of two cosines as a product, so that it keeps its digits
+    mass = np.sin((edges[1:] + edges[:-1]) / 2) * np.sin((edges[1:] - edges[:-1]) / 2)
+    return np.asarray(np.eye(mass.size, dtype=angle.dtype)[cell] / np.sqrt(mass).astype(angle.dtype))
+
+
 def flip(function: Function, rule: Rule) -> Function:
     """Specular reflection."""
-    return Function(lambda theta: function.evaluate(np.pi - theta), np.pi - function.breaks)
+    return Function(lambda theta: function.evaluate(theta.dtype.type(PI) - theta), PI - function.breaks)
 
 
 def identity(function: Function, rule: Rule) -> Function:
@@ -118,13 +183,18 @@ def identity(function: Function, rule: Rule) -> Function:
 
 def exchange(function: Function, rule: Rule) -> Function:
     """The involution u -> 1/2 - u for 0 < u < 1/2, u = (1 - cos theta)/2."""
-    fixed = np.append(function.breaks, 0.5 * np.pi)
-    return Function(lambda theta: function.evaluate(exchanged(theta)), np.append(exchanged(fixed), 0.5 * np.pi))
+    fixed = np.append(function.breaks, PI / 2)
+    return Function(lambda theta: function.evaluate(exchanged(theta)), np.append(exchanged(fixed), PI / 2))
 
 
 def exchanged(theta: Floats) -> Floats:
     """The involution: the half below pi/2 turned round, the other half as it is."""
-    return np.where(theta < 0.5 * np.pi, np.arccos(np.clip(1.0 - np.cos(theta), -1.0, 1.0)), theta)
+    theta = np.asarray(theta)
+    return np.where(theta < PI / 2, 2 * np.arcsin(np.sqrt(np.abs(np.cos(theta)) / 2)), theta)
+
+
+# Crossings of a crevice are followed so many times further where functions are not smooth near grazing.
+MOST_TIMES = 30
 
 
 # ---- laws of isometries: probabilities of the branches s theta + c ------------------------------------------------
@@ -140,110 +210,222 @@ class Isometries:
     def __call__(self, function: Function, rule: Rule) -> Function:
         targets = function.breaks
         sources = (self.sign[:, None] * (targets - self.offset[:, None])).ravel() if targets.size else np.empty(0)
-        breaks = np.concatenate((self.kinks, sources[(sources > 0.0) & (sources < np.pi)]))
+        breaks = np.concatenate((self.kinks, sources[(sources > 0.0) & (sources < PI)]))
         return Function(lambda theta: self._means(function, theta), np.unique(breaks))
 
     def _means(self, function: Function, theta: Floats) -> Floats:
         share = self.probabilities(theta)
-        row, branch = np.nonzero(share > 0.0)
-        outgoing = np.clip(self.sign[branch] * theta[row] + self.offset[branch], 0.0, np.pi)
-        image = share[row, branch][:, None] * function.evaluate(outgoing)
-        total = np.zeros((theta.size, image.shape[1]))
-        np.add.at(total, row, image)
+        total = 0.0 * function.evaluate(theta)
+        sign, offset = self.sign.astype(theta.dtype), self.offset.astype(theta.dtype)
+        for branch in range(sign.size):
+            row = np.flatnonzero(share[:, branch] > 0.0)
+            outgoing = np.clip(sign[branch] * theta[row] + offset[branch], 0, theta.dtype.type(PI))
+            total[row] += share[row, branch][:, None] * function.evaluate(outgoing)
         return total
 
 
-def triangular(psi: float) -> Isometries:
+@dataclass(frozen=True)
+class Triangular:
     """Triangular teeth, from the formula of a single ray by the bounds of the number n of hits."""
-    n = np.arange(0.0, np.ceil(np.pi / psi) + 3.0)
-    even = n % 2 == 0
-    sign = np.where(even, 1.0, -1.0)
-    left, right = np.where(even, np.pi - n * psi, n * psi), np.where(even, n * psi - np.pi, 2.0 * np.pi - n * psi)
 
-    def half(theta: Floats) -> Floats:
-        lowest, highest = np.abs(theta - 0.5 * psi), np.minimum(0.5 * np.pi, theta + 0.5 * psi)
-        bounds = [
-            np.clip((n + side) * psi - theta[:, None], lowest[:, None], np.maximum(highest, lowest)[:, None])
-            for side in (-0.5, 0.5)
-        ]
-        width = np.cos(theta - 0.5 * psi) - np.cos(theta + 0.5 * psi)
-        return (np.cos(bounds[0]) - np.cos(bounds[1])) / width[:, None]
+    apex: float
 
-    k = np.arange(-2.0, 2.0 * np.ceil(np.pi / psi) + 6.0)
-    one = np.concatenate((k * 0.5 * psi, (0.5 * k) * psi - 0.5 * np.pi, 0.5 * np.pi - 0.5 * k * psi))
-    both = np.concatenate((one, np.pi - one))
-    return Isometries(
-        np.concatenate((sign, sign)),
-        np.concatenate((left, right)),
-        lambda theta: np.concatenate((half(theta), half(np.pi - theta)), axis=1),
-        both[(both > 0.0) & (both < np.pi)],
-    )
+    def __call__(self, function: Function, rule: Rule) -> Function:
+        psi = Extended(self.apex)
+        n = np.arange(np.ceil(PI / psi) + 3, dtype=Extended)
+        even = n % 2 == 0
+        sign = np.where(even, 1, -1)
+        left, right = np.where(even, PI - n * psi, n * psi), np.where(even, n * psi - PI, 2 * PI - n * psi)
+
+        def half(theta: Floats) -> Floats:
+            angle, hits = theta.dtype.type(psi), n.astype(theta.dtype)
+            lowest = np.abs(theta - angle / 2)
+            highest = np.maximum(np.minimum(theta.dtype.type(PI / 2), theta + angle / 2), lowest)
+            first, last = (
+                np.clip((hits + side) * angle - theta[:, None], lowest[:, None], highest[:, None])
+                for side in (-0.5, 0.5)
+            )
+            width = np.sin(theta) * np.sin(angle / 2)
+            return np.asarray(np.sin((first + last) / 2) * np.sin((last - first) / 2) / width[:, None])
+
+        k = np.arange(-2, 2 * np.ceil(PI / psi) + 6, dtype=Extended)
+        one = np.concatenate((k * psi / 2, (k * psi - PI) / 2, (PI - k * psi) / 2))
+        both = np.concatenate((one, PI - one))
+        return Isometries(
+            np.concatenate((sign, sign)),
+            np.concatenate((left, right)),
+            lambda theta: np.concatenate((half(theta), half(theta.dtype.type(PI) - theta)), axis=1),
+            both[(both > 0) & (both < PI)],
+        )(function, rule)
 
 
-def rectangular(r: float) -> Operator:
-    """Rectangular teeth: specular with 1 - {d}/2 or 1/2 + {d}/2, d = 2 r |cot theta|.
+@dataclass(frozen=True)
+class Rectangular:
+    r"""Rectangular teeth one after the other: on f(pi - theta) = -f(theta) the factor -c, c = 1/2 + |1/2 - d/2 mod 1|.
 
-    Beyond an even number K of crossings the probability is replaced by its mean, 3/4. The first two antiderivatives of
-    the difference vanish in the mean over a period, so that this moves integrals by about r^2 / K^4.
+    That is specular with probability 1 - {d}/2 or 1/2 + {d}/2, d = 2 r |cot theta|; on even functions it is the
+    identity. Far towards grazing the power c^n is replaced by its mean over a period, little by little within a range
+    of many periods, so that the integral of the difference against a smooth function is beyond all powers of that.
+
+    Parameters
+    ----------
+    powers : dict
+        r and how often it occurs.
     """
 
-    def act(function: Function, rule: Rule) -> Function:
+    powers: dict[float, int]
+
+    def __call__(self, function: Function, rule: Rule) -> Function:
+        # what is not smooth near grazing is to lie where nothing is replaced yet
+        near = np.minimum(function.breaks, PI - function.breaks)
+        nearest = float(np.min(near[near > 1e-12], initial=np.pi))
+        last = int(np.clip(2.0 * 2.2 * max(self.powers) / nearest, rule.crossings, MOST_TIMES * rule.crossings))
+
+        def odd_factor(theta: Floats) -> Floats:
+            product = np.ones(theta.shape, dtype=theta.dtype)
+            for r, n in self.powers.items():
+                d = 2 * theta.dtype.type(r) / np.abs(np.tan(theta))
+                rest = d - 2 * np.floor(d / 2)
+                # w from 1 where d is even to 1/2 where it is odd; 1 - 2 (1 - w) is the factor, up to its sign
+                w = 1 - np.minimum(rest, 2 - rest) / 2
+                kept = (erfc(6.0 * (4.0 * np.minimum(d, 1e9).astype(float) / last - 3.0)) / 2).astype(d.dtype)
+                product *= (-1) ** n * (kept * (2 * w - 1) ** n + (1 - kept) / (n + 1))
+            return product
+
         def probabilities(theta: Floats) -> Floats:
-            d = 2.0 * r / np.abs(np.tan(theta))
-            part = d - np.floor(d)
-            mirror = np.where(np.floor(d) % 2.0 == 0.0, 1.0 - 0.5 * part, 0.5 + 0.5 * part)
-            mirror = np.where(d < rule.crossings, mirror, 0.75)
-            return np.stack((mirror, 1.0 - mirror), axis=-1)
+            odd = odd_factor(theta)
+            return np.stack(((1 - odd) / 2, (1 + odd) / 2), axis=-1)
 
-        steep = np.arctan2(2.0 * r, np.arange(0.0, rule.crossings + 1.0))
-        kinks = np.concatenate((steep, np.pi - steep))
-        return Isometries(np.array([-1.0, 1.0]), np.array([np.pi, 0.0]), probabilities, kinks)(function, rule)
+        many = np.arange(last + 1, dtype=Extended)
+        steep = np.concatenate([np.arctan2(2 * Extended(r), many) for r in self.powers])
+        return Isometries(np.array([-1, 1]), np.array([PI, 0]), probabilities, np.concatenate((steep, PI - steep)))(
+            function, rule
+        )
 
-    return act
+
+def joined(word: tuple[Operator, ...]) -> tuple[Operator, ...]:
+    """The word with rectangular teeth that follow one another as one operator; mirrors between them pass by."""
+    found: list[Operator] = []
+    for operator in word:
+        place = len(found)
+        while place and found[place - 1] in (flip, identity):
+            place -= 1
+        before = found[place - 1] if place else None
+        if isinstance(operator, Rectangular) and isinstance(before, Rectangular):
+            powers = dict(before.powers)
+            for r, n in operator.powers.items():
+                powers[r] = powers.get(r, 0) + n
+            found[place - 1] = Rectangular(powers)
+        else:
+            found.append(operator)
+    return tuple(found)
+
+
+# Rows of arcs are followed to so many times the hits whose kinks are followed in theta; so many nodes do for these.
+MORE_HITS, FEW_NODES = 16, 6
 
 
 # ---- circular arcs ------------------------------------------------------------------------------------------------
-def arcs(xi: float) -> Operator:
-    """Focusing arcs: a Gauss rule in delta between the changes of the number of hits and of what it hits."""
+@dataclass(frozen=True)
+class Arcs:
+    """Focusing arcs: Gauss rules in delta between the changes of the number of hits N and of what is hit.
 
-    def act(function: Function, rule: Rule) -> Function:
-        most = 4 * rule.nodes
-        hits = np.arange(1.0, most + 1.0)
-        x, w = np.polynomial.legendre.leggauss(rule.nodes)
+    For delta < pi/2 the outgoing angle is theta + pi - 2 N delta, (xi + theta)/(2 N + 1) < delta < (xi + theta)/
+    (2 N - 1), |theta - xi| < delta < min(theta + xi, 2 pi - theta - xi); beyond it is the mirror image of this.
+    """
 
-        def row(theta: float) -> tuple[Floats, Floats]:
-            begin, end = abs(theta - xi), min(theta + xi, 2.0 * np.pi - theta - xi)
-            cuts = [(xi + theta) / (2.0 * hits + 1.0), (2.0 * hits * np.pi - xi + theta) / (2.0 * hits + 1.0)]
-            for target in function.breaks:
-                cuts += [(theta + np.pi - target) / (2.0 * hits), np.pi - (target + np.pi - theta) / (2.0 * hits)]
-            inside = np.concatenate(cuts)
-            inside = inside[(inside > begin) & (inside < end)]
-            edges = np.unique(np.concatenate((inside, [begin, end, np.clip(0.5 * np.pi, begin, end)])))
-            half = 0.5 * np.diff(edges)[:, None]
-            delta = (0.5 * (edges[1:] + edges[:-1])[:, None] + half * x).ravel()
-            weight = (half * w).ravel() * np.sin(delta)
-            back = delta >= 0.5 * np.pi
-            step = np.where(back, 2.0 * (np.pi - delta), -2.0 * delta)
-            gamma = theta - delta
-            number = np.ceil(np.where(back, xi - gamma, xi + gamma) / np.abs(step))
-            outgoing = theta + number * step + np.where(back, -np.pi, np.pi)
-            return np.clip(outgoing, 0.0, np.pi), weight / weight.sum()
+    half_angle: float
+
+    def __call__(self, function: Function, rule: Rule) -> Function:
+        targets = np.sort(function.breaks.astype(float))
+        # also where the function is smooth but varies much
+        regular = np.linspace(0.0, np.pi, 8 + rule.panels // 3)[1:-1]
+        cuts = np.unique(np.concatenate((targets, regular)))
 
         def evaluate(theta: Floats) -> Floats:
-            rows = [row(float(angle)) for angle in theta]
-            owner = np.repeat(np.arange(theta.size), [angle.size for angle, _ in rows])
-            outgoing, weight = (np.concatenate(column) for column in zip(*rows, strict=True))
-            image = weight[:, None] * function.evaluate(outgoing)
-            total = np.zeros((theta.size, image.shape[1]))
-            np.add.at(total, owner, image)
-            return total
+            theta = theta.astype(float)
+            step = max(1, CHUNK // (MORE_HITS * rule.hits))
+            return np.concatenate([some(theta[start : start + step]) for start in range(0, theta.size, step)])
 
-        k = np.arange(1.0, 2.0 * rule.nodes)
-        one = np.concatenate((xi * (1.0 + 1.0 / k), xi * k / (k + 1.0), [xi, 0.5 * np.pi - xi]))
-        both = np.concatenate((one, np.pi - one))
-        return Function(evaluate, both[(both > 0.0) & (both < np.pi)])
+        def some(theta: Floats) -> Floats:
+            total = np.zeros((theta.size, function.evaluate(theta[:1]).shape[1]))
+            for mirrored in (False, True):
+                turned, aims = (np.pi - theta, np.pi - cuts[::-1]) if mirrored else (theta, cuts)
+                for row, outgoing, weight in self._row(turned, aims, rule):
+                    angle = np.clip(np.pi - outgoing if mirrored else outgoing, 0.0, np.pi)
+                    step = max(1, CHUNK // (weight.shape[1] * total.shape[1]))
+                    for start in range(0, row.size, step):
+                        part = slice(start, start + step)
+                        value = function.evaluate(angle[part].ravel()).reshape(*angle[part].shape, -1)
+                        np.add.at(total, row[part], np.einsum("ij,ijk->ik", weight[part], value))
+            return total / (2.0 * np.sin(theta) * np.sin(self.half_angle))[:, None]
 
-    return act
+        forward, back = self._breaks(targets, rule.hits), np.pi - self._breaks(np.pi - targets, rule.hits)
+        return Function(evaluate, np.concatenate((forward, back)))
+
+    def _row(self, theta: Floats, targets: Floats, rule: Rule) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """Rows, outgoing angles and weights, shapes (pieces,) and (pieces, nodes), of the chords below pi/2."""
+        number = np.arange(1.0, MORE_HITS * rule.hits + 1.0)
+        begin, end = self._ends(theta)
+        reach = (self.half_angle + theta)[:, None]
+        low = np.clip(reach / (2.0 * number + 1.0), begin[:, None], end[:, None])
+        high = np.clip(reach / (2.0 * number - 1.0), begin[:, None], end[:, None])
+        row, column = np.nonzero(low < high)
+        low, high, hits = low[row, column], high[row, column], number[column]
+        first = np.searchsorted(targets, theta[row] + np.pi - 2.0 * hits * high, side="right")
+        last = np.searchsorted(targets, theta[row] + np.pi - 2.0 * hits * low, side="left")
+        crossed = np.maximum(last - first, 0)
+        owner = np.repeat(np.arange(row.size), crossed)
+        which = np.arange(owner.size) - np.repeat(np.cumsum(crossed) - crossed, crossed) + first[owner]
+        cut = (theta[row][owner] + np.pi - targets[which]) / (2.0 * hits[owner])
+        cut = np.clip(cut, low[owner], high[owner])
+        owner = np.concatenate((np.arange(row.size), owner))
+        start = np.concatenate((low, cut))
+        order = np.lexsort((start, owner))
+        owner, start = owner[order], start[order]
+        closes = np.append(owner[1:] != owner[:-1], True)
+        stop = np.where(closes, high[owner], np.append(start[1:], 0.0))
+        few = hits[owner] <= rule.hits
+        for chosen, nodes in ((few, rule.nodes), (~few, FEW_NODES)):
+            piece = owner[chosen]
+            chord, weight = (part.astype(float) for part in nodes_between(start[chosen], stop[chosen], nodes))
+            yield row[piece], theta[row[piece], None] + np.pi - 2.0 * hits[piece, None] * chord, weight * np.sin(chord)
+        # and the chords with more hits
+        rest = np.minimum(reach[:, 0] / (2.0 * number[-1] + 1.0), end)
+        more = np.flatnonzero(begin < rest)
+        chord, weight = (part.astype(float) for part in nodes_between(begin[more], rest[more], FEW_NODES))
+        every = np.ceil((reach[more] - chord) / (2.0 * chord))
+        yield more, theta[more, None] + np.pi - 2.0 * every * chord, weight * np.sin(chord)
+
+    def _ends(self, theta: Floats) -> tuple[Floats, Floats]:
+        xi = self.half_angle
+        begin = np.abs(theta - xi)
+        return begin, np.maximum(np.minimum(np.minimum(theta + xi, 2.0 * np.pi - theta - xi), 0.5 * np.pi), begin)
+
+    def _breaks(self, targets: Floats, most: int) -> Floats:
+        """Angles at which a change of N meets an end, or a target one of both."""
+        xi, n = self.half_angle, np.arange(1.0, most + 1.0)[:, None]
+        zero, one = np.zeros_like(n), np.ones_like(n)
+        sides = [
+            (1.0 / (2.0 * n + 1.0), xi / (2.0 * n + 1.0)),
+            (1.0 / (2.0 * n - 1.0), xi / (2.0 * n - 1.0)),
+            *((a * one, b * one) for a, b in ((1.0, -xi), (-1.0, xi), (1.0, xi), (-1.0, 2.0 * np.pi - xi))),
+            (zero, 0.5 * np.pi * one),
+        ]
+        found = [xi * (1.0 + 1.0 / n).ravel(), xi * (n / (n + 1.0)).ravel()]
+        found.append(np.array([xi, 0.5 * np.pi - xi]))
+        # a series of changes accumulates at xi
+        found += [xi * (1.0 + sign / most * 0.4 ** np.arange(1.0, 12.0)) for sign in (-1.0, 1.0)]
+        for slope, offset in sides:
+            theta = (targets - np.pi + 2.0 * n * offset) / (1.0 - 2.0 * n * slope)
+            chord = slope * theta + offset
+            begin, end = self._ends(theta)
+            slack = 1e-9
+            met = (chord > begin - slack) & (chord < end + slack) & (theta > 0.0) & (theta < np.pi)
+            met &= (chord > (xi + theta) / (2.0 * n + 1.0) - slack) & (chord < (xi + theta) / (2.0 * n - 1.0) + slack)
+            found.append(theta[met])
+        every = np.concatenate(found)
+        return every[(every > 0.0) & (every < np.pi)]
 
 
 # ---- random expressions -------------------------------------------------------------------------------------------
@@ -313,20 +495,20 @@ def random_leaf(rng: np.random.Generator) -> Expression:
     if kind == "specular":
         return leaf(ker.specular(), flip)
     if kind == "lambert":
-        return leaf(ker.lambertian(), diagonal(np.ones(1)))
+        return leaf(ker.lambertian(), Diagonal(np.ones(1)))
     if kind == "scattering":
         g = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.1, 0.9))
         return leaf(ker.henyey_greenstein(g), scattering(g))
     if kind == "triangular":
         psi = float(rng.uniform(0.4, 2.8))
-        return leaf(ker.TriangularTeethLaw(psi), triangular(psi), TEETH)
+        return leaf(ker.TriangularTeethLaw(psi), Triangular(psi), TEETH)
     if kind == "rectangular":
         r = float(np.exp(rng.uniform(np.log(0.1), np.log(3.0))))
-        return leaf(ker.RectangularTeethLaw(r), rectangular(r), TEETH)
+        return leaf(ker.RectangularTeethLaw(r), Rectangular({r: 1}), TEETH)
     if kind == "density":
         a, b = rng.uniform(-0.5, 0.5, 2)
         values = np.array([1.0, a / 3.0, b / 5.0])
-        return leaf(ker.DensityLaw(_two_moments(float(a), float(b))), diagonal(values))
+        return leaf(ker.DensityLaw(_two_moments(float(a), float(b))), Diagonal(values))
     if kind == "matrix":
         if rng.random() < 0.5:
             return leaf(ker.MatrixLaw(LOPSIDED), piecewise(LOPSIDED))
@@ -334,7 +516,7 @@ def random_leaf(rng: np.random.Generator) -> Expression:
     if kind == "map":
         return leaf(ker.InvolutionLaw(exchanged), exchange)
     xi = float(rng.uniform(0.3, 1.5))
-    return leaf(ker.CircularArcLaw(xi), arcs(xi), ARCS)
+    return leaf(ker.CircularArcLaw(xi), Arcs(xi), ARCS)
 
 
 def _two_moments(a: float, b: float) -> Callable[[Floats, Floats], Floats]:
@@ -385,6 +567,7 @@ class Outcome:
     reported: float
     distance: float
     reference: float
+    seconds: float
 
     @property
     def exceeds(self) -> bool:
@@ -407,46 +590,84 @@ class Outcome:
         return max(self.distance - self.reference, 0.0) / self.reported if self.reported else np.inf
 
 
-COARSE, FINE = Rule(40, 9, 2000), Rule(56, 12, 6000)
+COARSE, FINE = Rule(40, 16, 400, 40), Rule(56, 20, 600, 64)
 # Crevices are followed less far where other teeth multiply the kinks.
-FEWER_CROSSINGS = 24
+FEWER_CROSSINGS = 3
 
 
 def reference(expression: Expression, basis: ker.Basis) -> tuple[Floats, float]:
     """<e_i, P e_j>, and twice the difference from a coarser rule plus rounding."""
-    coarse, fine = (_by_rule(expression, basis, rule) for rule in (COARSE, FINE))
-    return fine, 2.0 * float(np.linalg.norm(fine - coarse)) + ROUNDING * basis.size
+    (coarse, _), (fine, rounding) = (_by_rule(expression, basis, rule) for rule in (COARSE, FINE))
+    return fine, 2.0 * float(np.linalg.norm(fine - coarse)) + rounding
 
 
-def _by_rule(expression: Expression, basis: ker.Basis, rule: Rule) -> Floats:
-    oscillations = basis.size if isinstance(basis, ker.Legendre) else 0
-    whole = Rule(max(rule.panels, oscillations), rule.nodes, rule.crossings)
-    edges = np.empty(0) if oscillations else np.asarray(basis.edges[1:-1])
-    last = Function(_functions(basis), edges)
-    total = np.zeros((basis.size, basis.size))
+def _by_rule(expression: Expression, basis: ker.Basis, rule: Rule) -> tuple[Floats, float]:
+    last = _functions(basis)
+    total, rounding = np.zeros((basis.size, basis.size), dtype=Extended), 0.0
     for weight, word in expression.words:
-        multiplied = any(isinstance(operator, Isometries) for operator in word)
-        rule = replace(whole, crossings=whole.crossings // FEWER_CROSSINGS * 2) if multiplied else whole
+        operators = joined(word)
+        degrees = [operator.eigenvalues.size for operator in operators if isinstance(operator, Diagonal)]
+        degrees.append(basis.size if isinstance(basis, ker.Legendre) else 0)
+        teeth = sum(isinstance(operator, (Triangular, Rectangular, Arcs)) for operator in operators)
+        arcs = any(isinstance(operator, Arcs) for operator in operators)
+        own = replace(
+            rule,
+            # rows of arcs are dear, and their nodes do for some oscillations
+            panels=rule.panels + max(degrees) // (4 if arcs else 1),
+            crossings=rule.crossings if teeth < 2 else rule.crossings // FEWER_CROSSINGS,
+            kind=float if arcs else Extended,
+        )
         function = last
-        for operator in reversed(word):
-            function = operator(function, rule)
-        angle, mass = rule.grid(np.concatenate((function.breaks, edges)))
-        total += weight * last.evaluate(angle).T @ (mass[:, None] * function.evaluate(angle))
-    return total
+        for operator in reversed(operators):
+            function = operator(function, own)
+        total += weight * own.moments(last.evaluate, function, last.breaks)
+        rounding += weight * ROUNDING * float(np.finfo(own.kind).eps) * basis.size
+    return total, rounding
 
 
-def _functions(basis: ker.Basis) -> Callable[[Floats], Floats]:
+def _functions(basis: ker.Basis) -> Function:
     if isinstance(basis, ker.Legendre):
-        return lambda angle: polynomials(basis.size, angle)
+        return Function(lambda angle: polynomials(basis.size, angle), np.empty(0))
+    edges = basis.edges.astype(Extended)
+    edges[-1] = PI
     if isinstance(basis, ker.Bins):
-        mass = 0.5 * -np.diff(np.cos(basis.edges))
+        if np.abs(edges - equal_bins(basis.size)).max() < 1e-14:
+            edges = equal_bins(basis.size)
+        return Function(lambda angle: indicators(edges, angle), edges[1:-1])
+    triangles = [_orthonormal(low, high, basis.degree) for low, high in pairwise(edges)]
 
-        def indicators(angle: Floats) -> Floats:
-            cell = np.clip(np.searchsorted(basis.edges, angle, side="right") - 1, 0, mass.size - 1)
-            return np.eye(mass.size)[cell] / np.sqrt(mass)
+    def values(angle: Floats) -> Floats:
+        cell = np.clip(np.searchsorted(edges.astype(angle.dtype), angle, side="right") - 1, 0, len(triangles) - 1)
+        found = np.zeros((angle.size, basis.size), dtype=angle.dtype)
+        for place, triangle in enumerate(triangles):
+            row = np.flatnonzero(cell == place)
+            local = np.polynomial.legendre.legvander(_local(angle[row], edges, place), basis.degree)
+            width = basis.degree + 1
+            found[row, place * width : (place + 1) * width] = local @ triangle.astype(angle.dtype)
+        return found
 
-        return indicators
-    return basis.evaluate
+    return Function(values, edges[1:-1])
+
+
+def _local(angle: Floats, edges: Floats, place: int) -> Floats:
+    low, high = edges[place : place + 2].astype(angle.dtype)
+    return np.asarray((2 * angle - low - high) / (high - low))
+
+
+def _orthonormal(low: Any, high: Any, degree: int) -> Floats:
+    """Combinations of the Legendre polynomials on (low, high) that are orthonormal, by Gram and Schmidt."""
+    node, weight = gauss(degree + 16)
+    angle = low + (high - low) * (1 + node) / 2
+    mass = (high - low) * weight * np.sin(angle) / 4
+    table = np.polynomial.legendre.legvander(node, degree)
+    found = np.eye(degree + 1, dtype=Extended)
+    for column in range(degree + 1):
+        for _ in range(2):
+            for before in range(column):
+                overlap = np.sum(mass * (table @ found[:, before]) * (table @ found[:, column]))
+                found[:, column] -= overlap * found[:, before]
+        found[:, column] /= np.sqrt(np.sum(mass * (table @ found[:, column]) ** 2))
+    return found
 
 
 def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
@@ -470,6 +691,7 @@ def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
 
 def outcome(seed: int) -> tuple[str, Outcome] | None:
     """The kind of basis and the outcome of a seed; None if its law does not have the method that was drawn."""
+    begun = time.process_time()
     expression, kind, basis, method = drawn(seed)
     try:
         matrix = ker.discretise(expression.law, basis, method=method, samples=SAMPLES, rng=np.random.default_rng(seed))
@@ -478,15 +700,27 @@ def outcome(seed: int) -> tuple[str, Outcome] | None:
     exact, error = reference(expression, basis)
     distance = float(np.linalg.norm(matrix.symmetric - exact))
     name = "rays" if matrix.samples else matrix.method if matrix.method in ("exact", "quadrature") else "sum of several"
-    return kind, Outcome(seed, repr(expression.law), repr(basis), name, float(matrix.error), distance, error)
+    return kind, Outcome(
+        seed, repr(expression.law), repr(basis), name, float(matrix.error), distance, error, time.process_time() - begun
+    )
 
 
-def outcomes(seeds: Sequence[int]) -> Iterator[tuple[str, Outcome]]:
-    """All that have the method drawn."""
-    for seed in seeds:
-        found = outcome(seed)
-        if found is not None:
-            yield found
+def recorded(seeds: Iterable[int], record: Path, jobs: int) -> list[tuple[str, Outcome]]:
+    """The outcomes of all that have the method drawn, in the order of the seeds; those in the record are not repeated.
+
+    The record is a file of JSON lines: the seed, and the kind of basis and the outcome or null.
+    """
+    lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
+    known: dict[int, Any] = dict(map(json.loads, lines))
+    missing = [seed for seed in seeds if seed not in known]
+    with ProcessPoolExecutor(jobs, initializer=threadpool_limits, initargs=(1,)) as pool:
+        waiting = {pool.submit(outcome, seed): seed for seed in missing}
+        for done in as_completed(waiting):
+            seed, found = waiting[done], done.result()
+            known[seed] = None if found is None else [found[0], asdict(found[1])]
+            with record.open("a", encoding="utf-8") as file:
+                file.write(json.dumps([seed, known[seed]]) + "\n")
+    return [(known[seed][0], Outcome(**known[seed][1])) for seed in sorted(known) if known[seed]]
 
 
 def summary(found: Sequence[Outcome]) -> str:
@@ -519,17 +753,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.composed_laws", description=__doc__)
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--first", type=int, default=0, help="the first seed")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count(), help="processes")
+    parser.add_argument(
+        "--record", type=Path, default=Path("composed-laws.jsonl"), help="outcomes so far, to go on from"
+    )
     arguments = parser.parse_args()
-    found = []
-    for seed in range(arguments.first, arguments.first + arguments.count):
-        begun = time.perf_counter()
-        one = outcome(seed)
-        if one is None:
-            continue
-        found.append(one)
-        if one[1].exceeds or one[1].is_open or time.perf_counter() - begun > 60.0:
-            print(one[1], f"{time.perf_counter() - begun:.0f} s", flush=True)
-    print(f"\n{table(found)}")
+    seeds = range(arguments.first, arguments.first + arguments.count)
+    found = recorded(seeds, arguments.record, arguments.jobs)
+    for _, one in found:
+        if one.exceeds or one.is_open:
+            print(one)
+    dearest = max(found, key=lambda pair: pair[1].seconds)[1]
+    print(f"\n{table(found)}\n\n{sum(one.seconds for _, one in found):.0f} s of CPU, at most {dearest.seconds:.0f} s:")
+    print(dearest)
 
 
 if __name__ == "__main__":

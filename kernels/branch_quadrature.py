@@ -9,10 +9,10 @@ from numpy.typing import ArrayLike
 
 from ..checks import Floats
 from .basis import Basis
+from .branching import preimages
 from .composition import Composition, Power
 from .measure import gauss_on_intervals, gauss_rule
 from .products import add_products
-from .sorted_edges import edges_inside
 from .specular_frame import SpecularFrame
 from .weighted_sum import Combination
 
@@ -23,8 +23,6 @@ NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # Kinks that accumulate at grazing are followed until the omitted share is negligible or listing and using them would
 # take more than about a second.
 FEWEST_KINKS, KINK_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
-# Kinks of a chain are found from all pairs of kinks of its parts.
-MOST_CHAINED_KINKS = 2**11
 # Nodes times branches held at a time.
 CHUNK = 2**22
 
@@ -49,14 +47,16 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_KINKS
     kinks, omitted = law.kinks(limit)
-    most = MOST_CHAINED_KINKS if has_chain(law) else KINK_WORK // law.fan_out**2
+    most = KINK_WORK // law.fan_out**2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 2 * limit <= most:
         limit *= 2
         kinks, omitted = law.kinks(limit)
     edges = np.unique(np.concatenate((basis.edges, kinks)))
-    edges = np.unique(np.concatenate((edges, _preimages(law, np.concatenate(([0.0], kinks, [np.pi])), basis.edges))))
+    edges = np.unique(
+        np.concatenate((edges, preimages(law.branches, np.concatenate(([0.0], kinks, [np.pi])), basis.edges)))
+    )
     total = np.zeros((basis.size, basis.size))
     width, near = np.diff(edges), np.minimum(edges[1:], np.pi - edges[:-1])
     narrow = (width < NARROW) & (width < NARROW * near)
@@ -93,25 +93,6 @@ def _add_nodes(law: Branching, basis: Basis, angle: Floats, weight: Floats, tota
         used = probability[:, slot] > 0.0
         share = (mass * probability[:, slot])[used]
         add_products(total, basis, angle[used], outgoing[used, slot], share)
-
-
-def _preimages(law: Branching, kinks: Floats, edges: Floats) -> Floats:
-    """Angles that some branch maps to an edge, for every interval between kinks."""
-    low, high = kinks[:-1], kinks[1:]
-    proper = high > low
-    low, high = low[proper], high[proper]
-    probe = low + np.array([[0.25], [0.75]]) * (high - low)
-    # both probes in one call, so that a slot is the same isometry in both
-    probability, angle = law.branches(probe)
-    sign = np.sign(angle[1] - angle[0])
-    offset = angle[0] - sign * probe[0][:, None]
-    used = (probability.sum(axis=0) > 0.0) & (sign != 0.0)
-    piece, slot = np.nonzero(used)
-    sign, offset = sign[piece, slot], offset[piece, slot]
-    ends = sign * low[piece] + offset, sign * high[piece] + offset
-    owner, edge = edges_inside(edges, np.minimum(*ends), np.maximum(*ends))
-    source = sign[owner] * (edge - offset[owner])
-    return np.asarray(source[(source > low[piece][owner]) & (source < high[piece][owner])])
 
 
 def largest_square_sum(basis: Basis) -> float:

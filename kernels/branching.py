@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -10,14 +11,16 @@ from ..checks import Floats
 from ..errors import InputError
 from ..rounding import EPS
 from .law import Law
+from .sorted_edges import edges_inside
 from .stable_angles import kept_inside
 
 # Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
 SAME_ANGLE = 16.0 * EPS
 # Merging compares all pairs, and the number of branches of a chain grows exponentially unless they merge.
 MOST_BRANCHES = 64
-# Pairs of an interval and a kink of the next law that are compared: some hundred megabytes.
-MOST_PAIRS = 2**23
+
+# Probabilities and outgoing angles, shape theta.shape + (branches,).
+Branches = Callable[[Floats], tuple[Floats, Floats]]
 
 
 def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
@@ -55,27 +58,36 @@ def chained(laws: Sequence[Law], theta: Floats) -> tuple[Floats, Floats]:
 
 
 def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
-    """Kinks of a chain: those of the first law, and where its branches meet kinks of the rest.
+    """Kinks of a chain, and the probability of those left out.
 
-    Where these are too many to be compared, the later ones are left out, all of them for what is known.
+    They are those of the first law, and where its branches meet kinks of the rest.
     """
     kinks, left_out = laws[0].kinks(limit)
     for place in range(1, len(laws)):
         target, more = laws[place].kinks(limit)
-        edges = np.concatenate([[0.0], kinks, [np.pi]])
-        low, high = edges[:-1], edges[1:]
-        # Both probes in one call, so that a slot is the same isometry in both.
-        probe = low + np.array([[0.25], [0.75]]) * (high - low)
-        probability, angle = chained(laws[:place], probe)
-        if target.size * angle[0].size > MOST_PAIRS:
-            return kinks, 1.0
-        used, sign = np.all(probability > 0.0, axis=0), np.sign(angle[1] - angle[0])
-        offset = angle[0] - sign * probe[0][:, None]
-        source = sign[..., None] * (target - offset[..., None])
-        inside = used[..., None] & (source > low[:, None, None]) & (source < high[:, None, None])
-        kinks = np.unique(np.concatenate([kinks, source[inside]]))
+        sources = preimages(partial(chained, laws[:place]), np.concatenate([[0.0], kinks, [np.pi]]), target)
+        kinks = np.unique(np.concatenate([kinks, sources]))
         left_out += more
     return kinks, min(left_out, 1.0)
+
+
+def preimages(branches: Branches, kinks: Floats, targets: Floats) -> Floats:
+    """Angles that some branch maps to a target, for every interval between kinks; both are sorted."""
+    low, high = kinks[:-1], kinks[1:]
+    proper = high > low
+    low, high = low[proper], high[proper]
+    probe = low + np.array([[0.25], [0.75]]) * (high - low)
+    # both probes in one call, so that a slot is the same isometry in both
+    probability, angle = branches(probe)
+    sign = np.sign(angle[1] - angle[0])
+    offset = angle[0] - sign * probe[0][:, None]
+    used = (probability.sum(axis=0) > 0.0) & (sign != 0.0)
+    piece, slot = np.nonzero(used)
+    sign, offset = sign[piece, slot], offset[piece, slot]
+    ends = sign * low[piece] + offset, sign * high[piece] + offset
+    owner, target = edges_inside(targets, np.minimum(*ends), np.maximum(*ends))
+    source = sign[owner] * (target - offset[owner])
+    return np.asarray(source[(source > low[piece][owner]) & (source < high[piece][owner])])
 
 
 def _compressed(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:

@@ -34,6 +34,7 @@ from .net import PARTS, Net
 from .phase_function import HenyeyGreensteinLaw
 from .product_quadrature import product_matrix
 from .reflection import mirror_refinement, reflection_matrix
+from .repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
 from .responses import responder
 from .row_quadrature import LARGEST_ROW, MOST_FLIGHTS, is_affordable, row_matrix
 from .sampling import independent_rays
@@ -208,7 +209,12 @@ class MatrixMaker:
     def _isometric(self, law: Law, basis: Basis) -> tuple[Floats, float]:
         """The matrix of a law of isometries, and a bound of its error apart from rounding."""
         table = table_of(law)
-        return branch_matrix(law, basis, self.tolerance) if table is None else table_matrix(table, basis)
+        if table is not None:
+            return table_matrix(table, basis)
+        inner = law.law if isinstance(law, SpecularFrame) else law
+        if isinstance(inner, RepeatedTeethLaw):
+            return repeated_teeth_matrix(inner, basis, exchanged=inner is not law)
+        return branch_matrix(law, basis, self.tolerance)
 
     # ---- laws one after the other ----------------------------------------------------------------------------
     def _terms(self, law: Law) -> list[tuple[float, Word]]:

@@ -71,9 +71,19 @@ def _stiffness(basis: Basis) -> int:
     return basis.size if isinstance(basis, Legendre) else int(getattr(basis, "polynomial_degree", 0))
 
 
-def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats, Floats, float]:
+def crevice_nodes(
+    height_to_width: float, basis: Basis, times: int | None = None
+) -> tuple[Floats, Floats, Floats, float]:
     r"""Nodes for integrals of functions of the basis against the law of a crevice, for theta < pi/2 beyond the first
     periods.
+
+    Parameters
+    ----------
+    height_to_width : float
+        r.
+    basis : Basis
+    times : int, optional
+        Instead of q the probability (1 + (q - 1)^times) / 2, that of rectangular teeth so many times.
 
     Returns
     -------
@@ -88,7 +98,8 @@ def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats,
     angles, extra_block, extra_half = _cells(basis)
     # sin(theta)^3 / (4 r) d d is the measure: (2 r)^2 / d^3 / 2 far out
     mean_from = max(np.cbrt(0.125 / NEGLIGIBLE * (4.0 * r) * r), 2.0 * begin)
-    omitted = min(0.25 * _density(np.array([mean_from]), r)[0], 1.0)
+    # the antiderivative of any probability less its mean is below 1/4 on half a period, that of q below 1/8
+    omitted = min((0.25 if times is None else 0.5) * _density(np.array([mean_from]), r)[0], 1.0)
     inside = angles[angles < np.arctan2(2.0 * r, begin)]
     crossing = 2.0 * r / np.tan(inside[inside > np.arctan2(2.0 * r, mean_from)])
     scale = np.arange(np.arcsinh(begin / (2.0 * r)), np.arcsinh(mean_from / (2.0 * r)), BLOCK)[1:]
@@ -97,7 +108,7 @@ def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats,
     low, high = cuts[:-1], cuts[1:]
     first, last = np.ceil(0.5 * low), np.floor(0.5 * high)
     whole = last > first
-    halves = HALF_NODES + extra_half
+    halves = HALF_NODES + extra_half + (times or 0) // 2
     nodes = BLOCK_NODES + extra_block
     parts = [_periods(first[whole], last[whole], nodes, halves)]
     # what is left of a period at either end of a block, each within one period
@@ -111,10 +122,12 @@ def crevice_nodes(height_to_width: float, basis: Basis) -> tuple[Floats, Floats,
     end = float(np.arctan2(2.0 * r, mean_from))
     edges = np.concatenate([[0.0], inside[inside < end], [end]])
     far, share = SINE.quadrature(np.unique(edges), max(basis.nodes_per_interval, nodes))
-    share *= 0.5
+    mean = 0.5
+    if times is not None:
+        retro, mean = 0.5 * (1.0 + (retro - 1.0) ** times), 0.5 * (1.0 + (-1.0) ** times / (times + 1.0))
     angle = np.concatenate([theta, far])
-    specular = np.concatenate([weight * (1.0 - retro), share])
-    return angle, specular, np.concatenate([weight * retro, share]), float(omitted)
+    specular = np.concatenate([weight * (1.0 - retro), share * (1.0 - mean)])
+    return angle, specular, np.concatenate([weight * retro, share * mean]), float(omitted)
 
 
 def _cells(basis: Basis) -> tuple[Floats, int, int]:

@@ -3,7 +3,7 @@
 A word is a chain of laws, the first one first; the empty word is the identity. As operators, for laws that keep
 sin(theta) d theta: retroreflection is the identity; specular reflection J commutes with laws that are mirror-symmetric;
 J J = 1, as for other involutions; HG(g) HG(h) = HG(g h) and J HG(g) = HG(-g); after the Lambertian law nothing before
-it matters, and nothing after it either.
+it matters, and nothing after it either; rectangular teeth of one shape several times are known in closed form.
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from .ideal import IsometryLaw, LambertianLaw, lambertian, retroreflection, spec
 from .involution import InvolutionLaw
 from .law import Law
 from .phase_function import HenyeyGreensteinLaw
+from .rectangular import RectangularTeethLaw
+from .repeated_teeth import MOST_TIMES, RepeatedTeethLaw
 from .specular_frame import SpecularFrame
 
 Word = tuple[Law, ...]
@@ -142,14 +144,27 @@ def _flipped(word: Word) -> Word:
 
 
 def _joined(word: Word) -> Word:
-    """With neighbouring scatterings as one, and without involutions that undo each other."""
+    """With neighbouring scatterings, or teeth, as one, and without involutions that undo each other."""
     for place, (first, second) in enumerate(pairwise(word)):
         if isinstance(first, InvolutionLaw) and first == second:
             return reduced(word[:place] + word[place + 2 :])
         if isinstance(first, HenyeyGreensteinLaw) and isinstance(second, HenyeyGreensteinLaw):
             joint = HenyeyGreensteinLaw(first.g * second.g)
             return reduced((*word[:place], joint, *word[place + 2 :]))
+        again = _repeated(first, second)
+        if again is not None:
+            return reduced((*word[:place], again, *word[place + 2 :]))
     return word
+
+
+def _repeated(first: Law, second: Law) -> Law | None:
+    """Rectangular teeth of the same shape one after the other."""
+    teeth = [law for law in (first, second) if isinstance(law, (RectangularTeethLaw, RepeatedTeethLaw))]
+    times = sum(law.times if isinstance(law, RepeatedTeethLaw) else 1 for law in teeth)
+    shapes = {law.height_to_width for law in teeth}
+    return (
+        RepeatedTeethLaw(shapes.pop(), times) if len(teeth) == 2 and len(shapes) == 1 and times <= MOST_TIMES else None
+    )
 
 
 def _is_lambertian(law: Law) -> bool:
