@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from benchmarks.composed_laws import exchanged, outcome
+from benchmarks.composed_laws import Arcs, Rectangular, exchanged, leaf, outcome, reference
 
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
+from asperity.kernels.repeated_teeth import RepeatedTeethLaw
 from asperity.kernels.words import law_of, words_of
 
 TEETH, CREVICES = ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(0.8)
@@ -86,9 +87,42 @@ def test_errors_of_composed_laws_hold(seed: int) -> None:
 
 def test_panels_report_what_dense_kinks_leave_out() -> None:
     # kinks without number near grazing on both sides of the product: no number of panels follows them
-    found = outcome(15)
-    assert found is not None
-    assert 1e-4 < found[1].distance < found[1].reported < 0.1
+    deep, shallow = (leaf(ker.RectangularTeethLaw(r), Rectangular({r: 1})) for r in (2.5, 1.3))
+    exact, error = reference(deep @ shallow, ker.Bins(3))
+    found = ker.discretise((deep @ shallow).law, ker.Bins(3), method="quadrature")
+    distance = np.linalg.norm(found.symmetric - exact)
+    assert error < 1e-9 and 1e-6 < distance < float(found.error) < 1e-2
+
+
+def test_kinks_of_two_crevices_are_followed_far_towards_grazing() -> None:
+    deep, shallow = (leaf(ker.RectangularTeethLaw(r), Rectangular({r: 1})) for r in (2.5, 1.3))
+    exact, error = reference(deep @ shallow, ker.Bins(3))
+    found = ker.discretise((deep @ shallow).law, ker.Bins(3), method="exact")
+    assert np.linalg.norm(found.symmetric - exact) - error <= float(found.error) < 2e-7
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("basis", [ker.Bins(5), ker.Legendre(12), ker.Panels([0.0, 1.0, 2.0, np.pi], 1)], ids=repr)
+def test_rectangular_teeth_several_times_are_exact_up_to_grazing(basis: ker.Basis, turned: bool) -> None:
+    expression = leaf(ker.RectangularTeethLaw(1.7), Rectangular({1.7: 1})).power(3)
+    expression = expression.turned() if turned else expression
+    exact, error = reference(expression, basis)
+    found = ker.discretise(expression.law, basis)
+    assert error < 1e-14 and np.linalg.norm(found.symmetric - exact) <= float(found.error) < 5e-14
+
+
+def test_rectangular_teeth_several_times_have_the_branches_of_the_chain() -> None:
+    chain = CREVICES @ MIRROR @ CREVICES @ CREVICES @ MIRROR
+    assert words_of(chain) == {(RepeatedTeethLaw(0.8, 3),): 1.0}
+    for f in (np.cos, np.sin, smooth):
+        # the last digit of pi - theta moves d by 2 r / sin(theta)^2 times as much
+        assert np.abs(chain.apply(f, THETA) - RepeatedTeethLaw(0.8, 3).apply(f, THETA)).max() < 2e-13
+
+
+def test_the_reference_follows_the_kinks_of_arcs() -> None:
+    exact, error = reference(leaf(ker.CircularArcLaw(0.8), Arcs(0.8)), ker.Bins(2))
+    found = ker.discretise(ker.CircularArcLaw(0.8), ker.Bins(2))
+    assert error < 1e-13 and np.linalg.norm(found.symmetric - exact) <= float(found.error) < 2e-14
 
 
 class Known(ker.Law):
