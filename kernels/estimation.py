@@ -9,7 +9,7 @@ from ..checks import Floats, angles
 from ..errors import InputError
 from .basis import Basis
 from .bins import Bins
-from .counting import array_from_counts, array_from_sums, count_pairs, sum_products
+from .counting import BATCHES, array_from_counts, array_from_sums, count_pairs, sum_products
 from .matrix import KernelMatrix
 from .matrix_algebra import frobenius_error
 from .measure import SINE
@@ -19,8 +19,8 @@ from .symmetry import invariance_z_score
 NOT_INVARIANT_Z = 4.0
 # The totals are looked at in the basis' own bins, or in this many where it has none.
 TEST_BINS = 32
-# Batches whose spread gives the errors in bases without cells.
-BATCHES = 8
+# Batches of weighted pairs whose spread gives their errors: smaller ones would have less even weights.
+WEIGHTED_BATCHES = 8
 
 
 def estimate(
@@ -53,7 +53,7 @@ def estimate(
     -------
     KernelMatrix
         With the raw ``counts`` for Bins and in ``error`` the 95 % quantile of the sampling error, from the variance of
-        multinomial counts, or from the spread of 8 batches for weighted pairs and for bases without cells. The
+        multinomial counts, or from the spread of batches: 32 in bases without cells, 8 of weighted pairs. The
         truncation to the basis is not part of it.
 
     Raises
@@ -79,17 +79,17 @@ def estimate(
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for sin(theta), got {basis!r}")
     incoming, outgoing = incoming.ravel(), outgoing.ravel()
-    least = 1 if basis.is_partition else 2 * BATCHES
+    least = 1 if basis.is_partition else 2 * WEIGHTED_BATCHES
     if incoming.size < least:
         raise InputError(f"theta_in: expected at least {least} pairs for {basis!r}, got {incoming.size}")
     follows = _follows_measure(incoming, basis) if invariant is None else bool(invariant)
     counts = count_pairs(basis, incoming, outgoing) if basis.is_partition else None
-    if counts is not None and (follows or incoming.size < 2 * BATCHES):
+    if counts is not None and (follows or incoming.size < 2 * WEIGHTED_BATCHES):
         array = array_from_counts([counts], basis, symmetrise=symmetrise, independent=True)
         method = "variance of multinomial counts"
     else:
-        method = f"spread of {BATCHES} batches"
         means = _batch_means(basis, incoming, outgoing, follows)
+        method = f"spread of {len(means)} batches"
         if counts is not None:
             fluxes = [mean / (basis.heights[:, None] * basis.heights) for mean in means]
             array = array_from_counts(fluxes, basis, symmetrise=symmetrise, independent=False)
@@ -117,10 +117,10 @@ def _follows_measure(incoming: Floats, basis: Basis) -> bool:
 
 
 def _batch_means(basis: Basis, incoming: Floats, outgoing: Floats, follows: bool) -> list[Floats]:
-    """Means of e_i(theta) e_j(theta') over every eighth pair."""
-    means = []
-    for batch in range(BATCHES):
-        theta, image = incoming[batch::BATCHES], outgoing[batch::BATCHES]
+    """Means of e_i(theta) e_j(theta') over batches, of at least two pairs."""
+    means, number = [], min(BATCHES, incoming.size // 2) if follows else WEIGHTED_BATCHES
+    for batch in range(number):
+        theta, image = incoming[batch::number], outgoing[batch::number]
         weight = np.full(theta.size, 1.0 / theta.size) if follows else _nearest_measure(theta)
         means.append(sum_products(basis, theta, image, weight))
     return means

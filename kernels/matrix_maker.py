@@ -109,7 +109,7 @@ class MatrixMaker:
         if method == "qmc":
             return self.from_net(Net(law, self.basis, self.rng), self.samples)
         found = independent_rays(law, self.basis, self.samples, self.rng, self.symmetrise)
-        spread = f"spread of {PARTS} parts" if found[0].replicates else "variance of multinomial counts"
+        spread = "variance of multinomial counts" if self.basis.is_partition else "spread of parts"
         return self._from_rays("monte-carlo", found, spread)
 
     def from_net(self, net: Net, samples: int) -> KernelMatrix:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .basis import Basis
-from .counting import SampledArray
+from .counting import BATCHES, LARGEST_REPLICATES, SampledArray
 from .law import Law
 from .measure import SINE
 from .net import PARTS
@@ -21,12 +21,14 @@ def independent_rays(
 ) -> tuple[SampledArray, int, float]:
     """The matrix of a law from independent rays with incoming angles from the invariant measure; see `RaySums.array`.
 
-    In bases without cells errors come from the spread of 8 parts. A chunk of rays depends on a number drawn from
-    ``rng``, its part and its own index alone.
+    In bases without cells errors come from the spread of 32 parts, of 8 where 32 matrices are too large to keep. A
+    chunk of rays depends on a number drawn from ``rng``, its part and its own index alone.
     """
     root = [int(word) for word in rng.integers(0, 2**63, size=2)]
-    sums = RaySums(law, basis, 1 if basis.is_partition else PARTS)
-    parts, chunk = len(sums.tables), sums.chunk
+    most = LARGEST_REPLICATES // (np.dtype(np.float64).itemsize * basis.size**2)
+    parts = 1 if basis.is_partition else BATCHES if most >= BATCHES else PARTS
+    sums = RaySums(law, basis, parts)
+    chunk = sums.chunk
     sums.each = max(-(-samples // parts), 1)
     traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None
     with progress_bar(parts * sums.each) as bar:

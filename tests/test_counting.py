@@ -209,29 +209,63 @@ def test_dimensions_are_the_ratio_of_traces_whose_means_wishart_gave(number: int
     # E tr W^2 = (1 + 1/f) tr C^2 + (tr C)^2 / f and E (tr W)^2 = (tr C)^2 + 2 tr C^2 / f, solved for the two
     table = [[1.0 + 1.0 / freedom, 1.0 / freedom], [2.0 / freedom, 1.0]]
     of_square, squared = np.linalg.solve(table, [np.trace(covariance @ covariance), np.trace(covariance) ** 2])
-    assert counting._dimensions(differences) == pytest.approx(squared / of_square, rel=1e-10)
-    assert counting._dimensions(differences[:, :1]) == pytest.approx(1.0, rel=1e-10)
+    assert counting._dimensions(differences)[0] == pytest.approx(squared / of_square, rel=1e-10)
+    assert counting._dimensions(differences[:, :1]) == pytest.approx((1.0, 1.0), rel=1e-10)
     # the same in all directions that the parts allow: nothing is left of the trace of the square
     for scale in (1.0, 1e-5, 1e5):
-        assert counting._dimensions(scale * (np.eye(number) - 1.0 / number)) > 1e12
+        assert counting._dimensions(scale * (np.eye(number) - 1.0 / number))[0] > 1e12
 
 
-def test_half_widths_count_four_fifths_of_the_dimensions(monkeypatch) -> None:
+@pytest.mark.parametrize("number", [8, 33])
+def test_the_skewness_is_that_of_wisharts_third_moment(number: int) -> None:
+    freedom, spectrum = number - 1, np.array([1.0] + [0.02] * 150)
+    differences = np.random.default_rng(4).normal(size=(number, 151)) * np.sqrt(spectrum)
+    differences -= differences.mean(axis=0)
+    covariance = differences.T @ differences / freedom
+    spread, skew = counting._dimensions(differences)
+    # back from (tr C)^2 / tr C^2, (tr C^2)^3 / (tr C^3)^2 and E (tr W)^2 = (tr C)^2 + 2 tr C^2 / f to the traces
+    second = np.trace(covariance) ** 2 / (spread + 2.0 / freedom)
+    first, third = math.sqrt(spread * second), math.sqrt(second**3 / skew)
+
+    def moment(first: float, second: float, third: float) -> float:
+        f = freedom
+        return ((f**3 + 3 * f**2 + 4 * f) * third + 3 * (f**2 + f) * first * second + f * first**3) / f**3
+
+    # of identities of p dimensions E tr (f W)^3 = f p (f^2 + p^2 + 3 f p + 3 f + 3 p + 4)
+    f, p = freedom, 5
+    assert moment(p, p, p) * f**3 == pytest.approx(f * p * (f**2 + p**2 + 3 * f * p + 3 * f + 3 * p + 4))
+    assert moment(first, second, third) == pytest.approx(np.trace(covariance @ covariance @ covariance), rel=1e-10)
+
+
+@pytest.mark.parametrize("rest", [0, 20, 150])
+def test_half_widths_of_many_parts_are_quantiles_also_where_one_dimension_rules(rest: int) -> None:
+    spectrum = np.array([1.0] + [0.02] * rest)
+    rng = np.random.default_rng(12)
+    parts = rng.normal(size=(1500, len(spectrum))) * np.sqrt(spectrum)
+    squares = rng.normal(size=(200_000, 1)) ** 2 + 0.02 * rng.chisquare(max(rest, 1), size=(200_000, 1)) * (rest > 0)
+    exact = math.sqrt(np.quantile(squares, 0.95) / 1500)
+    # the spread of 1500 parts is known within 2 %; a chi-square of the same variance is 2.3 % below for 150
+    assert half_width(parts.mean(axis=0), list(parts)) == pytest.approx(exact, rel=0.015)
+
+
+def test_half_widths_follow_student_and_fisher(monkeypatch) -> None:
     from scipy.stats import f
 
     parts = list(np.random.default_rng(6).normal(size=(8, 4, 4)))
     middle = np.mean(parts, axis=0)
     differences = np.array([(part - middle).ravel() for part in parts])
-    dimensions = 0.8 * counting._dimensions(differences)
     square = float(np.sum(differences**2)) / 56.0
-    assert half_width(middle, parts) == pytest.approx(
-        math.sqrt(f.ppf(0.95, dimensions, 7 * dimensions) * square), rel=1e-10
-    )
+
+    def exact(compared: np.ndarray) -> float:
+        spread, skew = (max((1.0 - 1.5 / 7.0) * number, 1.0) for number in counting._dimensions(compared))
+        return math.sqrt((1.0 + (f.ppf(0.95, skew, 7 * skew) - 1.0) * math.sqrt(skew / spread)) * square)
+
+    assert half_width(middle, parts) == pytest.approx(exact(differences), rel=1e-10)
     assert 2**18 <= counting.MOST_COMPARED <= 2**22
     # of large arrays some rows are compared: 16 entries of which 8 may be, so every second row
     monkeypatch.setattr(counting, "MOST_COMPARED", 8)
-    some = 0.8 * counting._dimensions(np.array([(part - middle)[::2].ravel() for part in parts]))
-    assert half_width(middle, parts) == pytest.approx(math.sqrt(f.ppf(0.95, some, 7 * some) * square), rel=1e-10)
+    some = np.array([(part - middle)[::2].ravel() for part in parts])
+    assert half_width(middle, parts) == pytest.approx(exact(some), rel=1e-10)
 
 
 def test_replicates_are_sparse_where_that_is_smaller_and_dropped_where_too_large(monkeypatch) -> None:
