@@ -1,25 +1,39 @@
 """Which wrong lines the tests would let pass: python -m benchmarks.mutants [MODULE ...] prints a table of mutants.
 
-cosmic-ray writes one small fault at a time into a copy of a module (another number, - for +, / for *, a comparison
-turned, a condition negated, ...), and the module's own tests are run on it. A mutant that survives is a fault that
-nobody would see, unless the changed line means the same: `equivalent_mutants.toml` has those, each with its reason.
-The modules are those whose errors do not show in the results that they prove or weigh. A full run takes hours;
+cosmic-ray writes one small fault at a time into a module (another number, - for +, / for *, a comparison turned, a
+condition negated, ...), and the module's own tests are run on it. A mutant that survives is a fault that nobody would
+see, unless the changed line means the same: `equivalent_mutants.toml` has those, each with its reason. The modules are
+those whose errors do not show in the results that they prove or weigh.
+
+A mutant runs in a fork of a process that has imported what does not need the module; nothing is written to the tree.
+One that survives and is not known to be equivalent is tried again, by a fresh Python in a copy of the tree.
 ``--share 0.1`` takes every tenth mutant.
 """
 
 from __future__ import annotations
 
 import argparse
+import difflib
+import gc
+import importlib
 import os
 import random
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib.abc import InspectLoader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_file_location
+from multiprocessing import get_context
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -47,7 +61,12 @@ KINDS = (
     "Eq_NotEq", "NotEq_Eq", "Lt_LtE", "Lt_Gt", "LtE_Lt", "LtE_GtE", "Gt_GtE", "Gt_Lt", "GtE_Gt", "GtE_LtE", "Is_IsNot",
     "IsNot_Is", "In_NotIn", "NotIn_In",
 )  # fmt: skip
-SECONDS = 120.0
+# A mutant has ten times the processor time of the module itself and so many seconds more, and so many bytes.
+PATIENCE, SECONDS, BYTES = 10.0, 20.0, 2**34
+# What tests import besides asperity.
+LIBRARIES = ("hypothesis", "mpmath", "numba", "numpy.testing", "pytest", "scipy.linalg", "scipy.special", "scipy.stats")
+INTERNAL_ERROR = 3
+PYTEST = ("-x", "-q", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:xdist")
 LEFT_OUT = shutil.ignore_patterns(
     ".git", ".venv*", ".*_cache", ".hypothesis", "*.egg-info", "build", "dist", "_build", "study", "bench-results"
 )
@@ -63,6 +82,11 @@ class Mutant:
     after: str
     killed: bool
 
+    @property
+    def change(self) -> tuple[str, str, str]:
+        """What `equivalent_mutants.toml` knows it by."""
+        return self.module, self.before, self.after
+
 
 def main() -> None:
     """Print a row a module, and the survivors that are not known to be equivalent."""
@@ -75,14 +99,14 @@ def main() -> None:
     unknown = set(options.modules) - set(TESTS)
     if unknown:
         parser.error(f"no tests are listed for {', '.join(sorted(unknown))}")
-    same = known_equivalents()
+    same, found = known_equivalents(), []
     print("| module | mutants | killed | equivalent | survived | killed of the others |\n" + "|---" * 6 + "|")
-    with ThreadPoolExecutor(options.jobs) as pool:
-        rows = pool.map(lambda module: mutants_of(module, options.share, options.seed), options.modules or TESTS)
-        found = []
-        for module, mutants in zip(options.modules or TESTS, rows, strict=True):
+    modules = options.modules or list(TESTS)
+    with ProcessPoolExecutor(options.jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
+        tries = pool.map(partial(mutants_of, share=options.share, seed=options.seed, same=same), modules)
+        for module, mutants in zip(modules, tries, strict=True):
             alive = [mutant for mutant in mutants if not mutant.killed]
-            left = [mutant for mutant in alive if (module, mutant.before, mutant.after) not in same]
+            left = [mutant for mutant in alive if mutant.change not in same]
             killed, others = len(mutants) - len(alive), len(mutants) - len(alive) + len(left)
             print(
                 f"| `{module}` | {len(mutants)} | {killed} | {len(alive) - len(left)} | {len(left)} "
@@ -100,63 +124,114 @@ def known_equivalents() -> set[tuple[str, str, str]]:
     return {(entry["module"], entry["before"], entry["after"]) for entry in listed}
 
 
-def mutants_of(module: str, share: float, seed: int) -> list[Mutant]:
-    """Try the mutants of one module in a copy of the whole tree."""
-    from cosmic_ray.work_db import WorkDB, use_db
+def mutants_of(module: str, share: float, seed: int, same: set[tuple[str, str, str]]) -> list[Mutant]:
+    """Try the mutants of one module; the process must be a fresh one."""
+    original = (ROOT / module).read_text(encoding="utf-8")
+    _warm(module)
+    killed, seconds = _is_killed(module, original, resource.RLIM_INFINITY)
+    if killed:
+        sys.exit(f"the tests of {module} fail without a fault: run pytest {' '.join(_tests(module))}")
+    changed = list(_changed_sources(original))
+    found = []
+    for source in random.Random(seed).sample(changed, round(share * len(changed))):
+        mutant = _mutant(module, original, source, _is_killed(module, source, round(PATIENCE * seconds + SECONDS))[0])
+        if not mutant.killed and mutant.change not in same:
+            mutant = replace(mutant, killed=_is_killed_afresh(module, source))
+        found.append(mutant)
+    return found
 
+
+def _changed_sources(original: str) -> Iterator[str]:
+    """The module with one fault, of the kinds that are listed; not in decorators, whose arguments are no arithmetic."""
+    from cosmic_ray.ast import ast_nodes, get_ast
+    from cosmic_ray.mutating import mutate_code
+    from cosmic_ray.plugins import get_operator, operator_names
+
+    lines = original.splitlines()
+    for name in sorted(name for name in operator_names() if name.endswith(KINDS)):
+        operator = get_operator(name)()
+        places = [place for node in ast_nodes(get_ast(original)) for place in operator.mutation_positions(node)]
+        for number, ((line, _), _) in enumerate(places):
+            if not lines[line - 1].lstrip().startswith("@"):
+                yield mutate_code(original, operator, number)
+
+
+class _Source(MetaPathFinder, InspectLoader):
+    """Gives a module another source, or none, so that it cannot be imported."""
+
+    def __init__(self, module: str, source: str | None) -> None:
+        self.name = "asperity." + module.removesuffix(".py").replace("/", ".")
+        self.path, self.source = ROOT / "src" / "asperity" / module, source
+
+    def find_spec(self, fullname: str, path: object = None, target: object = None) -> ModuleSpec | None:
+        return spec_from_file_location(fullname, self.path, loader=self) if fullname == self.name else None
+
+    def get_source(self, fullname: str) -> str | None:
+        return self.source
+
+
+def _warm(module: str) -> None:
+    """Import whatever can be imported without the module."""
+    os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
+    os.chdir(ROOT)
+    sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
+    for library in LIBRARIES:
+        importlib.import_module(library)
+    sys.meta_path.insert(0, _Source(module, None))
+    for room in ("geometry", "kernels", "spectral"):
+        for path in sorted((ROOT / room).glob("*.py")):
+            with suppress(ImportError):
+                importlib.import_module(f"asperity.{room}.{path.stem}")
+    sys.meta_path.pop(0)
+    gc.freeze()  # or every fork would look for garbage among all that it shares
+
+
+def _is_killed(module: str, source: str, seconds: int) -> tuple[bool, float]:
+    """Whether the module's tests fail in a fork where it has this source, and the CPU seconds that they took."""
+    process = os.fork()
+    if process == 0:
+        with suppress(BaseException):
+            os._exit(_run_tests(module, source, seconds))
+        os._exit(INTERNAL_ERROR)
+    _, status, used = os.wait4(process, 0)
+    code = os.waitstatus_to_exitcode(status)
+    if code not in (0, 1, 2, -signal.SIGXCPU, -signal.SIGALRM):
+        sys.exit(f"the tests of {module} ended with {code}")
+    return code != 0, used.ru_utime + used.ru_stime
+
+
+def _run_tests(module: str, source: str, seconds: int) -> int:
+    import pytest
+
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 1)
+    os.dup2(nowhere, 2)
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+    sys.meta_path.insert(0, _Source(module, source))
+    return int(pytest.main([*PYTEST, *_tests(module)]))
+
+
+def _is_killed_afresh(module: str, source: str) -> bool:
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder) / "tree"
         shutil.copytree(ROOT, tree, symlinks=True, ignore=LEFT_OUT)
-        tests = " ".join(f"tests/{name}" for name in TESTS[module])
-        command = f"{sys.executable} -m pytest -x -q -p no:cacheprovider -p no:xdist {tests}"
-        (tree / "mutants.toml").write_text(
-            f'[cosmic-ray]\nmodule-path = "{module}"\ntimeout = {SECONDS}\ntest-command = "{command}"\n'
-            '[cosmic-ray.distributor]\nname = "local"\n'
-        )
+        (tree / module).write_text(source, encoding="utf-8")
+        command = [sys.executable, "-m", "pytest", *PYTEST, *_tests(module)]
         environment = {**os.environ, "PYTHONPATH": str(tree / "src")}
-        _run([*command.split()], tree, environment)
-        _run(["cosmic-ray", "init", "mutants.toml", "mutants.sqlite"], tree, environment)
-        database = str(tree / "mutants.sqlite")
-        with use_db(database, WorkDB.Mode.open) as work:
-            _leave_out(work, (tree / module).read_text(encoding="utf-8").splitlines(), share, random.Random(seed))
-        _run(["cosmic-ray", "exec", "mutants.toml", "mutants.sqlite"], tree, environment)
-        with use_db(database, WorkDB.Mode.open) as work:
-            results = [result for _, result in work.completed_work_items if result.test_outcome is not None]
-            return [_mutant(module, result.diff, result.is_killed) for result in results]
+        return subprocess.run(command, cwd=tree, env=environment, capture_output=True, check=False).returncode != 0
 
 
-def _leave_out(work, source: list[str], share: float, chance: random.Random) -> None:
-    """Skip the kinds that are not listed, decorators, whose arguments are no arithmetic, and all but a share."""
-    from cosmic_ray.work_item import WorkerOutcome, WorkResult
-
-    items = sorted(work.pending_work_items, key=lambda item: str(item.mutations))
-    wanted = [
-        item
-        for item in items
-        if item.mutations[0].operator_name.endswith(KINDS)
-        and not source[item.mutations[0].start_pos[0] - 1].lstrip().startswith("@")
-    ]
-    tried = {item.job_id for item in chance.sample(wanted, round(share * len(wanted)))}
-    left_out = [item.job_id for item in items if item.job_id not in tried]
-    work.set_multiple_results(left_out, WorkResult(worker_outcome=WorkerOutcome.SKIPPED))
+def _tests(module: str) -> list[str]:
+    return [f"tests/{name}" for name in TESTS[module]]
 
 
-def _mutant(module: str, diff: str, killed: bool) -> Mutant:
-    lines = diff.splitlines()
-    place = int(next(line for line in lines if line.startswith("@@")).split()[1].split(",")[0].lstrip("-"))
-    body = lines[next(k for k, line in enumerate(lines) if line.startswith("@@")) + 1 :]
-    offset = next(k for k, line in enumerate(body) if line.startswith("-"))
-    return Mutant(module, place + offset, _changed(body, "-"), _changed(body, "+"), killed)
-
-
-def _changed(body: Iterable[str], sign: str) -> str:
-    return " ".join(line[1:].strip() for line in body if line.startswith(sign))
-
-
-def _run(command: list[str], tree: Path, environment: dict[str, str]) -> None:
-    done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, check=False)
-    if done.returncode:
-        sys.exit(f"{' '.join(command)} failed:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+def _mutant(module: str, original: str, source: str, killed: bool) -> Mutant:
+    diff = list(difflib.unified_diff(original.splitlines(), source.splitlines(), lineterm="", n=0))
+    line = int(diff[2].split()[1].split(",")[0].lstrip("-"))
+    before, after = (" ".join(text[1:].strip() for text in diff[3:] if text.startswith(sign)) for sign in "-+")
+    return Mutant(module, line, before, after, killed)
 
 
 if __name__ == "__main__":
