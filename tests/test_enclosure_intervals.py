@@ -284,6 +284,18 @@ def test_what_comes_next_is_the_largest_that_is_not_listed(k, following):
     assert len(names) == k and next_value == pytest.approx(following, rel=0.0, abs=1e-13)
 
 
+def test_a_poor_trial_function_counts_where_it_reaches_to(monkeypatch):
+    """Of two that come next, of .25 and of .125, the second may stand for a value of .325 if its residual is .2."""
+
+    def poor(law, basis, vectors, values, **options):
+        return measured(values, np.where(np.abs(values) < 0.2, 0.2, 0.0))
+
+    monkeypatch.setattr(enclosure, "residuals", poor)
+    law = ring()
+    next_value = enclosure._trial(law, ker.Bins(law.edges), 2, 1e-8)[3]
+    assert next_value == pytest.approx(0.325, rel=0.0, abs=1e-13)
+
+
 def test_the_focusing_arc_has_the_published_eigenvalues_on_panels_that_adapt():
     """Facts 10: 0.3670253152(3) and -0.311346443 at a half angle of 1.2."""
     found = spec.enclosures(ker.CircularArcLaw(1.2), 3)
