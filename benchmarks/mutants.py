@@ -202,6 +202,11 @@ def _is_killed(module: str, source: str, seconds: int) -> tuple[bool, float]:
 
 def _run_tests(module: str, source: str, seconds: int) -> int:
     import pytest
+    from hypothesis import Phase, settings
+
+    # one counterexample will do, however long
+    phases = (Phase.explicit, Phase.generate)
+    settings.register_profile("mutants", deadline=None, derandomize=True, phases=phases, report_multiple_bugs=False)
 
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)
@@ -210,7 +215,7 @@ def _run_tests(module: str, source: str, seconds: int) -> int:
     resource.setrlimit(resource.RLIMIT_AS, (BYTES, BYTES))
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     sys.meta_path.insert(0, _Source(module, source))
-    return int(pytest.main([*PYTEST, *_tests(module)]))
+    return int(pytest.main([*PYTEST, "--hypothesis-profile=mutants", *_tests(module)]))
 
 
 def _is_killed_afresh(module: str, source: str) -> bool:
