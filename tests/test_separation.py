@@ -119,6 +119,17 @@ def test_without_a_lambertian_share_the_next_value_is_an_estimate():
     assert (apart.radius, apart.kind) == (0.4, "estimate")
 
 
+@pytest.mark.parametrize(("top", "radius"), [(0.8, 1.0), (0.75, 0.75), (0.7, 0.75), (None, 0.75)])
+def test_where_fast_oscillations_reach_further_than_the_next_value_nothing_is_known_to_be_left_below_one(
+    monkeypatch, top, radius
+):
+    shown = None if top is None else (top, "what rays show")
+    monkeypatch.setattr(separation, "fast_top", lambda law: shown)
+    found = rest_of_spectrum(ker.CircularArcLaw(1.2), np.array([1.0, 0.9]), 0.0, 0.75)
+    assert found.radius == radius and found.kind == "estimate"
+    assert ("what rays show" in found.reason) == (radius == 1.0)
+
+
 def test_the_lambertian_share_of_sums_and_products():
     diffuse, turned = ker.lambertian(), ker.specular()
     assert lambertian_share(diffuse) == 1.0 and lambertian_share(turned) == 0.0
