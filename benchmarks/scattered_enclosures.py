@@ -1,9 +1,12 @@
-"""Enclosures of random compositions with Henyey-Greenstein scatterings against spectra that are known otherwise.
+"""Enclosures of random compositions, and in random bases, against spectra that are known otherwise.
 
 ``python -m benchmarks.scattered_enclosures`` prints how many intervals hold their eigenvalue and how many indices are
 right. *Diagonal*: words in HG, specular and Lambertian reflection and sums of these, whose eigenvalues on the Legendre
 polynomial of degree l are products and sums of g^l, (-1)^l and 0. *Teeth*: HG(a) T HG(a) with triangular teeth T,
 against a matrix of scipy's Legendre polynomials by Gauss rules on many panels, with twice as many for its error.
+*Given basis*: powers and sums of scatterings, once as Henyey-Greenstein laws and once as a user's density, random
+matrices with their powers, and circular arcs, in random polynomials, bins and panels. *Only apply*: a user's law whose
+means are sums over a few directions must be refused, whatever is made of it.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ from scipy.special import eval_legendre
 
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.errors import InputError
 from asperity.kernels.phase_function import HenyeyGreensteinLaw
 
 Floats = NDArray[np.float64]
@@ -26,6 +30,8 @@ DIAGONAL, TEETH, LISTED, DEGREES = 200, 12, 5, 3000
 COARSE = 0.1
 # The judge's panels, nodes on each, and kinks; differences of roundings.
 PANELS, NODES, KINKS, ROUNDING = 750, 4, 256, 1e-15
+# Laws in given bases, and eigenvalues of arcs of half angle 1.2 by a second method.
+GIVEN, REFUSED, ARC, ARC_ERROR = 120, 12, (1.0, 0.3670253152, -0.311346443), 5e-10
 
 
 @dataclass(frozen=True)
@@ -35,6 +41,25 @@ class Case:
     law: ker.Law
     exact: Floats
     error: float
+    basis: ker.Basis | None = None
+    listed: int = LISTED
+
+
+class FewDirections(ker.Law):
+    """Scattering as a user may write it: sums over a few directions, without a word on their error."""
+
+    reversible = mirror_symmetric = True
+
+    def __init__(self, g: float, directions: int) -> None:
+        self.law, self.directions = ker.henyey_greenstein(g), directions
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        return self.law.sample(theta, rng)
+
+    def _apply(self, function, theta):  # type: ignore[no-untyped-def]
+        out = np.pi * (np.arange(self.directions) + 0.5) / self.directions
+        weight = self.law.density(theta[..., None], out)
+        return np.tensordot(weight / weight.sum(axis=-1, keepdims=True), function(out), axes=1)
 
 
 def diagonal_case(number: int) -> Case:
@@ -79,6 +104,65 @@ def teeth_case(number: int) -> Case:
     return Case(scattering @ teeth @ scattering, found[1], 2.0 * error + ROUNDING)
 
 
+def given_case(number: int) -> Case:
+    """A law of one of five kinds in a basis of one of three."""
+    rng = np.random.default_rng([20261126, number])
+    kind, power = number % 5, int(rng.integers(1, 4))
+    g, h = rng.uniform(-0.93, 0.93, 2).tolist()
+    degree = np.arange(float(DEGREES))
+    if kind == 0:
+        law, exact = ker.henyey_greenstein(g) ** power, g ** (power * degree)
+    elif kind == 1:
+        law, exact = _as_density(g) ** power, g ** (power * degree)
+    elif kind == 2:
+        parts = _as_density(g), ker.henyey_greenstein(h), ker.lambertian()
+        law = 0.5 * parts[0] + 0.3 * parts[1] + 0.2 * parts[2]
+        exact = 0.5 * g**degree + 0.3 * h**degree + 0.2 * (degree == 0)
+    elif kind == 3:
+        flux = rng.random((6, 6)) ** 2
+        flux = flux + flux.T
+        edges = np.concatenate([[0.0], np.sort(rng.uniform(0.1, 3.0, 5)), [np.pi]])
+        mass = 0.5 * np.diff(-np.cos(edges))
+        for _ in range(5000):
+            # symmetric, with the masses of the bins as sums
+            factor = np.sqrt(mass / flux.sum(axis=1))
+            flux = factor[:, None] * flux * factor
+        array, root = flux / mass[:, None], np.sqrt(mass)
+        law = ker.MatrixLaw(_Binned(array, ker.Bins(edges))) ** power
+        exact = np.append(np.linalg.eigvalsh(root[:, None] * array / root) ** power, np.zeros(3))
+    else:
+        law, exact = ker.CircularArcLaw(1.2) ** power, np.array(ARC) ** power
+    inner = np.sort(rng.uniform(0.05, 3.09, int(rng.integers(2, 9))))
+    bases = (
+        ker.Legendre(int(rng.integers(6, 48))), ker.Bins([0.0, *inner, np.pi]),
+        ker.Panels([0.0, *inner, np.pi], int(rng.integers(1, 5))),
+    )  # fmt: skip
+    error = ARC_ERROR if kind == 4 else 4.0 * ROUNDING
+    basis = bases[(number // 5) % 3]
+    # of arcs three eigenvalues are known, and few bins come near two of them
+    listed = {3: 4, 4: 3 if basis is bases[0] else 2}.get(kind, LISTED)
+    return Case(law, _by_modulus(exact), error, basis, min(listed, basis.size))
+
+
+def _as_density(g: float) -> ker.Law:
+    """The scattering as a density that a user wrote."""
+    return ker.DensityLaw(ker.henyey_greenstein(g).density)
+
+
+@dataclass(frozen=True)
+class _Binned:
+    array: Floats
+    basis: ker.Bins
+
+
+def refused_case(number: int) -> Case:
+    """A law by sums over few directions: alone, as a power, in a sum, in a composition."""
+    rng = np.random.default_rng([20261127, number])
+    law = FewDirections(float(rng.uniform(0.2, 0.9)), int(rng.integers(8, 32)))
+    made = (law, law**2, 0.5 * law + 0.5 * ker.lambertian(), law @ ker.specular() @ law)[number % 4]
+    return Case(made, np.ones(1), 0.0, (None, ker.Legendre(12), ker.Bins(8))[number // 4 % 3])
+
+
 def _judge(g: float, law: ker.Law, degrees: int, panels: int) -> Floats:
     node, share = np.polynomial.legendre.leggauss(NODES)
     # kinks of the law as edges: they make the rule better, not its values others
@@ -104,31 +188,50 @@ def _by_modulus(values: Floats) -> Floats:
 def judged(case: Case, tolerance: float = 1e-8) -> Counter[str]:
     """How many intervals hold an eigenvalue, and how many indices are right; what is wrong by its name."""
     found: Counter[str] = Counter()
-    for item in spec.enclosures(case.law, LISTED, tolerance=tolerance):
-        low, high = item.low - case.error, item.high + case.error
+    try:
+        items = spec.enclosures(case.law, case.listed, case.basis, tolerance)
+    except InputError:
+        return Counter(refused=1)
+    for item in items:
         found["intervals"] += 1
-        inside = (low <= case.exact) & (case.exact <= high)
+        inside = _inside(item, case)
         found["without an eigenvalue"] += not inside.any()
         if item.index is not None:
             found["indexed"] += 1
-            found["indexed falsely"] += not inside[item.index]
+            # enclosures whose moduli overlap may change places
+            group = [other for other in items if other.index is not None and _overlap(item, other)]
+            held = any(inside[other.index] for other in group)
+            held &= any(_inside(other, case)[item.index] for other in group)
+            found["indexed falsely"] += not held
     return found
+
+
+def _inside(item: spec.Enclosure, case: Case) -> NDArray[np.bool_]:
+    return np.asarray((item.low - case.error <= case.exact) & (case.exact <= item.high + case.error))
+
+
+def _overlap(one: spec.Enclosure, other: spec.Enclosure) -> bool:
+    # of an interval [a, b] the moduli run from max(a, -b, 0) to max(-a, b)
+    least = max(max(item.low, -item.high, 0.0) for item in (one, other))
+    return least <= min(max(-item.low, item.high) for item in (one, other))
 
 
 def main() -> None:
     """Print the table."""
-    print("| laws | compositions | intervals | without an eigenvalue | indexed | indexed falsely |")
-    print("|---|---|---|---|---|---|")
+    print("| laws | number | refused | intervals | without an eigenvalue | indexed | indexed falsely |")
+    print("|---|---|---|---|---|---|---|")
     for name, cases, tolerance in (
         ("words and sums, diagonal", map(diagonal_case, range(DIAGONAL)), 1e-8),
         ("HG, teeth, HG", map(teeth_case, range(TEETH)), 1e-8),
         ("HG, teeth, HG, few polynomials", map(teeth_case, range(TEETH)), COARSE),
+        ("given basis", map(given_case, range(GIVEN)), 1e-8),
+        ("only apply", map(refused_case, range(REFUSED)), 1e-8),
     ):
         rows = [judged(case, tolerance) for case in cases]
         total = sum(rows, Counter())
         print(
-            f"| {name} | {len(rows)} | {total['intervals']} | {total['without an eigenvalue']} | {total['indexed']} "
-            f"| {total['indexed falsely']} |",
+            f"| {name} | {len(rows)} | {total['refused']} | {total['intervals']} | {total['without an eigenvalue']} "
+            f"| {total['indexed']} | {total['indexed falsely']} |",
             flush=True,
         )
 

@@ -6,7 +6,8 @@ they are, mixed and squared, in both conventions. Their judge follows rays with 
 formula with the library's tracer; its Galerkin matrices in Legendre polynomials never show too much, so the gap that is
 reported must not be larger than theirs; where the verdict is *isolated* their values at three degrees must lead to it;
 and where it is *essential edge* the edge must lie between two bounds from rays that meet straight pieces only.
-*Tolerances*: `spectrum(law, tolerance=t)` against eigenvalues that are known.
+*Tolerances*: `spectrum(law, tolerance=t)` against eigenvalues that are known. ``--first`` and ``--last`` choose a range
+of the random walls; rows are printed as they are found, so that what was stopped goes on where it ended.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from asperity.errors import InputError
 
 Floats = NDArray[np.float64]
 
-POLYGONS, TOLERANCE, SHARE = 20, 1e-3, 0.3
+POLYGONS, WALLS, TOLERANCE, SHARE = 20, 48, 1e-3, 0.3
 # The judge's rays, in as many blocks, whose spread is its error; the degrees of its matrices.
 LOG_RAYS, BLOCKS, DEGREES = 18, 8, (16, 32, 64)
 # Angles and entry points of its straight rays; a step, and the turn by it that a curved piece gives.
@@ -238,7 +239,7 @@ class Row:
 def random_walls() -> Iterator[tuple[str, geo.Wall]]:
     """Curved and mixed walls, some with islands, some mirror-symmetric."""
     # three mixed ones, two with islands, one mirror-symmetric, so that a part of the list has all kinds
-    for number in range(8):
+    for number in range(WALLS // 6):
         for mixed in range(3 * number, 3 * number + 3):
             yield f"mixed {mixed}", random_curved_wall(mixed)
         for island in range(2 * number, 2 * number + 2):
@@ -298,6 +299,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.verdicts", description=__doc__)
     parser.add_argument("--tolerance", type=float, default=TOLERANCE, help="error asked of the random walls' gaps")
     parser.add_argument("--first", type=int, default=0, help="number of the first random wall; the tables only if 0")
+    parser.add_argument("--last", type=int, default=WALLS, help=f"the last is that before this one, {WALLS} by default")
     parser.add_argument("--brief", action="store_true", help="random walls in the paper's convention only")
     options = parser.parse_args()
     if options.first == 0:
@@ -306,9 +308,7 @@ def main() -> None:
     print("|" + "---|" * 6)
     verdicts: Counter[str] = Counter()
     refuted = 0
-    for k, (name, wall) in enumerate(random_walls()):
-        if k < options.first:
-            continue
+    for k, (name, wall) in islice(enumerate(random_walls()), options.first, options.last):
         rows = rows_of(name, wall, options.tolerance, more=k % 4 == 0)
         for row in islice(rows, 1 if options.brief else None):
             verdicts[row.gap.verdict] += 1

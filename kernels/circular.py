@@ -121,13 +121,18 @@ class CircularArcLaw(DrivenLaw):
         return right, base, chord, np.maximum(np.ceil((self.half_angle + base - chord) / (2.0 * chord)), 1.0)
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+        return self.means(function, theta)
+
+    def means(self, function: AngleFunction, theta: Floats, nodes: int = NODES, most_hits: int = MOST_HITS) -> Floats:
+        """What `apply` gives, by Gauss rules of so many nodes where N is constant, N followed up to ``most_hits``."""
         flat = theta.reshape(-1)
         starts = range(0, max(flat.size, 1), CHUNK)
-        total = np.concatenate([self._apply_chunk(function, flat[start : start + CHUNK]) for start in starts])
+        parts = [self._means(function, flat[start : start + CHUNK], nodes, most_hits) for start in starts]
+        total = np.concatenate(parts)
         return total.reshape(theta.shape + total.shape[1:])
 
-    def _apply_chunk(self, function: AngleFunction, theta: Floats) -> Floats:
-        ray, mirrored, outgoing, weight = self._row_quadrature(theta)
+    def _means(self, function: AngleFunction, theta: Floats, nodes: int, most_hits: int) -> Floats:
+        ray, mirrored, outgoing, weight = self._row_quadrature(theta, nodes, most_hits)
         angle = kept_inside(np.where(mirrored[:, None], np.pi - outgoing, outgoing))
         value = np.asarray(function(angle), dtype=np.float64)
         piece = np.einsum("ij,ij...->i...", weight, value)
@@ -156,15 +161,18 @@ class CircularArcLaw(DrivenLaw):
             np.add.at(found, ray[part], np.abs(np.diff(below, axis=1)))
         return np.asarray(found / found.sum(axis=1, keepdims=True))
 
-    def _row_quadrature(self, theta: Floats) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
+    def _row_quadrature(
+        self, theta: Floats, nodes: int, most_hits: int
+    ) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
         """Gauss rules in delta between the changes of N, for every theta and both sides.
 
         Returns for each piece its ray and whether it is followed in the mirror, shape (pieces,), sorted by ray,
-        and the outgoing angles there and their weights (not normalised), shape (pieces, NODES).
+        and the outgoing angles there and their weights (not normalised), shape (pieces, nodes). A piece with one
+        outcome has the weight of this at its nodes together.
         """
-        ray, mirrored, lower, upper, hits, rest, alone = self.pieces(theta)
+        ray, mirrored, lower, upper, hits, rest, alone = self.pieces(theta, most_hits)
         base = np.where(mirrored, np.pi - theta[ray], theta[ray])
-        chord, weight = (part.reshape(-1, NODES) for part in gauss_on_intervals(lower, np.maximum(upper, lower), NODES))
+        chord, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(lower, np.maximum(upper, lower), nodes))
         outgoing = np.pi + base[:, None] - 2.0 * hits[:, None] * chord
         outgoing = np.where(rest[:, None], np.pi - self.half_angle, outgoing)
         weight = weight * SINE.density(chord) + np.where(alone & ~rest, 1.0, 0.0)[:, None]

@@ -67,6 +67,7 @@ class IntervalExchangeLaw(Law):
     partner: NDArray[np.int64] = field(init=False, repr=False)
 
     reversible = True
+    exact_apply = True
     fan_out = 1
 
     def __post_init__(self) -> None:

@@ -59,6 +59,7 @@ class InvolutionLaw(Law):
     map: Callable[[Floats], Floats]
 
     reversible = True
+    exact_apply = True
 
     def __post_init__(self) -> None:
         if not callable(self.map):

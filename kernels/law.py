@@ -37,6 +37,9 @@ class Law(ABC):
         ``"specular"`` after `in_specular_frame`, where specular reflection is the identity (Feres' convention).
     fan_out : int
         At how many outgoing angles `apply` evaluates its function for one incoming angle: its cost.
+    exact_apply : bool
+        Whether `apply` gives expectations to rounding, of any function. Where it is a quadrature the answer is no, and
+        `asperity.spectral.enclosures` asks for errors that it can know otherwise.
 
     Notes
     -----
@@ -50,6 +53,7 @@ class Law(ABC):
     mirror_symmetric: bool | None = None
     frame: Frame = "paper"
     fan_out: int = 1
+    exact_apply: bool = False
 
     # A law is an operator, not an array: numpy must leave ``0.3 * law`` to us.
     __array_ufunc__ = None
@@ -145,6 +149,7 @@ class BranchLaw(Law):
     """
 
     reversible = True
+    exact_apply = True
 
     @abstractmethod
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...

@@ -52,6 +52,7 @@ class LeastResistanceLaw(Law):
 
     reversible = True
     mirror_symmetric = True
+    exact_apply = True
     fan_out = 2
 
     @property

@@ -101,7 +101,7 @@ def _(law: CircularArcLaw, basis: Basis) -> BasisRows:
 
 @basis_rows.register
 def _(law: Combination, basis: Basis) -> BasisRows:
-    return _weighted([(weight, basis_rows(term, basis)) for weight, term in law.terms_checked()])
+    return weighted_rows([(weight, basis_rows(term, basis)) for weight, term in law.terms_checked()])
 
 
 @basis_rows.register
@@ -136,12 +136,18 @@ def _(law: WallLaw, basis: Basis) -> BasisRows:
     return rows
 
 
+def height_of(basis: Basis, vectors: Floats) -> float:
+    """About the largest modulus of the functions with these coefficients: polynomials are largest at the ends."""
+    probes = basis.nodes_per_interval if isinstance(basis, Legendre) else HEIGHT_PROBES
+    angle = np.append(gauss_rule(basis.edges, probes)[0], basis.edges)
+    return float(np.abs(basis.evaluate(angle) @ vectors).max())
+
+
 @singledispatch
 def function_rows(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
     """As `basis_rows` for functions with the coefficients ``vectors``, shape (n, k); errors are those of the worst."""
     rows = basis_rows(law, basis)
-    angle, _ = gauss_rule(basis.edges, HEIGHT_PROBES)
-    height = float(np.abs(basis.evaluate(angle) @ vectors).max())
+    height = height_of(basis, vectors)
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         step = max(1, VALUES_AT_ONCE // basis.size)
@@ -162,7 +168,7 @@ def _(law: CircularArcLaw, basis: Basis, vectors: Floats) -> BasisRows:
 
 @function_rows.register
 def _(law: Combination, basis: Basis, vectors: Floats) -> BasisRows:
-    return _weighted([(weight, function_rows(term, basis, vectors)) for weight, term in law.terms_checked()])
+    return weighted_rows([(weight, function_rows(term, basis, vectors)) for weight, term in law.terms_checked()])
 
 
 @function_rows.register
@@ -179,7 +185,9 @@ def _(law: WallLaw, basis: Basis, vectors: Floats) -> BasisRows:
     return function_rows.dispatch(Law)(law, basis, vectors)
 
 
-def _weighted(terms: list[tuple[float, BasisRows]]) -> BasisRows:
+def weighted_rows(terms: list[tuple[float, BasisRows]]) -> BasisRows:
+    """Rows of a sum of laws with their weights, from those of its terms."""
+
     def rows(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         found = [(weight, *term(theta, tolerance)) for weight, term in terms]
         images = sum((weight * image for weight, image, _ in found[1:]), start=found[0][0] * found[0][1])

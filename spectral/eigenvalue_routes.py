@@ -10,6 +10,7 @@ from ..checks import Floats, frozen
 from ..kernels import DensityLaw, Law, Legendre, MatrixLaw, discretise
 from ..kernels.algebra import made_of_isometries
 from ..kernels.panel_rows import has_costly_rows, integrates_panels
+from ..rounding import EPS
 from .eigenvalues import Spectrum, SpectrumErrors, matrix_spectrum
 from .enclosure import EnclosedTrials, as_power, enclosed_trials
 from .ideal_parts import ideal_spectrum
@@ -147,7 +148,7 @@ def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
     base, error = 1.0 - found.gap, found.gap_error
     if exponent % 2 == 0 and found.slem > base:
         base, error = found.slem, float(width[np.argmin(found.values)])
-    grown = exponent * min(abs(base) + error, 1.0) ** (exponent - 1) * error
+    gap, grown = gap_of_power(1.0 - base if base != 1.0 - found.gap else found.gap, error, exponent)
     parts = found.errors
     return replace(
         found,
@@ -160,13 +161,32 @@ def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
             frozen((slope * parts.sampling)[order]),
             parts.quantile,
         ),
-        gap=1.0 - base**exponent,
+        gap=gap,
         gap_errors=discretisation_only(np.array([grown])),
         slem=found.slem**exponent,
         method=f"{_ordinal(exponent)} powers of the eigenvalues; {found.method}",
         matrix_error=exponent * found.matrix_error,
         parity=tuple(found.parity[i] for i in order),
     )
+
+
+def gap_of_power(gap: float, error: float, exponent: int) -> tuple[float, float]:
+    """1 - (1 - gap)^n with the largest change within the error: a gap of 1e-13 keeps its digits.
+
+    Of an even power the gap given is 1 - slem, at most 1.
+
+    Examples
+    --------
+    >>> gap_of_power(1e-16, 0.0, 3)[0], gap_of_power(1.5, 0.0, 3)[0]
+    (3e-16, 1.125)
+    """
+
+    def grown(one: float) -> float:
+        return float(-np.expm1(exponent * np.log1p(-one))) if one < 1.0 else 1.0 - (1.0 - one) ** exponent
+
+    least, most = max(gap - error, 0.0), min(gap + error, 2.0 if exponent % 2 else 1.0)
+    value = grown(gap)
+    return value, max(grown(most) - value, value - grown(least), 0.0) + 4.0 * EPS * abs(value)
 
 
 def _ordinal(number: int) -> str:

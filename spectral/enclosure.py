@@ -28,8 +28,7 @@ from ..kernels.algebra import made_of_isometries
 from ..kernels.ideal import LambertianLaw
 from ..kernels.measure import SINE
 from ..kernels.panel_rows import integrates_panels, traces_rows
-from ..kernels.specular_frame import SpecularFrame
-from ..kernels.weighted_sum import Combination
+from ..kernels.phase_function import HenyeyGreensteinLaw
 from ..rounding import EPS
 from .adapted_panels import adapted_trials
 from .contraction import refuse_unless_self_adjoint
@@ -37,7 +36,7 @@ from .eigenvalues import check_reversible
 from .parity import Parity, halves, outermost_by_parity
 from .scattered_enclosure import ScatteredSpectrum, scattered_spectrum, scattered_words
 from .separation import Separation, rest_of_spectrum
-from .trials import Residuals, images, residuals
+from .trials import Residuals, image_rule, residuals
 
 Label = Literal["indexed", "contains-spectrum"]
 
@@ -49,6 +48,8 @@ MATRIX_TOLERANCE = 1e-8
 TRIAL_SHARE, MOST_TRACED_ROWS, MOST_EXACT_ROWS = 0.3, 4_000, 40_000
 # Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
 QUOTIENT_ROUNDING = 4.0 * EPS
+# Laws whose images of polynomials are found to rounding.
+ROUNDED = (HenyeyGreensteinLaw, LambertianLaw)
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,9 @@ class Enclosure:
     low, high : float
         The interval.
     label : {"indexed", "contains-spectrum"}
-        ``"indexed"``: as many eigenvalues of the law as there are enclosures that overlap this one lie in their union,
-        and it is known how many are larger: ``index`` counts the eigenvalues by modulus, the constants' is 0.
+        ``"indexed"``: as many eigenvalues of the law as there are enclosures whose moduli overlap this one's lie in
+        their union, and it is known how many are larger: ``index`` counts the eigenvalues by modulus, the constants' is
+        0. Which of those that overlap is larger is not known; ``reason`` says so.
         ``"contains-spectrum"``: some point of the spectrum is in the interval, nothing more.
     index : int or None
     residual : float
@@ -156,8 +158,9 @@ def enclosures(
     Raises
     ------
     InputError
-        If the law is a composition with a density whose images have errors that are not known, or with a scattering too
-        near to a mirror.
+        If the errors of the means that `apply` gives are not known: of compositions with laws whose means are integrals
+        by quadrature, of walls of more than 64 pieces, of a user's law that does not promise to be exact
+        (``exact_apply``). Or if a scattering in a composition is too near to a mirror.
     AccuracyError
         If the law is not symmetric within its error. Of a law that is self-adjoint in the other convention only, the
         message says what is true in this one.
@@ -187,17 +190,17 @@ def enclosures(
     if not isinstance(law, Law):
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     refuse_unless_self_adjoint(law)
-    words = scattered_words(law) if basis is None and not isinstance(law, DensityLaw) else None
+    words = None if isinstance(law, DensityLaw) else scattered_words(law)
     if words is not None:
         only = next(iter(words)) if len(words) == 1 else ()
         if len(only) == 1 and isinstance(only[0], DensityLaw):
             # a product of scatterings is one scattering
-            return replace(enclosures(only[0], k, None, tolerance), convention=law.frame)
-        return _of_scattered(scattered_spectrum(law, words, k, tolerance), law.frame)
-    _refuse_unknown_images(law)
-    power = as_power(law) if basis is None else None
+            return replace(enclosures(only[0], k, basis, tolerance), convention=law.frame)
+        if basis is None:
+            return _of_scattered(scattered_spectrum(law, words, k, tolerance), law.frame)
+    power = as_power(law)
     if power is not None:
-        return _raised(enclosures(power[0], k, None, tolerance / power[1]), power[1])
+        return _raised(enclosures(power[0], k, basis, tolerance / power[1]), power[1])
     return enclosed_trials(law, k, basis, tolerance).enclosures
 
 
@@ -243,13 +246,33 @@ def enclosed_trials(
     order = np.argsort(-np.abs(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.rows} rows"
-    exact = isinstance(law, DensityLaw)
-    items = tuple(_enclosed(found, apart, order, place, names, exact) for place in range(len(values)))
-    return EnclosedTrials(Enclosures(items, apart[1], law.frame, method), basis, vectors)
+    # images by quadratures that follow them to rounding, or by sums; else the difference of two rules is an estimate
+    exact = isinstance(law, ROUNDED if isinstance(basis, Legendre) else MatrixLaw)
+    items = [_enclosed(found, apart, order, place, names, exact) for place in range(len(values))]
+    return EnclosedTrials(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
+
+
+def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
+    """With a word in the reason where the moduli of indexed enclosures overlap: their order is not known."""
+    listed = []
+    for item in items:
+        others = [other for other in items if other is not item and other.index is not None]
+        tied = [other for other in others if item.index is not None and _moduli_overlap(item, other)]
+        words = ", ".join(sorted(str(other.index) for other in tied))
+        listed.append(replace(item, reason=f"{item.reason}; may change places with {words}") if tied else item)
+    return tuple(listed)
+
+
+def _moduli_overlap(one: Enclosure, other: Enclosure) -> bool:
+    # of an interval [a, b] the moduli run from max(a, -b, 0) to max(-a, b)
+    least = max(max(item.low, -item.high, 0.0) for item in (one, other))
+    return least <= min(max(-item.low, item.high) for item in (one, other))
 
 
 def as_power(law: Law) -> tuple[Law, int] | None:
     """The law and the exponent of a power, also of one written as a product; None where powers tell nothing.
+
+    A first power is one, so that ``law ** 1`` has all that is known of the law.
 
     Examples
     --------
@@ -258,7 +281,7 @@ def as_power(law: Law) -> tuple[Law, int] | None:
     >>> as_power(g @ g) == as_power(g**2) == (g, 2), as_power(g) is None
     (True, True)
     """
-    if isinstance(law, Power) and law.exponent > 1:
+    if isinstance(law, Power) and law.exponent >= 1:
         base, exponent = law.law, law.exponent
     elif isinstance(law, Composition) and len(law.laws) > 1 and all(part == law.laws[0] for part in law.laws):
         base, exponent = law.laws[0], len(law.laws)
@@ -309,30 +332,6 @@ def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:
     return Enclosures(tuple(items), apart, convention, "eigenvalues of a matrix that the law is near to")
 
 
-def _refuse_unknown_images(law: Law) -> None:
-    """Raise an InputError for chains with densities whose images have errors that nobody knows."""
-
-    def refused(part: Law, in_chain: bool) -> bool:
-        if isinstance(part, Combination):
-            return any(refused(term, in_chain) for _, term in part.terms)
-        if isinstance(part, SpecularFrame):
-            return refused(part.law, in_chain)
-        if isinstance(part, Power):
-            return refused(part.law, in_chain or as_power(part) is None)
-        if isinstance(part, Composition):
-            whole = as_power(part)
-            parts = part.laws if whole is None else (whole[0],)
-            return any(refused(one, in_chain or whole is None) for one in parts)
-        return in_chain and isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw)
-
-    if refused(law, False):
-        raise InputError(
-            f"law: the images of trial functions under {law!r} have no known error, for it is a composition with a "
-            "density that neither begins nor ends it as a Henyey-Greenstein scattering; spectrum(law) and "
-            "spectral_gap(law) take the matrix of the composition"
-        )
-
-
 def _first_that_separates(
     law: Law, found: Residuals, order: NDArray[np.intp], next_value: float
 ) -> tuple[int, Separation]:
@@ -380,7 +379,7 @@ def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
     if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
         # a density may have a peak that no product rule sees; its rows have panels of their own
         angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval)
-        image, _ = images(law, basis.evaluate, angle, basis)
+        image, _ = image_rule(law, basis, np.eye(basis.size))(angle, tolerance)
         symmetric = basis.evaluate(angle).T @ (weight[:, None] * image)
         return np.asarray(0.5 * (symmetric + symmetric.T))
     matrix = discretise(law, basis, tolerance=tolerance)

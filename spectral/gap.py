@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..kernels import CollisionLaw, KernelMatrix, Law
 from ..rounding import EPS
 from .contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
-from .eigenvalue_routes import law_eigenvalues
+from .eigenvalue_routes import gap_of_power, law_eigenvalues
 from .eigenvalues import Spectrum, matrix_spectrum
 from .enclosure import as_power
 from .essential import EssentialEdge, essential_edge
@@ -129,13 +129,10 @@ def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.rand
     """The spectrum of P^n consists of the n-th powers of that of P: an even power turns its lower end up."""
     ask = modulus_gap if exponent % 2 == 0 else spectral_gap
     found = ask(base, tolerance / exponent, rng)
-    top = 1.0 - found.value
-    slope = exponent * min(abs(top) + found.error, 1.0) ** (exponent - 1)
+    value, error = gap_of_power(found.value, found.error, exponent)
     method = f"power {exponent} of the spectrum of P; {found.method}"
-    return SpectralGap(
-        1.0 - top**exponent, slope * found.error, found.kind, method, found.verdict, (f"P: {found}", *found.evidence),
-        law.frame,
-    )  # fmt: skip
+    evidence = (f"P: {found}", *found.evidence)
+    return SpectralGap(value, error, found.kind, method, found.verdict, evidence, law.frame)
 
 
 def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None) -> SpectralGap:
@@ -151,6 +148,9 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | No
     if ideal is not None and ideal.top < 1.0:
         found = spectral_gap(law, tolerance, rng)
         return replace(found, value=1.0 - max(abs(ideal.even), abs(ideal.odd)))
+    small = _shallow_modulus(law, tolerance)
+    if small is not None:
+        return small
     upper = spectral_gap(law, tolerance, rng)
     if upper.verdict == "no gap" or lambertian_share(law) == upper.value:
         # of modulus 1, or as large as the rest of a law with a Lambertian share can be
@@ -166,12 +166,26 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | No
     evidence = (*upper.evidence, f"the least eigenvalue is {-least:.10g} +- {error:.2g}")
     method = f"least eigenvalue, {listed.basis!r}, {listed.method}"
     if least - error > max(top + upper.error, edge.high):
-        return SpectralGap(1.0 - least, error, "estimate", method, "isolated", evidence, law.frame, listed)
+        gap = SpectralGap(1.0 - least, error, "estimate", method, "isolated", evidence, law.frame, listed)
+        return gap.cut_at_zero()
     low, high = max(top - upper.error, least - error), max(top + upper.error, least + error)
     method = f"largest and least eigenvalue: {upper.method}; {method}"
     return SpectralGap(
         1.0 - 0.5 * (low + high), 0.5 * (high - low), "estimate", method, upper.verdict, evidence, law.frame, listed
-    )  # fmt: skip
+    ).cut_at_zero()  # fmt: skip
+
+
+def _shallow_modulus(law: Law, tolerance: float) -> SpectralGap | None:
+    """Of mirror-symmetric shallow walls: slow functions are kept or turned round, and in the two conventions the gap is
+    that of either; fast ones have moduli further from 1."""
+    if not law.mirror_symmetric:
+        return None
+    both = [shallow_gap(one, essential_edge(one)) for one in (law, law.in_specular_frame())]
+    known = [one for one in both if one is not None]
+    least = min(known, key=lambda one: one.value, default=None)
+    if least is None or len(known) < 2 or least.error > tolerance:
+        return None
+    return replace(least, convention=law.frame, method=f"the lesser of the gaps in both conventions; {least.method}")
 
 
 def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generator) -> SpectralGap:

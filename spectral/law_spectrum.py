@@ -113,7 +113,7 @@ def _judged(law: Law, found: Spectrum, tolerance: float, rng: np.random.Generato
                 "may belong to the basis",
             )
         top = 1.0 - found.gap
-        if top - found.gap_error > edge.high:
+        if top - found.gap_error > edge.high and found.gap > found.gap_error:
             outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
             return replace(found, verdict="isolated", evidence=(*evidence, outside))
         known = spectral_gap(law, tolerance, rng)

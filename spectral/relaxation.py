@@ -119,47 +119,68 @@ def mixing_time(
         size = _distance_of(density)
     elif start is not None:
         steps_before, size = 1, _distance_after_a_step(kernel, start)
-    slem = largest_modulus(kernel)
-    most, least = min(slem.value + slem.error, 1.0), max(slem.value - slem.error, 0.0)
-    if most >= 1.0:
-        raise AccuracyError(f"the law is not known to have a gap: slem = {slem}, so no mixing time can be given", most)
+    gap = _modulus_gap(kernel)
+    slem = slem_from_gap(gap)
+    # as gaps: 1 - slem of a slem near 1 would lose its digits
+    least, most = gap.value - gap.error, min(gap.value + gap.error, 1.0)
+    if least <= 0.0:
+        raise AccuracyError(
+            f"the law is not known to have a gap: 1 - slem = {gap}, so no mixing time can be given", 1.0 - least
+        )
     target = {"L2": within, "total variation": 2.0 * within, "chi-square": float(np.sqrt(within))}[distance]
-    steps = steps_before + _steps(most, target / size if size else np.inf)
-    earliest = 0 if distance == "total variation" else _steps(least, target / size if size else np.inf)
-    time, slower, faster = (_time_scale(value) for value in (slem.value, most, least))
-    relaxation = Estimate(time, max(slower - time, time - faster), slem.kind, "-1/ln(slem)")
-    return MixingTime(steps, earliest, relaxation, slem, distance, size, slem.kind)
+    steps = steps_before + _steps(least, target / size if size else np.inf)
+    earliest = 0 if distance == "total variation" else _steps(most, target / size if size else np.inf)
+    return MixingTime(steps, earliest, relaxation_time(gap), slem, distance, size, slem.kind)
 
 
-def largest_modulus(kernel: Law | KernelMatrix | Spectrum) -> Estimate:
-    """The slem, sup of the modulus of the spectrum off the constants, with its error."""
+def slem_from_gap(gap: Estimate) -> Estimate:
+    """1 - gap, whose rounding is an error that the gap does not have."""
+    value = 1.0 - gap.value
+    return Estimate(value, gap.error + (EPS if 1.0 - value != gap.value else 0.0), gap.kind, gap.method)
+
+
+def relaxation_time(gap: Estimate) -> Estimate:
+    """-1/ln(1 - gap), with an infinite error where the gap may be 0.
+
+    Examples
+    --------
+    >>> float(relaxation_time(Estimate(1e-18, 0.0, "bound", "")))
+    1e+18
+    """
+    slower, value, faster = (_time_scale(one) for one in (gap.value - gap.error, gap.value, gap.value + gap.error))
+    if not np.isfinite(slower):
+        return Estimate(value if np.isfinite(value) else 0.0, np.inf, gap.kind, "-1/ln(slem)")
+    error = max(slower - value, value - faster) + 4.0 * EPS * value
+    return Estimate(value, error, gap.kind, "-1/ln(slem)")
+
+
+def _modulus_gap(kernel: Law | KernelMatrix | Spectrum) -> Estimate:
+    """1 - slem with its error."""
     if isinstance(kernel, Law):
-        found = modulus_gap(kernel, TOLERANCE)
-        return Estimate(1.0 - found.value, found.error, found.kind, found.method)
+        return modulus_gap(kernel, TOLERANCE)
     listed = kernel if isinstance(kernel, Spectrum) else matrix_spectrum(kernel, SOUGHT)
     modulus, width = np.abs(listed.values[1:]), listed.errors.total()[1:]
+    method = f"{listed.basis!r}, {listed.method}"
     if not modulus.size:
-        return Estimate(0.0, np.inf, "estimate", f"{listed.basis!r}, {listed.method}")
+        return Estimate(1.0, np.inf, "estimate", method)
     largest = int(np.argmax(modulus))
     if listed.slem > modulus[largest]:
         # the edge of a law's essential spectrum
-        return Estimate(listed.slem, listed.gap_error, "estimate", f"{listed.verdict}: {listed.method}")
-    return Estimate(
-        float(modulus[largest]), float(width[largest]), "estimate", f"{listed.basis!r}, {listed.method}"
-    )  # fmt: skip
+        return Estimate(1.0 - listed.slem, listed.gap_error, "estimate", f"{listed.verdict}: {listed.method}")
+    return Estimate(1.0 - float(modulus[largest]), float(width[largest]), "estimate", method)
 
 
-def _steps(factor: float, target: float) -> int:
-    """The least n with factor^n <= target."""
+def _steps(gap: float, target: float) -> int:
+    """The least n with (1 - gap)^n <= target."""
     if target >= 1.0:
         return 0
-    if factor <= 0.0:
+    if gap >= 1.0:
         return 1
-    return int(np.ceil(np.log(target) / np.log(factor) * (1.0 - 4.0 * EPS)))
+    return int(np.ceil(np.log(target) / np.log1p(-gap) * (1.0 - 4.0 * EPS)))
 
 
-def _time_scale(modulus: float) -> float:
-    return float(-1.0 / np.log(modulus)) if 0.0 < modulus < 1.0 else (np.inf if modulus >= 1.0 else 0.0)
+def _time_scale(gap: float) -> float:
+    return float(-1.0 / np.log1p(-gap)) if 0.0 < gap < 1.0 else (np.inf if gap <= 0.0 else 0.0)
 
 
 def _distance_of(density: Callable[[Floats], Floats]) -> float:

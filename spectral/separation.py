@@ -11,7 +11,7 @@ from ..estimates import ErrorKind
 from ..kernels import DensityLaw, Law, MatrixLaw
 from ..kernels.algebra import Rules, fold
 from ..kernels.ideal import LambertianLaw
-from ..kernels.measure import gauss_rule
+from ..kernels.measure import SINE, gauss_rule
 from ..kernels.phase_function import HenyeyGreensteinLaw
 from ..rounding import EPS
 from .essential import essential_edge
@@ -55,7 +55,7 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
         Modulus, with its residual, of the next one in the basis, for laws of which nothing better is known.
     """
     if isinstance(law, MatrixLaw):
-        return Separation(0.0, "bound", "the law has finite rank: there is nothing but 0 beyond its bins")
+        return _of_matrix(law, len(values))
     found = _hilbert_schmidt(law, values, width)
     if found is not None:
         return found
@@ -72,6 +72,18 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
         return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
     reason = f"next eigenvalue in the basis, with its residual; essential part at most {edge.high:.3g}"
     return Separation(next_value, "estimate", reason)
+
+
+def _of_matrix(law: MatrixLaw, listed: int) -> Separation:
+    """A law that is constant on bins has the eigenvalues of its matrix, and 0."""
+    root = np.sqrt(SINE.mass(law.edges[:-1], law.edges[1:]))
+    symmetric = root[:, None] * law.array / root
+    moduli = np.sort(np.abs(np.linalg.eigvalsh(0.5 * (symmetric + symmetric.T))))[::-1]
+    rounding = len(moduli) * EPS + float(np.linalg.norm(symmetric - symmetric.T))
+    radius = float(moduli[listed]) + rounding if listed < len(moduli) else 0.0
+    return Separation(
+        radius, "bound", f"the next of the {len(moduli)} eigenvalues of its matrix; beyond its bins it is 0"
+    )
 
 
 def lambertian_share(law: Law) -> float:

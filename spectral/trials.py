@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..checks import Floats
-from ..kernels import Basis, DensityLaw, Law, Legendre, Panels
+from ..errors import AccuracyError, InputError
+from ..kernels import (
+    Basis,
+    Bins,
+    CircularArcLaw,
+    Composition,
+    DensityLaw,
+    Law,
+    Legendre,
+    Panels,
+    PolygonLaw,
+    WallLaw,
+)
+from ..kernels.algebra import Rules, fold, holds_of_all
 from ..kernels.angle_panels import GAUSS, KRONROD, NODES
+from ..kernels.circular import MOST_HITS
 from ..kernels.density import GAUSS_NODES, split_rows
+from ..kernels.ideal import LambertianLaw
 from ..kernels.kernel_quadrature import GRAZING_EDGES
-from ..kernels.law import AngleFunction
 from ..kernels.measure import SINE, gauss_on_intervals
-from ..kernels.panel_rows import function_rows
-from ..kernels.weighted_sum import Combination
+from ..kernels.panel_rows import BasisRows, function_rows, height_of, integrates_panels, weighted_rows
+from ..kernels.reflection import mirror_refinement, reflection_matrix
+from ..kernels.specular_frame import SpecularFrame
+from ..kernels.words import law_of, words_of
 from ..rounding import EPS
 
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
@@ -81,10 +100,10 @@ def residuals(
     ``mirrored`` says that each function is even or odd, and the law mirror-symmetric; an error of a quotient below
     ``quotient_error`` is good enough.
     """
-    if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
+    if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.breakpoints.size:
         return _smooth_residuals(law, basis, vectors, values)
     function = _TrialFunctions(law, basis, vectors, quotient_error)
-    low, high = _first_panels(basis)
+    low, high = _first_panels(law, basis)
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
@@ -122,18 +141,13 @@ def residuals(
 
 def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -> Residuals:
     """The same for polynomials and a density, whose images are smooth: two Gauss rules that follow them."""
-    found, rows = [], 0
+    found, rows, rule = [], 0, image_rule(law, basis, vectors)
     for more in MORE_NODES:
         angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval + more)
         rows += angle.size
         here = expansion(basis, vectors, angle)
-        starts = range(0, angle.size, CHUNK_ROWS)
-        parts = [
-            images(law, lambda theta: expansion(basis, vectors, theta), angle[start : start + CHUNK_ROWS], basis)
-            for start in starts
-        ]
-        rest = np.concatenate([image for image, _ in parts]) - here * values
-        errors = np.concatenate([error for _, error in parts])
+        image, errors = rule(angle, ROW_TOLERANCE)
+        rest = image - here * values
         found.append((weight @ (here * rest), weight @ (rest * rest)))
     (first, first_square), (second, second_square) = found
     norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
@@ -142,18 +156,25 @@ def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -
     return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, rows)
 
 
-def _first_panels(basis: Basis) -> tuple[Floats, Floats]:
-    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES)))
-    return edges[:-1], edges[1:]
+def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
+    """Between the edges of the basis and beside grazing; of densities also where their images of jumps vary."""
+    edges = [basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES]
+    for part in {part for word in words_of(law) or () for part in word}:
+        if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
+            # the law is symmetric: where p(theta, .) has kinks, p(., theta') has them
+            edges += [part.breakpoints, part.incoming_edges(basis.edges)]
+            edges += [np.pi - one for one in edges[-2:]] if law.frame == "specular" else []
+    joint = np.unique(np.clip(np.concatenate(edges), 0.0, np.pi))
+    return joint[:-1], joint[1:]
 
 
 class _TrialFunctions:
     """Trial functions and what the law makes of them."""
 
     def __init__(self, law: Law, basis: Basis, vectors: Floats, row_tolerance: float) -> None:
-        self.basis, self.vectors, self.law = basis, vectors, law
+        self.basis, self.vectors = basis, vectors
         self.row_tolerance = row_tolerance or ROW_TOLERANCE
-        self.rows = function_rows(law, basis, vectors) if isinstance(basis, Panels) else None
+        self.rule = image_rule(law, basis, vectors)
 
     def __call__(self, theta: Floats) -> Floats:
         """Their values, shape (angles, k)."""
@@ -161,12 +182,10 @@ class _TrialFunctions:
 
     def images(self, theta: Floats) -> tuple[Floats, Floats]:
         """The values of P v, shape (angles, k), and their errors."""
-        if self.rows is not None:
-            found, errors = self.rows(theta, self.row_tolerance)
-            return found, np.nan_to_num(errors)
-        chunks = [theta[start : start + CHUNK_ROWS] for start in range(0, theta.size, CHUNK_ROWS)]
-        parts = [images(self.law, self, chunk, self.basis) for chunk in chunks]
-        return np.concatenate([found for found, _ in parts]), np.concatenate([errors for _, errors in parts])
+        found, errors = self.rule(theta, self.row_tolerance)
+        if np.isnan(errors).any():
+            raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
+        return found, errors
 
 
 def _integrals(
@@ -194,18 +213,87 @@ def _integrals(
     )
 
 
-def images(law: Law, function: AngleFunction, theta: Floats, basis: Basis) -> tuple[Floats, Floats]:
-    """P f at the angles theta for functions f of the basis, and estimated errors of the worst, shape (angles,).
+def image_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+    """What gives P v for the functions with the coefficients ``vectors``, and an error of the worst at each angle.
 
-    Rows of a density are cut at the edges of the basis and as fine as its functions need; the error is the difference
-    of two Gauss rules.
+    Raises
+    ------
+    InputError
+        If nothing is known of the errors: `apply` of a law of unknown kind, which does not promise to be exact, of
+        walls of very many pieces, and of compositions with laws that are not exact.
     """
-    if isinstance(law, Combination):
-        terms = [(weight, images(term, function, theta, basis)) for weight, term in law.terms_checked()]
-        values, errors = (sum(weight * one[place] for weight, one in terms) for place in (0, 1))
-        return np.asarray(values), np.asarray(errors)
-    if not isinstance(law, DensityLaw):
-        return law.apply(function, theta), np.zeros(theta.size)
+    words = words_of(law)
+    if words is None:
+        raise _refusal(law, "it is a sum of very many compositions")
+    return weighted_rows([(weight, _rule(law_of(word), basis, vectors)) for word, weight in words.items()])
+
+
+def _rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+    if isinstance(law, Composition) and not holds_of_all(law, _is_exact):
+        raise _refusal(law, "it is a composition with a law whose means are integrals by quadrature")
+    if isinstance(law, SpecularFrame):
+        fine, coefficients = mirror_refinement(basis)
+        return _rule(law.law, fine, reflection_matrix(fine) @ (coefficients.T @ vectors))
+    if isinstance(law, LambertianLaw):
+        mean = basis.constant @ vectors
+        return lambda theta, tolerance: (np.tile(mean, (theta.size, 1)), np.zeros(theta.size))
+    if isinstance(law, WallLaw) and law.exact_law is not None:
+        return _rule(law.exact_law, basis, vectors)
+    if holds_of_all(law, _is_exact):
+        return _exact_rule(law, basis, vectors)
+    if isinstance(law, DensityLaw):
+        return _of_two_rules(lambda theta, more: _means_of_density(law, theta, basis, vectors, more))
+    if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
+        return _of_two_rules(lambda theta, more: _means_of_arc(law, theta, basis, vectors, more))
+    if integrates_panels(law):
+        return function_rows(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)
+    raise _refusal(law, "its means come without errors, and it does not promise to be exact (exact_apply)")
+
+
+def _is_exact(law: Law) -> bool:
+    return law.exact_apply
+
+
+def _refusal(law: Law, reason: str) -> InputError:
+    return InputError(
+        f"law: the images of trial functions under {law!r} have no known error, for {reason}; spectrum(law) and "
+        "spectral_gap(law) take its matrix"
+    )
+
+
+def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+    """By `apply`; rays of a polygon whose way was not found, a share s, change P v by 2 s^(1/2) max|v| at most."""
+    unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda share: share))
+    doubt = 2.0 * math.sqrt(unknown) * height_of(basis, vectors) if unknown else 0.0
+
+    def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        return _in_chunks(lambda part: law.apply(lambda angle: expansion(basis, vectors, angle), part), theta), np.full(
+            theta.size, doubt
+        )
+
+    return rule
+
+
+def _unresolved(law: Law) -> float:
+    return float(law.unresolved) if isinstance(law, PolygonLaw) else 0.0
+
+
+def _of_two_rules(means: Callable[..., Floats]) -> BasisRows:
+    """Means by a Gauss rule and by a finer one, which differ by the error of the first."""
+
+    def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        coarser, finer = (_in_chunks(partial(means, more=more), theta) for more in MORE_NODES)
+        return finer, np.asarray(np.abs(finer - coarser).reshape(theta.size, -1).max(axis=1, initial=0.0))
+
+    return rule
+
+
+def _in_chunks(means: Callable[[Floats], Floats], theta: Floats) -> Floats:
+    return np.concatenate([means(theta[start : start + CHUNK_ROWS]) for start in range(0, theta.size, CHUNK_ROWS)])
+
+
+def _means_of_density(law: DensityLaw, theta: Floats, basis: Basis, vectors: Floats, more: int) -> Floats:
+    """Rows of a density are cut at the edges of the basis, and as fine as its functions need."""
     edges = law.panels(theta)
     if isinstance(basis, Legendre):
         # a panel's Gauss rule follows polynomials in cos(theta) of a degree below its nodes over its width
@@ -213,18 +301,18 @@ def images(law: Law, function: AngleFunction, theta: Floats, basis: Basis) -> tu
     else:
         inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
         edges = np.sort(np.concatenate([edges, inner], axis=1), axis=1)
-    finer, coarser = (
-        _means(law, function, theta, edges, nodes) for nodes in (GAUSS_NODES + MORE_NODES[1], GAUSS_NODES)
-    )
-    return finer, np.asarray(np.abs(finer - coarser).reshape(theta.size, -1).max(axis=1, initial=0.0))
-
-
-def _means(law: DensityLaw, function: AngleFunction, theta: Floats, edges: Floats, nodes: int) -> Floats:
-    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), nodes)
+    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), GAUSS_NODES + more)
     outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)
     weight = weight * law.density(theta[:, None], outgoing)
     weight /= weight.sum(axis=1, keepdims=True)
-    return np.asarray(np.einsum("ij,ij...->i...", weight, function(outgoing)))
+    return np.asarray(np.einsum("ij,ij...->i...", weight, expansion(basis, vectors, outgoing)))
+
+
+def _means_of_arc(law: CircularArcLaw, theta: Floats, basis: Basis, vectors: Floats, more: int) -> Floats:
+    """A piece of a row may be as long as (0, pi); the finer rule also follows twice as many hits."""
+    nodes = GAUSS_NODES + int(np.ceil(0.5 * np.pi * basis.size / NODES_PER_DEGREE)) + more
+    hits = 2 * MOST_HITS if more else MOST_HITS
+    return law.means(lambda angle: expansion(basis, vectors, angle), theta, nodes, hits)
 
 
 def expansion(basis: Basis, vectors: Floats, theta: Floats) -> Floats:

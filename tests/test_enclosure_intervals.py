@@ -170,7 +170,7 @@ def apart(law, quotients, norms, next_value):
 
 
 SHARE = ker.maxwell(0.25)  # an essential spectrum up to .75, all but the constants within .75
-RANK = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])  # nothing beyond
+RANK = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])  # .4 beyond the constants, and nothing beyond that
 
 
 @pytest.mark.parametrize(
@@ -186,10 +186,10 @@ RANK = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])  # nothing beyond
         (SHARE, [1, 0.98], [0, 0.1], 0.9, (1, 0.75, "bound")),
         (SHARE, [1, 0.9], [0.5, 0.001], 0.1, (0, 0.75, "bound")),
         (RANK, [1, 0.5], [0, 0.125], 0.25, (2, 0.0, "bound")),
-        (RANK, [1, 0.5], [0, 0.125], 0.375, (1, 0.0, "bound")),
-        (RANK, [1, 0.5], [0, 0.125], 0.45, (1, 0.0, "bound")),
+        (RANK, [1, 0.5], [0, 0.125], 0.375, (1, 0.4, "bound")),
+        (RANK, [1, 0.5], [0, 0.125], 0.45, (1, 0.4, "bound")),
         (RANK, [1, 0.5, 0.5], [0, 0, 0], 0.25, (3, 0.0, "bound")),
-        (RANK, [1, 0.125], [0, 0.125], -1.0, (1, 0.0, "bound")),
+        (RANK, [1, 0.125], [0, 0.125], -1.0, (1, 0.4, "bound")),
     ],
 )
 def test_the_largest_number_that_stays_beyond_the_rest(law, quotients, norms, next_value, expected):

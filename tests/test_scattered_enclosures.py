@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benchmarks.scattered_enclosures import COARSE, diagonal_case, judged, teeth_case
+from benchmarks.scattered_enclosures import COARSE, diagonal_case, given_case, judged, refused_case, teeth_case
 from scipy.special import eval_legendre
 
 from asperity import geometry as geo
@@ -12,6 +12,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.spectral.separation import rest_of_spectrum
+from asperity.spectral.trials import image_rule
 
 
 @pytest.mark.parametrize("make, numbers", [(diagonal_case, range(40)), (teeth_case, range(2))], ids=["words", "teeth"])
@@ -49,6 +50,48 @@ def test_a_composition_whose_images_have_no_known_error_is_refused():
     with pytest.raises(InputError, match="has a scattering that leaves"):
         near = ker.henyey_greenstein(0.96)
         spec.enclosures(near @ ker.TriangularTeethLaw(0.7) @ near, 2, tolerance=1e-12)
+
+
+@pytest.mark.parametrize("number", [0, 2, 3, 4, 5, 8, 9, 13, 14, 18, 19, 28])
+def test_laws_in_given_bases_are_enclosed_and_indexed_as_known_otherwise(number):
+    found = judged(given_case(number))
+    assert (
+        found["intervals"] > 1 and found["without an eigenvalue"] == found["indexed falsely"] == found["refused"] == 0
+    )
+
+
+@pytest.mark.parametrize("number", range(8))
+def test_a_law_by_apply_alone_is_refused_in_every_basis_and_composition(number):
+    assert judged(refused_case(number)) == {"refused": 1}
+
+
+def test_errors_of_images_of_arcs_and_of_unresolved_polygons_are_counted():
+    basis, angle = ker.Legendre(60), np.array([0.3, 1.1, 1.2002, 2.5])
+    vectors, arc = np.eye(60), ker.CircularArcLaw(1.2)
+    # midpoint sums over entry points, by parts where the fastest functions turn once
+    x = (np.arange(200_000) + 0.5) / 200_000
+    midpoint = np.array([basis.evaluate(arc.respond(x, np.full(x.size, one))).mean(axis=0) for one in angle])
+    found, error = image_rule(arc, basis, vectors)(angle, 1e-8)
+    assert np.all(np.abs(found - midpoint).max(axis=1) <= error + 1e-3) and error.max() < 1e-2
+    wall = geo.Wall.from_vertices([(0, 0), (0.2, -0.9), (0.45, -0.2), (0.8, -1.1), (1, 0)])
+    few = ker.PolygonLaw(wall, max_beams=40)
+    _, error = image_rule(few, ker.Bins(4), np.eye(4))(angle, 1e-8)
+    assert float(few.unresolved) > 0.0 and np.all(error >= 2.0 * np.sqrt(float(few.unresolved)))
+
+
+def test_a_first_power_is_the_law():
+    law = ker.henyey_greenstein(0.5)
+    assert [item.low for item in spec.enclosures(law**1, 3)] == [item.low for item in spec.enclosures(law, 3)]
+
+
+def test_indices_that_may_change_places_say_so():
+    matrix = ker.MatrixLaw([[0.5, 0.25, 0.25], [0.25, 0.3, 0.45], [0.25, 0.45, 0.3]])
+    found = spec.enclosures(matrix, 3, basis=ker.Legendre(16))
+    values = np.sort(np.linalg.eigvalsh(matrix.array))
+    assert np.allclose(values, [-0.15, 0.25, 1.0])
+    tied = [item for item in found if "may change places" in item.reason]
+    apart = max(abs(item.low) for item in found if item.value < 0) < min(item.low for item in found if item.value > 0)
+    assert bool(tied) == (not apart)
 
 
 def test_the_next_value_of_slow_functions_is_held_against_fast_oscillations():

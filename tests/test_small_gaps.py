@@ -44,6 +44,29 @@ def test_uniform_sines_of_the_slope_have_the_gap_of_the_series(size):
         assert abs(gap.value - exact[name]) <= gap.error <= 1e-6 * gap.value
 
 
+@pytest.mark.parametrize("exponent", [1, 2, 3, 10**6])
+@pytest.mark.parametrize("turn", [False, True], ids=["paper", "specular"])
+def test_gaps_of_powers_keep_their_digits(exponent, turn):
+    """In the paper's convention odd functions have eigenvalues near -1, whose even powers come nearest to 1."""
+    law = ker.CircularArcLaw(1e-6)
+    law = law.in_specular_frame() if turn else law
+    with mp.workdps(50):
+        sine = mp.sin(mp.mpf(1e-6))
+        factor = 1 if turn or exponent % 2 == 0 else 3
+        exact = float(1 - (1 - factor * (4 * sine**2 / 3)) ** exponent)
+    found = [spec.spectral_gap(law**exponent)] + ([spec.spectrum(law**exponent, 2)] if exponent == 2 else [])
+    for gap in found:
+        value, error = (gap.value, gap.error) if isinstance(gap, SpectralGap) else (gap.gap, gap.gap_error)
+        assert gap.verdict == "isolated" and value > error and abs(value - exact) <= error + 1e-11 * exact
+        assert error <= 1e-11 * exact
+
+
+def test_times_of_small_gaps_keep_their_digits():
+    found = spec.mixing_time(ker.CircularArcLaw(1e-7), 0.01)
+    assert abs(found.relaxation_time.value - 0.75e14) <= found.relaxation_time.error + 1.0 < 0.75e3
+    assert found.slem.error >= 1e-16 and abs(found.steps / (0.75e14 * np.log(50.0)) - 1.0) < 1e-9
+
+
 @pytest.mark.parametrize("law", [ker.CircularArcLaw(1e-2), ker.WallLaw(geo.dispersing_arcs(2e-2))], ids=str)
 def test_the_form_agrees_with_enclosures_where_both_have_digits(law):
     turned = law.in_specular_frame()

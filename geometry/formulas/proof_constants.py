@@ -45,14 +45,14 @@ def acceleration_of_the_contact(acceleration: Code) -> Verdict:
     id="S5.24",
     section="5.3.4",
     equation="Claims 5.7.1, 5.7.2",
-    statement="The fractions 2/5, 3/5, 4/5 of the claims: of a distance that two paths of bounded acceleration each "
-    "miss by a fifth at most, what both miss, what is left beside both, and what is left beside one.",
+    statement="The fractions 2/5, 3/5, 4/5 of the claims (the sum s₂: by reading): of a distance that two paths of "
+    "bounded acceleration each miss by a fifth at most, what both miss, what is left beside both, and beside one.",
     kind="numeric",
     printed=Formula(r"\tfrac25,\ \tfrac35,\ \tfrac45", lambda: (2 / 5, 3 / 5, 4 / 5)),
     perturbed=lambda: (2 / 5, 4 / 5, 4 / 5),
     reason="A path of row S5.23 misses the straight one by εω²t²/2, which eq. 5.143 makes a fifth; the worst "
-    "directions are found by search. The claims are reconstructed from this fifth; the sum s₂ of step 3 rests on "
-    "reading.",
+    "directions are found by search. The claims are reconstructed from this fifth; the sum s₂ of step 3 is not "
+    "checked, it rests on reading alone.",
 )
 def constants_of_the_claims(fractions: Code) -> Verdict:
     rng = generator()

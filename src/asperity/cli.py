@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from . import __version__
-from .errors import AccuracyError, AsperityError
+from .errors import AccuracyError, AsperityError, InputError
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile (mirrored to make it periodic, or profile.txt:seam=step)."""
@@ -118,7 +118,7 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
     if enclose:
         try:
             enclosed = enclosures(chosen, enclose)
-        except AccuracyError as reason:
+        except (AccuracyError, InputError) as reason:
             refusal = str(reason)
     if as_json:
         listed = None if enclosed is None else enclosures_as_list(enclosed)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import AsperityError
 from .estimates import Estimate, rounded
 from .spectral import diffusivity, mean_squared_slope
+from .spectral.relaxation import relaxation_time, slem_from_gap
 
 if TYPE_CHECKING:
     from .geometry import Wall
@@ -88,36 +89,28 @@ def consequences_of(
     wall: Wall, law: Law, gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None
 ) -> Consequences:
     """Derive what follows; a diffusivity that is infinite or out of reach is None, with the reason."""
-    slem = _slem(gap, specular_gap, found)
+    modulus_gap = _modulus_gap(gap, specular_gap, found)
+    slem = None if modulus_gap is None else slem_from_gap(modulus_gap)
+    time = None if modulus_gap is None else relaxation_time(modulus_gap)
     diffusion, refusal = None, ""
     try:
         diffusion = diffusivity(law)
     except AsperityError as reason:
         refusal = str(reason)
-    return Consequences(slem, None if slem is None else _relaxation(slem), diffusion, mean_squared_slope(wall), refusal)
+    return Consequences(slem, time, diffusion, mean_squared_slope(wall), refusal)
 
 
-def _slem(gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None) -> Estimate | None:
-    """The gaps see the upper end of the spectrum, and in the other convention minus the odd functions' lower end.
-
-    The lower end on even functions is that of the spectrum that was computed.
+def _modulus_gap(gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None) -> Estimate | None:
+    """1 - slem. The gaps see the upper end of the spectrum, and in the other convention minus the odd functions' lower
+    end; the lower end on even functions is that of the spectrum that was computed.
     """
     if gap is None or specular_gap is None or found is None:
         return None
     if not specular_gap.self_adjoint:
-        return Estimate(1.0 - specular_gap.value, specular_gap.error, specular_gap.kind, specular_gap.method)
+        return specular_gap
     nearer = gap if gap.value <= specular_gap.value else specular_gap
     lowest = int(found.values.argmin())
     if -found.values[lowest] > 1.0 - nearer.value + nearer.error:
         error = float(found.errors.total()[lowest])
-        return Estimate(-float(found.values[lowest]), error, "estimate", f"least eigenvalue in {found.basis!r}")
-    return Estimate(1.0 - nearer.value, nearer.error, nearer.kind, f"gap in the {nearer.convention} convention")
-
-
-def _relaxation(slem: Estimate) -> Estimate:
-    most, least = slem.value + slem.error, slem.value - slem.error
-    value = -1.0 / math.log(slem.value) if 0.0 < slem.value < 1.0 else (math.inf if slem.value >= 1.0 else 0.0)
-    if most >= 1.0 or not math.isfinite(value):
-        return Estimate(value if math.isfinite(value) else 0.0, math.inf, slem.kind, "-1/ln(slem)")
-    fastest = -1.0 / math.log(least) if least > 0.0 else 0.0
-    return Estimate(value, max(-1.0 / math.log(most) - value, value - fastest), slem.kind, "-1/ln(slem)")
+        return Estimate(1.0 + float(found.values[lowest]), error, "estimate", f"least eigenvalue in {found.basis!r}")
+    return Estimate(nearer.value, nearer.error, nearer.kind, f"gap in the {nearer.convention} convention")

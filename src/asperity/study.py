@@ -242,7 +242,7 @@ def study_wall(
         enclosed = None
         try:
             enclosed = _enclosures(law, gap, tolerance)
-        except AccuracyError as reason:
+        except (AccuracyError, InputError) as reason:
             refusals["enclosures"] = str(reason)
         progress.update()
         collision = CollisionLaw.from_wall(wall, disk)
