@@ -9,10 +9,14 @@ distribution of slopes, of divided differences or of the form's bounds:
   of it for slopes up to s, and 200 s^4 is allowed.
 - *rays*: for steeper walls a quarter of a million rays are followed by the tests' textbook tracer; the least value of
   the same form on polynomials is an upper bound of the gap but for its sampling error, and close to it.
+
+``--random FIRST LAST`` asks the same of random walls: polynomial curves of random heights between random places, depths
+from 1e-7 to 1e-2, with and without mirror axis and flat tops; every third is a mixture of the laws of two such walls.
 """
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -186,6 +190,81 @@ def cases(small: bool = False) -> Iterator[Case]:
         yield _tops(depth)
 
 
+def random_case(rng: np.random.Generator, name: str, deepest: float) -> Case:
+    """A wall of one to three polynomial curves, once more mirrored in half of the cases, and a flat top in a third."""
+    depth = 10.0 ** rng.uniform(-7.0, math.log10(deepest))
+    mirrored = bool(rng.random() < 0.5)
+    end, count = (0.5 if mirrored else 1.0), int(rng.integers(1, 4))
+    flat = float(rng.uniform(0.1, 0.4)) * end if rng.random() < 1.0 / 3.0 else 0.0
+    places = flat + (end - flat) * np.append(0.0, np.cumsum(rng.dirichlet(np.full(count, 6.0))))
+    places[-1] = end
+    levels = -depth * rng.uniform(0.2, 1.0, count + 1)
+    levels[0] = 0.0
+    if not mirrored:
+        levels[-1] = 0.0
+    half: list[tuple[float, float, tuple[float, ...]]] = []
+    for k in range(count):
+        inner = (-depth * rng.uniform(0.0, 1.2, 2)).tolist()
+        half.append((float(places[k]), float(places[k + 1]), (float(levels[k]), *inner, float(levels[k + 1]))))
+    graphs = half + ([(1.0 - b, 1.0 - a, c[::-1]) for a, b, c in half[::-1]] if mirrored else [])
+    pieces: list[geo.Segment | geo.Bezier] = [
+        geo.Bezier([(a + k / 3.0 * (b - a) if k < 3 else b, y) for k, y in enumerate(c)]) for a, b, c in graphs
+    ]
+    curves = [_graph(*graph) for graph in graphs]
+    steepest = max(3.0 * float(np.abs(np.diff(c)).max()) / (b - a) for a, b, c in half)
+    tops = ([(0.0, flat)] + ([(1.0 - flat, 1.0)] if mirrored else [])) if flat else []
+    for a, b in tops:
+        pieces.insert(0 if a == 0.0 else len(pieces), geo.Segment((a, 0.0), (b, 0.0)))
+        curves.append((a, b, lambda x: 0 * x, lambda x: 0 * x))
+    kind = f"{'mirrored' if mirrored else 'skew'}, {count} curves" + (", flat top" if flat else "")
+    return Case(
+        f"{name}, {kind}, depth {depth:.1e}", geo.Wall(pieces, period=1.0), tuple(curves), math.atan(steepest),
+        edge=math.fsum(b - a for a, b in tops),
+    )  # fmt: skip
+
+
+def _graph(a: float, b: float, levels: tuple[float, ...]) -> Curve:
+    """The cubic with these ordinates in Bernstein's form, and its slope."""
+    p, q, r, s = levels
+
+    def height(x: object) -> object:
+        t = (x - a) / (b - a)
+        return p * (1 - t) ** 3 + 3 * q * t * (1 - t) ** 2 + 3 * r * t**2 * (1 - t) + s * t**3
+
+    def slope(x: object) -> object:
+        t = (x - a) / (b - a)
+        return 3 * ((q - p) * (1 - t) ** 2 + 2 * (r - q) * t * (1 - t) + (s - r) * t**2) / (b - a)
+
+    return a, b, height, slope
+
+
+def random_rows(number: int) -> Iterator[Held]:
+    """Of a random wall, or of a mixture of two whose slopes the precise judge can follow."""
+    rng = np.random.default_rng([20261128, number])
+    if number % 3:
+        yield from held(random_case(rng, f"random {number}", 1e-2))
+        return
+    cases = [random_case(rng, f"random {number}", 3e-4) for _ in range(2)]
+    weight = float(rng.uniform(0.2, 0.8))
+    weights = (weight, 1.0 - weight)
+    law = weight * ker.WallLaw(cases[0].wall) + (1.0 - weight) * ker.WallLaw(cases[1].wall)
+    name = f"{cases[0].name}, and {weight:.2f} to {1.0 - weight:.2f} {cases[1].name.split(', ', 1)[1]}"
+    for frame, form in (("specular", law.in_specular_frame()), ("paper", law)):
+        if not form.reversible:
+            continue
+        # the form is linear in the law, and its least function is the same to leading order
+        value = sum(
+            w * _precise_quotient(case, 1 if frame == "specular" else 2) for w, case in zip(weights, cases, strict=True)
+        )
+        slack = max(_slack(case) for case in cases)
+        edge = essential_edge(form)
+        yield Held(
+            name, frame, spec.spectral_gap(form), (edge.low, edge.high),
+            sum(w * case.edge for w, case in zip(weights, cases, strict=True)),
+            value * (1.0 - slack), value * (1.0 + slack), "50 digits",
+        )  # fmt: skip
+
+
 def held(case: Case) -> Iterator[Held]:
     """The gaps in both conventions with the judge's intervals."""
     law = ker.WallLaw(case.wall)
@@ -201,11 +280,15 @@ def judged(case: Case, frame: str) -> tuple[float, float, str]:
     """Where the gap lies by a judge, and which."""
     if case.steepest <= PRECISE:
         value = _precise_quotient(case, 1 if frame == "specular" else 2)
-        slack = ALLOWED * case.steepest**4 * abs(math.log(case.steepest)) + 1e-15
+        slack = _slack(case)
         return value * (1.0 - slack), value * (1.0 + slack), "50 digits"
     value, spread = _sampled_gap(case, frame)
     missed = MISSED if case.steepest < 0.5 else MISSED_STEEP
     return value * (1.0 - missed) - SIGMAS * spread, value + SIGMAS * spread, "rays"
+
+
+def _slack(case: Case) -> float:
+    return ALLOWED * case.steepest**4 * abs(math.log(case.steepest)) + 1e-15
 
 
 def _precise_quotient(case: Case, degree: int) -> float:
@@ -298,18 +381,23 @@ def _followed(table, x, theta):  # type: ignore[no-untyped-def]
 
 def main() -> None:
     """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.small_gaps", description=__doc__)
+    parser.add_argument("--random", type=int, nargs=2, metavar=("FIRST", "LAST"), help="random walls of these numbers")
+    options = parser.parse_args()
+    rows = (row for case in cases() for row in held(case))
+    if options.random:
+        rows = (row for number in range(*options.random) for row in random_rows(number))
     print("| wall | convention | gap | verdict | edge | judge | by the judge | holds |")
     print("|---|---|---|---|---|---|---|---|")
     count = confirmed = 0
-    for case in cases():
-        for row in held(case):
-            count, confirmed = count + 1, confirmed + row.is_confirmed
-            print(
-                f"| {row.name} | {row.frame} | {row.found.value:.10g} +- {row.found.error:.1e} | {row.found.verdict} "
-                f"| {0.5 * sum(row.edge):g} | {row.judge} | {row.low:.10g} to {row.high:.10g} "
-                f"| {'yes' if row.is_confirmed else '**no**'} |",
-                flush=True,
-            )
+    for row in rows:
+        count, confirmed = count + 1, confirmed + row.is_confirmed
+        print(
+            f"| {row.name} | {row.frame} | {row.found.value:.10g} +- {row.found.error:.1e} | {row.found.verdict} "
+            f"| {0.5 * sum(row.edge):g} | {row.judge} | {row.low:.10g} to {row.high:.10g} "
+            f"| {'yes' if row.is_confirmed else '**no**'} |",
+            flush=True,
+        )
     print(f"\n{confirmed} of {count} hold.")
 
 

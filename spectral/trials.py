@@ -38,8 +38,8 @@ from ..rounding import EPS
 
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
 SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
-# Functions of the basis times outgoing angles held at a time.
-CHUNK_ROWS = 256
+# Rows held at a time for few functions, and how many functions are few.
+CHUNK_ROWS, FEW_FUNCTIONS = 256, 16
 # Halves of (0, pi) overlap by no more.
 HALF_ROUNDING = 1e-12
 # Errors of rows of which nothing is asked.
@@ -48,6 +48,8 @@ ROW_TOLERANCE = 1e-8
 NODES_PER_DEGREE = 1.2
 # Nodes beyond those that the basis asks for, of the two rules that are compared.
 MORE_NODES = (0, 8)
+# Into how many parts the panels are cut for these two rules, and for the third where the two differ by more than this.
+PARTS, SETTLED = (1, 1, 4), 1e-12
 
 
 @dataclass(frozen=True)
@@ -242,9 +244,9 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
     if holds_of_all(law, _is_exact):
         return _exact_rule(law, basis, vectors)
     if isinstance(law, DensityLaw):
-        return _of_two_rules(lambda theta, more: _means_of_density(law, theta, basis, vectors, more))
+        return _of_rules(partial(_means_of_density, law, basis, vectors), vectors.shape[1])
     if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
-        return _of_two_rules(lambda theta, more: _means_of_arc(law, theta, basis, vectors, more))
+        return _of_rules(partial(_means_of_arc, law, basis, vectors), vectors.shape[1])
     if integrates_panels(law):
         return function_rows(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)
     raise _refusal(law, "its means come without errors, and it does not promise to be exact (exact_apply)")
@@ -266,33 +268,43 @@ def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
     unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda share: share))
     doubt = 2.0 * math.sqrt(unknown) * height_of(basis, vectors) if unknown else 0.0
 
-    def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        return _in_chunks(lambda part: law.apply(lambda angle: expansion(basis, vectors, angle), part), theta), np.full(
-            theta.size, doubt
-        )
+    def means(theta: Floats) -> Floats:
+        return law.apply(lambda angle: expansion(basis, vectors, angle), theta)
 
-    return rule
+    return lambda theta, tolerance: (_in_chunks(means, theta, vectors.shape[1]), np.full(theta.size, doubt))
 
 
 def _unresolved(law: Law) -> float:
     return float(law.unresolved) if isinstance(law, PolygonLaw) else 0.0
 
 
-def _of_two_rules(means: Callable[..., Floats]) -> BasisRows:
-    """Means by a Gauss rule and by a finer one, which differ by the error of the first."""
+def _of_rules(means: Callable[..., Floats], functions: int) -> BasisRows:
+    """Means by two Gauss rules, and by a far finer one where these differ: the error is what both are from that."""
 
     def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        coarser, finer = (_in_chunks(partial(means, more=more), theta) for more in MORE_NODES)
-        return finer, np.asarray(np.abs(finer - coarser).reshape(theta.size, -1).max(axis=1, initial=0.0))
+        first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))
+        error = _largest(second - first)
+        # two rules that hardly differ may both miss a kink: one whose error is much less tells
+        open_rows = np.flatnonzero(error > SETTLED)
+        if open_rows.size:
+            finest = _in_chunks(partial(means, level=2), theta[open_rows], functions)
+            error[open_rows] = _largest(finest - first[open_rows]) + _largest(finest - second[open_rows])
+            second[open_rows] = finest
+        return second, error
 
     return rule
 
 
-def _in_chunks(means: Callable[[Floats], Floats], theta: Floats) -> Floats:
-    return np.concatenate([means(theta[start : start + CHUNK_ROWS]) for start in range(0, theta.size, CHUNK_ROWS)])
+def _largest(values: Floats) -> Floats:
+    return np.asarray(np.abs(values).reshape(len(values), -1).max(axis=1, initial=0.0))
 
 
-def _means_of_density(law: DensityLaw, theta: Floats, basis: Basis, vectors: Floats, more: int) -> Floats:
+def _in_chunks(means: Callable[[Floats], Floats], theta: Floats, functions: int) -> Floats:
+    step = max(1, CHUNK_ROWS // (1 + functions // FEW_FUNCTIONS))
+    return np.concatenate([means(theta[start : start + step]) for start in range(0, theta.size, step)])
+
+
+def _means_of_density(law: DensityLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
     """Rows of a density are cut at the edges of the basis, and as fine as its functions need."""
     edges = law.panels(theta)
     if isinstance(basis, Legendre):
@@ -301,17 +313,19 @@ def _means_of_density(law: DensityLaw, theta: Floats, basis: Basis, vectors: Flo
     else:
         inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
         edges = np.sort(np.concatenate([edges, inner], axis=1), axis=1)
-    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), GAUSS_NODES + more)
+    edges = split_rows(edges, PARTS[level])
+    nodes = GAUSS_NODES + MORE_NODES[level % 2]
+    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), nodes)
     outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)
     weight = weight * law.density(theta[:, None], outgoing)
     weight /= weight.sum(axis=1, keepdims=True)
     return np.asarray(np.einsum("ij,ij...->i...", weight, expansion(basis, vectors, outgoing)))
 
 
-def _means_of_arc(law: CircularArcLaw, theta: Floats, basis: Basis, vectors: Floats, more: int) -> Floats:
-    """A piece of a row may be as long as (0, pi); the finer rule also follows twice as many hits."""
-    nodes = GAUSS_NODES + int(np.ceil(0.5 * np.pi * basis.size / NODES_PER_DEGREE)) + more
-    hits = 2 * MOST_HITS if more else MOST_HITS
+def _means_of_arc(law: CircularArcLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
+    """A piece of a row may be as long as (0, pi); finer rules also follow more hits."""
+    nodes = GAUSS_NODES + int(np.ceil(0.5 * np.pi * basis.size / NODES_PER_DEGREE)) + MORE_NODES[level % 2]
+    hits = (level + 1) * MOST_HITS
     return law.means(lambda angle: expansion(basis, vectors, angle), theta, nodes, hits)
 
 

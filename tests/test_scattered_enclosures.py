@@ -11,6 +11,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
+from asperity.spectral.enclosure import Enclosure, _with_ties
 from asperity.spectral.separation import rest_of_spectrum
 from asperity.spectral.trials import image_rule
 
@@ -85,13 +86,29 @@ def test_a_first_power_is_the_law():
 
 
 def test_indices_that_may_change_places_say_so():
-    matrix = ker.MatrixLaw([[0.5, 0.25, 0.25], [0.25, 0.3, 0.45], [0.25, 0.45, 0.3]])
-    found = spec.enclosures(matrix, 3, basis=ker.Legendre(16))
-    values = np.sort(np.linalg.eigvalsh(matrix.array))
-    assert np.allclose(values, [-0.15, 0.25, 1.0])
-    tied = [item for item in found if "may change places" in item.reason]
-    apart = max(abs(item.low) for item in found if item.value < 0) < min(item.low for item in found if item.value > 0)
-    assert bool(tied) == (not apart)
+    def item(low, high, index):
+        return Enclosure(0.5 * (low + high), low, high, "indexed", index, 0.0, "estimate", "reason")
+
+    first, second, third = _with_ties([item(0.3, 0.4, 1), item(-0.35, -0.2, 2), item(-0.1, 0.15, 3)])
+    assert first.reason == "reason; may change places with 2" and second.reason == "reason; may change places with 1"
+    assert third.reason == "reason"
+
+
+def test_errors_of_means_of_a_density_with_a_kink_that_moves_are_counted():
+    """1 + (|u - v| - (1 + u^2)/2 - (1 + v^2)/2 + 2/3)/2 has rows of mean 1, and a kink at u = v."""
+
+    def kernel(u, v):
+        return 1.0 + 0.5 * (np.abs(u - v) - 0.5 * (1.0 + u**2) - 0.5 * (1.0 + v**2) + 2.0 / 3.0)
+
+    law = ker.DensityLaw(lambda theta, out: 0.5 * np.sin(out) * kernel(np.cos(theta), np.cos(out)))
+    basis, angle = ker.Legendre(12), np.array([0.31, 0.9, 1.7, 2.6])
+    found, error = image_rule(law, basis, np.eye(12))(angle, 1e-8)
+    node, weight = np.polynomial.legendre.leggauss(20)
+    for u, image, doubt in zip(np.cos(angle), found, error, strict=True):
+        # polynomials on either side of the kink
+        halves = [(0.5 * (a + b) + 0.5 * (b - a) * node, 0.5 * (b - a) * weight) for a, b in ((-1.0, u), (u, 1.0))]
+        exact = sum((0.5 * w * kernel(u, v)) @ basis.evaluate(np.arccos(v)) for v, w in halves)
+        assert 1e-12 < np.abs(image - exact).max() <= doubt < 1e-3
 
 
 def test_the_next_value_of_slow_functions_is_held_against_fast_oscillations():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 import pytest
-from benchmarks.small_gaps import cases, held
+from benchmarks.small_gaps import cases, held, random_rows
 from scipy.linalg import eigh
 
 from asperity import geometry as geo
@@ -26,6 +26,14 @@ def parabola(depth):
 @pytest.mark.parametrize("case", list(cases(small=True)), ids=lambda case: case.name)
 def test_small_gaps_hold_against_rays_in_fifty_digits(case):
     rows = list(held(case))
+    assert rows
+    for row in rows:
+        assert row.is_confirmed, row
+
+
+@pytest.mark.parametrize("number", [1, 6, 10])
+def test_small_gaps_of_random_walls_and_mixtures_hold_against_rays_in_fifty_digits(number):
+    rows = list(random_rows(number))
     assert rows
     for row in rows:
         assert row.is_confirmed, row
