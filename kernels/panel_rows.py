@@ -137,9 +137,10 @@ def _(law: WallLaw, basis: Basis) -> BasisRows:
 
 
 def height_of(basis: Basis, vectors: Floats) -> float:
-    """About the largest modulus of the functions with these coefficients: polynomials are largest at the ends."""
-    probes = basis.nodes_per_interval if isinstance(basis, Legendre) else HEIGHT_PROBES
-    angle = np.append(gauss_rule(basis.edges, probes)[0], basis.edges)
+    """About the largest modulus of the functions with these coefficients; of polynomials on (0, pi) it is at an end."""
+    angle, _ = gauss_rule(basis.edges, HEIGHT_PROBES)
+    if isinstance(basis, Legendre):
+        angle = np.append(gauss_rule(basis.edges, basis.nodes_per_interval)[0], basis.edges)
     return float(np.abs(basis.evaluate(angle) @ vectors).max())
 
 

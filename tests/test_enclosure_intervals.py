@@ -327,10 +327,10 @@ def test_laws_and_numbers_that_cannot_be_enclosed_are_refused():
 def test_powers_are_recognised_where_they_tell_something():
     law, other = ker.henyey_greenstein(0.5), ker.henyey_greenstein(0.25)
     assert enclosure.as_power(law**3) == enclosure.as_power(law @ law @ law) == (law, 3)
+    assert enclosure.as_power(ker.Power(law, 1)) == (law, 1)
     skew = ker.MatrixLaw(np.roll(np.eye(3), 1, axis=1))
     for nothing in (
         law,
-        ker.Power(law, 1),
         law @ other,
         law @ law @ other,
         other @ law @ law,
