@@ -177,8 +177,8 @@ def gap_of_power(gap: float, error: float, exponent: int) -> tuple[float, float]
 
     Examples
     --------
-    >>> gap_of_power(1e-16, 0.0, 3)[0], gap_of_power(1.5, 0.0, 3)[0]
-    (3e-16, 1.125)
+    >>> f"{gap_of_power(1e-16, 0.0, 3)[0]:.12g}", gap_of_power(1.5, 0.0, 3)[0]
+    ('3e-16', 1.125)
     """
 
     def grown(one: float) -> float:

@@ -144,8 +144,8 @@ def relaxation_time(gap: Estimate) -> Estimate:
 
     Examples
     --------
-    >>> float(relaxation_time(Estimate(1e-18, 0.0, "bound", "")))
-    1e+18
+    >>> f"{float(relaxation_time(Estimate(1e-18, 0.0, 'bound', ''))):.12g}"
+    '1e+18'
     """
     slower, value, faster = (_time_scale(one) for one in (gap.value - gap.error, gap.value, gap.value + gap.error))
     if not np.isfinite(slower):
