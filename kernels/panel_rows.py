@@ -137,10 +137,12 @@ def _(law: WallLaw, basis: Basis) -> BasisRows:
 
 
 def height_of(basis: Basis, vectors: Floats) -> float:
-    """About the largest modulus of the functions with these coefficients; of polynomials on (0, pi) it is at an end."""
-    angle, _ = gauss_rule(basis.edges, HEIGHT_PROBES)
+    """About the largest modulus of the functions with these coefficients, which polynomials often have at an end."""
+    edges = basis.edges
+    ends = np.concatenate((np.nextafter(edges[:-1], np.pi), np.nextafter(edges[1:], 0.0)))
+    angle = np.append(gauss_rule(edges, HEIGHT_PROBES)[0], ends)
     if isinstance(basis, Legendre):
-        angle = np.append(gauss_rule(basis.edges, basis.nodes_per_interval)[0], basis.edges)
+        angle = np.append(angle, gauss_rule(edges, basis.nodes_per_interval)[0])
     return float(np.abs(basis.evaluate(angle) @ vectors).max())
 
 
@@ -152,7 +154,8 @@ def function_rows(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         step = max(1, VALUES_AT_ONCE // basis.size)
-        parts = [rows(theta[start : start + step], tolerance) for start in range(0, theta.size, step)]
+        finer = tolerance / max(height, 1.0)
+        parts = [rows(theta[start : start + step], finer) for start in range(0, theta.size, step)]
         images = np.concatenate([image @ vectors for image, _ in parts])
         return images, height * np.concatenate([error for _, error in parts])
 
