@@ -120,6 +120,8 @@ class Verdict:
     wrong: int
     worst: float
     disagreements: tuple[tuple[float, float], ...]
+    # what is lost or wrong
+    failures: tuple[tuple[float, float], ...]
 
 
 def aimed_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -298,7 +300,7 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace)
     traced = geo.trace(wall, x, theta, max_collisions=COLLISIONS)
     twin = follow(wall, x, theta)
     flagged = (traced.status == geo.Status.CORNER) | (traced.status == geo.Status.GRAZING)
-    same, distance = _agree(traced, twin)
+    same, distance = _agree(wall, traced, twin)
     other = np.flatnonzero(~same)
     # lost: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
     lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == LOST)
@@ -307,9 +309,12 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace)
     for k in np.flatnonzero(~explained & (twin.status[other] != geo.Status.ESCAPED)):
         explained[k] = _is_precise(wall, traced, other[k], float(x[other[k]]), float(theta[other[k]]))
     worst = float(distance[same].max(initial=0.0))
+    failed = lost.copy()
+    failed[other[~explained]] = True
     return Verdict(
         len(x), int(lost.sum()), int(flagged.sum()), int(explained.sum()), int((~explained).sum()), worst,
         tuple(zip(x[other].tolist(), theta[other].tolist(), strict=True)),
+        tuple(zip(x[failed].tolist(), theta[failed].tolist(), strict=True)),
     )  # fmt: skip
 
 
@@ -327,7 +332,7 @@ def measure_robustness(rays: int) -> dict[str, Verdict]:
         for kind, make in KINDS.items():
             verdicts = list(pool.map(judged, range(len(WALLS)), [make] * len(WALLS)))
             sums = (sum(getattr(one, name) for one in verdicts) for name in COUNTED)
-            found[kind] = Verdict(*sums, max(one.worst for one in verdicts), ())
+            found[kind] = Verdict(*sums, max(one.worst for one in verdicts), (), ())
     return found
 
 
@@ -352,13 +357,19 @@ def _is_precise(wall: geo.Wall, traced: geo.Trace, k: int, x: float, theta: floa
     ray = trace_precisely(wall.scene, x, theta, COLLISIONS)
     if ray.theta is None:
         return bool(traced.status[k] == geo.Status.BOUNCE_LIMIT)
-    return bool(ray.bounces == traced.collisions[k]) and abs(float(ray.theta) - traced.theta[k]) < OPEN_ERROR
+    apart = max(abs(float(ray.theta) - traced.theta[k]), abs(float(ray.x) - traced.x[k]) * math.sin(float(ray.theta)))
+    return bool(ray.bounces == traced.collisions[k]) and apart < OPEN_ERROR
 
 
-def _agree(traced: geo.Trace, twin: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:
-    """Which rays end alike within conditioning, and their angles' distance in units of EPS times the derivative."""
+def _agree(wall: geo.Wall, traced: geo.Trace, twin: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:
+    """Which rays end alike within conditioning, and how far apart in units of EPS times the derivative.
+
+    They are as far apart as their angles, or as their places seen from along the ray.
+    """
     gone = (traced.status == geo.Status.ESCAPED) & (twin.status == geo.Status.ESCAPED)
     difference = np.abs((traced.theta - twin.theta[:, 0]) - twin.theta[:, 1])
+    across = np.abs((traced.x - twin.x[:, 0]) - twin.x[:, 1]) * np.sin(twin.theta[:, 0]) / (wall.period + wall.depth)
+    difference = np.maximum(difference, across)
     distance = np.where(gone, difference / (EPS * twin.amplification * (1.0 + twin.collisions)), 0.0)
     # a run on an arc is counted in full by the tracer, however long, but followed step by step by the twin
     limited = (twin.status == geo.Status.BOUNCE_LIMIT) & (traced.collisions >= COLLISIONS)
@@ -377,7 +388,7 @@ def _explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats, foll
             break
         place, angle = x[rest] + dx * EPS * wall.period, theta[rest]
         angle = np.clip(angle + dt * EPS, 0.5 * angle, 0.5 * (angle + math.pi))
-        result[rest] = _agree(_part(traced, rest), follow(wall, place, angle))[0]
+        result[rest] = _agree(wall, _part(traced, rest), follow(wall, place, angle))[0]
     return result
 
 
@@ -415,9 +426,12 @@ def main() -> None:
     print("|" + "---|" * 10)
     rng = np.random.default_rng(0)
     rays, precise = options.rays // len(WALLS), options.precise // (2 * len(WALLS))
+    failures: list[str] = []
     for name, wall in WALLS.items():
         for kind, make in KINDS.items():
-            _print_row(name, kind, [_judged(wall, make, rays, precise, twin_trace, rng)])
+            row = _judged(wall, make, rays, precise, twin_trace, rng)
+            _print_row(name, kind, [row])
+            failures += [f"{name}: x = {x!r}, theta = {theta!r}" for x, theta in row[0].failures]
     rays, precise = options.rays // POLYGON_WALLS, options.precise // POLYGON_WALLS
     for name in POLYGONS:
         rows = []
@@ -425,7 +439,9 @@ def main() -> None:
             own = np.random.default_rng([1, number])
             wall = random_polygon(name, own)
             rows.append(_judged(wall, rays_beside_corners, rays, precise, brute_force, own))
+            failures += [f"{name} {number}: x = {x!r}, theta = {theta!r}" for x, theta in rows[-1][0].failures]
         _print_row(f"{POLYGON_WALLS} random: {name}", "beside corners", rows)
+    print("\nRays that are lost or wrong, with the number of a random wall:", *(failures or ["none"]), sep="\n")
 
 
 def _judged(

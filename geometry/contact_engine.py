@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from .arc_engine import on_arc
-from .engine import CORNER, ESCAPED, GRAZING, near_end
+from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, near_end
 from .flight_engine import compiled, conic_after, inlined, line_after, satellite_after, towards_line, turning
 from .nearby_engine import LINE, NO_PIECE, SIDE
 
@@ -48,7 +48,8 @@ def next_root(sign, leaving, line, conic, t, end, turned, turn, motion, patience
 
     F is that of a ``line``, see `towards_line`, or of a ``conic`` (f, g1, g2, curvature, stretch); the other one is
     None. ``turned`` is the `turning` until t. ``leaving`` says that F(t) = 0 to rounding, a root that is not to be
-    found again, and ``patience`` is the longest time for which the bounds are worth having.
+    found again, and ``patience`` is the longest time for which the bounds are worth having. Where the steps run out the
+    time is the last one up to which there is no root, and the code `BOUNCE_LIMIT`.
     """
     third, growth = motion.spin * motion.spin * abs(motion.omega), 0.0
     for number in range(ROOT_STEPS):
@@ -81,6 +82,8 @@ def next_root(sign, leaving, line, conic, t, end, turned, turn, motion, patience
         # what F may still be there is its gap to the parabola; far below the slack it counts as 0
         if step < ahead and (doubt * step * step <= ROOT_SHARE * slack or t == before):
             return t, turned, CLEAR
+    else:
+        return t, turned, BOUNCE_LIMIT
     return np.inf, turned, CLEAR
 
 
@@ -133,6 +136,8 @@ def first_on_piece(kind, index, own, x, y, t, end, turned, turn, motion, size, s
         state, inward = satellite_after(t, turned, turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR
+        if code == BOUNCE_LIMIT:
+            return t, state, code
         if sign > 0.0:
             px, py = x + state[0], y + state[1]
             # at a shallow incidence a rounding error across the piece is a longer way along it

@@ -24,7 +24,19 @@ from ..rounding import EPS
 from .angle_engine import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 from .arc_engine import arc_incidence, arc_reflect, arc_time, on_arc
 from .bezier_engine import bend_number, bezier_hit, bezier_value
-from .nearby_engine import BEZIER, CIRCLE, DOUBTFUL, ELLIPSE, LID, LINE, NO_PIECE, SIDE, hit_nearby, line_time
+from .nearby_engine import (
+    BEZIER,
+    CIRCLE,
+    DOUBTFUL,
+    ELLIPSE,
+    LEAST_SHARE,
+    LID,
+    LINE,
+    NO_PIECE,
+    SIDE,
+    hit_nearby,
+    line_time,
+)
 from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
 from .resolution import JOINT_ULPS, NEARBY
 from .skips import skip_crossings, skip_hops
@@ -269,7 +281,8 @@ def trace_ray(
             itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(number)
         if period is not None:
             if kind == SIDE:
-                py += time * vy
+                # the ends of the wall are one point of it, and a ray passes a side above them
+                py = max(py + time * vy, joints[joint_low, 1])
                 px = left if vx > 0.0 else right
                 shift += (right - left) if vx > 0.0 else (left - right)
                 own_kind, own_index, own_s = SIDE, -1, -1.0
@@ -282,7 +295,7 @@ def trace_ray(
             px = joints[near, 0] + hit_s * lines[index, 0]
             py = joints[near, 1] + hit_s * lines[index, 1]
             # a first hit below an end of the opening is as exact as the ray, at the smallest distance from that corner
-            room = 0.0 if bounces == 0 and joints[near, 1] == 0.0 else slack
+            room = LEAST_SHARE * lines[index, 4] if bounces == 0 and joints[near, 1] == 0.0 else slack
             if abs(hit_s) * lines[index, 4] <= room and joints[near, 2] > 0.0:
                 return shift + px, vx, vy, bounces, CORNER
             w = 2.0 * (vx * lines[index, 2] + vy * lines[index, 3])

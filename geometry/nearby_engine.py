@@ -19,6 +19,8 @@ NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
 # In place of a tangency.
 DOUBTFUL = 2
+# The share from a line's end is negative even where the ray meets that end: it is at least the smallest of doubles.
+LEAST_SHARE = 5e-324
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
@@ -30,7 +32,7 @@ def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
     near = j
     if share > 0.5:
         # from the nearer joint, and negative to say so, so that both ends keep their digits
-        share = c_after / (c_before - c_after)
+        share = min(c_after / (c_before - c_after), -LEAST_SHARE)
         near = j + 1
     hx = joints[near, 0] + share * lines[j, 0]
     hy = joints[near, 1] + share * lines[j, 1]
@@ -59,12 +61,12 @@ def curve_at(kind, index, beziers):
 def starts_in_front(
     own_kind, own_index, own_s, kind, index, s, joints, circles, ellipses, beziers, px, py, vx, vy, flown, slack
 ):  # fmt: skip
-    """Whether the ray's start lies in front of a piece that is nearby; see `sides_engine`."""
+    """Whether the ray's start lies in front of a piece that is nearby, or may do so; see `sides_engine`."""
     if own_kind in (LID, SIDE):
         # no piece lies above the opening or beyond a side: one within rounding of them is met there
         return True
     if own_kind == LINE and kind == LINE:
-        return line_in_front_of_line(joints, own_index, index, px, py, vx, vy, flown, slack)
+        return line_in_front_of_line(joints, own_index, index, (px, 0.0), (py, 0.0), vx, vy, flown, slack, slack)
     if circles is None and ellipses is None and beziers is None:
         return False
     return in_front(
@@ -79,7 +81,7 @@ def starts_in_front(
         arc_at(kind, index, circles, ellipses),
         curve_at(kind, index, beziers),
         (s, 0.0),
-        (px, 0.0), (py, 0.0), vx, vy, flown, slack,
+        (px, 0.0), (py, 0.0), vx, vy, flown, slack, slack,
     )  # fmt: skip
 
 

@@ -10,13 +10,14 @@ Three sizes accompany a ray.
 
 * Its Jacobi fields: displacement and turn of the ray for a unit displacement, and a unit turn, of the incoming one.
 * The bound on its rounding error: to first order the error after n bounces is the sum of M(n <- i) e_i over the local
-  errors e_i, and |M(n <- i)| <= |M_n| |M_i| because an area-preserving map has |M^-1| = |M| in two dimensions. The
-  sum of absolute values from bounce to bounce is a second bound: better after a near tangency, worse along an arc.
+  errors e_i, at most sqrt((n + 1) trace C) max |e_i| with C the sum of M(n <- i) M(n <- i)^T (Cauchy and Schwarz), and
+  C goes from bounce to bounce as M C M^T + 1.
 * Its width: half an ulp of the incoming angle. An angle stands for the angles that round to it; a ray meets a corner
   exactly if one of them does. (No ray of rational data but a vertical one meets a corner in the strict sense, since
   the tangent of an algebraic angle is transcendental.)
 
-Long runs between two vertical sides that face each other are counted by a division; no other run is left out.
+Long runs between two vertical sides that face each other are counted by a division, and so are the cells that a ray
+passes at heights at which no piece lies; no other run is left out.
 """
 
 from __future__ import annotations
@@ -82,6 +83,29 @@ def crossings(joints, lines, pairs, index, other, py, vx, vy, most):
 
 
 @_compile
+def free_cells(bands, py, vx, vy, cell, width, spread):
+    """How many cells a ray that enters one passes without coming near a piece, and the way along y in each.
+
+    ``bands`` are the heights (low, high) at which no piece lies. The ray's width is at most ``width`` plus ``spread``
+    times the flight. The last cells before the end of a band are left over.
+    """
+    if vx[0] == 0.0 or vy[0] == 0.0:
+        return 0.0, (0.0, 0.0)
+    for row in range(bands.shape[0]):
+        low, high = bands[row, 0], bands[row, 1]
+        if low < py[0] < high:
+            behind, room = py[0] - low, min(high, 0.0) - py[0]
+            if vy[0] < 0.0:
+                behind, room = high - py[0], py[0] - low
+            margin = width + spread * room / abs(vy[0])
+            cells = math.floor((room - margin) * abs(vx[0] / vy[0]) / cell - LAST_HITS)
+            # beyond 2^53 not all whole numbers are doubles
+            if behind > margin and 0.0 < cells < 2.0**53:
+                return cells, multiply((cell, 0.0), divide(vy, vx if vx[0] > 0.0 else negate(vx)))
+    return 0.0, (0.0, 0.0)
+
+
+@_compile
 def earlier(t, time):
     """Whether t < time, which may be (inf, 0): differences of infinities are not numbers."""
     return t[0] < np.inf and (time[0] == np.inf or subtract(t, time)[0] < 0.0)
@@ -104,7 +128,7 @@ def meets(
         own_kind, own_index, arcs[own_index if own_kind == ARC else 0], beziers[own_index if own_kind == BEZIER else 0],
         own_s,
         kind, index, arcs[index if kind == ARC else 0], beziers[index if kind == BEZIER else 0], s,
-        px, py, vx[0], vy[0], flown, slack,
+        px, py, vx[0], vy[0], flown, slack, error,
     )  # fmt: skip
 
 
@@ -117,11 +141,12 @@ def is_beside(joints, index, corner):
 
 @_compile
 def refined_ray(
-    place, theta, hollow, joints, lines, pairs, arcs, first_ellipse, beziers, is_open, cell, limit, most_flights
+    place, theta, hollow, joints, lines, pairs, arcs, first_ellipse, beziers, bands, is_open, cell, limit, most_flights
 ):  # fmt: skip
     """Follow one ray; returns x and angle (double-doubles), bounces, status, amplification and rounding error.
 
-    ``place`` is a double-double in the hollow, and ``arcs`` holds the circles, then the ellipses, of `refined_arcs`.
+    ``place`` is a double-double in the hollow, ``arcs`` holds the circles, then the ellipses, of `refined_arcs`, and
+    ``bands`` are those of `free_cells`.
     The amplification is the norm of the map's derivative in the units (cell, radian).
     """
     left, right = hollow[0], hollow[1]
@@ -137,13 +162,14 @@ def refined_ray(
     # Jacobi fields of a displacement (j1, a1) and of a turn (j2, a2); displacements as shares of the scale
     j1, a1, j2, a2 = 1.0, 0.0, 0.0, 1.0
     half_ulp = math.ldexp(1.0, math.frexp(theta)[1] - 54)
-    spread, norm = 1.0, 1.0
-    step_j, step_a = 1.0, 1.0
+    norm = 1.0
+    # the sum of M M^T, with entries for displacement and turn, and how many errors there are
+    c_jj, c_ja, c_aa, errors = 1.0, 0.0, 1.0, 1.0
     wraps, bounces, steps = 0, 0, 0
     own_kind, own_index, own_s, flown = LID, -1, (-1.0, 0.0), 0.0
     while True:
         # bound on the transversal error of the ray: on the segment, at a distance of up to one scale
-        local = LOCAL_ERROR * min(norm * spread, step_j + step_a)
+        local = LOCAL_ERROR * math.sqrt(errors * (c_jj + c_aa))
         if not local <= LARGEST_ERROR:
             return px, (0.0, 0.0), bounces, UNSETTLED, norm, local
         error = 2.0 * scale * local
@@ -253,7 +279,8 @@ def refined_ray(
         flight = time[0] / scale
         j1 += flight * a1
         j2 += flight * a2
-        step_j += flight * step_a + 1.0
+        c_jj += flight * (2.0 * c_ja + flight * c_aa)
+        c_ja += flight * c_aa
         if kind == LID:
             x = add(qx, two_product(float(wraps), right - left))
             norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
@@ -261,9 +288,19 @@ def refined_ray(
         if (bounces >= limit and kind != SIDE) or steps >= most_flights:
             return px, (0.0, 0.0), bounces, BOUNCE_LIMIT, norm, local
         if kind == SIDE:
-            py = qy
+            # the ends of the wall are one point of it, and a ray passes a side above them
+            end = wide(joints[joint_low, 1])
+            py = end if subtract(qy, end)[0] < 0.0 else qy
             px = wide(left if vx[0] > 0.0 else right)
-            wraps += 1 if vx[0] > 0.0 else -1
+            spread = WIDTH_MARGIN * half_ulp * abs(a2) + error / scale
+            cells, step = free_cells(bands, py, vx, vy, cell, WIDTH_MARGIN * half_ulp * scale * abs(j2) + error, spread)
+            py = add(py, multiply((cells, 0.0), step))
+            wraps += (1 if vx[0] > 0.0 else -1) * (1 + np.int64(cells))
+            flight = cells * cell / abs(vx[0]) / scale
+            j1 += flight * a1
+            j2 += flight * a2
+            c_jj += flight * (2.0 * c_ja + flight * c_aa)
+            c_ja += flight * c_aa
         else:
             flown = time[0]
             px, py = qx, qy
@@ -275,9 +312,10 @@ def refined_ray(
             if incidence == 0.0:
                 return px, (0.0, 0.0), bounces, GRAZING, norm, local
             power = 2.0 * bent * scale / incidence
-            step_a += abs(power) * step_j + 1.0
             a1 -= power * j1
             a2 -= power * j2
+            c_aa += power * (power * c_jj - 2.0 * c_ja)
+            c_ja -= power * c_jj
             bounces += 1
             if kind == LINE and own_kind == LINE:
                 hits, way, flight = crossings(joints, lines, pairs, index, own_index, py, vx, vy, limit - bounces)
@@ -286,15 +324,16 @@ def refined_ray(
                 flight /= scale
                 j1 += flight * a1
                 j2 += flight * a2
-                step_j += flight * step_a
+                c_jj += flight * (2.0 * c_ja + flight * c_aa)
+                c_ja += flight * c_aa
         norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
-        spread += norm
+        c_jj, c_aa, errors = c_jj + 1.0, c_aa + 1.0, errors + 1.0
         own_kind, own_index, own_s = kind, index, hit_s if kind == BEZIER else (-1.0, 0.0)
 
 
 @_compile
 def refined_rays(
-    x, theta, hollows, joints, lines, pairs, arcs, first_ellipse, beziers, is_open, cell, limit, most_flights,
+    x, theta, hollows, joints, lines, pairs, arcs, first_ellipse, beziers, bands, is_open, cell, limit, most_flights,
     out_x, out_theta, bounces, status, amplification, rounding,
 ):  # fmt: skip
     """Trace rays; fills the output arrays, ``out_x`` and ``out_theta`` (n, 2) with double-doubles."""
@@ -328,8 +367,8 @@ def refined_rays(
                 out_theta[i, 0], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
         end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
-            place, theta[i], hollows[h], joints, lines, pairs, arcs, first_ellipse, beziers, is_open, cell, limit,
-            most_flights,
+            place, theta[i], hollows[h], joints, lines, pairs, arcs, first_ellipse, beziers, bands, is_open, cell,
+            limit, most_flights,
         )  # fmt: skip
         end = add(base, end)
         out_x[i, 0], out_x[i, 1] = end

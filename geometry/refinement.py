@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..checks import Floats
+from ..rounding import EPS
+from .resolution import JOINT_ULPS
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -60,7 +62,7 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     refined_rays(
         np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64),
         scene.hollows, scene.joints, _rows(scene.lines, 7), _rows(scene.pairs, 10), arcs, len(circles),
-        np.zeros((1, 14)) if scene.beziers is None else scene.beziers,
+        np.zeros((1, 14)) if scene.beziers is None else scene.beziers, _free_bands(scene),
         scene.is_open, scene.cell, max_collisions, REFINED_FLIGHTS,
         result.x, result.theta, result.collisions, result.status, result.amplification, result.rounding,
     )  # fmt: skip
@@ -109,3 +111,27 @@ def retrace(
 
 def _rows(table: Floats | None, columns: int) -> Floats:
     return np.empty((0, columns)) if table is None else table
+
+
+def _free_bands(scene: Scene) -> Floats:
+    """The heights (low, high) of an open wall, shape (n, 2), at which no piece lies; none where rays stay in a cell."""
+    if not scene.is_open:
+        return np.empty((0, 2))
+    lines = np.flatnonzero(scene.joints[:, 3] > 0.0)
+    heights = [np.column_stack([scene.joints[lines, 1], scene.joints[lines + 1, 1]])]
+    for arcs in (_rows(scene.circles, 19), _rows(scene.ellipses, 19)):
+        # no point of an arc is further from both ends than half of its length
+        half = 0.5 * arcs[:, 11] / np.abs(arcs[:, 4]) / arcs[:, 12]
+        heights.append(
+            np.column_stack([np.minimum(*arcs[:, (14, 16)].T) - half, np.maximum(*arcs[:, (14, 16)].T) + half])
+        )
+    c0, c1, c2, c3 = _rows(scene.beziers, 14)[:, 1:8:2].T
+    heights.append(np.column_stack([c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3]))
+    slack = JOINT_ULPS * EPS * float(scene.hollows[0, 2])
+    extents = sorted((float(row.min()) - slack, float(row.max()) + slack) for part in heights for row in part)
+    bands, top = [], extents[0][1]
+    for low, high in extents:
+        if low > top:
+            bands.append((top, low))
+        top = max(top, high)
+    return np.array([*bands, (top, np.inf)])

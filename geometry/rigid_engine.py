@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from .contact_engine import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, first_in_hollow, next_root
-from .engine import BOUNCE_LIMIT, CORNER, ESCAPED
+from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from .flight_engine import compiled, flight, inlined, satellite_after, towards_line, turning
 from .nearby_engine import LINE, NO_PIECE, SIDE
 from .opening_engine import last_hollow
@@ -57,8 +57,10 @@ def dive(x, y, t, end, turned, turn, motion, slack, ground):
     if y + dy > 0.0:
         lid = towards_line(y, 0.0, 1.0, turn, motion)
         t, turned, code = next_root(1.0, NO, lid, None, t, end, turned, turn, motion, np.inf, slack)
-        if t >= end or code != CLEAR:
+        if t >= end or code == GRAZING:
             return np.inf, turned, -1, 0.0, CLEAR
+        if code != CLEAR:
+            return t, turned, -1, 0.0, code
         dx, dy, sine, _ = satellite_after(t, turned, turn, motion)
     base = math.floor((x + dx) / ground.cell) * ground.cell
     if ground.is_open:
@@ -98,7 +100,7 @@ def first_contact(own_kind, own_index, h, base, x, y, t, end, turn, motion, slac
         t, kind, index, state, code = first_in_hollow(
             h, own_kind, own_index, came_from, x - base, y, t, end, turned, turn, motion, slack, ground
         )
-        if kind != SIDE:
+        if kind != SIDE or code == BOUNCE_LIMIT:
             return t, kind, index, h, base, state, code
         if y + state[1] > 0.0 and motion.v2 + motion.omega * state[2] > 0.0:
             return np.inf, NO_PIECE, -1, -1, base, state, CLEAR

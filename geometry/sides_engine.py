@@ -67,22 +67,6 @@ def orientation(ax, ay, bx, by, cx, cy):
 
 
 @_compile
-def height_over_line(joints, own, other, px, py):
-    """Distance of a place on the line ``own`` from the line ``other``, times the length of that, with the exact sign.
-
-    The two may meet between the ends of the own one, where the other stands on it; then the place decides.
-    """
-    ax, ay, bx, by = joints[other, 0], joints[other, 1], joints[other + 1, 0], joints[other + 1, 1]
-    first = orientation(ax, ay, bx, by, joints[own, 0], joints[own, 1])
-    last = orientation(ax, ay, bx, by, joints[own + 1, 0], joints[own + 1, 1])
-    if first * last >= 0.0:
-        return first + last
-    ex, ey = joints[own + 1, 0] - joints[own, 0], joints[own + 1, 1] - joints[own, 1]
-    share = ((px - joints[own, 0]) * ex + (py - joints[own, 1]) * ey) / (ex * ex + ey * ey)
-    return (1.0 - share) * first + share * last
-
-
-@_compile
 def line_height(joints, index, px, py):
     """Distance of a place from a line, on whose left the free side is, and the unit normal there."""
     ex = two_sum(joints[index + 1, 0], -joints[index, 0])
@@ -90,6 +74,25 @@ def line_height(joints, index, px, py):
     size = square_root(dot(ex, ey, ex, ey))
     nx, ny = negate(divide(ey, size)), divide(ex, size)
     return dot(subtract(px, wide(joints[index, 0])), subtract(py, wide(joints[index, 1])), nx, ny), nx, ny
+
+
+@_compile
+def height_over_line(joints, own, other, px, py, blur):
+    """Distance of a place on the line ``own`` from the line ``other``, times the length of that, with the exact sign.
+
+    The two may meet between the ends of the own one, where the other stands on it. Then the double-double place
+    decides, which is known to ``blur`` along the own line, and the distance is the largest that it may have.
+    """
+    ax, ay, bx, by = joints[other, 0], joints[other, 1], joints[other + 1, 0], joints[other + 1, 1]
+    first = orientation(ax, ay, bx, by, joints[own, 0], joints[own, 1])
+    last = orientation(ax, ay, bx, by, joints[own + 1, 0], joints[own + 1, 1])
+    if first * last >= 0.0:
+        return first + last
+    height, nx, ny = line_height(joints, own, px, py)
+    px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
+    height, _, _ = line_height(joints, other, px, py)
+    length = math.hypot(joints[own + 1, 0] - joints[own, 0], joints[own + 1, 1] - joints[own, 1])
+    return math.hypot(bx - ax, by - ay) * height[0] + blur * abs(last - first) / length
 
 
 @_compile
@@ -126,36 +129,38 @@ def came_through(x0, y0, x1, y1, mx, my, px, py, vx, vy, flown, slack):
 
 
 @_compile
-def line_in_front_of_line(joints, own, other, px, py, vx, vy, flown, slack):
+def line_in_front_of_line(joints, own, other, px, py, vx, vy, flown, slack, blur):
     """`in_front` for two segments."""
-    if height_over_line(joints, own, other, px, py) <= 0.0:
+    if height_over_line(joints, own, other, px, py, blur) <= 0.0:
         return False
     ex, ey = joints[own + 1, 0] - joints[own, 0], joints[own + 1, 1] - joints[own, 1]
     w = 2.0 * (vy * ex - vx * ey) / (ex * ex + ey * ey)
     x0, y0, x1, y1 = joints[other, 0], joints[other, 1], joints[other + 1, 0], joints[other + 1, 1]
     length = math.hypot(x1 - x0, y1 - y0)
     mx, my = (y0 - y1) / length, (x1 - x0) / length
-    return not came_through(x0, y0, x1, y1, mx, my, px, py, vx + w * ey, vy - w * ex, flown, slack)
+    return not came_through(x0, y0, x1, y1, mx, my, px[0], py[0], vx + w * ey, vy - w * ex, flown, slack)
 
 
 @_compile
 def in_front(
-    joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack
+    joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack,
+    blur,
 ):  # fmt: skip
     """Whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
 
     Each piece is given by its kind, the number of a line, the row of an arc in the table of `refined_arcs`, the row of
     a Bezier piece and the parameter there. ``px``, ``py`` (double-doubles) is the place, within rounding of the own
-    piece; ``flown`` the length of the flight that ended there.
+    piece; ``flown`` the length of the flight that ended there; ``blur`` the error of the place along the own piece.
+    Where that decides, as where one piece stands on the other, the ray counts as one in front.
     """
     if own_kind == LINE and kind == LINE:
-        return line_in_front_of_line(joints, own_index, index, px[0], py[0], vx, vy, flown, slack)
+        return line_in_front_of_line(joints, own_index, index, px, py, vx, vy, flown, slack, blur)
     nx, ny = px, py
     for _ in range(STEPS):
         height, nx, ny = height_over(own_kind, joints, own_index, own_arc, own_curve, own_s, px, py)
         px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
     height, mx, my = height_over(kind, joints, index, arc, curve, s, px, py)
-    if height[0] <= CURVE_NOISE * slack:
+    if height[0] + blur * abs(mx[0] * ny[0] - my[0] * nx[0]) <= CURVE_NOISE * slack:
         return False
     if kind == LINE:
         x0, y0, x1, y1 = joints[index, 0], joints[index, 1], joints[index + 1, 0], joints[index + 1, 1]

@@ -134,9 +134,10 @@ class _Flight:
             )
             bend = self.scale * v[:, 2] ** 2 + self._curvature() * self.fastest[touching] ** 2
             rest = distance[touching]
-            rest[(*pick, rest[pick].argmin(axis=-1))] = self.wall.period
+            # both faces of a thin plate are left at the same speed
+            rest[pick] = np.where(rest[pick] <= 2.0 * CLOSE, self.wall.period, rest[pick])
             free = rest.min(axis=(1, 2)) / self.fastest[touching]
-            time[touching] = np.minimum(np.minimum(np.maximum(speed, 0.0) / bend, free), end[touching])
+            time[touching] = np.minimum(np.minimum(np.abs(speed) / bend, free), end[touching])
         rows = np.arange(n)
         final, final_angles = here, angles
         for _ in range(MOST_STEPS):

@@ -37,6 +37,20 @@ def test_the_double_double_twin_agrees_with_fifty_digits(name):
 
 
 @pytest.mark.parametrize(
+    ("name", "x", "theta"),
+    [
+        ("cubic bumps", 0.8301588680018963, 1.2919607451958173),
+        ("four arcs", 0.15442430372297744, 1.4884981590669946),
+    ],
+)
+def test_double_doubles_settle_a_ray_that_sensitive_and_insensitive_bounces_take_in_turn(name, x, theta):
+    # beside a corner, and inside for 200 bounces more: the product of two norms bounds the rounding by 1e-15, not 1e-20
+    twin = refined_trace(WALLS[name].scene, np.array([x]), np.array([theta]), 200)
+    assert twin.status[0] == geo.Status.BOUNCE_LIMIT and twin.collisions[0] == 200 and twin.rounding[0] < 1e-19
+    assert geo.trace(WALLS[name], x, theta, max_collisions=200).status == geo.Status.BOUNCE_LIMIT
+
+
+@pytest.mark.parametrize(
     ("x", "theta"), [(0.5, 0.5 * math.pi), (0.0, 0.5 * math.pi), (0.25, 0.75 * math.pi), (0.75, 0.25 * math.pi)]
 )
 def test_a_corner_hit_exactly_is_reported_and_one_two_ulps_away_is_not(x, theta):

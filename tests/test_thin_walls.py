@@ -13,6 +13,7 @@ from benchmarks.robustness import COLLISIONS, POLYGONS, brute_force, judge, rand
 
 from asperity import geometry as geo
 from asperity.geometry.exact_points import ExactPoints
+from asperity.geometry.nearby_engine import line_time
 from asperity.geometry.refinement import refined_trace
 from asperity.geometry.sides_engine import orientation
 from precise_tracer import trace_precisely
@@ -28,6 +29,43 @@ def test_no_ray_beside_a_corner_is_lost_or_wrong(kind):
         wall = random_polygon(kind, rng)
         verdict = judge(wall, *rays_beside_corners(wall, RAYS, rng), brute_force)
         assert verdict.lost == 0 and verdict.wrong == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "number", "x", "theta"),
+    [
+        # in the apex of a wedge, 4e-16 beside the foot of a plate, where one line ends in front of another
+        ("standing plates", 11, 0.016413068599111277, 1.6542613177845171),
+        # into a corner, off the one line to within 1e-17 of the other
+        ("sharp islands", 99, 0.2086541361844363, 0.9038638355308218),
+        # past a corner, and out over 109,881 cells
+        ("floating plates", 24, 0.5669641334297323, 1.5708013899365827),
+        # to the joint at which the period begins, where rounding puts the ray below the floor
+        ("sharp islands", 10, 0.7547158996051004, 0.8729736157922413),
+    ],
+)
+def test_rays_that_were_lost_or_wrong(kind, number, x, theta):
+    wall = random_polygon(kind, np.random.default_rng([1, number]))
+    verdict = judge(wall, np.array([x]), np.array([theta]), brute_force)
+    assert verdict.lost == verdict.wrong == verdict.flagged == 0
+
+
+def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
+    joints, lines = np.array([[0.0, -1.0], [2.0, -1.0]]), np.array([[2.0, 0.0]])
+    time, share = line_time(joints, lines, 0, 2.0, 0.0, 2.0, 0.0, 0.0, -1.0)
+    assert time == 1.0 and share < 0.0
+
+
+@pytest.mark.parametrize("theta", [1e-4, 1e-6, np.pi - 1e-7, 1e-9])
+def test_double_doubles_count_the_cells_that_a_ray_passes_without_a_hit(theta):
+    """To the floor and out again, with the place by mpmath."""
+    lying = [geo.Segment((0.2, -0.9), (0.7, -0.9)), geo.Segment((0.7, -0.9), (0.2, -0.9))]
+    wall = geo.Wall(FLOOR, period=1.0, islands=[lying])
+    twin = refined_trace(wall.scene, np.array([0.3]), np.array([theta]), COLLISIONS)
+    assert twin.status[0] == geo.Status.ESCAPED and twin.collisions[0] == 1
+    with mp.workdps(50):
+        way = 2 * mp.mpf(0.9) * mp.cot(mp.mpf(float(theta)))
+        assert abs(mp.mpf(twin.x[0, 0]) + mp.mpf(twin.x[0, 1]) - mp.mpf(0.3) + way) < 1e-25 * abs(way)
 
 
 @pytest.mark.parametrize("kind", POLYGONS)
