@@ -6,6 +6,10 @@ A satellite meets a line or an upright conic where F = 0, see `flight_engine`.
 bounds the third one. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is a
 safe step; where the parabola has none, F has none. The steps converge quadratically because c tends to F''. All roots
 of F are visited in their order, in both directions, until one lies on the piece.
+
+**No face is met from behind.** A satellite that leaves one piece within rounding of another one has F = 0 there, too.
+Whether it lies in front of that one is decided by the pieces' own places, see `sides_engine`: not of the other face of
+a plate without thickness, nor of the other side of a sharp peak.
 """
 
 from __future__ import annotations
@@ -18,6 +22,8 @@ from .arc_engine import on_arc
 from .engine import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, near_end
 from .flight_engine import compiled, conic_after, inlined, line_after, satellite_after, towards_line, turning
 from .nearby_engine import LINE, NO_PIECE, SIDE
+from .sides_engine import ARC as CURVED
+from .sides_engine import in_front_at
 
 # A contact is clear, or double precision does not settle it; the codes are those of the statuses of rays.
 CLEAR = ESCAPED
@@ -28,7 +34,8 @@ ROOT_SHARE = 1.0 / 16.0
 # Incidences below 1e-6 radians are treated as that one, so that the slack stays far below the pieces' lengths.
 WIDEST_SLACK = 1e6
 # A near tangency halves its distance at every step at worst, from the wall's size to its rounding in about 100 steps.
-ROOT_STEPS = 400
+# The others are for disks that sink slowly while they turn fast: a step is a few of the wall's sizes on the rim.
+ROOT_STEPS = 100_000
 # Circles and ellipses together, a number that no kind of piece of the planar tracer has.
 ARC = 8
 
@@ -97,13 +104,27 @@ def where_on_line(joints, lines, j, x, y, slack):
     return from_start >= -slack and from_end >= -slack, corner
 
 
+@compiled
+def is_in_front(own_kind, own_index, kind, index, x, y, slack, ground):
+    """Whether a satellite at (x, y) on one piece lies in front of another one, which is within the slack of it."""
+    own_arc, arc = own_index if own_kind == ARC else 0, index if kind == ARC else 0
+    row, other = ground.exact_arcs[own_arc], ground.exact_arcs[arc]
+    # there are no Bezier pieces, and no flight: a face that it came through in that is not looked for
+    return in_front_at(
+        ground.joints, CURVED if own_kind == ARC else LINE, own_index, row, row, (0.0, 0.0),
+        CURVED if kind == ARC else LINE, index, other, other, (0.0, 0.0),
+        (x, 0.0), (y, 0.0), 0.0, 0.0, 0.0, slack, slack,
+    )  # fmt: skip
+
+
 @inlined
-def first_on_piece(kind, index, own, x, y, t, end, turned, turn, motion, size, slack, ground):
+def first_on_piece(kind, index, own_kind, own_index, x, y, t, end, turned, turn, motion, size, slack, ground):
     """First contact in [t, end) of one satellite with the front of one piece, its state there, and a code.
 
-    (x, y) is where the satellite was at the start of the flight, and ``own`` whether that is on this piece. ``turned``
-    is its `turning` until t, and its state is what `satellite_after` gives.
+    (x, y) is where the satellite was at the start of the flight, on the piece ``own_kind``, ``own_index`` if any.
+    ``turned`` is its `turning` until t, and its state is what `satellite_after` gives.
     """
+    own = own_kind == kind and own_index == index
     joints, lines, arcs = ground.joints, ground.lines, ground.arcs
     line, conic = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0)
     stretch, patience = 1.0, np.inf
@@ -113,6 +134,8 @@ def first_on_piece(kind, index, own, x, y, t, end, turned, turn, motion, size, s
         level = 0.0 if own else g1 * (x - joints[index, 0]) + g2 * (y - joints[index, 1])
         line = towards_line(level, g1, g2, turn, motion)
         here, rate, bend = line_after(line, t, turned, motion)
+        if t == 0.0 and own_kind != NO_PIECE and not own and abs(here) <= slack:
+            leaving = not is_in_front(own_kind, own_index, kind, index, x, y, slack, ground)
         ahead = end - t
         # F lies above a parabola that is not convex, and so above the lower one of its ends
         doubt = motion.spin * motion.spin * abs(motion.omega) * ahead
@@ -126,8 +149,13 @@ def first_on_piece(kind, index, own, x, y, t, end, turned, turn, motion, size, s
         level = 0.0 if own else 0.5 * ((arcs[index, 2] + g1) * rx + (arcs[index, 3] + g2) * ry)
         conic = (level, g1, g2, curvature, stretch)
         here, rate, _, _, _ = conic_after(conic, t, turned, turn, motion)
+        if t == 0.0 and own_kind != NO_PIECE and not own and abs(here) <= slack * max(1.0, stretch):
+            leaving = not is_in_front(own_kind, own_index, kind, index, x, y, slack * max(1.0, stretch), ground)
         patience = 2.0 * size / motion.fastest
-    sign = 1.0 if leaving or here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
+    sign = 1.0 if here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
+    if leaving:
+        # to the front, or, from the back of a face, away from it
+        sign = 1.0 if own or rate > 0.0 else -1.0
     while True:
         if kind == LINE:
             t, turned, code = next_root(sign, leaving, line, None, t, end, turned, turn, motion, patience, slack)
@@ -175,9 +203,8 @@ def first_in_hollow(h, own_kind, own_index, came_from, x, y, t, end, turned, tur
         tried = LINE if part == 3 else ARC
         for k in range(int(hollows[h, part]), int(hollows[h, part + 1])):
             if tried == ARC or joints[k, 3] > 0.0:
-                own = own_kind == tried and own_index == k
                 hit, place, unclear = first_on_piece(
-                    tried, k, own, x, y, t, end, turned, turn, motion, size, slack, ground
+                    tried, k, own_kind, own_index, x, y, t, end, turned, turn, motion, size, slack, ground
                 )
                 if hit < end:
                     end, kind, index, code, where = hit, tried, k, unclear, place

@@ -30,7 +30,8 @@ SLACK = 16.0 * EPS
 class Ground(NamedTuple):
     """The wall: its period, whether satellites pass from cell to cell below its tops, and the tables of its scene.
 
-    ``stop`` is the flag that ends a collision before its time.
+    ``exact_arcs`` are the arcs as `refined_arcs` has them, and ``stop`` is the flag that ends a collision before its
+    time.
     """
 
     cell: float
@@ -39,6 +40,7 @@ class Ground(NamedTuple):
     joints: Floats
     lines: Floats
     arcs: Floats
+    exact_arcs: Floats
     stop: NDArray[np.int64]
 
 
@@ -60,6 +62,8 @@ class Ring(NamedTuple):
 
 def ground_of(scene: Scene) -> Ground:
     """The tables of a wall; circles and ellipses have the same columns and become one table."""
+    from .refined_arc_engine import refined_arcs
+
     none = np.empty((0, 0))
     circles, ellipses = (none if table is None else table for table in (scene.circles, scene.ellipses))
     hollows = scene.hollows.copy()
@@ -67,7 +71,8 @@ def ground_of(scene: Scene) -> Ground:
     lines = np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines
     arcs = [table for table in (circles, ellipses) if len(table)]
     table = np.concatenate(arcs) if arcs else none
-    return Ground(scene.cell, scene.is_open, hollows, scene.joints, lines, table, new_flag())
+    exact_arcs = refined_arcs(table)
+    return Ground(scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, new_flag())
 
 
 def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:

@@ -142,19 +142,11 @@ def line_in_front_of_line(joints, own, other, px, py, vx, vy, flown, slack, blur
 
 
 @_compile
-def in_front(
+def in_front_at(
     joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack,
     blur,
 ):  # fmt: skip
-    """Whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
-
-    Each piece is given by its kind, the number of a line, the row of an arc in the table of `refined_arcs`, the row of
-    a Bezier piece and the parameter there. ``px``, ``py`` (double-doubles) is the place, within rounding of the own
-    piece; ``flown`` the length of the flight that ended there; ``blur`` the error of the place along the own piece.
-    Where that decides, as where one piece stands on the other, the ray counts as one in front.
-    """
-    if own_kind == LINE and kind == LINE:
-        return line_in_front_of_line(joints, own_index, index, px, py, vx, vy, flown, slack, blur)
+    """`in_front` by the heights of the place, whatever the pieces are."""
     nx, ny = px, py
     for _ in range(STEPS):
         height, nx, ny = height_over(own_kind, joints, own_index, own_arc, own_curve, own_s, px, py)
@@ -172,3 +164,23 @@ def in_front(
     w = 2.0 * (vx * nx[0] + vy * ny[0])
     vx, vy = vx - w * nx[0], vy - w * ny[0]
     return not came_through(x0, y0, x1, y1, mx[0], my[0], px[0], py[0], vx, vy, flown, slack)
+
+
+@_compile
+def in_front(
+    joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack,
+    blur,
+):  # fmt: skip
+    """Whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
+
+    Each piece is given by its kind, the number of a line, the row of an arc in the table of `refined_arcs`, the row of
+    a Bezier piece and the parameter there. ``px``, ``py`` (double-doubles) is the place, within rounding of the own
+    piece; ``flown`` the length of the flight that ended there; ``blur`` the error of the place along the own piece.
+    Where that decides, as where one piece stands on the other, the ray counts as one in front.
+    """
+    if own_kind == LINE and kind == LINE:
+        return line_in_front_of_line(joints, own_index, index, px, py, vx, vy, flown, slack, blur)
+    return in_front_at(
+        joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown,
+        slack, blur,
+    )  # fmt: skip

@@ -19,8 +19,12 @@ def distances(wall, points):
     """Distances of points (..., 2) from every piece in three cells, shape (..., pieces * 3)."""
     cell = np.floor(points[..., :1] / wall.period) * wall.period
     local = points - np.concatenate([cell, np.zeros_like(cell)], axis=-1)
-    away = [_away(piece, local - [shift * wall.period, 0.0]) for piece in wall.pieces for shift in (-1, 0, 1)]
+    away = [_away(piece, local - [shift * wall.period, 0.0]) for piece in _pieces(wall) for shift in (-1, 0, 1)]
     return np.stack([np.hypot(vector[..., 0], vector[..., 1]) for vector in away], axis=-1)
+
+
+def _pieces(wall):
+    return [*wall.pieces, *(piece for island in wall.islands for piece in island)]
 
 
 def _away(piece, points):
@@ -44,7 +48,7 @@ def front_normal(wall, points):
     nearest = distances(wall, points).argmin(axis=-1)
     local = points - np.stack([np.floor(points[:, 0] / wall.period) * wall.period, np.zeros(len(points))], axis=-1)
     normal = np.empty_like(points)
-    for number, piece in enumerate(wall.pieces):
+    for number, piece in enumerate(_pieces(wall)):
         for k, shift in enumerate((-1, 0, 1)):
             here = nearest == 3 * number + k
             if isinstance(piece, geo.Segment):
@@ -159,7 +163,7 @@ class _Flight:
         return time, which, final, final_angles
 
     def _curvature(self):
-        arcs = [1.0 / p.semi_axes[0] for p in self.wall.pieces if isinstance(p, geo.Arc)]
+        arcs = [1.0 / p.semi_axes[0] for p in _pieces(self.wall) if isinstance(p, geo.Arc)]
         return max(arcs, default=0.0)
 
     def _fourth(self, rows, time):

@@ -37,7 +37,7 @@ NAMED = (
     lambda: geo.mushrooms(0.3, 0.4, 2),
     # a plate of no thickness over a cavity, a thin one that stands in it, a cavity whose side touches the flat top
     lambda: _polygon((0, 0), (0.7, 0), (0.2, 0), (0.2, -1), (1, -1), (1, 0)),
-    lambda: _polygon((0, 0), (0, -1), (0.5, -1), (0.5, -0.2), (0.52, -0.2), (0.52, -1), (1, -1), (1, 0)),
+    lambda: _polygon((0, 0), (0, -1), (0.5, -1), (0.5, -0.2), (0.515625, -0.2), (0.515625, -1), (1, -1), (1, 0)),
     lambda: _polygon((0, 0), (0.3, 0), (0.5, -0.8), (0.4, -0.1), (0.3, 0), (0.9, 0), (1, -0.1), (1, 0)),
     _lens,
     lambda: geo.elliptical_arcs(0.9, geo.Disk(1.0, 0.5)),

@@ -9,6 +9,8 @@ import pytest
 
 from asperity import geometry as geo
 from asperity.errors import InputError
+from asperity.geometry.contact_engine import ROOT_STEPS, next_root
+from asperity.geometry.flight_engine import flight
 from asperity.geometry.satellites import Satellites
 from plain_collision import collide_plainly
 
@@ -113,6 +115,71 @@ def test_a_lip_without_thickness_is_met_from_below_by_a_satellite_that_came_in_b
     position = np.array([0.06781824, -0.03185973]) + 1e-9 * rng.random((200, 2))
     out = geo.collide(DISK, geo.mushrooms(0.3), 0.1, position, [[-0.63075937, -0.04428023, 1.00015155]])
     assert (out.contacts > 1).all() and out.two_satellites.all()
+
+
+def plate_in_a_hollow(thickness, lean):
+    foot, tip = 0.5 - 0.5 * thickness, 0.5 - 0.5 * thickness + lean
+    points = [(foot, -0.9), (tip, -0.2), (tip + thickness, -0.2), (foot + thickness, -0.9)]
+    points = [p for k, p in enumerate(points) if k == 0 or p != points[k - 1]]
+    return geo.Wall.from_vertices([(0, 0), (0, -0.9), *points, (1, -0.9), (1, 0)])
+
+
+ARC = geo.Arc((0.5, -0.6), 0.3, 2.5, 0.6)
+PLATES = {
+    "standing, no thickness": plate_in_a_hollow(0.0, 0.0),
+    "leaning, 3e-16 thick": plate_in_a_hollow(3e-16, 0.04),
+    "floating": geo.Wall(
+        [geo.Segment((0, -0.9), (1, -0.9))],
+        islands=[[geo.Segment((0.2, -0.6), (0.8, -0.4)), geo.Segment((0.8, -0.4), (0.2, -0.6))]],
+    ),
+    "an arc": geo.Wall([geo.Segment((0, -0.9), (1, -0.9))], islands=[[ARC, ARC.reversed()]]),
+}
+
+
+@pytest.mark.parametrize("name", PLATES)
+def test_disks_leave_a_plate_that_is_thinner_than_rounding(name):
+    wall, scale = PLATES[name], 1e-3
+    position, velocity = states(wall, scale, 60, seed=7)
+    spacing = Satellites.around(scale, scale * wall.depth).spacing
+    out = geo.collide(DISK, wall, scale, position, velocity)
+    _, outgoing, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
+    done = ~np.isnan(outgoing[:, 0])
+    assert out.escaped.all() and done.mean() > 0.95
+    assert np.array_equal(contacts[done], out.contacts[done])
+    few = done & (contacts < 8)
+    np.testing.assert_allclose(outgoing[few], out.velocity[few], atol=1e-5)
+
+
+def test_the_two_sides_of_a_sharp_peak_are_told_apart_next_to_its_tip():
+    # a disk that does not turn hits the left side so far below the tip, where the peak is 1e-15 to 1e-12 thick
+    wall = geo.Wall.from_vertices([(0, 0), (0, -0.9), (0.4996, -0.9), (0.5, -0.2), (0.5004, -0.9), (1, -0.9), (1, 0)])
+    below, scale = np.array([1e-9, 1e-10, 1e-11, 3e-12, 1e-12]), 1e-3
+    theta = np.arctan2(0.2 + below, 0.3 - 0.5)
+    velocity = -np.stack([np.cos(theta), np.sin(theta), 0.0 * theta], axis=1)
+    out = geo.collide(DISK, wall, scale, [[0.3 * scale, 0.0]], velocity)
+    assert out.escaped.all() and np.all(out.contacts == out.contacts[0])
+    np.testing.assert_allclose(out.velocity, out.velocity[[0] * len(below)], atol=1e-6)
+
+
+def test_a_root_that_is_too_many_steps_away_is_not_called_none():
+    motion = flight(0.0, -1.0, 0.0, 0.1)
+    arguments = (1.0, False, None, (3.0 * ROOT_STEPS, 0.0, 1.0, 0.0, 1.0), 0.0, 1e9, (0.0, 0.0), (0.0, 1.0), motion)
+    near, _, found = next_root(*arguments, 1.0, 1e-15)
+    assert near == ROOT_STEPS and found == geo.Status.BOUNCE_LIMIT
+    at, _, found = next_root(*arguments, 10.0, 1e-15)
+    assert at == pytest.approx(3.0 * ROOT_STEPS) and found == geo.Status.ESCAPED
+
+
+def test_a_disk_that_sinks_far_slower_than_it_turns_does_not_pass_through_the_wall():
+    # its lowest satellite rolls on the spot
+    sinking = np.array([1e-2, 1e-3, 1e-4])
+    velocity = np.stack([np.full(3, -0.5), -sinking, np.full(3, 0.5)], axis=1)
+    wall, scale = geo.focusing_arcs(1.2), 1e-8
+    out = geo.collide(DISK, wall, scale, [[0.4 * scale, 0.0]], velocity)
+    assert out.escaped.all() and np.all(out.contacts > 0)
+    back = geo.collide(DISK, wall, scale, out.position, -out.velocity)
+    assert np.array_equal(back.contacts, out.contacts)
+    np.testing.assert_allclose(back.velocity, -velocity, atol=1e-6)
 
 
 def test_a_flat_wall_reflects_in_closed_form():
