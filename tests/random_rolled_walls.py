@@ -35,9 +35,9 @@ NAMED = (
     lambda: geo.double_parabola(),
     lambda: geo.koch(2),
     lambda: geo.mushrooms(0.3, 0.4, 2),
-    # a plate of no thickness over a cavity, a thin one that stands in it, a cavity whose side touches the flat top
+    # a plate of no thickness over a cavity, one that stands in it, a cavity whose side touches the flat top
     lambda: _polygon((0, 0), (0.7, 0), (0.2, 0), (0.2, -1), (1, -1), (1, 0)),
-    lambda: _polygon((0, 0), (0, -1), (0.5, -1), (0.5, -0.2), (0.515625, -0.2), (0.515625, -1), (1, -1), (1, 0)),
+    lambda: _polygon((0, 0), (0, -1), (0.5, -1), (0.5, -0.2), (0.5, -1), (1, -1), (1, 0)),
     lambda: _polygon((0, 0), (0.3, 0), (0.5, -0.8), (0.4, -0.1), (0.3, 0), (0.9, 0), (1, -0.1), (1, 0)),
     _lens,
     lambda: geo.elliptical_arcs(0.9, geo.Disk(1.0, 0.5)),
