@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from tests.plain_collision import collide_plainly
 
 from asperity import geometry as geo
 from asperity.bench.timing import least_time
@@ -32,6 +34,8 @@ EPS = float(np.finfo(float).eps)
 # The largest of so many random errors of the way back stands for its conditioning; with six, two states in 10^6 whose
 # three coordinates happened to cancel seemed worse than that.
 SHAKES = 20
+# Disks for each plate and scale.
+PLATE_STATES = 200
 
 
 @dataclass(frozen=True)
@@ -116,6 +120,51 @@ def check_involution(states: int = STATES) -> list[InvolutionCheck]:
     return rows
 
 
+def standing_plate(thickness: float, lean: float) -> geo.Wall:
+    """A plate in a rectangular hollow."""
+    foot = 0.5 - 0.5 * thickness
+    points = [(foot, -0.9), (foot + lean, -0.2), (foot + lean + thickness, -0.2), (foot + thickness, -0.9)]
+    points = [point for k, point in enumerate(points) if k == 0 or point != points[k - 1]]
+    return geo.Wall.from_vertices([(0.0, 0.0), (0.0, -0.9), *points, (1.0, -0.9), (1.0, 0.0)])
+
+
+def floating_plate(thickness: float, tilt: float) -> geo.Wall:
+    """A plate over a floor."""
+    along, down = (
+        0.3 * np.array([math.cos(tilt), math.sin(tilt)]),
+        thickness * np.array([math.sin(tilt), -math.cos(tilt)]),
+    )
+    middle = np.array([0.5, -0.5])
+    corners = [tuple(p) for p in (middle - along, middle + along, middle + along + down, middle - along + down)]
+    loop = [point for k, point in enumerate(corners) if point not in corners[:k]]
+    island = [geo.Segment(a, b) for a, b in zip(loop, [*loop[1:], loop[0]], strict=True)]
+    return geo.Wall([geo.Segment((0.0, -0.9), (1.0, -0.9))], period=1.0, islands=[island])
+
+
+def check_plates(states: int = PLATE_STATES) -> list[str]:
+    """Plates and sharp peaks against the tests' brute force: a table of disks that are lost or wrong."""
+    walls = {f"standing plate, {t:g} thick": standing_plate(t, 0.0) for t in (0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-10)}
+    walls |= {f"leaning plate, {t:g} thick": standing_plate(t, 0.04) for t in (0.0, 3e-16, 1e-14)}
+    walls |= {
+        f"floating plate, {t:g} thick, tilted by {angle:g}": floating_plate(t, angle)
+        for t in (0.0, 3e-16, 1e-13)
+        for angle in (0.0, 0.3, 1.2)
+    }
+    rows = ["| wall | scale | disks | judged | lost | wrong |", "|---|---|---|---|---|---|"]
+    for name, wall in walls.items():
+        for scale in (1e-1, 1e-3):
+            position, velocity = random_states(wall, scale, states, np.random.default_rng(2))
+            out = geo.collide(DISK, wall, scale, position, velocity)
+            spacing = Satellites.around(scale, scale * wall.depth).spacing
+            _, expected, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
+            judged = ~np.isnan(expected[:, 0])
+            apart = np.abs(expected - out.velocity).max(axis=1) > 1e-6
+            wrong = int((judged & out.escaped & (apart | (contacts != out.contacts))).sum())
+            lost = int((judged & ~out.escaped).sum())
+            rows.append(f"| {name} | {scale:g} | {states} | {int(judged.sum())} | {lost} | {wrong} |")
+    return rows
+
+
 def speed_table() -> list[str]:
     """The speeds as a table, each beside the prototype's range and the planar tracer's speed in the same run."""
     rows = [
@@ -133,7 +182,8 @@ def speed_table() -> list[str]:
 
 
 def main() -> None:
-    """Print both tables."""
+    """Print the three tables."""
+    print("\n".join(check_plates()), flush=True)
     print("| wall | scale | states | not settled | median error | worst error | mismatches | energy |")
     for row in check_involution():
         print(
