@@ -42,6 +42,8 @@ STEP = mp.mpf(10) ** -30
 WALL_ERROR = 4 * EPS
 # A ray that makes more than these one by one would take hours.
 MOST_HITS = 10**15
+# Of rays that the rounding of the wall decides, those that leave later are left unknown.
+MOST_STORED_HITS = 100_000
 # Flights after which the tracer gives a ray up (`geometry.engine.MOST_STEPS`).
 MOST_FLIGHTS = 1_000_000
 
@@ -73,7 +75,7 @@ class Closed:
     def __init__(self, wall, ray):
         hollow = wall.hollows[0]
         self.cell, self.left, self.width = mp.mpf(wall.period), mp.mpf(hollow.left), mp.mpf(hollow.right - hollow.left)
-        self.ray = ray
+        self.ray, self.stored = ray, Traced(wall, MOST_STORED_HITS)
 
     def __call__(self, x, theta):
         """State on the way out (here the angle alone), hits, itinerary."""
@@ -86,13 +88,13 @@ class Traced:
 
     reference = "tracer in 50 digits"
 
-    def __init__(self, wall):
+    def __init__(self, wall, most_hits=MOST_HITS):
         self.scene, self.cell = wall.scene, mp.mpf(wall.period)
-        self.width = self.cell
+        self.width, self.most_hits = self.cell, most_hits
 
     def __call__(self, x, theta):
         """State on the way out, hits, itinerary."""
-        ray = trace_precisely(self.scene, x, theta, MOST_HITS)
+        ray = trace_precisely(self.scene, x, theta, self.most_hits)
         if ray.theta is None:
             raise ArithmeticError(f"x = {x}, theta = {theta}: still inside after {ray.bounces} hits")
         return (ray.theta, ray.x / self.cell), ray.bounces, ray.itinerary
@@ -157,6 +159,13 @@ def judged(name, judge, x, theta):
                 # what differs by no more than the ray was moved is no other way
                 if other != hits and abs(out - state[0]) > 64 * EPS * condition:
                     others[float(out)] = other
+        if clearance == IN_WALL:
+            # the wall that is traced is that of the rounded coordinates, and their rounding decides this ray
+            try:
+                (out, *_), other, _ = judge.stored(place, angle)
+                others[float(out)] = other
+            except ArithmeticError:
+                pass
         rest = [[out.hex(), other] for out, other in sorted(others.items())]
         return [x.hex(), theta.hex(), float(state[0]).hex(), hits, float(f"{float(condition):.4g}"), clearance, rest]
 

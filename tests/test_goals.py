@@ -21,10 +21,10 @@ def test_the_memory_of_an_estimate_does_not_grow_with_its_rays():
 
 
 def test_a_lost_or_wrong_ray_misses_the_goal():
-    right = robustness.Verdict(100, 0, 7, 3, 0, 1.0, ())
+    right = robustness.Verdict(100, 0, 7, 3, 0, 1.0, (), ())
     assert goals._robust("corners", right).is_met
-    assert not goals._robust("corners", robustness.Verdict(100, 1, 7, 3, 0, 1.0, ())).is_met
-    assert not goals._robust("grazing", robustness.Verdict(100, 0, 7, 3, 1, 1.0, ())).is_met
+    assert not goals._robust("corners", robustness.Verdict(100, 1, 7, 3, 0, 1.0, (), ())).is_met
+    assert not goals._robust("grazing", robustness.Verdict(100, 0, 7, 3, 1, 1.0, (), ())).is_met
 
 
 def test_rays_of_all_walls_are_counted_together(monkeypatch):

@@ -136,7 +136,7 @@ def test_the_potential_certifies_the_least_law():
     potential = law.potential(theta)
     slack = np.cos(theta[:, None] - theta) - potential[:, None] - potential
     assert slack.min() > -1e-14
-    probability, outgoing = law.outcomes(theta)
+    probability, outgoing = law.images(theta)
     tight = np.cos(outgoing - theta[:, None]) - law.potential(outgoing) - potential[:, None]
     assert np.abs(tight[probability > 0.0]).max() < 1e-13
 

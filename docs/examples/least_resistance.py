@@ -52,7 +52,7 @@ def _draw(
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     left, right = figure.subplots(1, 2)
     theta = np.linspace(1e-3, np.pi - 1e-3, 1201)
-    probability, outgoing = law.outcomes(theta)
+    probability, outgoing = law.images(theta)
     for slot in (0, 1):
         used = probability[:, slot] > 0.0
         left.scatter(

@@ -47,7 +47,8 @@ class KnownRay:
     clearance : int
         ``CLEAR``, ``IN_ANGLE``, ``IN_WALL`` or ``TOO_FAR``.
     others : mapping of float to int
-        Angles and hits of rays some ulps beside it that go another way.
+        Angles and hits of rays some ulps beside it that go another way, and of this ray where the wall's rounded
+        coordinates send it another way than the ideal ones.
     """
 
     x: float
