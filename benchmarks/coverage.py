@@ -18,9 +18,9 @@ import numpy as np
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.kernels import functional
-from asperity.kernels.circular import CircularArcLaw
-from asperity.spectral.sampling import sampling_errors, sampling_quantile
+from asperity.kernels.aerodynamics import drag as functional
+from asperity.kernels.walls.circular_arc import CircularArcLaw
+from asperity.spectral.eigenvalues.standard_errors import sampling_errors, sampling_quantile
 
 REPEATS, RAYS, RESISTANCE_RAYS = 1000, 4096, 2**14
 TEETH, ARC = ker.TriangularTeethLaw(1.1), CircularArcLaw(1.2)

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from asperity import kernels as ker
-from asperity.kernels.row_quadrature import row_matrix
-from asperity.kernels.wall_rows import adaptive_rows
+from asperity.kernels.discretisation.traced import row_matrix
+from asperity.kernels.walls.conditionals import adaptive_rows
 
 TESTS = Path(__file__).parents[1] / "tests"
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)

@@ -11,10 +11,10 @@ from tests import precise_triangular
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.bench.timing import least_time
-from asperity.geometry.beams import beams_of
-from asperity.kernels.polygon_law import table_of_beams
-from asperity.kernels.row_quadrature import row_matrix
-from asperity.kernels.table_quadrature import table_matrix
+from asperity.geometry.polygons.beams import beams_of
+from asperity.kernels.discretisation.isometry_tables import table_matrix
+from asperity.kernels.discretisation.traced import row_matrix
+from asperity.kernels.walls.polygon import table_of_beams
 
 REPEATS = 3
 # <u, P u> / <u, u>, u = cos(theta): closed forms and independent quadrature, see docs/theory/closed-forms.md

@@ -31,8 +31,9 @@ from tests.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 import asperity
 from asperity import ledger
-from asperity.geometry import kinetics, rolling
-from asperity.kernels import circular, triangular
+from asperity.geometry.disk import kinetics, rolling
+from asperity.kernels.walls import circular_arc as circular
+from asperity.kernels.walls import triangular
 from asperity.verification import Entry
 
 ROOT = Path(asperity.__file__).parent

@@ -40,18 +40,18 @@ ROOT = Path(__file__).resolve().parent.parent
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 # The tests that are to see a fault in a module; the quick ones first, since the first failure ends a run.
 TESTS = {
-    "spectral/completeness.py": ("test_completeness.py",),
-    "spectral/enclosure.py": ("test_enclosure_intervals.py",),
-    "spectral/separation.py": ("test_separation.py",),
-    "kernels/symmetry.py": ("test_symmetry.py",),
-    "kernels/counting.py": ("test_counting.py",),
-    "kernels/products.py": ("test_weights_and_bases.py",),
-    "kernels/legendre.py": ("test_weights_and_bases.py",),
-    "kernels/panels.py": ("test_weights_and_bases.py",),
-    "kernels/collision.py": ("test_collision_maps.py",),
-    "kernels/measure.py": ("test_weights_and_bases.py",),
-    "geometry/disk.py": ("test_disk.py",),
-    "geometry/profile.py": ("test_profiles.py",),
+    "spectral/eigenvalues/completeness.py": ("test_completeness.py",),
+    "spectral/bounds/enclosure.py": ("test_enclosure_intervals.py",),
+    "spectral/bounds/separation.py": ("test_separation.py",),
+    "kernels/matrices/defects.py": ("test_symmetry.py",),
+    "kernels/sampling/counts.py": ("test_counting.py",),
+    "kernels/bases/assembly.py": ("test_weights_and_bases.py",),
+    "kernels/bases/legendre.py": ("test_weights_and_bases.py",),
+    "kernels/bases/panels.py": ("test_weights_and_bases.py",),
+    "kernels/collisions/collision_law.py": ("test_collision_maps.py",),
+    "kernels/bases/measure.py": ("test_weights_and_bases.py",),
+    "geometry/disk/disk.py": ("test_disk.py",),
+    "geometry/cells/profile.py": ("test_profiles.py",),
 }
 # Mutants of these kinds: exchanges of operators whose faults people make, not every operator by every other.
 KINDS = (

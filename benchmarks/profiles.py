@@ -25,7 +25,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.timing import least_time
 from asperity.checks import angles, finite_array
-from asperity.geometry.angle_engine import direction_angle, sine_cosine
+from asperity.geometry.tracing.compiled.trigonometry import direction_angle, sine_cosine
 
 from .rigid import DISK, random_states
 from .throughput import WALLS

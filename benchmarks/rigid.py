@@ -10,7 +10,7 @@ from tests.plain_collision import collide_plainly
 
 from asperity import geometry as geo
 from asperity.bench.timing import least_time
-from asperity.geometry.satellites import Satellites
+from asperity.geometry.disk.satellites import Satellites
 
 COLLISIONS, REPEATS = 2**18, 5
 STATES = 10**6

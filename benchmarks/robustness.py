@@ -22,9 +22,9 @@ from tests.precise_tracer import trace_precisely
 
 from asperity import geometry as geo
 from asperity.errors import WallError
-from asperity.geometry.double_double import EPS_DOUBLE_DOUBLE
-from asperity.geometry.refined_engine import LOST
-from asperity.geometry.refinement import RefinedTrace, refined_trace
+from asperity.geometry.tracing.double_double.arithmetic import EPS_DOUBLE_DOUBLE
+from asperity.geometry.tracing.double_double.rays import LOST
+from asperity.geometry.tracing.refinement import RefinedTrace, refined_trace
 
 Floats = NDArray[np.float64]
 EPS = 2.0**-52

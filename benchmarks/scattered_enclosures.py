@@ -21,7 +21,7 @@ from scipy.special import eval_legendre
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
-from asperity.kernels.phase_function import HenyeyGreensteinLaw
+from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw
 
 Floats = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.checks import Floats
-from asperity.spectral.essential import essential_edge
+from asperity.spectral.essential.edge import essential_edge
 
 DIGITS = 50
 # Of the slope to the fourth: what the precise judge allows, and up to which slope it is asked.

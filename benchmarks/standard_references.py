@@ -26,7 +26,7 @@ from asperity.bench.scenes import RANDOM_WALLS, wall_of
 from asperity.bench.standard_set import problem_names
 from asperity.bench.uniform_disk import DISK, correlation_of
 from asperity.checks import Floats
-from asperity.kernels.row_quadrature import row_matrix
+from asperity.kernels.discretisation.traced import row_matrix
 
 from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
 from .reference_eigenvalues import reference_eigenvalue

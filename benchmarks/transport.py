@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity import kernels as ker
 from asperity.bench.timing import least_time
-from asperity.kernels.row_transport import grid_wasserstein
+from asperity.kernels.distances.transport import grid_wasserstein
 
 REPEATS = 5
 # Sizes that the page shows.

@@ -6,21 +6,27 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..verification.identity import verify
-from .arc import Arc
-from .bezier import Bezier
-from .catalogue import WALLS, NamedWall, wall_from_text
-from .charts import RollingCharts, plane_crossing, plane_crossing_differential
-from .collision_drawing import collision_path, draw_collision, draw_configurations
-from .configuration import ConfigurationSpace
-from .container import Container
-from .curve import Curve
-from .cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
-from .disk import Disk
-from .drawing import draw_wall
-from .hollow import Hollow
-from .koch_curve import koch
-from .mushroom import mushrooms
-from .named import (
+from .cells.hollow import Hollow
+from .cells.profile import read_profile
+from .cells.toml import load_wall
+from .collisions.configuration_space import ConfigurationSpace
+from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
+from .collisions.rigid import RigidCollision, collide
+from .curves.arc import Arc
+from .curves.bezier import Bezier
+from .curves.curve import Curve
+from .curves.segment import Segment
+from .disk.charts import RollingCharts, plane_crossing, plane_crossing_differential
+from .disk.disk import Disk
+from .plotting.collisions import collision_path, draw_collision, draw_configurations
+from .plotting.walls import draw_wall
+from .scene.plan import TracePlan
+from .tables.container import Container
+from .tracing.tracing import Status, Trace, trace, trajectory
+from .walls.catalogue import WALLS, NamedWall, wall_from_text
+from .walls.koch_curve import koch
+from .walls.mushroom import mushrooms
+from .walls.named import (
     dispersing_arcs,
     double_parabola,
     elliptical_arcs,
@@ -29,16 +35,10 @@ from .named import (
     rectangular_teeth,
     triangular_teeth,
 )
-from .plan import TracePlan
-from .profile import read_profile
-from .rigid import RigidCollision, collide
-from .segment import Segment
-from .tracing import Status, Trace, trace, trajectory
-from .wall import Wall
-from .wallfile import load_wall
+from .walls.wall import Wall
 
 if TYPE_CHECKING:
-    from . import symbolic
+    from .disk import symbolic
 
 __all__ = [
     "WALLS",
@@ -90,5 +90,5 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     # sympy is loaded when it is first asked for
     if name == "symbolic":
-        return import_module(".symbolic", __name__)
+        return import_module(".disk.symbolic", __name__)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..checks import Floats, angles, frozen, number_between, whole_number
-from .blocks import interruptibly
-from .triangulation import triangulated
+from .polygons.triangulation import triangulated
+from .tracing.threads import interruptibly
 
 MAX_INTERVALS = 1_000_000
 MAX_BOUNCES = 1_000_000

@@ -13,10 +13,10 @@ import math
 import numpy as np
 from numba import njit
 
-from .double_double import add
-from .growing_tables import longer, taller
-from .triangulation import FIRST_WALL, OPENING
-from .unfolding_engine import offset_of, reduced, wall_lines
+from .polygons.compiled.unfolding_engine import offset_of, reduced, wall_lines
+from .polygons.triangulation import FIRST_WALL, OPENING
+from .tracing.compiled.growing import longer, taller
+from .tracing.double_double.arithmetic import add
 
 # Triangles that a ray may pass for every bounce that it is allowed.
 STEPS_A_BOUNCE = 64

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numba import njit
 
-from asperity.geometry.double_double import (
+from asperity.geometry.tracing.double_double.arithmetic import (
     add,
     cross,
     direction_angle,
@@ -30,7 +30,7 @@ from asperity.geometry.double_double import (
     two_sum,
     wide,
 )
-from asperity.geometry.refinement import RefinedTrace
+from asperity.geometry.tracing.refinement import RefinedTrace
 
 ESCAPED, CORNER, BOUNCE_LIMIT = 0, 1, 3
 # In front of a place, as a share of the cell and the depth: double-doubles carry some 1e-31, plates are 1e-17 at least.

@@ -1,8 +1,8 @@
 """Eigenvalues of focusing arcs by a second method: the complete Galerkin matrix on graded panels, entry by entry.
 
 ``python tests/precise_arc_eigenvalues.py`` prints what tests/test_adapted_panels.py holds the enclosures against. The
-entries are integrals over the polygons of each number of hits (kernels/arc_quadrature.py), which share nothing with
-rows, residuals and adapted panels but the law; moduli converge from below.
+entries are integrals over the polygons of each number of hits (kernels/discretisation/arcs.py), which share nothing
+with rows, residuals and adapted panels but the law; moduli converge from below.
 """
 
 from asperity import geometry as geo

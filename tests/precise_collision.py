@@ -14,7 +14,7 @@ import mpmath as mp
 import numpy as np
 
 from asperity.bench.extreme_disks import DATA, DISK, SCALES, WALL
-from asperity.geometry.satellites import Satellites
+from asperity.geometry.disk.satellites import Satellites
 
 FILE = Path(__file__).parents[1] / "src/asperity/bench" / DATA
 DIGITS, GUARD = 50, 15

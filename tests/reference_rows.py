@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.kernels import Legendre
-from asperity.kernels.row_quadrature import panel_edges
+from asperity.kernels.discretisation.traced import panel_edges
 from random_curved_walls import COUNT, random_curved_wall
 from textbook_tracer import compiled, follow, table_of
 

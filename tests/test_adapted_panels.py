@@ -8,11 +8,11 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.kernels.angle_panels import NODES
-from asperity.kernels.arc_quadrature import arc_matrix
-from asperity.kernels.measure import gauss_rule
-from asperity.kernels.panel_rows import basis_rows, function_rows, integrates_panels
-from asperity.spectral.adapted_panels import adapted_trials
+from asperity.kernels.bases.measure import gauss_rule
+from asperity.kernels.discretisation.arcs import arc_matrix
+from asperity.kernels.expectations.angle_panels import NODES
+from asperity.kernels.expectations.basis_means import basis_rows, function_rows, integrates_panels
+from asperity.spectral.bounds.trial_space import adapted_trials
 
 ANGLES = np.concatenate([0.05 + 0.3 * np.arange(10.0), [1e-6, 1.2, np.pi - 1e-6]])
 EDGES = np.append(np.arange(0.0, 3.0, 0.3), np.pi)
@@ -55,8 +55,8 @@ def test_rows_integrated_over_theta_give_the_matrix_of_polygons(panels):
 
 def test_rows_of_traced_walls_are_those_of_the_closed_form(panels):
     wall = geo.focusing_arcs(0.9)
-    from asperity.kernels.panel_rows import means_of_basis
-    from asperity.kernels.wall_rows import WallRows
+    from asperity.kernels.expectations.basis_means import means_of_basis
+    from asperity.kernels.walls.conditionals import WallRows
 
     rows = WallRows(wall, 1, panels.edges[1:-1], 2)(ANGLES[:5], 1e-8)
     traced = means_of_basis(panels, rows.nodes, rows.weights, rows.starts)

@@ -9,10 +9,10 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.angle_panels import GAUSS, KRONROD, NODES
-from asperity.kernels.panel_rows import has_costly_rows
-from asperity.kernels.row_quadrature import KRONROD_SHARE, row_matrix
-from asperity.kernels.wall_rows import adaptive_rows
+from asperity.kernels.discretisation.traced import KRONROD_SHARE, row_matrix
+from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
+from asperity.kernels.expectations.basis_means import has_costly_rows
+from asperity.kernels.walls.conditionals import adaptive_rows
 from plain_tracer import trace_plainly
 from random_curved_walls import random_curved_wall
 

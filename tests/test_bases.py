@@ -12,7 +12,7 @@ from numpy.polynomial import chebyshev, legendre
 
 from asperity.errors import InputError
 from asperity.kernels import SINE, SINE_SQUARED, Basis, Bins, Legendre, Panels, TensorBasis
-from asperity.kernels.reflection import is_mirror_symmetric, mirror_refinement, reflection_matrix
+from asperity.kernels.bases.mirror import is_mirror_symmetric, mirror_refinement, reflection_matrix
 
 BASES = [
     Bins(1),

@@ -6,7 +6,7 @@ import pytest
 from asperity import InputError, WallError
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.beams import beams_of
+from asperity.geometry.polygons.beams import beams_of
 from random_hollows import random_hollow, wall_with
 
 RANDOM = 50

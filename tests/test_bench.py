@@ -34,8 +34,8 @@ from asperity.bench.timing import side_by_side
 from asperity.cli import main
 from asperity.errors import InputError
 from asperity.estimates import student_95
-from asperity.kernels.directions import Directions
-from asperity.kernels.net import PARTS
+from asperity.kernels.bases.momentum import Directions
+from asperity.kernels.sampling.sobol import PARTS
 
 RAYS = 2**12
 

@@ -8,8 +8,8 @@ import sympy
 from asperity import geometry as geo
 from asperity import ledger
 from asperity.errors import InputError
-from asperity.geometry import rolling
-from asperity.geometry.rolling import SERIES_ANGLE
+from asperity.geometry.disk import rolling
+from asperity.geometry.disk.rolling import SERIES_ANGLE
 from differentiation import complex_steps
 
 CHARTS = [geo.RollingCharts(2 * np.pi / 40), geo.RollingCharts(2 * np.pi / 9000, scale=1e-8)]

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from asperity.kernels.circular import CircularArcLaw
-from asperity.kernels.law import BranchLaw, Law
-from asperity.kernels.measure import SINE
-from asperity.kernels.rectangular import RectangularTeethLaw
-from asperity.kernels.triangular import TriangularTeethLaw
+from asperity.kernels.bases.measure import SINE
+from asperity.kernels.laws.law import BranchLaw, Law
+from asperity.kernels.walls.circular_arc import CircularArcLaw
+from asperity.kernels.walls.rectangular import RectangularTeethLaw
+from asperity.kernels.walls.triangular import TriangularTeethLaw
 
 ANGLES = [0.02, 0.3, 0.7, math.pi / 4, 1.1, math.pi / 3, math.pi / 2, 2.0, 2.9, math.pi - 1e-4]
 

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asperity.errors import InputError
-from asperity.kernels.circular import CircularArcLaw
-from asperity.kernels.law import BranchLaw, Law
-from asperity.kernels.measure import SINE
-from asperity.kernels.rectangular import RectangularTeethLaw
-from asperity.kernels.triangular import TriangularTeethLaw
+from asperity.kernels.bases.measure import SINE
+from asperity.kernels.laws.law import BranchLaw, Law
+from asperity.kernels.walls.circular_arc import CircularArcLaw
+from asperity.kernels.walls.rectangular import RectangularTeethLaw
+from asperity.kernels.walls.triangular import TriangularTeethLaw
 
 EPS = float(np.finfo(np.float64).eps)
 Hit = tuple[float, tuple[float, float]] | None

@@ -10,9 +10,9 @@ import pytest
 from numba import njit
 
 from asperity import geometry as geo
-from asperity.geometry import angle_engine
-from asperity.geometry.refinement import refined_trace
-from asperity.geometry.tracing import Status
+from asperity.geometry.tracing.compiled import trigonometry as angle_engine
+from asperity.geometry.tracing.refinement import refined_trace
+from asperity.geometry.tracing.tracing import Status
 from precise_polynomials import POLYNOMIALS, coefficients
 
 EPS = 2.0**-52

@@ -8,7 +8,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import InputError
-from asperity.kernels import collision
+from asperity.kernels.collisions import collision_law as collision
 
 DISK = geo.Disk(1.0, 0.5)
 

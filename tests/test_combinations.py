@@ -11,15 +11,15 @@ from hypothesis import strategies as st
 
 from asperity.errors import InputError
 from asperity.kernels import Combination, Composition, mixture
-from asperity.kernels.circular import CircularArcLaw
-from asperity.kernels.density import DensityLaw
-from asperity.kernels.ideal import lambertian, maxwell, retroreflection, specular
-from asperity.kernels.law import Law
-from asperity.kernels.matrix_law import MatrixLaw
-from asperity.kernels.measure import SINE
-from asperity.kernels.phase_function import henyey_greenstein
-from asperity.kernels.rectangular import RectangularTeethLaw
-from asperity.kernels.triangular import TriangularTeethLaw
+from asperity.kernels.bases.measure import SINE
+from asperity.kernels.laws.density import DensityLaw
+from asperity.kernels.laws.ideal import lambertian, maxwell, retroreflection, specular
+from asperity.kernels.laws.law import Law
+from asperity.kernels.laws.matrix_law import MatrixLaw
+from asperity.kernels.laws.phase_function import henyey_greenstein
+from asperity.kernels.walls.circular_arc import CircularArcLaw
+from asperity.kernels.walls.rectangular import RectangularTeethLaw
+from asperity.kernels.walls.triangular import TriangularTeethLaw
 
 THETA = np.linspace(0.07, 3.05, 23)
 # A law that preserves the measure and is neither reversible nor mirror symmetric: a cycle of three equal bins.

@@ -8,8 +8,8 @@ from scipy.linalg import qr
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.spectral.completeness import Deflated, margin_below, norm_beyond
-from asperity.spectral.extremes import end_values, outermost
+from asperity.spectral.eigenvalues.completeness import Deflated, margin_below, norm_beyond
+from asperity.spectral.eigenvalues.dense import end_values, outermost
 
 SIZE = 600
 RNG = np.random.default_rng(7)

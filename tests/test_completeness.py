@@ -8,7 +8,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from asperity.spectral.completeness import Deflated, margin_below, norm_beyond
+from asperity.spectral.eigenvalues.completeness import Deflated, margin_below, norm_beyond
 
 U = 2.0**-53
 RNG = np.random.default_rng(11)

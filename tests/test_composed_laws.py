@@ -11,8 +11,8 @@ from benchmarks.composed_laws import Arcs, Rectangular, exchanged, leaf, outcome
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
-from asperity.kernels.repeated_teeth import RepeatedTeethLaw
-from asperity.kernels.words import law_of, words_of
+from asperity.kernels.walls.repeated_teeth import RepeatedTeethLaw
+from asperity.kernels.walls.words import law_of, words_of
 
 TEETH, CREVICES = ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(0.8)
 HG = ker.henyey_greenstein

@@ -8,7 +8,7 @@ import shapely
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry import rolling
+from asperity.geometry.disk import rolling
 from differentiation import complex_steps
 
 WALLS = [

@@ -11,8 +11,9 @@ from scipy.sparse import issparse
 from scipy.stats import binom, chi2, gamma, norm, t
 
 from asperity.errors import AccuracyError
-from asperity.kernels import Bins, Legendre, counting
-from asperity.kernels.counting import array_from_counts, array_from_sums, count_pairs, half_width, sum_products
+from asperity.kernels import Bins, Legendre
+from asperity.kernels.sampling import counts as counting
+from asperity.kernels.sampling.counts import array_from_counts, array_from_sums, count_pairs, half_width, sum_products
 
 UNEVEN = Bins([0.0, np.pi / 3, np.pi])  # of measures 1/4 and 3/4
 COUNTS = np.array([[30, 10], [20, 100]])

@@ -22,7 +22,7 @@ from scipy.stats import binomtest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.kernels.counting import LEVEL, _squared_norms, half_width
+from asperity.kernels.sampling.counts import LEVEL, _squared_norms, half_width
 from asperity.study import check_tracer
 
 REPEATS = 120

@@ -8,7 +8,7 @@ from benchmarks import modified_law
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.satellites import Satellites
+from asperity.geometry.disk.satellites import Satellites
 from test_rigid import WALLS, states
 
 RATIOS = (0.1, 1.0, 2.0, 10.0)

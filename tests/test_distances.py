@@ -18,10 +18,10 @@ from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
-from asperity.kernels import joint_distance
-from asperity.kernels.pseudometric import flux_means
-from asperity.kernels.row_transport import Distributions, grid_wasserstein, wasserstein
-from asperity.kernels.wall_rows import WallRows
+from asperity.kernels.distances import joint as joint_distance
+from asperity.kernels.distances.pseudometric import flux_means
+from asperity.kernels.distances.transport import Distributions, grid_wasserstein, wasserstein
+from asperity.kernels.walls.conditionals import WallRows
 
 KINDS = ("rows", "sup", "joint", "pseudometric")
 

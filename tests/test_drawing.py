@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.geometry.drawing import vertical_stretch
-from asperity.spectral.picture import draw_spectrum
+from asperity.geometry.plotting.walls import vertical_stretch
+from asperity.spectral.plotting import draw_spectrum
 from asperity.study import study_wall
 from asperity.study_picture import MOST_BOUNCES, chosen_rays, draw_outgoing_velocities, draw_study_wall, gallery
 

@@ -8,10 +8,10 @@ import pytest
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
-from asperity.spectral import enclosure
-from asperity.spectral.enclosure import Enclosure, Enclosures
-from asperity.spectral.separation import Separation
-from asperity.spectral.trials import Residuals
+from asperity.spectral.bounds import enclosure
+from asperity.spectral.bounds.enclosure import Enclosure, Enclosures
+from asperity.spectral.bounds.operator_residuals import Residuals
+from asperity.spectral.bounds.separation import Separation
 
 EPS = float(np.finfo(float).eps)
 REST = Separation(0.25, "bound", "known")

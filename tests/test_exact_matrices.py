@@ -7,9 +7,9 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.beams import beams_of
-from asperity.kernels.polygon_law import table_of_beams
-from asperity.kernels.table_quadrature import table_matrix
+from asperity.geometry.polygons.beams import beams_of
+from asperity.kernels.discretisation.isometry_tables import table_matrix
+from asperity.kernels.walls.polygon import table_of_beams
 from precise_triangular import ANGLE, BINS, matrix, reference
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
-from asperity.geometry.refinement import refined_trace
+from asperity.geometry.tracing.refinement import refined_trace
 from precise_tracer import trace_precisely
 
 EPS = 2.0**-52

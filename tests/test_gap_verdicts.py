@@ -9,8 +9,8 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError
-from asperity.kernels.algebra import lists_branches, made_of_isometries
-from asperity.spectral.essential import essential_edge, grazing_symbol
+from asperity.kernels.laws.structure import lists_branches, made_of_isometries
+from asperity.spectral.essential.edge import essential_edge, grazing_symbol
 
 SEMICIRCLE = ker.CircularArcLaw(np.pi / 2)
 TEETH = ker.TriangularTeethLaw(0.7)

@@ -165,5 +165,5 @@ def test_the_sdist_carries_tests_pages_and_the_rooms_as_real_files(distributions
 def test_no_function_bears_the_name_of_its_file():
     # once the file is imported its name would hide a function that its room exports lazily
     for room in ("geometry", "kernels", "spectral"):
-        for file in (ROOT / room).glob("*.py"):
+        for file in (ROOT / room).rglob("*.py"):
             assert not re.search(rf"^def {file.stem}\(", file.read_text(encoding="utf-8"), re.MULTILINE), file

@@ -13,14 +13,14 @@ from numpy.polynomial import legendre
 from scipy.special import ellipe
 
 from asperity.errors import AccuracyError, InputError
-from asperity.kernels.bins import Bins
-from asperity.kernels.density import DensityLaw
-from asperity.kernels.ideal import lambertian, maxwell, retroreflection, specular
-from asperity.kernels.involution import InvolutionLaw
-from asperity.kernels.legendre import Legendre
-from asperity.kernels.matrix_law import MatrixLaw
-from asperity.kernels.measure import SINE
-from asperity.kernels.phase_function import HenyeyGreensteinLaw, henyey_greenstein
+from asperity.kernels.bases.bins import Bins
+from asperity.kernels.bases.legendre import Legendre
+from asperity.kernels.bases.measure import SINE
+from asperity.kernels.laws.density import DensityLaw
+from asperity.kernels.laws.ideal import lambertian, maxwell, retroreflection, specular
+from asperity.kernels.laws.involution import InvolutionLaw
+from asperity.kernels.laws.matrix_law import MatrixLaw
+from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw, henyey_greenstein
 
 THETA = np.array([1e-12, 1e-4, 0.2, 0.9, math.pi / 2, 2.2, 3.0, math.pi - 1e-4, math.pi - 1e-12])
 

@@ -9,9 +9,9 @@ import pytest
 
 from asperity import kernels as ker
 from asperity.errors import InputError
-from asperity.kernels import ray_sums
-from asperity.kernels.net import PARTS, SOBOL_BITS, Net
-from asperity.kernels.reflection import reflection_matrix
+from asperity.kernels.bases.mirror import reflection_matrix
+from asperity.kernels.sampling import rays as ray_sums
+from asperity.kernels.sampling.sobol import PARTS, SOBOL_BITS, Net
 
 TEETH = ker.TriangularTeethLaw(1.1)
 BASES = [ker.Bins(16), ker.Bins(9), ker.Legendre(6), ker.Panels(np.linspace(0.0, np.pi, 5), 2)]

@@ -11,9 +11,9 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
-from asperity.kernels.branch_quadrature import branch_matrix
-from asperity.kernels.isometry import isometries, table_of
-from asperity.kernels.isometry_table import IsometryTable
+from asperity.kernels.discretisation.isometries import branch_matrix
+from asperity.kernels.walls.isometry_branches import isometries, table_of
+from asperity.kernels.walls.isometry_table import IsometryTable
 from traced_pairs import chi_square_p
 
 EPS = float(np.finfo(np.float64).eps)
@@ -80,9 +80,9 @@ def test_polygons_that_are_teeth_have_the_laws_of_teeth(r: float) -> None:
 
 
 def test_beams_of_a_triangle_and_a_rectangle_give_the_closed_forms() -> None:
-    from asperity.geometry.beams import beams_of
-    from asperity.kernels.polygon_law import table_of_beams
-    from asperity.kernels.table_quadrature import table_matrix
+    from asperity.geometry.polygons.beams import beams_of
+    from asperity.kernels.discretisation.isometry_tables import table_matrix
+    from asperity.kernels.walls.polygon import table_of_beams
 
     for basis in BASES:
         table = table_of_beams(beams_of([(0, 0), (0.5, -0.5 / math.tan(0.35)), (1, 0)]))
@@ -136,7 +136,7 @@ def test_traced_rays_follow_the_exact_law(name: str) -> None:
 def test_different_hollows_add_up_by_their_widths_and_equal_ones_are_computed_once(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from asperity.geometry import beams
+    from asperity.geometry.polygons import beams
 
     calls: list[int] = []
     whole = beams.beams_of

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.profile import vertices_of_profile
+from asperity.geometry.cells.profile import vertices_of_profile
 
 # ---- from positions and heights to vertices ----------------------------------------------------------------------
 EXACT = {

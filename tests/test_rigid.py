@@ -9,9 +9,9 @@ import pytest
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.contact_engine import ROOT_STEPS, next_root
-from asperity.geometry.flight_engine import flight
-from asperity.geometry.satellites import Satellites
+from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, next_root
+from asperity.geometry.collisions.compiled.flight_engine import flight
+from asperity.geometry.disk.satellites import Satellites
 from plain_collision import collide_plainly
 
 DISK = geo.Disk(1.0, 0.6)

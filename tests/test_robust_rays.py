@@ -10,7 +10,7 @@ import pytest
 from benchmarks.robustness import WALLS, aimed_rays, grazing_rays, judge
 
 from asperity import geometry as geo
-from asperity.geometry.refinement import refined_trace
+from asperity.geometry.tracing.refinement import refined_trace
 from precise_tracer import trace_precisely
 
 RAYS = 3_000

@@ -10,7 +10,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
-from asperity.kernels.net import PARTS
+from asperity.kernels.sampling.sobol import PARTS
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
-from asperity.spectral.enclosure import Enclosure, _with_ties
-from asperity.spectral.separation import rest_of_spectrum
-from asperity.spectral.trials import image_rule
+from asperity.spectral.bounds.enclosure import Enclosure, _with_ties
+from asperity.spectral.bounds.operator_residuals import image_rule
+from asperity.spectral.bounds.separation import rest_of_spectrum
 
 
 @pytest.mark.parametrize("make, numbers", [(diagonal_case, range(40)), (teeth_case, range(2))], ids=["words", "teeth"])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
-from asperity.spectral import separation
-from asperity.spectral.separation import lambertian_share, rest_of_spectrum
+from asperity.spectral.bounds import separation
+from asperity.spectral.bounds.separation import lambertian_share, rest_of_spectrum
 
 EPS = float(np.finfo(float).eps)
 CONSTANTS = np.ones(1)

@@ -11,11 +11,11 @@ from scipy.linalg import eigh
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.spectral.essential import essential_edge, grazing_symbol
-from asperity.spectral.grazing import grazed, grazing_limit
-from asperity.spectral.oscillations import held_against_oscillations
-from asperity.spectral.shallow import shallow_gap
-from asperity.spectral.verdict import SpectralGap, isolated
+from asperity.spectral.bounds.oscillations import held_against_oscillations
+from asperity.spectral.essential.edge import essential_edge, grazing_symbol
+from asperity.spectral.essential.grazing import grazed, grazing_limit
+from asperity.spectral.gap.shallow import shallow_gap
+from asperity.spectral.gap.verdict import SpectralGap, isolated
 from textbook_tracer import follow, table_of
 
 
@@ -130,7 +130,7 @@ def test_a_vertical_side_of_a_shallow_hollow_is_looked_at_from_its_own_scale():
 
 
 def test_a_limit_above_the_norm_is_no_limit(monkeypatch):
-    from asperity.spectral import grazing
+    from asperity.spectral.essential import grazing
 
     def growing(law, angle, end, parts):
         return np.array([1.0 + 0.1 * end, 0.2]), 1e-9
@@ -142,7 +142,7 @@ def test_a_limit_above_the_norm_is_no_limit(monkeypatch):
 
 
 def test_what_cannot_be_told_is_undecided(monkeypatch):
-    from asperity.spectral import grazing
+    from asperity.spectral.essential import grazing
 
     monkeypatch.setattr(grazing, "_row", lambda law, angle, end, parts: (np.array([2.0, 0.0]), 1e-9))
     wall = geo.Wall([geo.Arc((0.5, 0), (0.5, 0.35), np.pi, 2 * np.pi)])
@@ -178,7 +178,7 @@ def bent_teeth(depth, bend):
 
 
 def test_the_better_of_two_gaps_is_reported(monkeypatch):
-    from asperity.spectral import gap as module
+    from asperity.spectral.gap import gap as module
 
     law = ker.CircularArcLaw(1e-3).in_specular_frame()
     poor = SpectralGap(1e-6, 1e-5, "estimate", "a matrix", "undecided", (), law.frame)
@@ -215,7 +215,7 @@ def test_a_gap_of_slow_functions_is_held_against_fast_oscillations(depth, of_slo
 
 
 def test_gaps_of_laws_go_through_the_check_by_oscillations(monkeypatch):
-    from asperity.spectral import gap as module
+    from asperity.spectral.gap import gap as module
 
     law = ker.WallLaw(bent_teeth(1.0, 1e-4))
     claimed = SpectralGap(0.2, 1e-6, "estimate", "slow functions", "isolated", (), law.frame)

@@ -14,7 +14,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
 from asperity.estimates import Estimate
-from asperity.spectral.sampling import sampling_errors
+from asperity.spectral.eigenvalues.standard_errors import sampling_errors
 
 
 # ---- parities ---------------------------------------------------------------------------------------------------

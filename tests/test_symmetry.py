@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, gamma, norm, t
 
-from asperity.kernels.symmetry import (
+from asperity.kernels.matrices.defects import (
     SYMMETRY_NORM,
     Defect,
     SymmetryDefect,

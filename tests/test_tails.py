@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asperity import kernels as ker
-from asperity.kernels.periodic_tail import crevice_nodes, first_crossing, sum_rule
+from asperity.kernels.walls.crevice_tail import crevice_nodes, first_crossing, sum_rule
 
 EPS = float(np.finfo(np.float64).eps)
 DEPTHS = [1e-6, 1e-3, 0.3, 1.0, 7.3, 1e2, 1e4, 1e8, 1e12]

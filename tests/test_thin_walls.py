@@ -12,10 +12,10 @@ import pytest
 from benchmarks.robustness import COLLISIONS, POLYGONS, brute_force, judge, random_polygon, rays_beside_corners
 
 from asperity import geometry as geo
-from asperity.geometry.exact_points import ExactPoints
-from asperity.geometry.nearby_engine import line_time
-from asperity.geometry.refinement import refined_trace
-from asperity.geometry.sides_engine import orientation
+from asperity.geometry.polygons.predicates import ExactPoints
+from asperity.geometry.tracing.compiled.nearby import line_time
+from asperity.geometry.tracing.double_double.sides import orientation
+from asperity.geometry.tracing.refinement import refined_trace
 from precise_tracer import trace_precisely
 
 WALLS, RAYS, PRECISE_RAYS = 12, 1_000, 6

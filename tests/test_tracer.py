@@ -10,7 +10,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.blocks import in_blocks
+from asperity.geometry.tracing.threads import in_blocks
 from plain_tracer import trace_plainly
 
 EPS = np.finfo(float).eps

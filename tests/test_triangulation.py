@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from asperity.geometry.beams import beams_of
 from asperity.geometry.marching import exact_row
-from asperity.geometry.triangulation import FIRST_WALL, OPENING, triangulated
+from asperity.geometry.polygons.beams import beams_of
+from asperity.geometry.polygons.triangulation import FIRST_WALL, OPENING, triangulated
 from random_hollows import graph_hollow, random_hollow
 
 AWKWARD = {

@@ -14,10 +14,10 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.cli import main
 from asperity.errors import AccuracyError
-from asperity.spectral.contraction import self_adjoint_elsewhere
-from asperity.spectral.eigenvalues import matrix_spectrum
-from asperity.spectral.refinement import Refinement
-from asperity.spectral.straight_pieces import straight_part
+from asperity.spectral.bounds.contraction import self_adjoint_elsewhere
+from asperity.spectral.eigenvalues.spectra import matrix_spectrum
+from asperity.spectral.essential.straight_pieces import straight_part
+from asperity.spectral.gap.refinement import Refinement
 
 ARC = ker.CircularArcLaw(1.2)
 SKEW = ker.WallLaw(geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])]))

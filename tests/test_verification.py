@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from asperity import InputError, Verdict, verify
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry import symbolic as sym
+from asperity.geometry.disk import symbolic as sym
 from asperity.verification import agreement, every, holds, no_excess
 from asperity.verification.balls import evaluate
 

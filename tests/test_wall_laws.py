@@ -10,13 +10,13 @@ import pytest
 from asperity import geometry as geo
 from asperity.errors import AccuracyError, InputError
 from asperity.kernels import Combination
-from asperity.kernels.circular import CircularArcLaw
-from asperity.kernels.ideal import specular
-from asperity.kernels.law import Law
-from asperity.kernels.measure import SINE
-from asperity.kernels.rectangular import RectangularTeethLaw
-from asperity.kernels.triangular import TriangularTeethLaw
-from asperity.kernels.wall_law import LOST_TOLERANCE, WallLaw
+from asperity.kernels.bases.measure import SINE
+from asperity.kernels.laws.ideal import specular
+from asperity.kernels.laws.law import Law
+from asperity.kernels.walls.circular_arc import CircularArcLaw
+from asperity.kernels.walls.rectangular import RectangularTeethLaw
+from asperity.kernels.walls.triangular import TriangularTeethLaw
+from asperity.kernels.walls.wall_law import LOST_TOLERANCE, WallLaw
 
 
 def same(law: Law | None, expected: Law) -> bool:

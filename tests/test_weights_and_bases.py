@@ -11,10 +11,10 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.kernels import SINE, SINE_SQUARED, Bins, Legendre, Panels
-from asperity.kernels import measure as weights_module
-from asperity.kernels import products as products_module
-from asperity.kernels.measure import gauss_on_intervals, gauss_rule, measure_by_name
-from asperity.kernels.products import add_products, cell_index, one_blas_thread, overlaps
+from asperity.kernels.bases import assembly as products_module
+from asperity.kernels.bases import measure as weights_module
+from asperity.kernels.bases.assembly import add_products, cell_index, one_blas_thread, overlaps
+from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
 
 UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...verification import Formula, Verdict, agreement, erratum, every, holds, no_excess, verified, verify
 from ...verification.entry import Code
-from .. import rolling
+from ..disk import rolling
 from .trials import clearance, generator, is_free, residual, satellites
 
 SATELLITES = 40
@@ -238,7 +238,7 @@ def rolling_from_rest(claim: Code) -> Verdict:
 def distance_of_satellites(distance: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     places = [rolling.satellite(0, 0, sym.alpha + k * sym.rho, 1, sp) for k in (0, 1)]
     square = sum((a - b) ** 2 for a, b in zip(*places, strict=True))

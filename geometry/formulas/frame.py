@@ -6,7 +6,7 @@ from typing import Any
 
 from ...verification import Formula, Verdict, convention, erratum, every, verified, verify
 from ...verification.entry import Code
-from ..kinetics import direction, foreshortening, frame_rows
+from ..disk.kinetics import direction, foreshortening, frame_rows
 
 
 @verified(
@@ -24,7 +24,7 @@ from ..kinetics import direction, foreshortening, frame_rows
 def rolling_momentum(momentum: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     v1, v2, omega = sp.symbols("v1 v2 omega", real=True)
     return verify(momentum(sym.m, sym.J, v1, omega), sym.inner([v1, v2, omega], [-1, 0, 1]))
@@ -42,7 +42,7 @@ def rolling_momentum(momentum: Code) -> Verdict:
 def sign_of_the_rolling_direction(chi: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     frame = sp.Matrix([*frame_rows(sym.m, sym.J, sp)[:2], chi(sym.m, sym.J, sp)])
     turned = verify((frame * sym.metric.applyfunc(sp.sqrt)).det(), 1)
@@ -65,7 +65,7 @@ def sign_of_the_rolling_direction(chi: Code) -> Verdict:
 def the_frame_is_orthonormal(frame_of: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     frame = sp.Matrix(frame_of(sym.m, sym.J, sp))
     w = sp.Matrix([sym.v1, sym.v2, sym.omega])
@@ -90,7 +90,7 @@ def the_frame_is_orthonormal(frame_of: Code) -> Verdict:
 def chart_of_the_half_sphere(components: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     chart = sym.frame.T * sp.Matrix(components(sym.theta, sym.psi, sp))
     area = sym.volume_density(chart, [sym.theta, sym.psi])
@@ -120,7 +120,7 @@ def chart_of_the_half_sphere(components: Code) -> Verdict:
 def vertical_component(component: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     return verify(sym.inner(sym.G, sym.e2), component(sym.m, sym.theta, sym.psi, sp))
 
@@ -144,7 +144,7 @@ def vertical_component(component: Code) -> Verdict:
 def invariant_measure(density: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     y1, y3 = sp.symbols("y1 y3", real=True)
     place = y1 * sym.chi_perp + y3 * sym.chi
@@ -165,7 +165,7 @@ def invariant_measure(density: Code) -> Verdict:
 def flip_of_the_polar_angle(flip: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     theta_out, offset = sp.symbols("theta' offset", real=True)
 
@@ -200,7 +200,7 @@ def flip_of_the_polar_angle(flip: Code) -> Verdict:
 def foreshortened_wall(image: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     x1, x2, a = sp.symbols("x1 x2 a", real=True)
     place = [x1 - a, x2, a]
@@ -218,7 +218,7 @@ def foreshortened_wall(image: Code) -> Verdict:
     "on it.",
 )
 def masses_without_loss(normalised: Code) -> Verdict:
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     mass, inertia = normalised(sym.m, sym.J)
     same_law = verify(sym.no_slip, sym.no_slip.subs({sym.m: mass, sym.J: inertia}, simultaneous=True))

@@ -20,7 +20,7 @@ from ...verification import (
     verify,
 )
 from ...verification.entry import Code
-from ..kinetics import contact_normal
+from ..disk.kinetics import contact_normal
 from .trials import generator
 
 
@@ -53,7 +53,7 @@ def impulsive_torque(torque: Code) -> Verdict:
     "likes. No formula uses the range.",
 )
 def range_of_the_arm(interval: Code) -> Verdict:
-    from ..mushroom import mushrooms
+    from ..walls.mushroom import mushrooms
 
     low, high = interval()
     normals = []
@@ -87,8 +87,8 @@ def range_of_the_arm(interval: Code) -> Verdict:
 def arm_of_a_satellite(sine: Code) -> Verdict:
     import sympy as sp
 
-    from .. import rolling
-    from .. import symbolic as sym
+    from ..disk import rolling
+    from ..disk import symbolic as sym
 
     direction, x1, x2, turn = sp.symbols("direction x1 x2 turn", real=True)
     k = sp.cos(direction), sp.sin(direction)
@@ -113,7 +113,7 @@ def arm_of_a_satellite(sine: Code) -> Verdict:
 def impulse_is_reflection(reflected: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     direction, v1, v2, omega = sp.symbols("direction v1 v2 omega", real=True)
     k, w = (sp.cos(direction), sp.sin(direction)), (v1, v2, omega)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...verification import Formula, Verdict, by_reading, erratum, every, no_excess, verified, verify
 from ...verification.entry import Code
-from .. import rolling
+from ..disk import rolling
 
 
 @verified(

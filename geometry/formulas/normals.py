@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ...verification import Formula, Verdict, erratum, every, verified, verify
 from ...verification.entry import Code
-from .. import rolling
-from ..kinetics import contact_normal
+from ..disk import rolling
+from ..disk.kinetics import contact_normal
 
 
 @verified(
@@ -50,7 +50,7 @@ def _is_unit_normal(normal: Code, turned: bool) -> Verdict:
     """Whether it is the kinetic gradient of the satellite's distance from the wall, and of norm 1."""
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     direction, x1, x2, angle = sp.symbols("direction x1 x2 angle", real=True)
     turn = sp.Symbol("turn", real=True) if turned else sp.Integer(0)

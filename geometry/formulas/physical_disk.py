@@ -32,7 +32,7 @@ DEPTH = 0.7
 )
 def limit_of_the_disk(factor: Code) -> Verdict:
     from .. import Wall
-    from ..tracing import trace
+    from ..tracing.tracing import trace
 
     rng = generator()
     verdicts = []
@@ -50,7 +50,7 @@ def limit_of_the_disk(factor: Code) -> Verdict:
 
 def _angle_after(x: float, theta: float, psi: float, m: float, J: float) -> float:
     """Follow the disk through the wall, in units of eps, and return the angle of its outgoing velocity."""
-    from ..disk import Disk
+    from ..disk.disk import Disk
 
     disk = Disk(m, J)
     w = -disk.from_angles(theta, psi)

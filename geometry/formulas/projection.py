@@ -8,8 +8,8 @@ import numpy as np
 
 from ...verification import Formula, Verdict, by_reading, convention, erratum, every, holds, verified, verify
 from ...verification.entry import Code
-from .. import rolling
-from ..kinetics import frame_rows
+from ..disk import rolling
+from ..disk.kinetics import frame_rows
 from .trials import generator, masses
 
 
@@ -17,7 +17,7 @@ def _orthonormal(s1: Any, s2: Any) -> Any:
     """The components along chi_perp and e2^ of a configuration over the point (s1, s2) of the plane."""
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     configuration = rolling.roll_linear(s1, s2, sym.alpha)
     return [sp.simplify(sym.inner(row, configuration)) for row in frame_rows(sym.m, sym.J, sp)[:2]]
@@ -39,7 +39,7 @@ def _orthonormal(s1: Any, s2: Any) -> Any:
 def compression_of_the_wall(factor: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     s1, s2 = sp.symbols("s1 s2", positive=True)
     across, up = _orthonormal(s1, s2)
@@ -58,7 +58,7 @@ def compression_of_the_wall(factor: Code) -> Verdict:
 def angle_of_the_axis(axis: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     direction = axis(sym.J, sp)
     return every(
@@ -85,7 +85,7 @@ def angle_of_the_axis(axis: Code) -> Verdict:
 def projection_of_the_cylinder(image: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     s1, s2 = sp.symbols("s1 s2", real=True)
     return verify(image(s1, s2, sym.m, sym.J, sp), _orthonormal(s1, s2))
@@ -164,7 +164,7 @@ def covering_by_squares(factor: Code) -> Verdict:
 def scale_of_the_foreshortened_wall(factor: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     s1, s2 = sp.symbols("s1 s2", real=True)
     stretch = sp.sqrt(1 + sym.m / sym.J)

@@ -6,19 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ...verification import (
-    Formula,
-    Verdict,
-    agreement,
-    by_reading,
-    erratum,
-    every,
-    no_excess,
-    verified,
-    verify,
-)
+from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, no_excess, verified, verify
 from ...verification.entry import Code
-from .. import rolling
+from ..disk import rolling
 from .trials import generator, masses, unit_velocities
 
 

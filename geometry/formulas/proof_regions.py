@@ -18,7 +18,7 @@ from ...verification import (
     verify,
 )
 from ...verification.entry import Code
-from .. import rolling
+from ..disk import rolling
 from .trials import generator, kinetic_norm, masses, residual, unit_velocities
 
 good_states = by_reading(
@@ -200,7 +200,7 @@ def size_of_a_displacement(bound: Code) -> Verdict:
 def area_of_the_zoomed_rectangle(factor: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     eps, x1, alpha = sp.Symbol("epsilon", positive=True), sp.Symbol("x1"), sp.Symbol("alpha")
     half = sym.rho / (2 * eps)

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...verification import Formula, Verdict, agreement, by_reading, erratum, every, holds, verified, verify
 from ...verification.entry import Code
-from ..named import dispersing_arcs, focusing_arcs, rectangular_teeth, triangular_teeth
-from ..tracing import trace
+from ..tracing.tracing import trace
+from ..walls.named import dispersing_arcs, focusing_arcs, rectangular_teeth, triangular_teeth
 
 RAYS = 400
 # Rounding of a ray grows with the curvature of the wall and its bounces; these walls and rays have few.

@@ -18,7 +18,7 @@ from ...verification import (
     verify,
 )
 from ...verification.entry import Code
-from .. import rolling
+from ..disk import rolling
 from .trials import generator, is_free, kinetic_norm, masses, tooth
 
 
@@ -34,7 +34,7 @@ from .trials import generator, is_free, kinetic_norm, masses, tooth
 def linear_chart(chart: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     s1, s2 = sp.symbols("s1 s2", real=True)
     rolled = (*rolling.roll(s1, s2, sym.alpha, 1, sp), sym.alpha)
@@ -59,7 +59,7 @@ def linear_chart(chart: Code) -> Verdict:
 def straightening(bend: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     s1, s2 = sp.symbols("s1 s2", real=True)
     y1, y2, _ = rolling.roll_linear(s1, s2, sym.alpha)
@@ -143,7 +143,7 @@ def size_of_the_straightening(bound: Code) -> Verdict:
 def point_of_the_shifted_wall(point: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     s1, s2 = sp.symbols("s1 s2", real=True)
     x1, x2, alpha = rolling.roll_linear(s1, s2 + 1, sym.alpha)  # the paper's f_lin, with heights from the centre
@@ -163,7 +163,7 @@ def point_of_the_shifted_wall(point: Code) -> Verdict:
 def graph_of_the_bent_plane(graph: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     x1, x2, s = sp.symbols("x1 x2 s", real=True)
     u = graph(sym.alpha, sp)

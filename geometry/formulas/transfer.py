@@ -8,7 +8,7 @@ import numpy as np
 
 from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, no_excess, verified, verify
 from ...verification.entry import Code
-from .. import rolling
+from ..disk import rolling
 from .trials import generator, kinetic_norm, masses, unit_velocities
 
 
@@ -82,7 +82,7 @@ def projection_along_velocities(project: Code) -> Verdict:
 def slip_of_the_straightening(size: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     x1, x2, bar = sp.symbols("x1 x2 bar", real=True)
     return verify(rolling.bend(x1, x2, bar, 1, sp)[0] - x1, size(sym.alpha, bar, sp))
@@ -151,7 +151,7 @@ def _velocity(sp: Any) -> Any:
 def transfer_of_the_entry(transfer: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     x1, w = sp.Symbol("x1", real=True), _velocity(sp)
     s1, s2 = rolling.straight_contact(x1, 0, sym.alpha)
@@ -180,7 +180,7 @@ def transfer_of_the_entry(transfer: Code) -> Verdict:
 def differential_of_the_transfer(differential: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     x1, w = sp.Symbol("x1", real=True), _velocity(sp)
     image = sp.Matrix(rolling.transfer(x1, sym.alpha, sym.alpha, w, 1, sp))
@@ -267,7 +267,7 @@ def remainder_of_the_translation(start: Code) -> Verdict:
 def measure_of_the_rectangle(measure: Code) -> Verdict:
     import sympy as sp
 
-    from .. import symbolic as sym
+    from ..disk import symbolic as sym
 
     area = sp.Symbol("area", positive=True)
     upward = sp.simplify(sym.inner(sym.G, sym.e2))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...verification import Formula, Verdict, agreement, convention, erratum, every, no_excess, verified, verify
 from ...verification.entry import Code
-from .. import rolling
+from ..disk import rolling
 from .trials import generator, kinetic_norm, masses, residual, unit_velocities
 
 

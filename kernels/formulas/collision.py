@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry import Disk, Wall, rectangular_teeth, trace, triangular_teeth
-from ...geometry.kinetics import contact_normal, foreshortening
+from ...geometry.disk.kinetics import contact_normal, foreshortening
 from ...verification import Formula, Verdict, agreement, erratum, every, verified, verify
 from ...verification.entry import Code
 
@@ -42,7 +42,7 @@ def explicit_matrices(m: Any, J: Any) -> list[list[list[Any]]]:
 def matrices_of_the_two_laws(matrices: Code) -> Verdict:
     import sympy as sp
 
-    from ...geometry import symbolic as sym
+    from ...geometry.disk import symbolic as sym
 
     smooth, no_slip = (sp.Matrix(rows) for rows in matrices(sym.m, sym.J))
 
@@ -70,7 +70,7 @@ def matrices_of_the_two_laws(matrices: Code) -> Verdict:
 def properties_of_the_two_matrices(matrices: Code) -> Verdict:
     import sympy as sp
 
-    from ...geometry import symbolic as sym
+    from ...geometry.disk import symbolic as sym
 
     both = [sp.Matrix(rows) for rows in matrices(sym.m, sym.J)]
     slip = sp.Matrix([[1, 0, 1]])
@@ -102,7 +102,7 @@ def properties_of_the_two_matrices(matrices: Code) -> Verdict:
 def wall_that_is_felt_as_given(point: Code) -> Verdict:
     import sympy as sp
 
-    from ...geometry import symbolic as sym
+    from ...geometry.disk import symbolic as sym
 
     x1, x2 = sp.symbols("x1 x2", real=True)
     factor = foreshortening(sym.m, sym.J, sp)
@@ -127,7 +127,7 @@ def wall_that_is_felt_as_given(point: Code) -> Verdict:
 def symmetry_of_the_two_laws(maps: Code) -> Verdict:
     import sympy as sp
 
-    from ...geometry import symbolic as sym
+    from ...geometry.disk import symbolic as sym
 
     def check(index: int) -> Verdict:
         theta, psi = maps(sym.theta, sym.psi, sp)[index]

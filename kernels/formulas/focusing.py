@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ...geometry import focusing_arcs, trace
-from ...geometry.kinetics import foreshortening
+from ...geometry.disk.kinetics import foreshortening
 from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
 from ...verification.entry import Code
-from ..circular import CircularArcLaw
+from ..walls.circular_arc import CircularArcLaw
 
 HALF_ANGLES = (0.3, 0.8, 1.3)
 RAYS = 4000
@@ -304,7 +304,7 @@ def entry_increases_with_the_hit(derivative: Code) -> Verdict:
 def elliptical_tooth_function(function: Code) -> Verdict:
     import sympy as sp
 
-    from ...geometry import symbolic as sym
+    from ...geometry.disk import symbolic as sym
 
     x, eps, xi = sp.symbols("x epsilon xi", positive=True)
     centre, radius = eps / (2 * sp.tan(xi)), eps / (2 * sp.sin(xi))

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ...geometry import rectangular_teeth, trace
-from ...geometry.kinetics import foreshortening
+from ...geometry.disk.kinetics import foreshortening
 from ...verification import Formula, Verdict, agreement, erratum, verify
 from ...verification.entry import Code
-from ..rectangular import RectangularTeethLaw, crevice_retro
+from ..walls.rectangular import RectangularTeethLaw, crevice_retro
 from .shares import SHARE_ERROR, share
 
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
@@ -109,7 +109,7 @@ def specular_share_of_a_crevice(probability: Code) -> Verdict:
 def ratio_of_foreshortened_teeth(ratio: Code) -> Verdict:
     import sympy as sp
 
-    from ...geometry import symbolic as sym
+    from ...geometry.disk import symbolic as sym
 
     width, height = sp.symbols("width height", positive=True)
     felt = height / (foreshortening(sym.m, sym.J, sp) * width)

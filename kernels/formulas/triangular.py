@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ...geometry import focusing_arcs, rectangular_teeth, trace, triangular_teeth
-from ...geometry.kinetics import foreshortening
+from ...geometry.disk.kinetics import foreshortening
 from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
 from ...verification.entry import Code
-from ..triangular import TriangularTeethLaw
+from ..walls.triangular import TriangularTeethLaw
 from .shares import SHARE_ERROR, share
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
@@ -258,7 +258,7 @@ def flux_of_triangular_teeth(law: Code) -> Verdict:
 def apex_angle_of_foreshortened_teeth(angle: Code) -> Verdict:
     import sympy as sp
 
-    from ...geometry import symbolic as sym
+    from ...geometry.disk import symbolic as sym
 
     psi = sym.psi
     half_width, depth = sp.Rational(1, 2), sp.cot(psi / 2) / 2

@@ -19,7 +19,7 @@ from .errors import AccuracyError, AsperityError, FileExistsRefusal, InputError,
 from .estimates import Estimate
 
 if TYPE_CHECKING:
-    from . import geometry, kernels, spectral
+    pass
     from .verification import Verdict, verify
 
 __version__ = "0.1.0"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import AsperityError
 from .estimates import Estimate, rounded
 from .spectral import diffusivity, mean_squared_slope
-from .spectral.relaxation import relaxation_time, slem_from_gap
+from .spectral.consequences.mixing import relaxation_time, slem_from_gap
 
 if TYPE_CHECKING:
     from .geometry import Wall

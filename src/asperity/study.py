@@ -17,10 +17,10 @@ from .errors import AccuracyError, FileExistsRefusal, InputError
 from .estimates import NORMAL_95, Estimate
 from .geometry import Disk, Wall, trace
 from .kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
-from .kernels.measure import SINE
+from .kernels.bases.measure import SINE
 from .spectral import Enclosures, SpectralGap, Spectrum, enclosures, gaps_in_both_conventions, spectral_gap, spectrum
-from .spectral.eigenvalue_routes import law_eigenvalues
-from .spectral.law_spectrum import with_gap
+from .spectral.gap.law_spectrum import with_gap
+from .spectral.gap.methods import law_eigenvalues
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -60,7 +60,7 @@ def draw_study_wall(study: Study, ax: Axes) -> None:
 def chosen_rays(wall: Wall) -> tuple[Floats, Floats]:
     """Entry points and angles of rays, spread over the widest hollow, that leave after few bounces."""
     from .geometry import trace
-    from .geometry.drawing import vertical_stretch
+    from .geometry.plotting.walls import vertical_stretch
 
     low, high = 0.0, wall.period
     if wall.hollows:
@@ -83,7 +83,7 @@ def _draw_kernel(study: Study, ax: Axes) -> None:
 
 
 def _draw_spectrum(study: Study, ax: Axes) -> None:
-    from .spectral.picture import draw_spectrum
+    from .spectral.plotting import draw_spectrum
 
     if study.spectrum is None:
         ax.set_axis_off()

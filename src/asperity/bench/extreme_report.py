@@ -99,7 +99,7 @@ def _load() -> None:
     import numpy as np
 
     from .. import geometry as geo
-    from ..geometry.refinement import refined_trace
+    from ..geometry.tracing.refinement import refined_trace
     from .extreme_disks import WALL
     from .extreme_walls import extreme_walls
     from .uniform_disk import DISK

@@ -10,7 +10,7 @@ import numpy as np
 from ..checks import Floats
 from ..estimates import Estimate
 from ..kernels import Bins, KernelMatrix, Legendre
-from ..kernels.directions import MEAN_SINE, SINE_NORM, Directions
+from ..kernels.bases.momentum import MEAN_SINE, SINE_NORM, Directions
 from ..spectral import WorkMethod
 from .quantity import Methods, Quantity
 from .routes import RANDOM_ORDER, Route, declared_order, routes_for

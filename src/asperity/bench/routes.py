@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels import KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
-from ..kernels.matrix_algebra import frobenius_error
-from ..kernels.row_quadrature import row_matrix
+from ..kernels.discretisation.traced import row_matrix
+from ..kernels.matrices.matrix_algebra import frobenius_error
 from .quantity import QUICK_RAYS, RAYS
 
 if TYPE_CHECKING:

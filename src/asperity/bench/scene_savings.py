@@ -10,10 +10,10 @@ import numpy as np
 
 from ..checks import Floats
 from ..geometry import Trace, trace
-from ..geometry.scene import Scene, scene_in_one
-from ..geometry.scene_switches import without_formulas, without_grid, without_pairs, without_runs
+from ..geometry.scene.ablations import without_formulas, without_grid, without_pairs, without_runs
+from ..geometry.scene.scene import Scene, scene_in_one
 from ..kernels import KernelMatrix, Legendre, PolygonLaw, WallLaw, discretise
-from ..kernels.row_quadrature import row_matrix
+from ..kernels.discretisation.traced import row_matrix
 from .scenes import standard_names, wall_of
 from .timing import SideBySide, side_by_side
 

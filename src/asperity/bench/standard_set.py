@@ -13,8 +13,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
-from ..spectral.machine import on_few_cores
-from ..spectral.stopwatch import measure
+from ..spectral.work_diagrams.machine import on_few_cores
+from ..spectral.work_diagrams.stopwatch import measure
 from .child_process import ChildCrashed, ChildProcess, OutOfTime
 from .collision_quantities import by_true_disks
 from .known_references import known_reference
@@ -153,9 +153,9 @@ def file_stem(name: str) -> str:
 def prepare(scene: str) -> None:
     """What a new process loads before anything is timed: the wall, and the compiled loops for it."""
     from ..geometry import trace
-    from ..geometry.beams import beams_of
+    from ..geometry.polygons.beams import beams_of
     from ..kernels import Legendre, WallLaw, discretise
-    from ..kernels.wall_rows import adaptive_rows
+    from ..kernels.walls.conditionals import adaptive_rows
 
     wall = wall_of(scene)
     for one in (wall, wall.foreshorten(DISK)):

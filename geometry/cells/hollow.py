@@ -1,0 +1,66 @@
+"""The hollows of a wall: what lies below each of its openings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from ...checks import Floats
+from ..curves.curve import Curve
+from ..curves.segment import Segment
+
+
+@dataclass(frozen=True)
+class Hollow:
+    """One opening of a wall with the pieces below it.
+
+    Parameters
+    ----------
+    left, right : float
+        The opening is left < x < right on the level of the wall's highest points.
+    first, last : int
+        ``wall.cell.pieces[first:last]`` is the boundary of the hollow, in order, from its left end to its right end;
+        a wall that begins at (0, 0) is its own ``cell``.
+    """
+
+    left: float
+    right: float
+    first: int
+    last: int
+
+    @property
+    def width(self) -> float:
+        """The width of the opening."""
+        return self.right - self.left
+
+
+def flat_tops(pieces: Sequence[Curve], vertices: Floats) -> list[int]:
+    """Return the indices of the pieces that run rightward along y = 0."""
+    level = (vertices[:-1, 1] == 0.0) & (vertices[1:, 1] == 0.0) & (vertices[1:, 0] > vertices[:-1, 0])
+    return [i for i in level.nonzero()[0].tolist() if isinstance(pieces[i], Segment)]
+
+
+def hollows_between(tops: Sequence[int], vertices: Floats) -> tuple[Hollow, ...]:
+    """Return the hollows of a closed wall: the chains of pieces between flat tops, cut where they touch y = 0.
+
+    A chain is cut at joints at height 0 that lie strictly between its ends; joints beside the ends belong to pieces
+    that run back below a flat top (a plate of zero thickness).
+    """
+    found: list[Hollow] = []
+    count = len(vertices) - 1
+    edges = [-1, *tops, count]
+    touching = vertices[:, 1] == 0.0
+    for before, after in pairwise(edges):
+        first, last = before + 1, after
+        if first == last:
+            continue
+        left, right = float(vertices[first, 0]), float(vertices[last, 0])
+        for joint in (first + 1 + touching[first + 1 : last].nonzero()[0]).tolist():
+            x = float(vertices[joint, 0])
+            if left < x < right:
+                found.append(Hollow(left, x, first, joint))
+                left, first = x, joint
+        if left < right:
+            found.append(Hollow(left, right, first, last))
+    return tuple(found)

@@ -1,0 +1,112 @@
+"""The shape of a hollow: what remains of it without its place and its size. Its law depends on nothing else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...checks import Floats, frozen
+from ...rounding import EPS
+from ..curves.segment import Segment
+from .hollow import Hollow
+
+if TYPE_CHECKING:
+    from ..walls.wall import Wall
+
+# Shapes are equal, and sides level or vertical, to this share of the size of the numbers: places are rounded once
+# each, and named walls compute them by some ten operations.
+SHAPE_TOLERANCE = 64.0 * EPS
+# Besides its ends three inner points tell a piece: circles need three points, ellipses and cubics five.
+INNER = np.array([0.25, 0.5, 0.75])
+
+
+@dataclass(frozen=True, eq=False)
+class HollowShape:
+    """A hollow moved to x = 0 and scaled to an opening of width 1.
+
+    Parameters
+    ----------
+    kinds : tuple of str
+        The types of its pieces from left to right.
+    vertices : array, shape (pieces + 1, 2)
+        From (0, 0) to (1, 0).
+    inner : array, shape (curved pieces, 3, 2)
+        Points inside the pieces that are not straight.
+    rounding : float
+        How far a coordinate may be off because the wall's own coordinates are rounded.
+    """
+
+    kinds: tuple[str, ...]
+    vertices: Floats
+    inner: Floats
+    rounding: float
+
+    @classmethod
+    def of(cls, wall: Wall, hollow: Hollow) -> HollowShape:
+        """The shape of one hollow of a wall that is its own ``cell``."""
+        pieces = wall.pieces[hollow.first : hollow.last]
+        corner = np.array([hollow.left, 0.0])
+        vertices = (wall.vertices[hollow.first : hollow.last + 1] - corner) / hollow.width
+        vertices[-1, 0] = 1.0
+        curved = [piece.point(INNER) for piece in pieces if not isinstance(piece, Segment)]
+        inner = (np.reshape(curved, (-1, len(INNER), 2)) - corner) / hollow.width
+        size = max(wall.period / hollow.width, float(np.abs(vertices).max()))
+        kinds = tuple(type(piece).__name__ for piece in pieces)
+        return cls(kinds, frozen(vertices), frozen(inner), SHAPE_TOLERANCE * size)
+
+    def mirrored(self) -> HollowShape:
+        """The shape of the mirror image."""
+        vertices, inner = self.vertices[::-1].copy(), self.inner[::-1, ::-1].copy()
+        vertices[:, 0], inner[..., 0] = 1.0 - vertices[:, 0], 1.0 - inner[..., 0]
+        return HollowShape(self.kinds[::-1], frozen(vertices), frozen(inner), self.rounding)
+
+    def same_as(self, other: HollowShape) -> bool:
+        """Whether two shapes are equal within the rounding of either."""
+        if self.kinds != other.kinds:
+            return False
+        rounding = max(self.rounding, other.rounding)
+        pairs = ((self.vertices, other.vertices), (self.inner, other.inner))
+        return all(bool(np.all(np.abs(one - two) <= rounding)) for one, two in pairs)
+
+    @property
+    def apex_angle(self) -> float | None:
+        """The angle at the bottom of an isosceles triangle, radians; None for every other shape."""
+        if self.kinds != ("Segment",) * 2 or abs(self.vertices[1, 0] - 0.5) > SHAPE_TOLERANCE:
+            return None
+        return 2.0 * math.atan2(0.5, -self.vertices[1, 1])
+
+    @property
+    def height_to_width(self) -> float | None:
+        """Depth over width of a rectangle; None for every other shape."""
+        if self.kinds != ("Segment",) * 3:
+            return None
+        (left, depth), (right, other) = self.vertices[1:3].tolist()
+        level = depth < 0.0 and abs(other - depth) <= SHAPE_TOLERANCE * abs(depth)
+        return -depth if level and max(abs(left), abs(right - 1.0)) <= SHAPE_TOLERANCE else None
+
+
+def distinct_hollows(wall: Wall) -> list[tuple[HollowShape, list[Hollow]]]:
+    """The different shapes of a closed wall's hollows, each with the hollows of ``wall.cell`` that have it, in order.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> wall = geo.Wall.from_vertices([(0, 0), (0.1, -0.2), (0.2, 0), (0.6, -0.8), (1, 0)])
+    >>> [(round(shape.apex_angle, 12), len(hollows)) for shape, hollows in distinct_hollows(wall)]
+    [(0.927295218002, 2)]
+    """
+    found: dict[tuple[str, ...], list[tuple[HollowShape, list[Hollow]]]] = {}
+    cell = wall.cell
+    for hollow in cell.hollows:
+        shape = HollowShape.of(cell, hollow)
+        alike = found.setdefault(shape.kinds, [])
+        for known, hollows in alike:
+            if shape.same_as(known):
+                hollows.append(hollow)
+                break
+        else:
+            alike.append((shape, [hollow]))
+    return [entry for alike in found.values() for entry in alike]

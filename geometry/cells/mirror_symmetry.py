@@ -1,0 +1,90 @@
+"""Whether a periodic wall equals its mirror image."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...checks import Floats
+from ...rounding import EPS
+from ..curves.arc import Arc
+from ..curves.curve import Curve
+from ..curves.segment import Segment
+from .origin import joined
+
+if TYPE_CHECKING:
+    from ..walls.wall import Wall
+
+# Mirror images agree to rounding if their points differ by this much, relative to the wall's size: a mirrored point
+# rounds once, but the two halves of a wall may have been computed by formulas of some fifty operations.
+MIRROR_TOLERANCE = 256.0 * EPS
+# Where pieces are compared besides their starts; the same read backwards.
+PARAMETERS = np.array([0.25, 0.5, 0.75, 1.0])
+
+
+def has_mirror_axis(wall: Wall) -> bool:
+    """Whether the periodic wall has a mirror axis x = const; with islands only x = period/2 is tried.
+
+    A wall without islands is compared with its mirror image as a cycle of pieces, from every place at which the first
+    piece of the one can be the first of the other; so the cell may start anywhere.
+    """
+    tolerance = MIRROR_TOLERANCE * max(wall.period, float(np.abs(wall.vertices).max()), wall.depth)
+    if wall.islands:
+        image = wall.mirrored()
+        islands, images = map(_with_bottom_starts, (wall.islands, image.islands))
+        return _agree(wall.pieces, image.pieces, tolerance) and all(
+            any(_agree(loop[k:] + loop[:k], other, tolerance) for other in images for k in range(len(loop)))
+            for loop in islands
+        )
+    own = _steps(_closed_up(wall.pieces, tolerance))
+    other = _mirrored(own)
+    starts = np.flatnonzero(np.abs(own - other[0]).max(axis=(1, 2)) <= tolerance).tolist()
+    return any(np.abs(np.roll(own, -k, axis=0) - other).max() <= tolerance for k in starts)
+
+
+def _closed_up(pieces: Sequence[Curve], tolerance: float) -> Sequence[Curve]:
+    """The pieces as a cycle: the last and the first one are one if they are parts of it, as of a flat top."""
+    if len(pieces) < 2:
+        return pieces
+    last, first = pieces[-1], pieces[0].moved(pieces[-1].end[0], 0.0)
+    whole = joined(last, first, tolerance)
+    return pieces if whole is None else (whole, *pieces[1:-1])
+
+
+def _with_bottom_starts(islands: Sequence[Sequence[Curve]]) -> list[tuple[Curve, ...]]:
+    """The same islands, with those of one whole ellipse starting at its bottom: they may start anywhere."""
+    bottom = -0.5 * np.pi
+    return [
+        (Arc(loop[0].center, loop[0].semi_axes, bottom, bottom + 2.0 * np.pi * loop[0].direction),)
+        if len(loop) == 1 and isinstance(loop[0], Arc)
+        else tuple(loop)
+        for loop in islands
+    ]
+
+
+def _steps(path: Sequence[Curve]) -> Floats:
+    """For every piece its points at three parameters and at its end, seen from its start; shape (n, 4, 2)."""
+    start, end = (np.array([getattr(piece, name) for piece in path]) for name in ("start", "end"))
+    # the points of a segment follow from its ends
+    steps = PARAMETERS[:, None] * (end - start)[:, None, :]
+    for i, piece in enumerate(path):
+        if not isinstance(piece, Segment):
+            steps[i, :-1] = piece.point(PARAMETERS[:-1]) - start[i]
+    return np.asarray(steps)
+
+
+def _mirrored(steps: Floats) -> Floats:
+    """The steps of the mirror image, which runs backwards: parameter t is 1 - t there."""
+    end = steps[:, -1:]
+    points = np.concatenate([steps[:, -2::-1] - end, -end], axis=1)
+    return np.asarray(points[::-1] * [-1.0, 1.0])
+
+
+def _agree(path: Sequence[Curve], other: Sequence[Curve], tolerance: float) -> bool:
+    """Whether two paths are the same piece by piece within ``tolerance``."""
+    if len(path) != len(other) or [type(p) for p in path] != [type(p) for p in other]:
+        return False
+    starts = np.array([p.start for p in path]) - np.array([p.start for p in other])
+    return bool(np.abs(starts).max() <= tolerance and np.abs(_steps(path) - _steps(other)).max() <= tolerance)

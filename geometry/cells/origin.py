@@ -1,0 +1,168 @@
+"""Where the cell of a wall begins: at one of its highest points, which is then the origin (condition B5').
+
+(Rudzis 2022, section 1.3.1.) A wall without islands closes from any of its highest points on, whatever point of its
+period was given first and however far below y = 0 it lies: its law is that of the cell that begins there.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...checks import Floats
+from ...rounding import EPS
+from ..curves.arc import Arc
+from ..curves.bezier import Bezier
+from ..curves.curve import Curve, Point
+from ..curves.segment import Segment
+
+if TYPE_CHECKING:
+    from ..walls.wall import Wall
+
+# Two pieces are parts of one if that passes their joint, and points of either, at this distance relative to the wall's
+# size: the joint comes out of a few dozen operations, and the shift of the cell rounds once more.
+SAME_PIECE = 64.0 * EPS
+# Where parts are compared with the whole.
+INNER = np.array([0.25, 0.5, 0.75])
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The pieces of a wall from one of its highest points on, over one period, with that point as the origin.
+
+    Parameters
+    ----------
+    pieces : tuple of Curve
+        From (0, 0) to (period, 0).
+    origin : (float, float)
+        Where (0, 0) lies in the coordinates of the wall.
+    numbers : tuple of int
+        For every piece the number of the (first) piece of the wall that it is.
+    """
+
+    pieces: tuple[Curve, ...]
+    origin: Point
+    numbers: tuple[int, ...]
+
+
+def cell_of(wall: Wall) -> Cell | None:
+    """The cell of a wall without islands; None if it has some, or if the shift would make pieces vanish by rounding."""
+    if wall.islands:
+        return None
+    first = first_top(wall.vertices, wall.period)
+    if first is None:
+        return None
+    x, y = (float(c) for c in wall.vertices[first])
+    count = len(wall.pieces)
+    if first == 0 and y == 0.0:
+        return Cell(wall.pieces, (0.0, 0.0), tuple(range(count)))
+    order = [*range(first, count), *range(first)]
+    shifts = np.where(np.array(order) >= first, -x, wall.period - x)
+    starts = wall.vertices[order] + np.column_stack([shifts, np.full(count, -y)])
+    vertices = np.concatenate([starts, [(wall.period, 0.0)]])
+    given = wall.vertices[1:][order] - wall.vertices[:-1][order]
+    if np.any(np.all(vertices[1:] == vertices[:-1], axis=1) & np.any(given != 0.0, axis=1)):
+        return None
+    places = [(px, py) for px, py in vertices.tolist()]
+    pieces = [
+        Segment(start, end)
+        if isinstance(wall.pieces[k], Segment)
+        else wall.pieces[k].moved(float(shift), -y).pinned(start, end)
+        for k, shift, (start, end) in zip(order, shifts, pairwise(places), strict=True)
+    ]
+    seam = count - first
+    if 0 < seam < count:
+        whole = joined(pieces[seam - 1], pieces[seam], SAME_PIECE * _size(vertices))
+        if whole is not None:
+            pieces[seam - 1 : seam + 1] = [whole]
+            del order[seam]
+    return Cell(tuple(pieces), (x, y), tuple(order))
+
+
+def first_top(vertices: Floats, period: float) -> int | None:
+    """The first joint of greatest height from which all others of that height lie within a period to the right.
+
+    Only joints on plates of zero thickness, which run back below a flat top, do not have that property.
+
+    Examples
+    --------
+    >>> first_top(np.array([(0, -1), (0.2, 0), (0.5, 0), (0.3, 0), (1, -1)]), 1.0)
+    1
+    """
+    height = vertices[:-1, 1]
+    tops = np.flatnonzero(height == height.max())
+    x = vertices[tops, 0]
+    # of this joint and those after it, and of those before it, a period later
+    least = np.minimum.accumulate(x[::-1])[::-1]
+    most = np.maximum.accumulate(x[::-1])[::-1]
+    least[1:] = np.minimum(least[1:], np.minimum.accumulate(x)[:-1] + period)
+    most[1:] = np.maximum(most[1:], np.maximum.accumulate(x)[:-1] + period)
+    found = tops[(least >= x) & (most <= x + period)]
+    return int(found[0]) if len(found) else None
+
+
+def joined(before: Curve, after: Curve, tolerance: float) -> Curve | None:
+    """The one piece whose two parts, one behind the other, these are within ``tolerance``; None if there is none.
+
+    Examples
+    --------
+    >>> joined(Segment((0, 0), (1, -1)), Segment((1, -1), (3, -3)), 1e-15)
+    Segment(start=(0.0, 0.0), end=(3.0, -3.0))
+    """
+    if isinstance(before, Segment) and isinstance(after, Segment):
+        return _joined_segments(before, after, tolerance)
+    if isinstance(before, Arc) and isinstance(after, Arc):
+        return _joined_arcs(before, after, tolerance)
+    if isinstance(before, Bezier) and isinstance(after, Bezier):
+        return _joined_beziers(before, after, tolerance)
+    return None
+
+
+def _joined_segments(before: Segment, after: Segment, tolerance: float) -> Segment | None:
+    (ax, ay), (bx, by), (cx, cy) = before.start, before.end, after.end
+    dx, dy = cx - ax, cy - ay
+    length = math.hypot(dx, dy)
+    along, across = (bx - ax) * dx + (by - ay) * dy, (bx - ax) * dy - (by - ay) * dx
+    if not 0.0 < along < length * length or abs(across) > tolerance * length:
+        return None
+    return Segment(before.start, after.end)
+
+
+def _joined_arcs(before: Arc, after: Arc, tolerance: float) -> Arc | None:
+    span = 2.0 * (before.half_span + after.half_span)
+    if before.direction != after.direction or span > 2.0 * math.pi:
+        return None
+    end = before.start_angle + before.direction * span
+    whole = Arc(before.center, before.semi_axes, before.start_angle, end).pinned(before.start, after.end)
+    return whole if _are_parts(whole, before, after, before.half_span / (0.5 * span), tolerance) else None
+
+
+def _joined_beziers(before: Bezier, after: Bezier, tolerance: float) -> Bezier | None:
+    if before.degree != after.degree:
+        return None
+    first, second = (np.array(part.control_points) for part in (before, after))
+    # the derivative at the joint, times the share of the parameter that each part has
+    left, right = math.dist(first[-1], first[-2]), math.dist(second[1], second[0])
+    if left == 0.0 or right == 0.0:
+        return None
+    share = left / (left + right)
+    inner = [first[0] + (first[1] - first[0]) / share]
+    if before.degree == 3:
+        inner.append(second[-1] + (second[-2] - second[-1]) / (1.0 - share))
+    whole = Bezier([before.start, *(tuple(p) for p in inner), after.end])
+    return whole if _are_parts(whole, before, after, share, tolerance) else None
+
+
+def _are_parts(whole: Curve, before: Curve, after: Curve, share: float, tolerance: float) -> bool:
+    """Whether points of both parts, and their joint, lie on the whole at their share of its parameter."""
+    given = np.concatenate([before.point(INNER), [before.end], after.point(INNER)])
+    found = whole.point(np.concatenate([share * INNER, [share], share + (1.0 - share) * INNER]))
+    return bool(np.abs(given - found).max() <= tolerance)
+
+
+def _size(vertices: Floats) -> float:
+    return float(np.ptp(vertices, axis=0).max())

@@ -1,0 +1,193 @@
+"""Walls as TOML files: written exactly, read with an error that names the file and the key."""
+
+from __future__ import annotations
+
+import tomllib
+from itertools import pairwise
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from ...errors import FileExistsRefusal, InputError
+from ..curves.arc import Arc
+from ..curves.bezier import Bezier
+from ..curves.curve import Curve, Point
+from ..curves.segment import Segment
+from ..walls.wall import Wall
+
+FORMAT = "asperity wall 1"
+
+Table = dict[str, Any]
+
+
+def save_wall(wall: Wall, path: str | PathLike[str], overwrite: bool = False) -> None:
+    """Write a wall as TOML; see ``Wall.save``."""
+    import tomli_w
+
+    document: Table = {"format": FORMAT, "period": wall.period}
+    if all(isinstance(piece, Segment) for piece in wall.pieces):
+        document["vertices"] = wall.vertices.tolist()
+    else:
+        document["pieces"] = [_table(piece) for piece in wall.pieces]
+    if wall.islands:
+        document["islands"] = [{"pieces": [_table(piece) for piece in loop]} for loop in wall.islands]
+    text = tomli_w.dumps(document)
+    file = Path(path)
+    # the text is complete before the file is touched
+    try:
+        with file.open("w" if overwrite else "x", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+    except FileExistsError as reason:
+        raise FileExistsRefusal(f"{file} exists; pass overwrite=True to replace it") from reason
+    except OSError as reason:
+        raise InputError(
+            f"{file}: cannot write there ({reason.strerror}); choose a folder that is writable"
+        ) from reason
+
+
+def load_wall(path: str | PathLike[str]) -> Wall:
+    """Read a wall from a TOML file.
+
+    Parameters
+    ----------
+    path : path
+        A file that ``Wall.save`` wrote, or one written by hand: ``period``, then either ``vertices`` (a list of
+        points) or ``[[pieces]]`` tables of ``kind`` "segment" (``start``, ``end``), "arc" (``center``,
+        ``semi_axes``, ``angles`` and, where known exactly, ``start`` and ``end``) or "bezier" (``control_points``);
+        islands are ``[[islands]]`` tables with ``pieces``.
+
+    Returns
+    -------
+    Wall
+        Equal to the saved one, to the bit.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not TOML, or has a missing, unknown or unsuitable key.
+    WallError
+        If the wall breaks a condition.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "wall.toml"
+    ...     _ = file.write_text("period = 1.0\\nvertices = [[0, 0], [0.2, -0.4], [1, 0]]")
+    ...     load_wall(file) == Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
+    True
+    """
+    file = Path(path)
+    try:
+        document = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as reason:
+        raise InputError(f"{file}: cannot read the file ({reason.strerror})") from reason
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
+        raise InputError(f"{file}: not a TOML file ({reason})") from reason
+    try:
+        return _wall(document)
+    except InputError as reason:
+        raise type(reason)(f"{file}: {reason}") from reason
+
+
+def _table(piece: Curve) -> Table:
+    if isinstance(piece, Segment):
+        return {"kind": "segment", "start": list(piece.start), "end": list(piece.end)}
+    if isinstance(piece, Arc):
+        return {
+            "kind": "arc",
+            "center": list(piece.center),
+            "semi_axes": list(piece.semi_axes),
+            "angles": [piece.start_angle, piece.end_angle],
+            "start": list(piece.start),
+            "end": list(piece.end),
+        }
+    if isinstance(piece, Bezier):
+        return {"kind": "bezier", "control_points": [list(p) for p in piece.control_points]}
+    raise InputError(f"save: expected a Segment, an Arc or a Bezier, got {piece!r}")
+
+
+def _wall(document: Table) -> Wall:
+    _check_keys(document, {"period"}, {"format", "vertices", "pieces", "islands"})
+    if document.get("format", FORMAT) != FORMAT:
+        raise InputError(f"key 'format': expected {FORMAT!r}, got {document['format']!r}")
+    if ("vertices" in document) == ("pieces" in document):
+        raise InputError("expected exactly one of the keys 'vertices' and 'pieces'")
+    if "vertices" in document:
+        corners = _points("vertices", document["vertices"])
+        ends = pairwise(corners)
+        pieces = _pieces("vertices", [{"kind": "segment", "start": list(p), "end": list(q)} for p, q in ends])
+    else:
+        pieces = _pieces("pieces", document["pieces"])
+    islands = []
+    for k, table in enumerate(_tables("islands", document.get("islands", []))):
+        try:
+            _check_keys(table, {"pieces"}, set())
+            islands.append(_pieces("pieces", table["pieces"]))
+        except InputError as reason:
+            raise type(reason)(f"islands[{k}]: {reason}") from reason
+    return Wall(pieces, _number("period", document["period"]), islands)
+
+
+def _pieces(name: str, value: Any) -> list[Curve]:
+    pieces = []
+    for i, table in enumerate(_tables(name, value)):
+        try:
+            pieces.append(_piece(table))
+        except InputError as reason:
+            raise type(reason)(f"{name}[{i}]: {reason}") from reason
+    return pieces
+
+
+def _piece(table: Table) -> Curve:
+    kind = table.get("kind")
+    if kind == "segment":
+        _check_keys(table, {"kind", "start", "end"}, set())
+        return Segment(_pair("start", table["start"]), _pair("end", table["end"]))
+    if kind == "arc":
+        _check_keys(table, {"kind", "center", "semi_axes", "angles"}, {"start", "end"})
+        axes = table["semi_axes"]
+        start, end = _pair("angles", table["angles"])
+        semi_axes = _pair("semi_axes", axes if isinstance(axes, list) else [axes, axes])
+        arc = Arc(_pair("center", table["center"]), semi_axes, start, end)
+        if "start" not in table and "end" not in table:
+            return arc
+        _check_keys(table, {"kind", "center", "semi_axes", "angles", "start", "end"}, set())
+        return arc.pinned(_pair("start", table["start"]), _pair("end", table["end"]))
+    if kind == "bezier":
+        _check_keys(table, {"kind", "control_points"}, set())
+        return Bezier(_points("control_points", table["control_points"]))
+    _check_keys(table, {"kind"}, set(table))
+    raise InputError(f"key 'kind': expected 'segment', 'arc' or 'bezier', got {kind!r}")
+
+
+def _check_keys(table: Table, required: set[str], optional: set[str]) -> None:
+    missing, unknown = sorted(required - set(table)), sorted(set(table) - required - optional)
+    if missing:
+        raise InputError(f"missing key {missing[0]!r}")
+    if unknown:
+        raise InputError(f"unknown key {unknown[0]!r}; expected {', '.join(sorted(required | optional))}")
+
+
+def _tables(name: str, value: Any) -> list[Table]:
+    if not isinstance(value, list) or not all(isinstance(table, dict) for table in value):
+        raise InputError(f"key {name!r}: expected an array of tables ([[{name}]]), got {value!r}")
+    return value
+
+
+def _points(name: str, value: Any) -> list[Point]:
+    if not isinstance(value, list) or not value:
+        raise InputError(f"key {name!r}: expected a list of points, got {value!r}")
+    return [_pair(f"{name}[{i}]", point) for i, point in enumerate(value)]
+
+
+def _pair(name: str, value: Any) -> Point:
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f"key {name!r}: expected two numbers [a, b], got {value!r}")
+    return _number(name, value[0]), _number(name, value[1])
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"key {name!r}: expected a number, got {value!r}")
+    return float(value)

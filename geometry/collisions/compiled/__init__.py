@@ -1,0 +1,1 @@
+"""The compiled collision of the disk: flights, first contacts and reflections."""

@@ -1,0 +1,101 @@
+"""What the compiled collision of the disk reads: the wall as tables, the ring of satellites and the masses as numbers.
+
+Lengths are in units of the wall, so that the disk's radius is 1/scale.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...rounding import EPS
+from ..disk.disk import Disk
+from ..disk.satellites import Satellites
+from ..tracing.threads import new_flag
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
+
+# A bound that is attained only by a satellite on the deepest point of the wall half-way between two others; the room
+# is for rounding.
+ROOM = 1e-9
+# Positions carry a few rounding errors of their size each, as those of rays do (engine.JOINT_ULPS).
+SLACK = 16.0 * EPS
+
+
+class Ground(NamedTuple):
+    """The wall: its period, whether satellites pass from cell to cell below its tops, and the tables of its scene.
+
+    ``exact_arcs`` are the arcs as `refined_arcs` has them, and ``stop`` is the flag that ends a collision before its
+    time.
+    """
+
+    cell: float
+    is_open: bool
+    hollows: Floats
+    joints: Floats
+    lines: Floats
+    arcs: Floats
+    exact_arcs: Floats
+    stop: NDArray[np.int64]
+
+
+class Ring(NamedTuple):
+    """The satellites, and the disk that carries them.
+
+    Farther than ``reach`` from the lowest point a satellite is above the wall, ``-floor`` is as low as the disk can be,
+    and by rounding a satellite may be off by ``slack``. The last two are the sine and cosine of half the spacing.
+    """
+
+    scale: float
+    spacing: float
+    reach: float
+    floor: float
+    slack: float
+    half_sine: float
+    half_cosine: float
+
+
+def ground_of(scene: Scene) -> Ground:
+    """The tables of a wall; circles and ellipses have the same columns and become one table."""
+    from ..tracing.double_double.arcs import refined_arcs
+
+    none = np.empty((0, 0))
+    circles, ellipses = (none if table is None else table for table in (scene.circles, scene.ellipses))
+    hollows = scene.hollows.copy()
+    hollows[:, 7:9] += len(circles)
+    lines = np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines
+    arcs = [table for table in (circles, ellipses) if len(table)]
+    table = np.concatenate(arcs) if arcs else none
+    exact_arcs = refined_arcs(table)
+    return Ground(scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, new_flag())
+
+
+def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
+    """The numbers of a ring above a wall of this scale."""
+    half = 0.5 * satellites.spacing
+    return Ring(
+        scale,
+        satellites.spacing,
+        satellites.reach * (1.0 + ROOM),
+        satellites.lowest / scale * (1.0 + ROOM),
+        rounding_of_places(scene, math.sin(satellites.reach) / scale),
+        math.sin(half),
+        math.cos(half),
+    )
+
+
+def shares(disk: Disk) -> tuple[float, float]:
+    """Mass and inertia in the unit m + J: laws know only their ratio."""
+    total = disk.mass + disk.inertia
+    return disk.mass / total, disk.inertia / total
+
+
+def rounding_of_places(scene: Scene, farthest: float) -> float:
+    """How far off a satellite may be by rounding: of the wall's size and of its distance from the disk's centre."""
+    size = float(scene.hollows[:, 2].max()) if len(scene.hollows) else 0.0
+    return SLACK * (size + scene.cell + farthest)

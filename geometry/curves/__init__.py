@@ -1,0 +1,1 @@
+"""Pieces of walls: segments, arcs and Bezier curves, and whether they cross."""

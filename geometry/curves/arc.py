@@ -1,0 +1,265 @@
+"""Circular and elliptic arcs with axes along x and y: a class that every upright affine map keeps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from ...errors import WallError
+from ...rounding import EPS
+from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
+
+# Up to this span (radians) an arc is placed by its chord and its semi-axes: the difference of two angles near pi/2
+# has an error of eps, so a span of 1e-8 read from the angles would keep 8 digits only; the chord keeps 16.
+# Beyond it the angles are the better data, because a chord says little about a span near pi.
+CHORD_SPAN = 1.0
+
+# Semi-axes that agree to this relative distance after a stretch are those of a circle: two products and two
+# quotients, each rounded by eps/2, separate them by at most 2 eps.
+CIRCLE_TOLERANCE = 4.0 * EPS
+
+# Computing c + a cos t rounds three times at the size of |c| + a.
+END_ROUNDING = 4.0 * EPS
+
+
+@dataclass(frozen=True, init=False, repr=False)
+class Arc(Curve):
+    """The arc (cx + a cos t, cy + b sin t) with t running from one angle to another, either way round.
+
+    Parameters
+    ----------
+    center : (float, float)
+        (cx, cy).
+    semi_axes : float or (float, float)
+        The radius, or (a, b); greater than 0.
+    start, end : float
+        The angles t of the two ends in radians; their distance is greater than 0 and at most 2 pi. For an ellipse t
+        is the parametric (eccentric) angle. Counterclockwise if ``end > start``.
+
+    Attributes
+    ----------
+    start_angle, end_angle : float
+        The two arguments ``start`` and ``end``.
+    start, end : (float, float)
+        The end *points*, as on every curve.
+    is_circular : bool
+        Whether the semi-axes are equal.
+    half_span : float
+        Half of the angle that the arc subtends, in (0, pi]; accurate also for arcs that are nearly straight.
+
+    Raises
+    ------
+    WallError
+        If a number is not finite, a semi-axis is not positive or the span is 0 or more than 2 pi.
+
+    Notes
+    -----
+    A nearly straight arc has its centre far away, and its end points cannot be computed well from it. ``pinned``
+    gives an arc end points that are known exactly; the curve is then placed by its chord and semi-axes.
+
+    Examples
+    --------
+    >>> from math import pi
+    >>> Arc((0, 0), 1.0, start=-pi, end=0.0).length == pi
+    True
+    >>> Arc((0, 0), (2, 1), 0.0, pi / 2).is_circular
+    False
+    """
+
+    center: Point
+    semi_axes: Point
+    start_angle: float
+    end_angle: float
+    start: Point
+    end: Point
+    rounding: float = field(compare=False)
+
+    def __init__(self, center: Any, semi_axes: Any, start: float, end: float) -> None:
+        middle = as_point("Arc center", center)
+        axes = as_point("Arc semi_axes", (semi_axes, semi_axes) if np.ndim(semi_axes) == 0 else semi_axes)
+        angles = as_point("Arc start and end", (start, end))
+        if min(axes) <= 0.0:
+            raise WallError(f"Arc semi_axes: expected numbers greater than 0, got {axes}")
+        span = abs(angles[1] - angles[0])
+        if not 0.0 < span <= 2.0 * math.pi * (1.0 + 2.0 * EPS):
+            raise WallError(
+                "Arc start and end: expected angles in radians that differ by more than 0 and at most 2 pi, "
+                f"got {angles}"
+            )
+        points = [(middle[0] + axes[0] * math.cos(t), middle[1] + axes[1] * math.sin(t)) for t in angles]
+        rounding = END_ROUNDING * max(abs(middle[0]) + axes[0], abs(middle[1]) + axes[1])
+        self._fill(middle, axes, angles, points[0], points[1], rounding)
+
+    def _fill(self, center: Point, axes: Point, angles: Point, start: Point, end: Point, rounding: float) -> None:
+        values = (center, axes, *angles, start, end, rounding)
+        for name, value in zip(self.__dataclass_fields__, values, strict=True):
+            object.__setattr__(self, name, value)
+
+    def _with(self, center: Point, axes: Point, angles: Point, start: Point, end: Point, rounding: float) -> Arc:
+        arc = object.__new__(Arc)
+        arc._fill(center, axes, angles, start, end, rounding)
+        return arc
+
+    def __repr__(self) -> str:
+        axes = self.semi_axes[0] if self.is_circular else self.semi_axes
+        return f"Arc(center={self.center}, semi_axes={axes}, start={self.start_angle!r}, end={self.end_angle!r})"
+
+    @property
+    def is_circular(self) -> bool:
+        """Whether the semi-axes are equal."""
+        return self.semi_axes[0] == self.semi_axes[1]
+
+    @property
+    def direction(self) -> int:
+        """1 for counterclockwise, -1 for clockwise."""
+        return 1 if self.end_angle > self.start_angle else -1
+
+    @property
+    def _chord(self) -> tuple[float, float, float]:
+        # In the coordinates (x, y a/b) the arc is circular with radius a.
+        dx = self.end[0] - self.start[0]
+        dy = (self.end[1] - self.start[1]) * (self.semi_axes[0] / self.semi_axes[1])
+        return dx, dy, math.hypot(dx, dy)
+
+    @property
+    def half_span(self) -> float:
+        """Half of the angle that the arc subtends, in (0, pi]."""
+        span = abs(self.end_angle - self.start_angle)
+        if span > CHORD_SPAN:
+            return 0.5 * span
+        return math.asin(min(1.0, self._chord[2] / (2.0 * self.semi_axes[0])))
+
+    def point(self, s: ArrayLike) -> Floats:
+        """Return the points at the parameters ``s`` in [0, 1] (uniform in t), shape ``s.shape + (2,)``."""
+        s = np.asarray(s, dtype=np.float64)
+        if abs(self.end_angle - self.start_angle) > CHORD_SPAN:
+            return self._point_by_angle(s)
+        dx, dy, chord = self._chord
+        half = self.half_span
+        phi = (2.0 * s - 1.0) * half
+        along = 0.5 * (1.0 + np.sin(phi) / math.sin(half))
+        # R cos(half) - R cos(phi) as a product, so that flat arcs keep all digits of their depth
+        across = self.direction * 2.0 * self.semi_axes[0] * np.sin(0.5 * (phi + half)) * np.sin(0.5 * (phi - half))
+        x = self.start[0] + along * dx - across * (dy / chord)
+        y = self.start[1] + (along * dy + across * (dx / chord)) * (self.semi_axes[1] / self.semi_axes[0])
+        return self._with_exact_ends(s, np.stack([x, y], axis=-1))
+
+    def _point_by_angle(self, s: Floats) -> Floats:
+        """Add to the nearer end point the exact product form of a (cos t - cos t0), b (sin t - sin t0)."""
+        first = (s <= 0.5)[..., np.newaxis]
+        anchor = np.where(first, np.array(self.start), np.array(self.end))
+        anchor_angle = np.where(s <= 0.5, self.start_angle, self.end_angle)
+        turn = np.where(s <= 0.5, s, s - 1.0) * (self.end_angle - self.start_angle)
+        a, b = self.semi_axes
+        chord = 2.0 * np.sin(0.5 * turn)
+        middle = anchor_angle + 0.5 * turn
+        moved = anchor + np.stack([-a * chord * np.sin(middle), b * chord * np.cos(middle)], axis=-1)
+        return self._with_exact_ends(s, moved)
+
+    def _with_exact_ends(self, s: Floats, points: Floats) -> Floats:
+        points[s == 0.0] = self.start
+        points[s == 1.0] = self.end
+        return points
+
+    def tangent(self, s: ArrayLike) -> Floats:
+        """Return the unit tangents at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
+        s = np.asarray(s, dtype=np.float64)
+        a, b = self.semi_axes
+        if abs(self.end_angle - self.start_angle) > CHORD_SPAN:
+            t = self.start_angle + s * (self.end_angle - self.start_angle)
+            vx, vy = -self.direction * a * np.sin(t), self.direction * b * np.cos(t)
+        else:
+            dx, dy, chord = self._chord
+            phi = (2.0 * s - 1.0) * self.half_span
+            cos, sin = np.cos(phi), self.direction * np.sin(phi)
+            vx, vy = (cos * dx - sin * dy) / chord, (cos * dy + sin * dx) / chord * (b / a)
+        speed = np.hypot(vx, vy)
+        return np.stack([vx / speed, vy / speed], axis=-1)
+
+    @property
+    def length(self) -> float:
+        """The arc length: R times the span, or an incomplete elliptic integral of the second kind."""
+        a, b = self.semi_axes
+        half = self.half_span
+        if self.is_circular:
+            return 2.0 * a * half
+        if half < 0.1 * min(a / b, b / a):  # far from the branch points tan t = +-i b/a: Gauss is exact to rounding
+            nodes, weights = np.polynomial.legendre.leggauss(20)
+            t = 0.5 * (self.start_angle + self.end_angle) + half * nodes
+            return float(half * np.sum(weights * np.hypot(a * np.sin(t), b * np.cos(t))))
+        from scipy.special import ellipeinc
+
+        # b int sqrt(1 - m sin^2 t) dt with the longer semi-axis in front, so that m is in (0, 1)
+        shift, long, short = (0.0, b, a) if b > a else (0.5 * math.pi, a, b)
+        m = (1.0 - short / long) * (1.0 + short / long)
+        ends = ellipeinc(np.array([self.start_angle, self.end_angle]) - shift, m)
+        return float(long * abs(ends[1] - ends[0]))
+
+    def turning_points(self, axis: int) -> list[float]:
+        """Return the parameters in (0, 1) where x (axis 0) or y (axis 1) is extremal, ascending."""
+        offset = 0.0 if axis == 0 else 0.5 * math.pi
+        low, high = sorted((self.start_angle, self.end_angle))
+        first = math.ceil((low - offset) / math.pi)
+        last = math.floor((high - offset) / math.pi)
+        span = self.end_angle - self.start_angle
+        turns = [(offset + k * math.pi - self.start_angle) / span for k in range(first, last + 1)]
+        return sorted(s for s in turns if 0.0 < s < 1.0)
+
+    def turning_values(self, axis: int) -> list[float]:
+        """Return coordinate ``axis`` at its turning points: the centre's plus or minus the semi-axis."""
+        span = self.end_angle - self.start_angle
+        if abs(span) <= CHORD_SPAN:
+            return super().turning_values(axis)
+        wave = math.cos if axis == 0 else math.sin
+        angles = (self.start_angle + s * span for s in self.turning_points(axis))
+        return [self.center[axis] + math.copysign(self.semi_axes[axis], wave(t)) for t in angles]
+
+    def reversed(self) -> Arc:
+        """Return the arc run the other way."""
+        angles = (self.end_angle, self.start_angle)
+        return self._with(self.center, self.semi_axes, angles, self.end, self.start, self.rounding)
+
+    def stretched(self, x_factor: float, y_factor: float) -> Arc:
+        """Return the image under (x, y) -> (x_factor x, y_factor y); semi-axes equal to rounding become equal."""
+        fx, fy = stretch_factors(x_factor, y_factor)
+        angles = (self.start_angle, self.end_angle)
+        if fx < 0.0:
+            angles = (math.pi - angles[0], math.pi - angles[1])
+        if fy < 0.0:
+            angles = (-angles[0], -angles[1])
+        axes = (self.semi_axes[0] * abs(fx), self.semi_axes[1] * abs(fy))
+        if abs(axes[0] - axes[1]) <= CIRCLE_TOLERANCE * axes[0]:
+            axes = (axes[0], axes[0])
+        center, start, end = ((fx * x, fy * y) for x, y in (self.center, self.start, self.end))
+        return self._with(center, axes, angles, start, end, self.rounding * max(abs(fx), abs(fy)))
+
+    def moved(self, dx: float, dy: float) -> Arc:
+        """Return the arc shifted by (dx, dy)."""
+        center, start, end = ((x + dx, y + dy) for x, y in (self.center, self.start, self.end))
+        return self._with(center, self.semi_axes, (self.start_angle, self.end_angle), start, end, self.rounding)
+
+    def pinned(self, start: Point, end: Point) -> Arc:
+        """Return the arc with its end points set to nearby points that are known exactly."""
+        first, last = as_point("Arc start point", start), as_point("Arc end point", end)
+        return self._with(self.center, self.semi_axes, (self.start_angle, self.end_angle), first, last, 0.0)
+
+    def split(self, s: float) -> tuple[Arc, Arc]:
+        """Return the parts before and after the parameter ``s`` in (0, 1)."""
+        angle = self.start_angle + s * (self.end_angle - self.start_angle)
+        x, y = self.point(s)
+        middle = (float(x), float(y))
+        before = self._with(self.center, self.semi_axes, (self.start_angle, angle), self.start, middle, self.rounding)
+        after = self._with(self.center, self.semi_axes, (angle, self.end_angle), middle, self.end, self.rounding)
+        return before, after
+
+    def flattened(self, tolerance: float) -> Floats:
+        """Return points on the arc, uniform in t, whose polyline is within ``tolerance``."""
+        # A step of d leaves at most max(a, b) (1 - cos(d/2)) = 2 max(a, b) sin^2(d/4).
+        sine = math.sqrt(max(tolerance, 0.0) / (2.0 * max(self.semi_axes)))
+        step = 4.0 * math.asin(min(sine, 0.5)) or math.inf
+        return self.point(uniform_parameters(tolerance, 2.0 * self.half_span / step))

@@ -1,0 +1,117 @@
+"""What every piece of a wall can do: the base class of Segment, Arc and Bezier."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from ...errors import WallError
+
+Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+
+
+class Curve(ABC):
+    """A smooth directed curve in the plane, parametrised over [0, 1]; a value that never changes.
+
+    The free side of a wall is on the left of the direction of travel.
+
+    Attributes
+    ----------
+    start, end : (float, float)
+        The end points. ``point(0.0)`` and ``point(1.0)`` are these numbers to the bit.
+    rounding : float
+        How far ``start`` and ``end`` may be off because they were computed; 0.0 where they were given.
+    """
+
+    start: Point
+    end: Point
+    rounding: float
+
+    @abstractmethod
+    def point(self, s: ArrayLike) -> Floats:
+        """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
+
+    @abstractmethod
+    def tangent(self, s: ArrayLike) -> Floats:
+        """Return the unit tangents at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
+
+    @property
+    @abstractmethod
+    def length(self) -> float:
+        """The arc length."""
+
+    @abstractmethod
+    def turning_points(self, axis: int) -> list[float]:
+        """Return the parameters in (0, 1) where coordinate ``axis`` has zero derivative, ascending."""
+
+    def turning_values(self, axis: int) -> list[float]:
+        """Return coordinate ``axis`` at its turning points."""
+        turns = self.turning_points(axis)
+        return [float(v) for v in self.point(turns)[:, axis]] if turns else []
+
+    @abstractmethod
+    def reversed(self) -> Self:
+        """Return the same curve run the other way."""
+
+    @abstractmethod
+    def stretched(self, x_factor: float, y_factor: float) -> Self:
+        """Return the image under (x, y) -> (x_factor x, y_factor y); negative factors reflect, 0 is refused."""
+
+    @abstractmethod
+    def moved(self, dx: float, dy: float) -> Self:
+        """Return the curve shifted by (dx, dy)."""
+
+    @abstractmethod
+    def pinned(self, start: Point, end: Point) -> Self:
+        """Return the curve with its end points set to nearby points that are known exactly."""
+
+    @abstractmethod
+    def split(self, s: float) -> tuple[Self, Self]:
+        """Return the parts before and after the parameter ``s`` in (0, 1)."""
+
+    @abstractmethod
+    def flattened(self, tolerance: float) -> Floats:
+        """Return points on the curve, shape (n, 2), both ends included, whose polyline is within ``tolerance``."""
+
+    @property
+    def box(self) -> Box:
+        """The smallest upright box (xmin, ymin, xmax, ymax) that holds the curve."""
+        bounds = []
+        for axis in (0, 1):
+            values = [self.start[axis], self.end[axis], *self.turning_values(axis)]
+            bounds.append((min(values), max(values)))
+        (xmin, xmax), (ymin, ymax) = bounds
+        return xmin, ymin, xmax, ymax
+
+
+def as_point(name: str, value: Any) -> Point:
+    """Return ``value`` as a pair of finite floats, or raise a WallError that says what it is."""
+    try:
+        x, y = value
+        point = float(x), float(y)
+    except (TypeError, ValueError) as reason:
+        raise WallError(f"{name}: expected a point (x, y), got {value!r}") from reason
+    if not (math.isfinite(point[0]) and math.isfinite(point[1])):
+        raise WallError(f"{name}: expected finite coordinates, got {point}")
+    return point
+
+
+def stretch_factors(x_factor: float, y_factor: float) -> tuple[float, float]:
+    """Return both factors as finite floats other than zero."""
+    factors = float(x_factor), float(y_factor)
+    if not all(math.isfinite(f) and f != 0.0 for f in factors):
+        raise WallError(f"stretched: expected two finite factors other than 0, got {factors}")
+    return factors
+
+
+def uniform_parameters(tolerance: float, steps: float) -> Floats:
+    """Return parameters from 0 to 1 in at least ``steps`` equal steps; ``tolerance`` must be positive."""
+    if not tolerance > 0.0:
+        raise WallError(f"flattened: expected a tolerance greater than 0, got {tolerance!r}")
+    return np.linspace(0.0, 1.0, max(1, math.ceil(steps)) + 1)

@@ -1,0 +1,102 @@
+"""Straight pieces of walls."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from ...errors import WallError
+from .curve import Box, Curve, Point, as_point, stretch_factors
+
+
+@dataclass(frozen=True)
+class Segment(Curve):
+    """A straight piece from ``start`` to ``end``.
+
+    Parameters
+    ----------
+    start, end : (float, float)
+        Two different points.
+
+    Raises
+    ------
+    WallError
+        If a coordinate is not finite or the two points coincide.
+
+    Examples
+    --------
+    >>> side = Segment((0, 0), (3, -4))
+    >>> side.length
+    5.0
+    >>> side.point([0.0, 0.5]).tolist()
+    [[0.0, 0.0], [1.5, -2.0]]
+    """
+
+    start: Point
+    end: Point
+    rounding: float = field(default=0.0, init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", as_point("Segment start", self.start))
+        object.__setattr__(self, "end", as_point("Segment end", self.end))
+        if self.start == self.end:
+            raise WallError(f"Segment: expected two different points, got {self.start} twice; leave this piece out")
+
+    def point(self, s: ArrayLike) -> Floats:
+        """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""
+        along = np.asarray(s, dtype=np.float64)[..., np.newaxis]
+        points: Floats = (1.0 - along) * np.array(self.start) + along * np.array(self.end)
+        return points
+
+    def tangent(self, s: ArrayLike) -> Floats:
+        """Return the unit tangent, once for every parameter in ``s``, shape ``s.shape + (2,)``."""
+        dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
+        speed = math.hypot(dx, dy)
+        direction = np.array([dx / speed, dy / speed])
+        return np.array(np.broadcast_to(direction, (*np.shape(s), 2)), dtype=np.float64)
+
+    @property
+    def length(self) -> float:
+        """The distance between the end points."""
+        return math.dist(self.start, self.end)
+
+    @property
+    def box(self) -> Box:
+        """The smallest upright box (xmin, ymin, xmax, ymax) that holds the segment."""
+        (x0, y0), (x1, y1) = self.start, self.end
+        return min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
+
+    def turning_points(self, axis: int) -> list[float]:
+        """Return an empty list: a straight line does not turn."""
+        return []
+
+    def reversed(self) -> Segment:
+        """Return the segment run the other way."""
+        return Segment(self.end, self.start)
+
+    def stretched(self, x_factor: float, y_factor: float) -> Segment:
+        """Return the image under (x, y) -> (x_factor x, y_factor y)."""
+        fx, fy = stretch_factors(x_factor, y_factor)
+        return Segment((fx * self.start[0], fy * self.start[1]), (fx * self.end[0], fy * self.end[1]))
+
+    def moved(self, dx: float, dy: float) -> Segment:
+        """Return the segment shifted by (dx, dy)."""
+        return Segment((self.start[0] + dx, self.start[1] + dy), (self.end[0] + dx, self.end[1] + dy))
+
+    def pinned(self, start: Point, end: Point) -> Segment:
+        """Return the segment between the given points."""
+        return Segment(start, end)
+
+    def split(self, s: float) -> tuple[Segment, Segment]:
+        """Return the parts before and after the parameter ``s`` in (0, 1)."""
+        x, y = self.point(s)
+        middle = (float(x), float(y))
+        return Segment(self.start, middle), Segment(middle, self.end)
+
+    def flattened(self, tolerance: float) -> Floats:
+        """Return the two end points, whatever the tolerance."""
+        return np.array([self.start, self.end])

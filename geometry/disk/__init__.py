@@ -1,0 +1,1 @@
+"""The disk: its masses and frame, how it rolls, its satellites, its charts, and the same in symbols."""

@@ -1,0 +1,158 @@
+"""The disk: its masses, its kinetic-energy metric, its frame, and the angles of its velocities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, angles, finite_array, frozen, positive_number
+from ...errors import InputError
+from .kinetics import direction, foreshortening, frame_rows
+
+
+@dataclass(frozen=True)
+class Disk:
+    """A disk of radius 1 that slides and spins: velocities are w = (v1, v2, omega).
+
+    Parameters
+    ----------
+    mass : float
+        m, greater than 0.
+    inertia : float
+        J, the moment of inertia about the centre, greater than 0. A uniform disk has J = m/2 and a ring J = m;
+        J > m is accepted but no real disk of radius 1 has it.
+
+    Raises
+    ------
+    InputError
+        If a parameter is not a finite number greater than 0.
+
+    Notes
+    -----
+    The inner product is the kinetic-energy one, <w, w'> = m v1 v1' + m v2 v2' + J omega omega'. The sign of chi is
+    that of Rudzis 2022, index of notation (sections 1.3.6 and 4.2 print the opposite one).
+
+    Examples
+    --------
+    >>> disk = Disk(mass=1.0, inertia=1 / 3)
+    >>> disk.foreshortening
+    0.5
+    >>> disk.rolling_momentum((1.0, 0.0, 3.0))
+    array(0.)
+    """
+
+    mass: float = 1.0
+    inertia: float = 0.5
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", positive_number("mass", self.mass))
+        object.__setattr__(self, "inertia", positive_number("inertia", self.inertia))
+
+    @property
+    def foreshortening(self) -> float:
+        """kappa = (1 + m/J)^(-1/2) < 1: how much the disk's rotation compresses a wall along x."""
+        return float(foreshortening(self.mass, self.inertia))
+
+    @property
+    def frame(self) -> Floats:
+        """Rows chi_perp, e2^ and chi, orthonormal for ``inner``; shape (3, 3), read-only.
+
+        chi_perp = (1/m + 1/J)^(-1/2) (1/m, 0, 1/J), e2^ = m^(-1/2) (0, 1, 0), chi = (m + J)^(-1/2) (-1, 0, 1).
+        """
+        return frozen(frame_rows(self.mass, self.inertia))
+
+    def inner(self, w: ArrayLike, w2: ArrayLike) -> Floats:
+        """Return the kinetic-energy inner products of velocities of shape (..., 3), broadcast."""
+        products = _velocities("w", w) * _velocities("w2", w2)
+        return np.asarray(self.mass * (products[..., 0] + products[..., 1]) + self.inertia * products[..., 2])
+
+    def rolling_momentum(self, w: ArrayLike) -> Floats:
+        """Return -m v1 + J omega, which every collision keeps; shape (...) for velocities of shape (..., 3)."""
+        velocity = _velocities("w", w)
+        return np.asarray(-self.mass * velocity[..., 0] + self.inertia * velocity[..., 2])
+
+    def to_angles(self, w: ArrayLike) -> tuple[Floats, Floats]:
+        """Return the angles (theta, psi) of velocities; the speed is dropped.
+
+        Parameters
+        ----------
+        w : array_like, shape (..., 3)
+            Velocities (v1, v2, omega) with v2 > 0. Of an incoming velocity pass the negative.
+
+        Returns
+        -------
+        theta, psi : ndarray, shape (...)
+            In (0, pi), with w = speed (cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi).
+
+        Raises
+        ------
+        InputError
+            If some v2 is not positive.
+
+        Examples
+        --------
+        >>> theta, psi = Disk().to_angles((0.0, 2.0, 0.0))
+        >>> bool(theta == np.pi / 2), bool(psi == np.pi / 2)
+        (True, True)
+        """
+        velocity = _velocities("w", w)
+        if not np.all(velocity[..., 1] > 0.0):
+            where = tuple(int(i) for i in np.argwhere(~(velocity[..., 1] > 0.0))[0])
+            place = f" at index {where}" if where else ""
+            raise InputError(
+                f"w: expected velocities with v2 > 0, got v2 = {float(velocity[where][1])!r}{place}; "
+                "pass minus the velocity of an incoming disk"
+            )
+        across = (velocity[..., 0] + velocity[..., 2]) / math.sqrt(1.0 / self.mass + 1.0 / self.inertia)
+        upward = math.sqrt(self.mass) * velocity[..., 1]
+        rolling = self.rolling_momentum(velocity) / math.sqrt(self.mass + self.inertia)
+        # two arctangents are accurate at grazing and at the poles, where arccos loses half of the digits
+        return np.arctan2(upward, across), np.arctan2(np.hypot(upward, across), rolling)
+
+    def from_angles(self, theta: ArrayLike, psi: ArrayLike, speed: ArrayLike = 1.0) -> Floats:
+        """Return velocities (v1, v2, omega) with the given angles.
+
+        Parameters
+        ----------
+        theta, psi : array_like
+            Angles in (0, pi), radians.
+        speed : array_like
+            The norm <w, w>^(1/2), greater than 0; the three arguments broadcast.
+
+        Returns
+        -------
+        ndarray, shape (..., 3)
+
+        Raises
+        ------
+        InputError
+            If an angle is outside (0, pi), a speed is not positive, or the shapes do not broadcast.
+
+        Examples
+        --------
+        >>> velocity = Disk(mass=4.0).from_angles(np.pi / 2, np.pi / 2)
+        >>> float(velocity[1])
+        0.5
+        """
+        norms = finite_array("speed", speed)
+        if not np.all(norms > 0.0):
+            raise InputError(f"speed: expected numbers greater than 0, got {float(np.min(norms))!r}")
+        try:
+            theta, psi, norms = np.broadcast_arrays(angles("theta", theta), angles("psi", psi), norms)
+        except ValueError as reason:
+            if isinstance(reason, InputError):
+                raise
+            raise InputError(f"theta, psi, speed: expected shapes that broadcast ({reason})") from reason
+        parts = norms[..., np.newaxis] * np.stack(direction(theta, psi), axis=-1)
+        # not a matrix product: each component keeps its own relative accuracy
+        return np.asarray(np.sum(parts[..., :, np.newaxis] * self.frame, axis=-2))
+
+
+def _velocities(name: str, w: ArrayLike) -> Floats:
+    array = finite_array(name, w)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise InputError(f"{name}: expected velocities (v1, v2, omega) of shape (..., 3), got shape {array.shape}")
+    return array

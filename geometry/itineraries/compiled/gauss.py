@@ -1,0 +1,116 @@
+"""Compiled Gauss rules on a piece of a row on which the itinerary does not change. Imported inside functions only.
+
+The rules are those in s with x = a + (b - a) s^2 (3 - 2 s): the square roots at tangencies are then analytic at both
+ends. ``rules`` are what `gauss_tables` gives. ``nodes`` are the outgoing angles and masses of a row, with spare room.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ....rounding import EPS
+from .changes import FIRST_LABEL, inner, is_spent, probe
+
+ORDERS = (4, 7, 12, 20, 32)
+# Nodes of one row at most.
+MOST_NODES = 1 << 17
+# Nodes that the margins and gaps of a row may need beyond those.
+SPARE = 4
+# A Gauss rule's error is taken as the last difference times the last ratio of differences, at least this, twice: where
+# differences shrink by chance rather than regularly, smaller ratios have proved too hopeful.
+LEAST_RATIO = 0.03
+# Pieces are not halved below this share of the opening.
+NARROWEST = 1e-9
+MOST_HALVINGS = 40
+
+
+def gauss_tables() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Positions in (0, 1) and weights of all rules after the substitution, one after the other, and their starts."""
+    places, weights, starts = [], [], [0]
+    for order in ORDERS:
+        node, weight = np.polynomial.legendre.leggauss(order)
+        s = 0.5 * (1.0 + node)
+        places.append(s * s * (3.0 - 2.0 * s))
+        weights.append(0.5 * weight * 6.0 * s * (1.0 - s))
+        starts.append(starts[-1] + order)
+    return np.concatenate(places), np.concatenate(weights), np.array(starts)
+
+
+@inner
+def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, strict):
+    """One rule after the other on [low, high], until two of them agree.
+
+    Returns the number of nodes, the error, a place where a ray has another label (nan: none), and the number of rays.
+    Without ``strict`` labels do not matter, and the difference of the rules has to show what the piece hides.
+    """
+    places, weights, starts = rules
+    node, mass = nodes
+    degree = task[6]
+    width = high - low
+    old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
+    k = max(degree, 1)
+    error = 2.0 * width
+    used, rays = np.int64(0), np.int64(0)
+    for level in range(least, len(ORDERS)):
+        first, last = starts[level], starts[level + 1]
+        if last - first > MOST_NODES - filled - 2 or is_spent(task):
+            break
+        new0, new1, new2 = 0.0, 0.0, 0.0
+        for n in range(first, last):
+            x = low + width * places[n]
+            out, here = probe(x, task)
+            rays += 1
+            if strict and here != label:
+                return used, error, x, rays
+            weight = width * weights[n]
+            node[filled + n - first], mass[filled + n - first] = out, weight
+            new0 += weight * math.cos(out)
+            new1 += weight * math.cos(k * out)
+            new2 += weight * math.sin(k * out)
+        used = last - first
+        if degree == 0 or label < FIRST_LABEL:
+            return used, 0.0, np.nan, rays
+        if level > least:
+            step = max(abs(new0 - old0), max(abs(new1 - old1), abs(new2 - old2))) + EPS * width
+            ratio = 1.0 if level == least + 1 else step / old_step
+            error = 2.0 * step * min(1.0, max(ratio, LEAST_RATIO))
+            if error <= goal:
+                break
+            old_step = step
+        old0, old1, old2 = new0, new1, new2
+    return used, error, np.nan, rays
+
+
+@inner
+def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, filled, strict):
+    """Nodes on a piece, which is halved where the rules do not agree; ``out`` is the angle of a ray of it.
+
+    Returns the number of nodes in all, the error, a place where a ray has another label (nan: none), and the rays.
+    """
+    whole = task[1][1] - task[1][0]
+    low_stack, high_stack = np.empty(MOST_HALVINGS + 2), np.empty(MOST_HALVINGS + 2)
+    low_stack[0], high_stack[0] = ends
+    depth, error, rays = np.int64(1), 0.0, np.int64(0)
+    while depth > 0:
+        depth -= 1
+        low, high = low_stack[depth], high_stack[depth]
+        allowed = goal * max((high - low) / whole, share)
+        used, miss, other, spent = apply_rules(low, high, label, allowed, rules, least, task, nodes, filled, strict)
+        rays += spent
+        if not math.isnan(other):
+            return filled, error, other, rays
+        able = MOST_NODES - filled - 2 >= ORDERS[-1] and not is_spent(task)
+        if miss > allowed and depth < MOST_HALVINGS and high - low > NARROWEST * whole and able:
+            middle = 0.5 * (low + high)
+            low_stack[depth], high_stack[depth] = middle, high
+            low_stack[depth + 1], high_stack[depth + 1] = low, middle
+            depth += 2
+            continue
+        if used == 0:
+            nodes[0][filled], nodes[1][filled] = out, high - low
+            used = 1
+        filled += used
+        error += miss
+    return filled, error, np.nan, rays

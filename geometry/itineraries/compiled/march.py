@@ -1,0 +1,170 @@
+"""The compiled march along rows: pieces of equal itinerary, and Gauss nodes on each. Imported inside functions only.
+
+A node whose label is not that of its piece is a change that was overlooked; it is put among the samples.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ....rounding import EPS
+from ...tracing.compiled.growing import longer
+from .changes import FIRST_LABEL, MOST_SAMPLES, add_change, empty_chain, inner, is_spent, sample_row, spread, undecided
+from .gauss import MOST_NODES, SPARE, integrate_piece
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+# Pieces of a row that its neighbours start from.
+MOST_SEEDS = 128
+# Rounding of the mean of a row, as a share of the opening, and of the place of a change, as one of the hollow's size.
+# Rays are good to a few units of EPS times the derivative of their map, seldom above some hundreds except next to a
+# change: measured, not proved.
+ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
+# The share of the tolerance that the Gauss rules may spend, and that all undecided gaps may take.
+RULE_SHARE, GAP_SHARE = 0.5, 0.25
+# The share of what the rules may spend that any piece may, however short it is.
+LEAST_SHARE = 0.02
+# The share of what the gaps may take for those of a change that was overlooked.
+LATE_SHARE = 0.05
+
+
+@inner
+def merged(first, second):
+    """Two increasing sequences as one."""
+    both = np.empty(first.shape[0] + second.shape[0])
+    i, j = np.int64(0), np.int64(0)
+    for k in range(both.shape[0]):
+        if j == second.shape[0] or (i < first.shape[0] and first[i] <= second[j]):
+            both[k] = first[i]
+            i += 1
+        else:
+            both[k] = second[j]
+            j += 1
+    return both
+
+
+@inner
+def march_row(task, goal, rules, least, places, chain, nodes, pieces):
+    """Nodes and masses of one row; returns their number, the error, the lost width, the number of pieces and of rays.
+
+    What a row that has spent its flights leaves undone is in its error. ``pieces`` receives first and last
+    place and label of every piece.
+    """
+    xs, outs, labels, follow, _, _ = chain
+    node, mass = nodes
+    hollow, degree, code = task[1], task[6], task[7]
+    left, right = hollow[0], hollow[1]
+    whole = right - left
+    code[1] = np.uint64(0)
+    count, last = sample_row(places, task, chain, GAP_SHARE * goal)
+    rays = np.int64(0)
+    # the margins count with the first and the last sample
+    node[0], mass[0] = outs[0], xs[0] - left
+    node[1], mass[1] = outs[last], right - xs[last]
+    filled, number, lost = np.int64(2), np.int64(0), 0.0
+    error = ROUNDING * whole
+    error += mass[0] * spread(outs[0], outs[1], degree) + mass[1] * spread(outs[last], outs[last - 1], degree)
+    i = np.int64(0)
+    while i >= 0:
+        j = i
+        while follow[j] >= 0 and labels[follow[j]] == labels[i]:
+            j = follow[j]
+        if j != i:
+            ready, miss, other, spent = integrate_piece(
+                (xs[i], xs[j]), outs[i], labels[i], RULE_SHARE * goal, LEAST_SHARE, rules, least, task, nodes, filled,
+                count < MOST_SAMPLES - 4 and not is_spent(task),
+            )  # fmt: skip
+            rays += spent
+            if not math.isnan(other):
+                # an overlooked change: it joins the samples, and the piece is walked again
+                count = add_change(other, i, task, chain, count, LATE_SHARE * GAP_SHARE * goal)
+                continue
+            filled, error = ready, error + miss
+            if labels[i] < FIRST_LABEL:
+                lost += xs[j] - xs[i]
+                error += 2.0 * (xs[j] - xs[i])
+        pieces[0][number], pieces[1][number], pieces[2][number] = xs[i], xs[j], labels[i]
+        number += 1
+        following = follow[j]
+        if following >= 0:
+            width = xs[following] - xs[j]
+            if filled + 2 < MOST_NODES:
+                node[filled], mass[filled] = outs[j], 0.5 * width
+                node[filled + 1], mass[filled + 1] = outs[following], 0.5 * width
+                filled += 2
+            else:
+                mass[filled - 1] += width
+                error += width
+            error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[2] * spread(outs[j], outs[following], degree)
+        i = following
+    return filled, error, lost, number, rays + count
+
+
+@inner
+def room_for_pieces(count):
+    """First places, last places and labels."""
+    return np.empty(count), np.empty(count), np.empty(count, np.uint64)
+
+
+@_compile
+def wide_middles(lows, highs, least):
+    """The middles of the pieces wider than that: of the widest ones, if they are many."""
+    # doubled until they are few
+    least, many = max(least, EPS * EPS), True
+    while many:
+        count = 0
+        for k in range(lows.shape[0]):
+            count += highs[k] - lows[k] > least
+        many = count > MOST_SEEDS
+        least *= 2.0
+    middles = np.empty(count)
+    count = 0
+    for k in range(lows.shape[0]):
+        if highs[k] - lows[k] > 0.5 * least:
+            middles[count] = 0.5 * (lows[k] + highs[k])
+            count += 1
+    return middles
+
+
+@_compile
+def march_rows(thetas, tolerances, scene, degree, rules, least, seeds, seed_starts):
+    """Rows at increasing angles.
+
+    ``scene``: hollow, tables, period, limits, edges of cells. A row starts from its seeds, which increase, and from the
+    middles of the pieces of the row before, so that a narrow piece is followed until it vanishes. Returns outgoing
+    angles and masses, one row after the other, and where each row starts; the same of first places, last places and
+    labels of the pieces; and the error, the width lost and the numbers of rays and of flights of each row.
+    """
+    hollow, tables, period, limits, edges = scene
+    whole = hollow[1] - hollow[0]
+    chain, code = empty_chain(), np.zeros(2, np.uint64)
+    nodes = np.empty(MOST_NODES + SPARE), np.empty(MOST_NODES + SPARE)
+    pieces = room_for_pieces(MOST_SAMPLES)
+    n = thetas.shape[0]
+    node_starts, piece_starts = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
+    errors, lost, rays, flights = np.empty(n), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
+    all_nodes = np.empty(1024), np.empty(1024)
+    all_pieces = room_for_pieces(1024)
+    previous = np.empty(0)
+    for k in range(n):
+        task = (thetas[k], hollow, tables, period, limits, edges, degree, code)
+        goal = tolerances[k] * whole
+        places = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
+        filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, least, places, chain, nodes, pieces)
+        flights[k] = np.int64(code[1])
+        previous = wide_middles(pieces[0][:number], pieces[1][:number], goal)
+        begin, end = node_starts[k], node_starts[k] + filled
+        if end > all_nodes[0].shape[0]:
+            all_nodes = longer(all_nodes[0], 2 * end), longer(all_nodes[1], 2 * end)
+        all_nodes[0][begin:end], all_nodes[1][begin:end] = nodes[0][:filled], nodes[1][:filled]
+        node_starts[k + 1] = end
+        begin, end = piece_starts[k], piece_starts[k] + number
+        if end > all_pieces[0].shape[0]:
+            all_pieces = longer(all_pieces[0], 2 * end), longer(all_pieces[1], 2 * end), longer(all_pieces[2], 2 * end)
+        all_pieces[0][begin:end], all_pieces[1][begin:end] = pieces[0][:number], pieces[1][:number]
+        all_pieces[2][begin:end] = pieces[2][:number]
+        piece_starts[k + 1] = end
+    return all_nodes, node_starts, all_pieces, piece_starts, errors, lost, rays, flights

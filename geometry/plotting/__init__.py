@@ -1,0 +1,1 @@
+"""Pictures of walls with rays, and of collisions."""

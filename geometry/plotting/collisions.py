@@ -1,0 +1,218 @@
+"""Pictures of the true disk: a collision satellite by satellite, and the configurations that a wall leaves free."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, number_between, positive_number
+from ...errors import InputError
+from ..collisions.configuration_space import ConfigurationSpace
+from ..collisions.rigid import collide
+from ..disk.disk import Disk
+from ..walls.wall import Wall
+from .walls import LEVEL, RAY_COLOURS, SOLID
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Points of a satellite's path in one flight: it is nearly straight.
+FLIGHT_POINTS = 40
+# How much free space is shown above the tops, in depths of the wall, and how many cells beside the contacts.
+FREE, MARGIN = 1.0, 1.0
+# Pixels of one side of a section of the configuration space.
+SECTION = 500
+MOST_CONTACTS = 200
+
+
+def collision_path(
+    disk: Disk, wall: Wall, scale: float, position: ArrayLike, velocity: ArrayLike, spacing: float | None = None
+) -> Floats:
+    """Configurations (x1, x2, alpha) of one disk from height 0 through every contact to height 0, shape (k + 2, 3).
+
+    Parameters
+    ----------
+    disk, wall, scale, spacing
+        As in `collide`.
+    position : array_like, shape (2,)
+    velocity : array_like, shape (3,)
+
+    Raises
+    ------
+    InputError
+        As in `collide`, and if the disk does not come back or has more than 200 contacts.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> path = collision_path(geo.Disk(), geo.triangular_teeth(2.0), 0.01, [0.0025, 0.0], [0.0, -1.0, 0.0])
+    >>> path.shape, bool(path[0, 1] == 0.0), bool(path[1, 1] < 0.0), abs(float(path[-1, 1])) < 1e-15
+    ((4, 3), True, True, True)
+    """
+    start, moving = np.array([position], dtype=float), np.array([velocity], dtype=float)
+    whole = collide(disk, wall, scale, start, moving, spacing)
+    contacts = int(whole.contacts[0])
+    if not whole.escaped[0] or contacts > MOST_CONTACTS:
+        state = next(name for name, count in whole.counts().items() if count)
+        raise InputError(
+            f"position, velocity: expected a disk that comes back after at most {MOST_CONTACTS} contacts, got {state} "
+            f"after {contacts}"
+        )
+    # the first part of each run goes to the contact after its last one; heights follow from the times
+    states = [(start[0], moving[0], 0.0)]
+    legs = [collide(disk, wall, scale, start, moving, spacing, max_contacts=k) for k in range(1, contacts)]
+    states += [(leg.position[0], leg.velocity[0], float(leg.time[0])) for leg in [*legs, whole]]
+    height, path = 0.0, [(*start[0], 0.0)]
+    if contacts:
+        first = _first_time(disk, wall, scale, start, moving, spacing, states[-1] if contacts == 1 else states[1])
+        path.append((*(start[0] + moving[0, [0, 2]] * first), moving[0, 1] * first))
+        height, before = moving[0, 1] * first, first
+        for place, w, at in states[1:]:
+            height += w[1] * (at - before)
+            before = at
+            path.append((*place, height))
+    else:
+        path.append((*whole.position[0], 0.0))
+    return np.array([(x1, x2, alpha) for x1, alpha, x2 in path])
+
+
+def _first_time(
+    disk: Disk, wall: Wall, scale: float, start: Floats, moving: Floats, spacing: float | None,
+    after: tuple[Floats, Floats, float],
+) -> float:  # fmt: skip
+    """When the first contact is: both velocities are known, and where the flight after it ends."""
+    place, w, end = after
+    change = w[[0, 2]] - moving[0, [0, 2]]
+    reached = place - start[0] - end * w[[0, 2]]
+    # start + v first + w (end - first) = place
+    if not np.any(change):
+        # only v2 changed: it came back to height 0, or touched again at a height that v2 alone does not tell
+        return float(end * w[1] / (w[1] - moving[0, 1]))
+    return float(-(change @ reached) / (change @ change))
+
+
+def draw_collision(
+    disk: Disk,
+    wall: Wall,
+    scale: float,
+    position: ArrayLike,
+    velocity: ArrayLike,
+    spacing: float | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw one collision near the wall: the rim at every contact, and the paths of the satellites that come near.
+
+    Parameters
+    ----------
+    disk, wall, scale, position, velocity, spacing
+        As in `collision_path`.
+    ax : matplotlib Axes, optional
+        A new figure is made if there is none.
+
+    Returns
+    -------
+    matplotlib Axes
+        Lengths in units of the wall. Dots are satellites at height 0 and at every contact, lines their paths; the rim
+        between them, dashed, does not touch the wall.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> axes = draw_collision(geo.Disk(), geo.triangular_teeth(2.0), 0.01, [0.0025, 0.0], [0.0, -1.0, 0.0])
+    >>> axes.get_ylabel()
+    'height above the tops'
+    """
+    eps = positive_number("scale", scale)
+    space = ConfigurationSpace(wall, disk, eps, spacing)
+    path = collision_path(disk, wall, eps, position, velocity, spacing)
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.figure(layout="constrained").subplots()
+    lowest = -space.charts.nearest(path[:, 2])
+    numbers = np.arange(lowest.min() - 1, lowest.max() + 2)
+    low = space.zoomed.satellite(path / eps, lowest)
+    cells = np.array([low[:, 0].min(), low[:, 0].max()]) / wall.period
+    left, right = np.floor(cells[0] - MARGIN), np.ceil(cells[1] + MARGIN)
+    top = FREE * max(wall.depth, 0.3 * wall.period)
+    outline = wall.outline(1e-3 * wall.period)
+    for k in range(int(left) - 1, int(right) + 1):
+        ax.fill_between(outline[:, 0] + k * wall.period, outline[:, 1], -2.0 * top, color=SOLID, linewidth=0)
+        ax.plot(outline[:, 0] + k * wall.period, outline[:, 1], color="black", linewidth=1.2)
+    for j, number in enumerate(numbers):
+        colour = RAY_COLOURS[j % len(RAY_COLOURS)]
+        for before, after in pairwise(path):
+            share = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, None]
+            way = space.zoomed.satellite((before + share * (after - before)) / eps, number)
+            ax.plot(way[:, 0], way[:, 1], color=colour, linewidth=1.1)
+    _draw_rims(ax, space, path, numbers)
+    ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":")
+    ax.set_xlim(left * wall.period, right * wall.period)
+    ax.set_ylim(-1.15 * max(wall.depth, 0.1 * wall.period), top)
+    ax.set_aspect("equal")
+    ax.set_xlabel("x (length units of the wall)")
+    ax.set_ylabel("height above the tops")
+    return ax
+
+
+def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Floats) -> None:
+    """The rim of the disk at start, contacts and end, with its satellites."""
+    angles = np.linspace(-1.5 * space.spacing, 1.5 * space.spacing, 4 * FLIGHT_POINTS)
+    for place in path:
+        x1, x2, alpha = place / space.scale
+        x = x1 + np.sin(angles) / space.scale
+        y = x2 + 2.0 * np.sin(0.5 * angles) ** 2 / space.scale
+        ax.plot(x, y, color=LEVEL, linewidth=0.7, linestyle=(0, (4, 3)), zorder=1.5)
+        for j, number in enumerate(numbers):
+            dot = space.zoomed.satellite(np.array([x1, x2, alpha]), number)
+            ax.plot(*dot, "o", color=RAY_COLOURS[j % len(RAY_COLOURS)], markersize=4.5, zorder=4)
+
+
+def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | None = None) -> Axes:
+    """Draw the section x2 = ``height`` of the free configurations over two cells and two spacings.
+
+    Free space is white. Inside the bands alpha in Z, marked at the side, the solid is a bent cylinder over the wall,
+    x1 + sin(alpha) constant; in the gaps between them two satellites are below the tops and two cylinders cross.
+
+    Parameters
+    ----------
+    space : ConfigurationSpace
+    height : float
+        x2 in units of the depth of the scaled wall, in (-1, 0): -0.5 is half-way down. Measured from where the lowest
+        satellite half-way between two others touches the tops, so that the section meets the solid for every alpha.
+    ax : matplotlib Axes, optional
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> space = ConfigurationSpace(geo.triangular_teeth(2.0), geo.Disk(), 0.01)
+    >>> draw_configurations(space, -0.5).get_images()[0].get_extent()
+    [0.0, 2.0, -1.0, 1.0]
+    """
+    height = number_between("height", height, -1.0, 0.0)
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.figure(layout="constrained").subplots()
+    width, rho = space.scale * space.wall.period, space.spacing
+    x1 = width * (np.arange(SECTION) + 0.5) / SECTION * 2.0
+    alpha = rho * (2.0 * (np.arange(SECTION) + 0.5) / SECTION - 1.0)
+    grid = np.stack(np.meshgrid(x1, alpha, indexing="xy"), axis=-1)
+    x2 = height * space.depth - 2.0 * np.sin(0.5 * space.charts.residual(grid[..., 1])) ** 2
+    free = space.contains(np.stack([grid[..., 0], x2, grid[..., 1]], axis=-1))
+    extent = (0.0, 2.0 * space.wall.period, -1.0, 1.0)
+    ax.imshow(np.where(free, 1.0, float(SOLID)), cmap="gray", vmin=0.0, vmax=1.0, origin="lower", extent=extent,
+              aspect="auto", interpolation="nearest")  # fmt: skip
+    gap = space.gap_radius / rho
+    for middle in (-0.5, 0.5):
+        ax.axhspan(middle - gap, middle + gap, color=RAY_COLOURS[4], alpha=0.25, linewidth=0)
+    ax.set_xlabel("x1 / eps")
+    ax.set_ylabel("alpha / rho")
+    return ax

@@ -1,0 +1,188 @@
+"""Pictures of walls and of rays in them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, angles, finite_array
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from ..curves.curve import Curve
+    from ..walls.wall import Wall
+
+# Okabe and Ito's colours, which stay apart for colour-blind readers.
+RAY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+SOLID, LEVEL = "0.82", "0.5"
+# Curves are drawn within this share of the picture's size, and corners nearer to each other than it are drawn as one:
+# a tenth of a pixel in a picture a thousand pixels wide.
+OUTLINE_TOLERANCE = 1e-4
+# How much of the two neighbouring cells is drawn beside the cell, and of free space above it, in periods.
+MARGIN, FREE = 0.12, 0.3
+# Both axes have one scale if the depth is within these shares of the period; a shallower or deeper wall would be a
+# line, and its vertical axis says how much it is stretched.
+SHALLOWEST, DEEPEST = 0.04, 3.0
+# Height over width of the picture of one cell of a wall that is stretched.
+SHALLOW_SHAPE, DEEP_SHAPE = 0.55, 1.6
+# Outlines with more points than this are drawn with a thin pen, which does not blot their details.
+FINE_POINTS = 2000
+# Rays that rise less than this in the picture leave it sideways.
+FLATTEST = 0.2
+# A ray that wanders farther through the cells of an open wall is followed this many cells to either side.
+MOST_CELLS = 2
+
+
+def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | None = None) -> Axes:
+    """Draw one period of a wall, with the trajectories of the rays that enter at ``x`` with the angles ``theta``.
+
+    Parameters
+    ----------
+    wall : Wall
+    x, theta : array_like
+        Entry points and incoming angles in (0, pi); they broadcast, and may be empty.
+    ax : matplotlib Axes, optional
+        A new figure is made if there is none.
+
+    Returns
+    -------
+    matplotlib Axes
+        Lengths are in the units of the wall. A dot marks where a ray enters, a ring where it leaves; a ray that does
+        not escape ends in a cross. Both axes have the same scale unless the wall is very shallow or very deep; the
+        label of the vertical axis then says by what factor it is stretched.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> draw_wall(geo.triangular_teeth(1.5), 0.25, np.pi / 2).get_ylabel()
+    'y'
+    >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
+    'y (stretched 29.1 times against x)'
+    """
+    places, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.figure(layout="constrained").subplots()
+    free, floor = _heights(wall)
+    rays = [
+        _Ray(wall, float(place), float(angle), free)
+        for place, angle in zip(np.ravel(places), np.ravel(incoming), strict=True)
+    ]
+    inside = np.concatenate([[0.0, 1.0], *(ray.points[:, 0] / wall.period for ray in rays)])
+    first = max(int(np.floor(inside.min())), -MOST_CELLS)
+    last = min(int(np.ceil(inside.max())), 1 + MOST_CELLS)
+    _draw_solid(ax, wall, range(first - 1, last + 1), floor)
+    ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":", zorder=1)
+    for i, ray in enumerate(rays):
+        _draw_ray(ax, ray, RAY_COLOURS[i % len(RAY_COLOURS)])
+    left, right = (first - MARGIN) * wall.period, (last + MARGIN) * wall.period
+    ax.set_xlim(left, right)
+    ax.set_ylim(floor, free)
+    ax.set_xlabel("x (length units of the wall)")
+    factor = vertical_stretch(wall)
+    words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
+    ax.set_ylabel("y" if factor == 1.0 else f"y ({words} against x)")
+    ax.set_aspect(factor)
+    ax.locator_params(axis="both", nbins=6)
+    return ax
+
+
+def vertical_stretch(wall: Wall) -> float:
+    """How many times larger y is drawn than x: 1 unless the wall is very shallow or very deep.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> vertical_stretch(geo.flat()), vertical_stretch(geo.rectangular_teeth(1e4)) < 1
+    (1.0, True)
+    """
+    if wall.depth == 0.0 or SHALLOWEST * wall.period <= wall.depth <= DEEPEST * wall.period:
+        return 1.0
+    free, floor = _heights(wall)
+    shape = SHALLOW_SHAPE if wall.depth < wall.period else DEEP_SHAPE
+    return shape * (1.0 + 2.0 * MARGIN) * wall.period / (free - floor)
+
+
+def _heights(wall: Wall) -> tuple[float, float]:
+    """Top and bottom of the picture: where free space and the solid end."""
+    shallow = 0.0 < wall.depth < SHALLOWEST * wall.period
+    free = wall.depth if shallow else FREE * max(wall.period, wall.depth)
+    return free, -wall.depth - 0.25 * free
+
+
+class _Ray:
+    """The path of one ray: where it comes from, its points inside, where it goes."""
+
+    def __init__(self, wall: Wall, x: float, theta: float, free: float) -> None:
+        from ..tracing.tracing import trace, trajectory
+
+        stretch = vertical_stretch(wall)
+        result = trace(wall, x, theta)
+        self.points = trajectory(wall, x, theta)
+        self.arrival = self.points[0] + _up_to(free, theta, stretch)
+        self.departure: Floats | None = None
+        if bool(result.escaped):
+            self.points[-1] = (float(result.x), 0.0)
+            self.departure = self.points[-1] + _up_to(free, float(result.theta), stretch)
+
+
+def _up_to(height: float, theta: float, stretch: float) -> Floats:
+    """The vector along theta that rises by ``height``, or less where it is flat in the picture."""
+    direction = np.array([np.cos(theta), np.sin(theta)])
+    return np.asarray(height * direction / max(direction[1], FLATTEST * abs(direction[0]) / stretch))
+
+
+def _draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> None:
+    # a tenth of a pixel in either direction
+    step = OUTLINE_TOLERANCE * np.array([wall.period, -floor])
+    outline = _thinned(wall.outline(float(step.min())), step)
+    pen = 1.2 if len(outline) <= FINE_POINTS else 0.6
+    # the last point of a cell is the first of the next
+    path = np.concatenate([*(outline[:-1] + np.array([k * wall.period, 0.0]) for k in cells), outline[-1:]])
+    path[-1, 0] = (cells[-1] + 1) * wall.period
+    below = np.array([[path[-1, 0], floor], [path[0, 0], floor]])
+    solid = np.vstack([path, below])
+    ax.fill(solid[:, 0], solid[:, 1], color=SOLID, linewidth=0, zorder=1)
+    ax.plot(path[:, 0], path[:, 1], color="black", linewidth=pen, zorder=2, solid_joinstyle="round")
+    for island in wall.islands:
+        loop = _loop(island, float(step.min()))
+        for k in cells:
+            ax.fill(
+                loop[:, 0] + k * wall.period, loop[:, 1], facecolor=SOLID, edgecolor="black", linewidth=1.2, zorder=2
+            )
+
+
+def _loop(island: Sequence[Curve], tolerance: float) -> Floats:
+    return np.vstack([piece.flattened(tolerance) for piece in island])
+
+
+def _thinned(points: Floats, step: Floats) -> Floats:
+    """Leave out points in the same rectangle of sides ``step`` as the one before: a wall may have 10^5 pieces."""
+    cells_of = np.floor(points / step)
+    keep = np.any(cells_of[1:] != cells_of[:-1], axis=1)
+    keep[-1] = True
+    return np.asarray(points[np.concatenate([[True], keep])])
+
+
+def _draw_ray(ax: Axes, ray: _Ray, colour: str) -> None:
+    """One trajectory: an arrow in, the path, an arrow out; a dot where it enters, a ring where it leaves."""
+    ends = [ray.departure] if ray.departure is not None else []
+    path = np.vstack([ray.arrival, ray.points, *ends])
+    ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.1, zorder=3)
+    style = {"arrowstyle": "-|>", "color": colour, "shrinkA": 0.0, "shrinkB": 0.0, "mutation_scale": 13.0}
+    arrows = [(ray.arrival, ray.points[0], 0.55)]
+    ax.plot(*ray.points[0], "o", color=colour, markersize=4.5, zorder=4)
+    if ray.departure is None:
+        ax.plot(*ray.points[-1], "x", color=colour, markersize=7, zorder=4)
+    else:
+        ax.plot(*ray.points[-1], "o", markersize=5.5, mfc="white", mec=colour, mew=1.3, zorder=4)
+        arrows.append((ray.points[-1], ray.departure, 0.8))
+    for start, end, share in arrows:
+        tail, tip = start + (share - 0.05) * (end - start), start + share * (end - start)
+        ax.annotate("", xy=tuple(tip), xytext=tuple(tail), arrowprops=style, zorder=4, annotation_clip=True)

@@ -1,0 +1,1 @@
+"""Polygonal hollows sorted exactly into beams that are reflected alike."""

@@ -1,0 +1,1 @@
+"""The compiled loop that splits beams, and its tables."""

@@ -1,0 +1,327 @@
+"""The compiled loop that splits beams. Only `beams` imports this file, because it loads numba.
+
+A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0, and an
+unfolded vertex (X, Y) is the functional f = X s - Y c - p, positive where it lies right of the line. A beam is a convex
+polygon of such vectors. The generators have p, s and abs(c) of one sign, and cutting only mixes them with positive
+weights: every component keeps its relative accuracy down to grazing. `beam_tables` says where a beam's numbers stand.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ....rounding import EPS
+from ...tracing.compiled.growing import larger, longer, taller
+from ...tracing.compiled.trigonometry import PI
+from ...tracing.double_double.arithmetic import add
+from ..triangulation import FIRST_WALL, OPENING
+from .columns import (
+    BOUNCES,
+    COUNT,
+    EDGE,
+    ERROR_X,
+    ERROR_Y,
+    FLUX,
+    LEAF,
+    SIGN,
+    T_X,
+    T_X_LOW,
+    T_Y,
+    T_Y_LOW,
+    TURN,
+    TURN_LOW,
+    copied,
+    pop,
+    push,
+    put,
+)
+from .unfolding_engine import offset_of, reduced, wall_lines
+
+# f is a sum of five products of numbers with one to three rounding errors each; every term is counted in `f`'s size.
+FUNCTIONAL_ULPS = 8.0
+# T gains 2 d R n at a reflection: d, n, R and the two products have one rounding error each.
+STEP_ULPS = 4.0
+DONE, BUDGET = 0, 1
+# The open flux is a running sum; it is added up anew this often.
+RECOUNT = 4096
+# A beam may pass this many triangles for every beam that the budget allows.
+STEPS_A_BEAM = 64
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def polygon_flux(polygon, count):
+    """The integral of dp dtheta over a polygon of lines, positive if counterclockwise, as a fan of triangles.
+
+    That of a triangle is -det(a, b, c) sqrt(2 / product of 1 + cos over the three differences of angle).
+    """
+    total = 0.0
+    p, s, c = polygon[0, 0], polygon[0, 1], polygon[0, 2]
+    for i in range(1, count - 1):
+        here_s, here_c = polygon[i, 1], polygon[i, 2]
+        next_s, next_c = polygon[i + 1, 1], polygon[i + 1, 2]
+        bp, bs, bc = polygon[i, 0] - p, here_s - s, here_c - c
+        cp, cs, cc = polygon[i + 1, 0] - p, next_s - s, next_c - c
+        det = p * (bs * cc - bc * cs) - s * (bp * cc - bc * cp) + c * (bp * cs - bs * cp)
+        product = (1.0 + s * here_s + c * here_c) * (1.0 + here_s * next_s + here_c * next_c)
+        total -= det * math.sqrt(2.0 / (product * (1.0 + s * next_s + c * next_c)))
+    return total
+
+
+@_compile
+def clip(polygon, count, values, wanted, edge_x, edge_y, out):
+    """The part of a polygon where the functional has the wanted sign; returns its number of vertices."""
+    size = 0
+    for i in range(count):
+        j = i + 1 if i + 1 < count else 0
+        here, there = wanted * values[i], wanted * values[j]
+        if here >= 0.0:
+            for k in range(5):
+                out[size, k] = polygon[i, k]
+            if here == 0.0 and there < 0.0:
+                out[size, 3], out[size, 4] = edge_x, edge_y
+            size += 1
+        if (here > 0.0 and there < 0.0) or (here < 0.0 and there > 0.0):
+            near, far = abs(there), abs(here)
+            p = near * polygon[i, 0] + far * polygon[j, 0]
+            s = near * polygon[i, 1] + far * polygon[j, 1]
+            c = near * polygon[i, 2] + far * polygon[j, 2]
+            scale = 1.0 / math.sqrt(s * s + c * c)
+            out[size, 0], out[size, 1], out[size, 2] = p * scale, s * scale, c * scale
+            if here > 0.0:
+                out[size, 3], out[size, 4] = edge_x, edge_y
+            else:
+                out[size, 3], out[size, 4] = polygon[i, 3], polygon[i, 4]
+            size += 1
+    return size
+
+
+@_compile
+def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
+    """Take a beam through an edge of its triangle: on to the next one, back from a wall, or out (then True)."""
+    code = beyond[edge]
+    if code >= 0:
+        whole[slot, EDGE] = code
+        return False
+    if code == OPENING:
+        whole[slot, EDGE] = edge
+        whole[slot, LEAF] = 1
+        return True
+    wall = FIRST_WALL - code
+    sign = float(whole[slot, SIGN])
+    # the image of the wall's unit normal, whose angle is turn + sign (direction + pi / 2)
+    turn = sign * turn_high[wall], sign * turn_low[wall]
+    high, low = add((real[slot, TURN], real[slot, TURN_LOW]), turn)
+    sine, cosine = math.sin(high), math.cos(high)
+    sine, cosine = sine + low * cosine, cosine - low * sine
+    dx, dy = -2.0 * distance[wall] * sign * sine, 2.0 * distance[wall] * sign * cosine
+    real[slot, T_X], real[slot, T_X_LOW] = add((real[slot, T_X], real[slot, T_X_LOW]), (dx, 0.0))
+    real[slot, T_Y], real[slot, T_Y_LOW] = add((real[slot, T_Y], real[slot, T_Y_LOW]), (dy, 0.0))
+    real[slot, ERROR_X] += STEP_ULPS * EPS * abs(dx)
+    real[slot, ERROR_Y] += STEP_ULPS * EPS * abs(dy)
+    high, low = add((high, low), turn)
+    real[slot, TURN], real[slot, TURN_LOW] = reduced(high, low)
+    whole[slot, SIGN] = -whole[slot, SIGN]
+    whole[slot, EDGE] = edge
+    whole[slot, BOUNCES] += 1
+    return False
+
+
+@_compile
+def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, tolerance, max_beams, halves):
+    """Carry the beams of all rays through the hollow, the largest first; of the rays with theta < pi/2 if halves is 1.
+
+    Returns the tables, the number of slots, the rounding bound (flux) and the number of splits.
+    """
+    width = x[x.shape[0] - 1]
+    distance = wall_lines(x, y, turn_high)[:, 2]
+    room, wide = 1024, 12
+    corners = np.empty((room, wide, 5))
+    real = np.zeros((room, 9))
+    whole = np.zeros((room, 5), np.int64)
+    heap = np.empty(room, np.int64)
+    used, queue = 0, 0
+    for half in range(halves):
+        polygon = corners[half]
+        for i in range(3):
+            for k in range(5):
+                polygon[i, k] = 0.0
+        if half == 0:
+            polygon[0, 2], polygon[1, 1], polygon[2, 1] = 1.0, 1.0, 1.0
+            polygon[2, 0], polygon[2, 3] = width, width
+        else:
+            polygon[0, 1], polygon[1, 2], polygon[2, 1] = 1.0, -1.0, 1.0
+            polygon[2, 0], polygon[1, 3] = width, width
+        whole[half, COUNT], whole[half, EDGE], whole[half, SIGN] = 3, entrance, 1
+        real[half, FLUX] = polygon_flux(polygon, 3)
+        queue = push(heap, queue, real, half)
+        used += 1
+    total = real[:halves, FLUX].sum()
+    open_flux = total
+    rounding = 0.0
+    values = np.empty(wide)
+    first, second = np.empty((wide, 5)), np.empty((wide, 5))
+    splits, steps = 0, 0
+    status = DONE
+    slot = -1
+    while True:
+        if slot < 0:
+            if queue == 0:
+                break
+            if splits % RECOUNT == 0 or open_flux <= tolerance * total:
+                open_flux = 0.0
+                for i in range(queue):
+                    open_flux += real[heap[i], FLUX]
+                if open_flux <= tolerance * total:
+                    break
+            if used >= max_beams or steps >= STEPS_A_BEAM * max_beams:
+                status = BUDGET
+                break
+            slot, queue = pop(heap, queue, real)
+        steps += 1
+        if steps >= STEPS_A_BEAM * max_beams:
+            queue = push(heap, queue, real, slot)
+            status = BUDGET
+            break
+        edge, count = whole[slot, EDGE], whole[slot, COUNT]
+        sign = float(whole[slot, SIGN])
+        triangle, side = edge // 3, edge % 3
+        apex = triangles[triangle, (side + 2) % 3]
+        sine, cosine = math.sin(real[slot, TURN]), math.cos(real[slot, TURN])
+        sine, cosine = sine + real[slot, TURN_LOW] * cosine, cosine - real[slot, TURN_LOW] * sine
+        xx, xy, yx, yy = cosine * x[apex], -sign * sine * y[apex], sine * x[apex], sign * cosine * y[apex]
+        vx, vy = xx + xy + real[slot, T_X], yx + yy + real[slot, T_Y]
+        size_x = FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(real[slot, T_X])) + real[slot, ERROR_X]
+        size_y = FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(real[slot, T_Y])) + real[slot, ERROR_Y]
+        polygon = corners[slot]
+        doubtful, doubt = False, 0.0
+        positive, negative = False, False
+        low_i, high_i = 0, 0
+        for i in range(count):
+            p, s, c = polygon[i, 0], polygon[i, 1], polygon[i, 2]
+            value = vx * s - vy * c - p
+            slack = size_x * s + size_y * abs(c) + FUNCTIONAL_ULPS * EPS * p
+            if abs(value) <= slack:
+                if value != 0.0:
+                    doubtful = True
+                value = 0.0
+            doubt = max(doubt, slack)
+            values[i] = value
+            positive = positive or value > 0.0
+            negative = negative or value < 0.0
+            if c * polygon[low_i, 1] > s * polygon[low_i, 2]:
+                low_i = i
+            if c * polygon[high_i, 1] < s * polygon[high_i, 2]:
+                high_i = i
+        if doubtful and not (positive and negative):
+            # what lies beyond the line, by at most `doubt` in p, over at most the beam's range of angles
+            spread = polygon[high_i, 1] * polygon[low_i, 2] - polygon[high_i, 2] * polygon[low_i, 1]
+            rounding += 0.5 * math.pi * doubt * abs(spread)
+        # the side of the triangle between its apex and the vertex of the edge that lies left of the beam, or right
+        left_side, right_side = (side + 1) % 3, (side + 2) % 3
+        if sign < 0.0:
+            left_side, right_side = right_side, left_side
+        if not (positive and negative):
+            if not positive and not negative:
+                rounding += abs(real[slot, FLUX])
+            out = 3 * triangle + (right_side if negative else left_side)
+            if enter(out, slot, real, whole, beyond, turn_high, turn_low, distance):
+                open_flux -= real[slot, FLUX]
+                slot = -1
+            continue
+        if used >= max_beams:
+            queue = push(heap, queue, real, slot)
+            status = BUDGET
+            break
+        splits += 1
+        if used == room:
+            room *= 2
+            corners = larger(corners, room, wide)
+            real, whole, heap = taller(real, room), taller(whole, room), longer(heap, room)
+            polygon = corners[slot]
+        if count + 1 >= wide:
+            wide *= 2
+            corners = larger(corners, room, wide)
+            polygon = corners[slot]
+            values = longer(values, wide)
+            first, second = np.empty((wide, 5)), np.empty((wide, 5))
+        count_first = clip(polygon, count, values, 1.0, vx, vy, first)
+        count_second = clip(polygon, count, values, -1.0, vx, vy, second)
+        for i in range(count_first):
+            if first[i, 3] == vx and first[i, 4] == vy:
+                # the line that divides is misplaced by at most `doubt` in p over the cut's range of angles
+                j = i + 1 if i + 1 < count_first else 0
+                s, c = max(first[i, 1], first[j, 1]), max(abs(first[i, 2]), abs(first[j, 2]))
+                doubt = size_x * s + size_y * c + FUNCTIONAL_ULPS * EPS * max(first[i, 0], first[j, 0])
+                rounding += 0.5 * math.pi * doubt * abs(first[i, 1] * first[j, 2] - first[i, 2] * first[j, 1])
+        new = used
+        used += 1
+        copied(slot, real, whole, new)
+        put(first, count_first, corners, slot)
+        put(second, count_second, corners, new)
+        whole[slot, COUNT], whole[new, COUNT] = count_first, count_second
+        open_flux -= real[slot, FLUX]
+        real[slot, FLUX] = polygon_flux(corners[slot], count_first)
+        real[new, FLUX] = polygon_flux(corners[new], count_second)
+        open_flux += real[slot, FLUX] + real[new, FLUX]
+        if enter(3 * triangle + left_side, slot, real, whole, beyond, turn_high, turn_low, distance):
+            open_flux -= real[slot, FLUX]
+        else:
+            queue = push(heap, queue, real, slot)
+        if enter(3 * triangle + right_side, new, real, whole, beyond, turn_high, turn_low, distance):
+            open_flux -= real[new, FLUX]
+        else:
+            queue = push(heap, queue, real, new)
+        slot = -1
+    return corners, real, whole, used, rounding, splits, status
+
+
+@_compile
+def pieces_of(corners, real, whole, used, width):
+    """Cut every polygon at the angles of its vertices; rows: low, high, sine, cosine, offset, and slot, sign, ..."""
+    most = 0
+    for slot in range(used):
+        most += whole[slot, COUNT]
+    rows = np.empty((most, 5))
+    tags = np.empty((most, 4), np.int64)
+    size, leaf = 0, 0
+    angle = np.empty(corners.shape[1])
+    for slot in range(used):
+        count = whole[slot, COUNT]
+        polygon = corners[slot]
+        for i in range(count):
+            angle[i] = math.atan2(polygon[i, 1], polygon[i, 2])
+        cuts = np.sort(angle[:count])
+        sign = float(whole[slot, SIGN])
+        middle = 0.5 * (cuts[0] + cuts[count - 1])
+        offset = offset_of(sign, real[slot, TURN], real[slot, TURN_LOW], middle)
+        if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + offset <= PI:
+            # no ray can leave downwards: a sliver within rounding of a corner
+            whole[slot, LEAF] = 0
+        for k in range(count - 1):
+            if cuts[k + 1] <= cuts[k]:
+                continue
+            middle = 0.5 * (cuts[k] + cuts[k + 1])
+            lower, upper = -1, -1
+            for i in range(count):
+                j = i + 1 if i + 1 < count else 0
+                if angle[i] <= middle < angle[j]:
+                    lower = i
+                elif angle[j] <= middle < angle[i]:
+                    upper = i
+            if lower < 0 or upper < 0:
+                continue
+            rows[size, 0], rows[size, 1] = cuts[k], cuts[k + 1]
+            rows[size, 2] = (polygon[upper, 3] - polygon[lower, 3]) / width
+            rows[size, 3] = (polygon[lower, 4] - polygon[upper, 4]) / width
+            rows[size, 4] = offset
+            tags[size, 0] = leaf
+            tags[size, 1], tags[size, 2], tags[size, 3] = whole[slot, SIGN], whole[slot, BOUNCES], whole[slot, LEAF]
+            size += 1
+        if whole[slot, LEAF] == 1:
+            leaf += 1
+    return rows[:size], tags[:size]

@@ -1,0 +1,1 @@
+"""Regions with straight walls in which the centre of a disk flies."""

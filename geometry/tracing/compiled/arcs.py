@@ -1,0 +1,91 @@
+"""Where a ray meets an arc and how it leaves it: compiled, and taken in by the loop of `engine`. Loads numba.
+
+A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0 with r measured from its first joint and n0 the unit normal there,
+towards the free side; kappa > 0 is focusing. Its one front root is (B + sqrt(D)) / (kappa |v|^2), and
+2 B / (kappa |v|^2) where the ray starts on the arc itself. An elliptic arc is the same in stretched coordinates. The
+columns of the tables are explained in `scene`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ....rounding import EPS
+from ...scene.tolerances import TANGENT_ULPS
+
+_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+
+@_compile
+def arc_time(arc, own, px, py, vx, vy, stretch):
+    """Flight time to the front of one arc, or inf; 1 where the ray is tangent within rounding; and its height.
+
+    The height, in coordinates where the arc is a circle, is about the distance in front of the arc of a ray that comes
+    from there and meets it close by, and inf where the ray goes to the far side of a focusing arc.
+    """
+    rx, ry = px - arc[0], stretch * (py - arc[1])
+    wy = stretch * vy
+    curvature = arc[4]
+    b = arc[2] * vx + arc[3] * wy - curvature * (rx * vx + ry * wy)
+    speed2 = vx * vx + wy * wy
+    if own:
+        if curvature <= 0.0 or b <= 0.0:
+            return np.inf, 0, np.inf
+        return 2.0 * b / (curvature * speed2), 0, np.inf
+    f = arc[2] * rx + arc[3] * ry - 0.5 * curvature * (rx * rx + ry * ry)
+    d = b * b + 2.0 * curvature * speed2 * f
+    tangent = 0
+    if curvature < 0.0 and b < 0.0 and abs(d) <= TANGENT_ULPS * EPS * b * b:
+        tangent = 1
+        d = 0.0
+    if d < 0.0:
+        return np.inf, 0, np.inf
+    root = math.sqrt(d)
+    if b >= 0.0:
+        if curvature <= 0.0:
+            return np.inf, 0, np.inf
+        return (b + root) / (curvature * speed2), tangent, np.inf
+    return 2.0 * f / (root - b), tangent, f
+
+
+@_compile
+def on_arc(arc, qx, qy, slack):
+    """Whether the point q on the full circle, measured from the first joint, belongs to the arc."""
+    if arc[7] > 0.0:
+        # up to a half angle of pi/4 the position along the chord decides, on the arc's own side of the circle
+        along = qx * arc[5] + qy * arc[6]
+        nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
+        facing = ny * arc[5] - nx * arc[6]
+        return -slack <= along <= arc[7] + slack and facing > 0.0
+    # beyond it the side of the chord decides; the arc bulges away from its free side exactly if it is focusing
+    height = qy * arc[5] - qx * arc[6]
+    return height <= slack if arc[4] > 0.0 else height >= -slack
+
+
+@_compile
+def arc_reflect(arc, t, px, py, vx, vy, stretch):
+    """Position on the arc after the time t and the velocity reflected there."""
+    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
+    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
+    f = arc[2] * qx + arc[3] * qy - 0.5 * arc[4] * (qx * qx + qy * qy)
+    # one Newton step on F puts the point back on the arc
+    qx -= f * nx
+    qy -= f * ny
+    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
+    scale = 1.0 / math.sqrt(nx * nx + ny * ny)
+    nx *= scale
+    ny *= scale
+    px, py = arc[0] + qx, arc[1] + qy / stretch
+    w = 2.0 * (vx * nx + vy * ny)
+    return px, py, vx - w * nx, vy - w * ny
+
+
+@_compile
+def arc_incidence(arc, t, px, py, vx, vy, stretch):
+    """Sine of the angle between the velocity and the arc that it meets after the time t."""
+    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
+    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
+    return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)

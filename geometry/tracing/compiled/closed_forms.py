@@ -1,0 +1,194 @@
+"""Rays through hollows whose reflection is known in closed form: see `closed_forms`. Loads numba.
+
+Rays are taken in blocks that fit into the first-level cache, and those of one hollow together. The loops over a block
+have no branches and change their arrays in place, so that the compiler makes vector instructions of them; all they
+compute is sums, products, quotients, roots and choices, so that a ray's result does not depend on its block.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ...scene.closed_forms import CHAIN_COLUMNS, FAN, FAN_COLUMN, NONE
+from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
+from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
+
+# Status of a ray that is left to the loop.
+UNDECIDED = 255
+ESCAPED = 0
+RAYS = 512
+# Adding and subtracting it rounds a number below 2^51 to a whole one.
+ROUNDER = 1.5 * 2.0**52
+
+_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+
+@_compile
+def cross_bowl(form, place, angle, hits, moment, incidence):
+    """Take rays through a bowl: place and angle become those of the exit, hits their number, 0 for a doubtful ray.
+
+    With d the angle of incidence from the arc, X the share of the opening to the left of the ray,
+
+        sin^2(d/2) = (1 - X) sin^2((theta + xi)/2) + X sin^2((theta - xi)/2),
+
+    all terms positive, and the same with cosines; a hop advances by 2 d, to the left where d is acute, else by
+    2 (pi - d) to the right, and the rest is counting. The angular momentum about the centre gives the exit.
+    """
+    left, right, doubt = form[1], form[2], form[3]
+    middle, height, radius, half = form[4], form[5], form[6], form[7]
+    width = right - left
+    for i in range(place.shape[0]):
+        theta = angle[i]
+        east, west = (place[i] - left) / width, (right - place[i]) / width
+        s0, c0 = sine_cosine(0.5 * (theta + half))
+        inner = 0.5 * (theta - half)
+        s1, c1 = sine_cosine(-inner if inner < 0.0 else inner)
+        sine2, cosine2 = west * (s0 * s0) + east * (s1 * s1), west * (c0 * c0) + east * (c1 * c1)
+        moment[i] = sine2 - cosine2
+        incidence[i] = sine2 if sine2 < cosine2 else cosine2
+    for i in range(place.shape[0]):
+        incidence[i] = 2.0 * arcsine(math.sqrt(incidence[i]))
+    for i in range(place.shape[0]):
+        acute = moment[i] < 0.0
+        # |theta - pi| where d is obtuse: the mirror image
+        seen = angle[i] if acute else (PI - angle[i]) + PI_REST
+        hop = 2.0 * incidence[i]
+        ratio = ((half + seen) - incidence[i]) / hop
+        count = (ratio + ROUNDER) - ROUNDER
+        # from the last hit on to the end, or from the end on to the hit that is none
+        off = (ratio - count) * hop
+        count = count + 1.0 if off > 0.0 else count
+        off = -off if off < 0.0 else off
+        start = (half - seen) + incidence[i]
+        gone = ((seen - count * hop) + PI) + PI_REST
+        angle[i] = gone if acute else (PI - gone) + PI_REST
+        # the lines of the first and the last flight pass the joints at 2 r sin(a/2) sin((hop - a)/2) with these a
+        passing = start * (hop - start)
+        passing = passing if passing < off * (hop - off) else off * (hop - off)
+        hits[i] = count if passing > doubt else 0.0
+    for i in range(place.shape[0]):
+        sine, cosine = sine_cosine(angle[i])
+        place[i] = middle + (radius * moment[i] - height * cosine) / sine
+
+
+@_compile
+def cross_fan(form, place, angle, hits, vx, vy, turn):
+    """Take rays through a fan, as `cross_bowl` does; the last three arrays are room to work in.
+
+    The sign of ``turn``, the moment of the apex about the ray, tells which line is met first. The number of hits is
+    that of the unfolded ends of the opening, one after the other, that lie on the other side of the ray than the apex.
+    """
+    left, right, doubt, apex_x, apex_y = form[1], form[2], form[3], form[4], form[5]
+    copies = int(form[6])
+    mirrored = CHAIN_COLUMNS * (copies + 2)
+    for i in range(place.shape[0]):
+        sine, cosine = sine_cosine(angle[i])
+        vx[i], vy[i] = -cosine, -sine
+    for i in range(place.shape[0]):
+        turn[i] = (apex_x - place[i]) * vy[i] - apex_y * vx[i]
+    for i in range(place.shape[0]):
+        hits[i] = 1.0
+    for k in range(2, copies + 1):
+        first = FAN_COLUMN + CHAIN_COLUMNS * k
+        x0, y0 = form[first], form[first + 1]
+        x1, y1 = form[first + mirrored], form[first + mirrored + 1]
+        before, now = k - 1.0, float(k)
+        for i in range(place.shape[0]):
+            x, y = (x0, y0) if turn[i] > 0.0 else (x1, y1)
+            beyond = ((x - place[i]) * vy[i] - y * vx[i]) * turn[i] < 0.0
+            hits[i] = now if beyond and hits[i] == before else hits[i]
+    for i in range(place.shape[0]):
+        count = int(hits[i])
+        last = FAN_COLUMN + CHAIN_COLUMNS * count + (0 if turn[i] > 0.0 else mirrored)
+        following = last + CHAIN_COLUMNS
+        inside = (form[last] - place[i]) * vy[i] - form[last + 1] * vx[i]
+        outside = (form[following] - place[i]) * vy[i] - form[following + 1] * vx[i]
+        odd = count % 2 == 1
+        goes_right = odd == (turn[i] > 0.0)
+        share = inside / (inside - outside)
+        near, far = (right, left) if goes_right else (left, right)
+        exit = near + share * (far - near)
+        incoming = angle[i]
+        angle[i] = form[last + 2] + (-incoming if odd else incoming)
+        # how closely the ray's line passes the apex, the ends of the opening where it enters, and where it leaves
+        west, east = (left - place[i]) * vy[i], (place[i] - right) * vy[i]
+        closest = min(min(abs(turn[i]), min(west, east)), min(abs(inside), abs(outside)))
+        hits[i] = hits[i] if closest > doubt and share > 0.0 else 0.0
+        place[i] = exit
+
+
+@_compile
+def cross(form, place, angle, hits, room):
+    """Take rays of one hollow through it."""
+    count = place.shape[0]
+    if form[0] == FAN:
+        cross_fan(form, place, angle, hits, room[0, :count], room[1, :count], room[2, :count])
+    else:
+        cross_bowl(form, place, angle, hits, room[0, :count], room[1, :count])
+
+
+@_compile
+def cell_of(x, cell):
+    """Left end of the cell in which a place lies."""
+    return np.floor(x / cell) * cell
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def trace_closed(x, theta, hollows, closed, cell, limit, out_x, out_theta, bounces, status):
+    """Trace a block of rays through flat tops and closed forms; all others get the status `UNDECIDED`."""
+    room = np.empty((6, RAYS))
+    rays, others, met = np.empty(RAYS, np.int64), np.empty(RAYS, np.int64), np.empty(RAYS, np.int64)
+    # the rays of a hollow in a block are a list: the first one, and for each the next one, numbers from 0 in the block
+    heads = np.full(hollows.shape[0], -1)
+    whole = hollows.shape[0] == 1 and hollows[0, 0] == 0.0 and hollows[0, 1] == cell
+    for first in range(0, x.shape[0], RAYS):
+        count = min(RAYS, x.shape[0] - first)
+        starts = x[first : first + count]
+        if whole:
+            # the only hollow: its rays need not be gathered, and are taken through it where their results are to stand
+            place, angle, hits = out_x[first : first + count], out_theta[first : first + count], room[3, :count]
+            for j in range(count):
+                place[j] = starts[j] - cell_of(starts[j], cell)
+            for j in range(count):
+                angle[j] = theta[first + j]
+            cross(closed[0], place, angle, hits, room)
+            for j in range(count):
+                place[j] += cell_of(starts[j], cell)
+            for j in range(count):
+                bounces[first + j] = int(hits[j])
+                status[first + j] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
+            continue
+        kinds = 0
+        for j in range(count):
+            i = first + j
+            h = opening_at(x[i] - cell_of(x[i], cell), hollows)
+            if h == FLAT_TOP:
+                out_x[i], out_theta[i], bounces[i], status[i] = x[i], mirrored(theta[i]), 1, ESCAPED
+            elif h == TOP_CORNER or closed[h, 0] == NONE:
+                status[i] = UNDECIDED
+            else:
+                if heads[h] < 0:
+                    met[kinds] = h
+                    kinds += 1
+                others[j] = heads[h]
+                heads[h] = j
+        for k in range(kinds):
+            h = met[k]
+            j, count = heads[h], 0
+            heads[h] = -1
+            while j >= 0:
+                rays[count] = first + j
+                count += 1
+                j = others[j]
+            place, angle, hits = room[4, :count], room[5, :count], room[3, :count]
+            for j in range(count):
+                place[j] = x[rays[j]] - cell_of(x[rays[j]], cell)
+                angle[j] = theta[rays[j]]
+            cross(closed[h], place, angle, hits, room)
+            for j in range(count):
+                i = rays[j]
+                out_x[i], out_theta[i], bounces[i] = place[j] + cell_of(x[i], cell), angle[j], int(hits[j])
+                status[i] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED

@@ -1,0 +1,162 @@
+"""The pieces close to a ray's start, which the loop of `engine` leaves aside. Loads numba.
+
+Where a piece is met so close that the start's rounding may count, before or behind it, the loop only says so, and all
+such pieces are looked at again in a function of its own: the loop has no call in it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..double_double.arcs import refined_arcs
+from ..double_double.sides import ARC, in_front, line_in_front_of_line
+from ..double_double.sides import BEZIER as CURVE
+from .arcs import arc_time, on_arc
+from .beziers import bezier_hit
+
+NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
+
+# In place of a tangency.
+DOUBTFUL = 2
+# The share from a line's end is negative even where the ray meets that end: it is at least the smallest of doubles.
+LEAST_SHARE = 5e-324
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
+    """Flight time to the line that starts at joint j, and the share of it at the hit, negative from its end."""
+    share = c_before / (c_before - c_after)
+    near = j
+    if share > 0.5:
+        # from the nearer joint, and negative to say so, so that both ends keep their digits
+        share = min(c_after / (c_before - c_after), -LEAST_SHARE)
+        near = j + 1
+    hx = joints[near, 0] + share * lines[j, 0]
+    hy = joints[near, 1] + share * lines[j, 1]
+    return (hx - px) * vx + (hy - py) * vy, share
+
+
+@_compile
+def arc_at(kind, index, circles, ellipses):
+    """The arc of that kind and number as a row of `refined_arcs`, a row of no meaning for other kinds."""
+    if circles is not None and kind == CIRCLE:
+        return refined_arcs(circles[index : index + 1])[0]
+    if ellipses is not None and kind == ELLIPSE:
+        return refined_arcs(ellipses[index : index + 1])[0]
+    return np.empty(0)
+
+
+@_compile
+def curve_at(kind, index, beziers):
+    """The row of that Bezier piece, a row of no meaning for other kinds."""
+    if beziers is not None and kind == BEZIER:
+        return beziers[index]
+    return np.empty(0)
+
+
+@_compile
+def starts_in_front(
+    own_kind, own_index, own_s, kind, index, s, joints, circles, ellipses, beziers, px, py, vx, vy, flown, slack
+):  # fmt: skip
+    """Whether the ray's start lies in front of a piece that is nearby, or may do so; see `sides_engine`."""
+    if own_kind in (LID, SIDE):
+        # no piece lies above the opening or beyond a side: one within rounding of them is met there
+        return True
+    if own_kind == LINE and kind == LINE:
+        return line_in_front_of_line(joints, own_index, index, (px, 0.0), (py, 0.0), vx, vy, flown, slack, slack)
+    if circles is None and ellipses is None and beziers is None:
+        return False
+    return in_front(
+        joints,
+        LINE if own_kind == LINE else CURVE if own_kind == BEZIER else ARC,
+        own_index,
+        arc_at(own_kind, own_index, circles, ellipses),
+        curve_at(own_kind, own_index, beziers),
+        (own_s, 0.0),
+        LINE if kind == LINE else CURVE if kind == BEZIER else ARC,
+        index,
+        arc_at(kind, index, circles, ellipses),
+        curve_at(kind, index, beziers),
+        (s, 0.0),
+        (px, 0.0), (py, 0.0), vx, vy, flown, slack, slack,
+    )  # fmt: skip
+
+
+@_compile
+def arc_nearby(arc, px, py, vx, vy, slack, close):
+    """Flight time to an arc that is met close by, else inf; its tangency; and whether it is ahead for certain."""
+    stretch = arc[12]
+    wide = slack * max(1.0, stretch)
+    t, touch, height = arc_time(arc, False, px, py, vx, vy, stretch)
+    if abs(t) > close or height < -wide:
+        return np.inf, 0, False
+    t = max(t, 0.0)
+    if not on_arc(arc, px + t * vx - arc[0], stretch * (py + t * vy - arc[1]), wide):
+        return np.inf, 0, False
+    return t, touch, height > wide
+
+
+@_compile
+def hit_nearby(
+    hollow, joints, lines, circles, ellipses, beziers,
+    own_kind, own_index, own_s, px, py, vx, vy, flown, slack, close,
+):  # fmt: skip
+    """First hit of a piece nearby that the ray starts in front of: time (inf if none), kind, number, place, doubt.
+
+    The place is that of a line or of a Bezier piece as in the loop. The doubt is the tangency, or `DOUBTFUL` where the
+    gap that the ray crosses is within the slack: doubles do not know where it goes on, in the apex of a wedge.
+    """
+    time, found, number, place, doubt = np.inf, NO_PIECE, -1, 0.0, 0
+    if lines is not None:
+        for j in range(int(hollow[3]), int(hollow[4]) - 1):
+            if joints[j, 3] <= 0.0 or (own_kind == LINE and own_index == j):
+                continue
+            c_before = (joints[j, 0] - px) * vy - (joints[j, 1] - py) * vx
+            c_after = (joints[j + 1, 0] - px) * vy - (joints[j + 1, 1] - py) * vx
+            if c_before >= 0.0 >= c_after and c_before > c_after:
+                t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
+                height, reach = t * (c_before - c_after), slack * lines[j, 4]
+                if abs(t) > close or t >= time or height < -reach:
+                    continue
+                if height > reach or starts_in_front(
+                    own_kind, own_index, own_s, LINE, j, share, joints, circles, ellipses, beziers,
+                    px, py, vx, vy, flown, slack,
+                ):  # fmt: skip
+                    time, found, number, place = max(t, 0.0), LINE, j, share
+                    doubt = DOUBTFUL if height <= reach and own_kind not in (LID, SIDE) else 0
+    if circles is not None:
+        for k in range(int(hollow[5]), int(hollow[6])):
+            if own_kind == CIRCLE and own_index == k:
+                continue
+            t, touch, is_clear = arc_nearby(circles[k], px, py, vx, vy, slack, close)
+            if t < time and (is_clear or starts_in_front(
+                own_kind, own_index, own_s, CIRCLE, k, 0.0, joints, circles, ellipses, beziers,
+                px, py, vx, vy, flown, slack,
+            )):  # fmt: skip
+                time, found, number, place = t, CIRCLE, k, 0.0
+                doubt = touch if is_clear or own_kind in (LID, SIDE) else DOUBTFUL
+    if ellipses is not None:
+        for k in range(int(hollow[7]), int(hollow[8])):
+            if own_kind == ELLIPSE and own_index == k:
+                continue
+            t, touch, is_clear = arc_nearby(ellipses[k], px, py, vx, vy, slack, close)
+            if t < time and (is_clear or starts_in_front(
+                own_kind, own_index, own_s, ELLIPSE, k, 0.0, joints, circles, ellipses, beziers,
+                px, py, vx, vy, flown, slack,
+            )):  # fmt: skip
+                time, found, number, place = t, ELLIPSE, k, 0.0
+                doubt = touch if is_clear or own_kind in (LID, SIDE) else DOUBTFUL
+    if beziers is not None:
+        for k in range(int(hollow[9]), int(hollow[10])):
+            own = own_s if own_kind == BEZIER and own_index == k else -1.0
+            s = bezier_hit(beziers[k], own, px, py, vx, vy, slack)[3]
+            if s >= 0.0 and time > 0.0 and starts_in_front(
+                own_kind, own_index, own_s, BEZIER, k, s, joints, circles, ellipses, beziers,
+                px, py, vx, vy, flown, slack,
+            ):  # fmt: skip
+                time, found, number, place = 0.0, BEZIER, k, s
+                doubt = 0 if own_kind in (LID, SIDE) else DOUBTFUL
+    return time, found, number, place, doubt

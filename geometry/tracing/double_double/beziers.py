@@ -1,0 +1,158 @@
+"""Bezier pieces in double-double arithmetic, for `refined_engine`."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ...scene.tolerances import NEARBY
+from ..compiled.beziers import curve_size
+from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, square_root, subtract, wide
+
+# Bisections: more than a double has digits and exponents before the point.
+ROOT_STEPS = 200
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def cubic(a0, a1, a2, a3, s):
+    return add(multiply(add(multiply(add(multiply(a3, s), a2), s), a1), s), a0)
+
+
+@_compile
+def cubic_slope(a1, a2, a3, s):
+    three = multiply((3.0, 0.0), multiply(a3, s))
+    return add(multiply(add(three, (2.0 * a2[0], 2.0 * a2[1])), s), a1)
+
+
+@_compile
+def falling_root(a0, a1, a2, a3, low, high):
+    """The root in [low, high], where the cubic falls from >= 0 to <= 0: bisection to a double, then Newton steps."""
+    for _ in range(ROOT_STEPS):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        if cubic(a0, a1, a2, a3, (middle, 0.0))[0] >= 0.0:
+            low = middle
+        else:
+            high = middle
+    s = (low, 0.0)
+    for _ in range(4):
+        slope = cubic_slope(a1, a2, a3, s)
+        if slope[0] == 0.0:
+            break
+        step = divide(cubic(a0, a1, a2, a3, s), slope)
+        if abs(step[0]) > 4.0 * (high - low):
+            break
+        s = subtract(s, step)
+    return s
+
+
+@_compile
+def bezier_coefficients(curve):
+    """The coefficients in x and in y; the highest one takes the curve to its end joint exactly."""
+    n = curve.shape[0]
+    ax0, ax1, ax2, ax3 = wide(curve[0]), wide(curve[2]), wide(curve[4]), wide(curve[6])
+    ay0, ay1, ay2, ay3 = wide(curve[1]), wide(curve[3]), wide(curve[5]), wide(curve[7])
+    rest_x = subtract(subtract(wide(curve[n - 4]), ax0), ax1)
+    rest_y = subtract(subtract(wide(curve[n - 3]), ay0), ay1)
+    if curve[6] == 0.0 and curve[7] == 0.0:
+        ax2, ay2 = rest_x, rest_y
+    else:
+        ax3, ay3 = subtract(rest_x, ax2), subtract(rest_y, ay2)
+    return ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3
+
+
+@_compile
+def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
+    """First front hit of one Bezier piece: time (inf if none), parameter, time of an undecided contact (or inf).
+
+    The fourth value is the parameter of a hit within the slack of the start, which is not among the others, or -1.
+    """
+    ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
+    n = curve.shape[0]
+    a0 = cross(subtract(ax0, px), subtract(ay0, py), vx, vy)
+    a1, a2, a3 = cross(ax1, ay1, vx, vy), cross(ax2, ay2, vx, vy), cross(ax3, ay3, vx, vy)
+    best_t, best_s, undecided = (np.inf, 0.0), (0.0, 0.0), np.inf
+    near_s = (-1.0, 0.0)
+    if own_s[0] >= 0.0:
+        b0 = cubic_slope(a1, a2, a3, own_s)
+        b1 = add(multiply(multiply((3.0, 0.0), a3), own_s), a2)
+        product = multiply(a3, b0)
+        disc = subtract(multiply(b1, b1), (4.0 * product[0], 4.0 * product[1]))
+        if disc[0] < 0.0:
+            return best_t, best_s, undecided, near_s
+        root = square_root(disc)
+        q = add(b1, root if b1[0] >= 0.0 else negate(root))
+        q = (-0.5 * q[0], -0.5 * q[1])
+        for which in range(2):
+            bottom, top = (a3, q) if which == 0 else (q, b0)
+            if bottom[0] == 0.0:
+                continue
+            s = add(own_s, divide(top, bottom))
+            if s[0] >= -LOCAL_ERROR and subtract(s, (1.0, 0.0))[0] <= LOCAL_ERROR:
+                dx = subtract(cubic(ax0, ax1, ax2, ax3, s), px)
+                dy = subtract(cubic(ay0, ay1, ay2, ay3, s), py)
+                t = dot(dx, dy, vx, vy)
+                if cubic_slope(a1, a2, a3, s)[0] <= 0.0 and 0.0 < t[0] < best_t[0]:
+                    best_t, best_s = t, s
+        return best_t, best_s, undecided, near_s
+    size = abs(curve[0] - px[0]) + abs(curve[1] - py[0]) + curve_size(curve)
+    # the critical points of g are needed as doubles only: g there changes in second order
+    c1, c2 = 2.0, 2.0
+    disc = subtract(multiply(a2, a2), multiply((3.0, 0.0), multiply(a3, a1)))
+    if disc[0] > 0.0:
+        root = square_root(disc)
+        q = negate(add(a2, root if a2[0] >= 0.0 else negate(root)))
+        if a3[0] != 0.0:
+            c1 = divide(q, multiply((3.0, 0.0), a3))[0]
+        if q[0] != 0.0:
+            c2 = divide(a1, q)[0]
+        if c1 > c2:
+            c1, c2 = c2, c1
+    low, value_low = 0.0, a0
+    for part in range(3):
+        high = 1.0 if part == 2 else (c1 if part == 0 else c2)
+        if high <= low or high > 1.0:
+            if part < 2:
+                continue
+            high = 1.0
+        if high == 1.0:
+            value_high = cross(subtract(wide(curve[n - 4]), px), subtract(wide(curve[n - 3]), py), vx, vy)
+        else:
+            value_high = cubic(a0, a1, a2, a3, (high, 0.0))
+            if abs(value_high[0]) <= error:
+                dx = subtract(cubic(ax0, ax1, ax2, ax3, (high, 0.0)), px)
+                dy = subtract(cubic(ay0, ay1, ay2, ay3, (high, 0.0)), py)
+                contact = dot(dx, dy, vx, vy)[0]
+                if 0.0 < contact < undecided:
+                    undecided = contact
+        if value_low[0] >= 0.0 >= value_high[0] and value_low[0] > value_high[0]:
+            s = falling_root(a0, a1, a2, a3, low, high)
+            dx = subtract(cubic(ax0, ax1, ax2, ax3, s), px)
+            dy = subtract(cubic(ay0, ay1, ay2, ay3, s), py)
+            t = dot(dx, dy, vx, vy)
+            if t[0] < best_t[0]:
+                tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
+                reach = slack * math.hypot(tx[0], ty[0])
+                if abs(t[0]) <= NEARBY * size and abs(t[0] * cross(tx, ty, vx, vy)[0]) <= reach:
+                    near_s = s
+                elif t[0] > 0.0:
+                    best_t, best_s = t, s
+        low, value_low = high, value_high
+    return best_t, best_s, undecided, near_s
+
+
+@_compile
+def bezier_place(curve, s):
+    """Position at the parameter s, unit normal there, and the curvature there (a double, positive where focusing)."""
+    ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
+    tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
+    size = square_root(dot(tx, ty, tx, ty))
+    bx, by = 2.0 * ax2[0] + 6.0 * ax3[0] * s[0], 2.0 * ay2[0] + 6.0 * ay3[0] * s[0]
+    bent = (tx[0] * by - ty[0] * bx) / size[0] ** 3
+    nx, ny = negate(divide(ty, size)), divide(tx, size)
+    return cubic(ax0, ax1, ax2, ax3, s), cubic(ay0, ay1, ay2, ay3, s), nx, ny, bent

@@ -1,0 +1,186 @@
+"""Whether a ray that leaves one piece within rounding of another one lies in front of that one. Loads numba.
+
+The place of a ray is wrong by some rounding errors of the hollow's size. So its distance from a piece says nothing
+where it is of that size: beside the tip of a sharp peak, in the apex of a narrow wedge, and on a plate that is thinner
+than rounding or has no thickness. The wall is exact there, and the ray starts on the piece that it has left. So the
+distance is taken from the joints of both pieces.
+
+* Two segments: the distance is linear along the own one, and its signs at the two joints are exact (expansions of
+  Shewchuk 1997). Coincident faces have distance 0: the ray is not in front of the other one.
+* Curves: the place is put on its own piece, and its distance taken, in double-double arithmetic. Distances below the
+  rounding of that are 0.
+
+Two faces of a plate cross within rounding where vertices that are meant to lie on one line do not, in doubles. Then the
+ray has come through the back of the one to the front of the other; a face that it came through from behind does not
+hold it back on its way out.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from ....rounding import EPS, UNIT_ROUNDOFF
+from .arcs import arc_height
+from .arithmetic import add, divide, dot, multiply, negate, square_root, subtract, two_product, two_sum, wide
+from .beziers import bezier_coefficients, bezier_place, cubic, cubic_slope
+
+LINE, ARC, BEZIER = 3, 4, 5
+# A double-double place that was put on a curve carries so much of the slack: 16 EPS against 64 of its own roundings.
+CURVE_NOISE = 2.0**-48
+# Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
+CROSS_ROUNDING = (3.0 + 16.0 * EPS) * UNIT_ROUNDOFF
+# A ray whose last start lies further behind a face than so many slacks did not start between it and its own piece.
+BEHIND_SLACKS = 4.0
+# Newton steps from a place within rounding of a curve to one on it: the error is squared each time.
+STEPS = 2
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def orientation(ax, ay, bx, by, cx, cy):
+    """(b - a) x (c - a) with the exact sign: positive where c lies on the left of the way from a to b."""
+    first, second = (bx - ax) * (cy - ay), (by - ay) * (cx - ax)
+    value = first - second
+    size = abs(first) + abs(second)
+    if size == 0.0 or abs(value) > CROSS_ROUNDING * size:
+        return value
+    along, up = two_sum(bx, -ax), two_sum(by, -ay)
+    right, above = two_sum(cx, -ax), two_sum(cy, -ay)
+    # the exact sum of 16 terms, as numbers that do not overlap, the largest last
+    total, count = np.zeros(16), 0
+    for i in range(2):
+        for j in range(2):
+            for term in (*two_product(along[i], above[j]), *two_product(-up[i], right[j])):
+                rest = term
+                for k in range(count):
+                    rest, total[k] = two_sum(rest, total[k])
+                total[count] = rest
+                count += 1
+    value = 0.0
+    for k in range(count):
+        value += total[k]
+    return value
+
+
+@_compile
+def line_height(joints, index, px, py):
+    """Distance of a place from a line, on whose left the free side is, and the unit normal there."""
+    ex = two_sum(joints[index + 1, 0], -joints[index, 0])
+    ey = two_sum(joints[index + 1, 1], -joints[index, 1])
+    size = square_root(dot(ex, ey, ex, ey))
+    nx, ny = negate(divide(ey, size)), divide(ex, size)
+    return dot(subtract(px, wide(joints[index, 0])), subtract(py, wide(joints[index, 1])), nx, ny), nx, ny
+
+
+@_compile
+def height_over_line(joints, own, other, px, py, blur):
+    """Distance of a place on the line ``own`` from the line ``other``, times the length of that, with the exact sign.
+
+    The two may meet between the ends of the own one, where the other stands on it. Then the double-double place
+    decides, which is known to ``blur`` along the own line, and the distance is the largest that it may have.
+    """
+    ax, ay, bx, by = joints[other, 0], joints[other, 1], joints[other + 1, 0], joints[other + 1, 1]
+    first = orientation(ax, ay, bx, by, joints[own, 0], joints[own, 1])
+    last = orientation(ax, ay, bx, by, joints[own + 1, 0], joints[own + 1, 1])
+    if first * last >= 0.0:
+        return first + last
+    height, nx, ny = line_height(joints, own, px, py)
+    px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
+    height, _, _ = line_height(joints, other, px, py)
+    length = math.hypot(joints[own + 1, 0] - joints[own, 0], joints[own + 1, 1] - joints[own, 1])
+    return math.hypot(bx - ax, by - ay) * height[0] + blur * abs(last - first) / length
+
+
+@_compile
+def bezier_height(curve, s, px, py):
+    """Distance of a place from a Bezier piece near its parameter s, and the unit normal there."""
+    ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
+    for _ in range(STEPS):
+        tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
+        rx, ry = subtract(px, cubic(ax0, ax1, ax2, ax3, s)), subtract(py, cubic(ay0, ay1, ay2, ay3, s))
+        s = add(s, divide(dot(rx, ry, tx, ty), dot(tx, ty, tx, ty)))
+    x, y, nx, ny, _ = bezier_place(curve, s)
+    return dot(subtract(px, x), subtract(py, y), nx, ny), nx, ny
+
+
+@_compile
+def height_over(kind, joints, index, arc, curve, s, px, py):
+    """Distance of a double-double place from a piece, positive on its free side, and the unit normal there."""
+    if kind == LINE:
+        return line_height(joints, index, px, py)
+    if kind == ARC:
+        return arc_height(arc, px, py)
+    return bezier_height(curve, s, px, py)
+
+
+@_compile
+def came_through(x0, y0, x1, y1, mx, my, px, py, vx, vy, flown, slack):
+    """Whether a ray's last flight, which ended at p with the velocity v, crossed a piece from behind.
+
+    The piece has the ends (x0, y0) and (x1, y1), and its normal next to p is (mx, my).
+    """
+    if flown * (vx * mx + vy * my) <= BEHIND_SLACKS * slack:
+        return False
+    return (x0 - px) * vy - (y0 - py) * vx <= 0.0 <= (x1 - px) * vy - (y1 - py) * vx
+
+
+@_compile
+def line_in_front_of_line(joints, own, other, px, py, vx, vy, flown, slack, blur):
+    """`in_front` for two segments."""
+    if height_over_line(joints, own, other, px, py, blur) <= 0.0:
+        return False
+    ex, ey = joints[own + 1, 0] - joints[own, 0], joints[own + 1, 1] - joints[own, 1]
+    w = 2.0 * (vy * ex - vx * ey) / (ex * ex + ey * ey)
+    x0, y0, x1, y1 = joints[other, 0], joints[other, 1], joints[other + 1, 0], joints[other + 1, 1]
+    length = math.hypot(x1 - x0, y1 - y0)
+    mx, my = (y0 - y1) / length, (x1 - x0) / length
+    return not came_through(x0, y0, x1, y1, mx, my, px[0], py[0], vx + w * ey, vy - w * ex, flown, slack)
+
+
+@_compile
+def in_front_at(
+    joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack,
+    blur,
+):  # fmt: skip
+    """`in_front` by the heights of the place, whatever the pieces are."""
+    nx, ny = px, py
+    for _ in range(STEPS):
+        height, nx, ny = height_over(own_kind, joints, own_index, own_arc, own_curve, own_s, px, py)
+        px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
+    height, mx, my = height_over(kind, joints, index, arc, curve, s, px, py)
+    if height[0] + blur * abs(mx[0] * ny[0] - my[0] * nx[0]) <= CURVE_NOISE * slack:
+        return False
+    if kind == LINE:
+        x0, y0, x1, y1 = joints[index, 0], joints[index, 1], joints[index + 1, 0], joints[index + 1, 1]
+    elif kind == ARC:
+        x0, y0, x1, y1 = arc[0], arc[1], arc[16], arc[17]
+    else:
+        n = curve.shape[0]
+        x0, y0, x1, y1 = curve[0], curve[1], curve[n - 4], curve[n - 3]
+    w = 2.0 * (vx * nx[0] + vy * ny[0])
+    vx, vy = vx - w * nx[0], vy - w * ny[0]
+    return not came_through(x0, y0, x1, y1, mx[0], my[0], px[0], py[0], vx, vy, flown, slack)
+
+
+@_compile
+def in_front(
+    joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack,
+    blur,
+):  # fmt: skip
+    """Whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
+
+    Each piece is given by its kind, the number of a line, the row of an arc in the table of `refined_arcs`, the row of
+    a Bezier piece and the parameter there. ``px``, ``py`` (double-doubles) is the place, within rounding of the own
+    piece; ``flown`` the length of the flight that ended there; ``blur`` the error of the place along the own piece.
+    Where that decides, as where one piece stands on the other, the ray counts as one in front.
+    """
+    if own_kind == LINE and kind == LINE:
+        return line_in_front_of_line(joints, own_index, index, px, py, vx, vy, flown, slack, blur)
+    return in_front_at(
+        joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown,
+        slack, blur,
+    )  # fmt: skip

@@ -1,0 +1,137 @@
+"""Rays that double precision does not settle, traced again in double-double arithmetic."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...rounding import EPS
+from ..scene.tolerances import JOINT_ULPS
+
+if TYPE_CHECKING:
+    from ..scene.scene import Scene
+
+# Double-double steps cost about twenty times a double one: a flagged ray that needs more flights than these keeps its
+# flag. Runs between vertical sides are one flight, runs along arcs and in wedges are not.
+REFINED_FLIGHTS = 40_000
+_SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
+
+
+@dataclass(frozen=True)
+class RefinedTrace:
+    """Rays traced in double-double arithmetic, each value the sum of the last axis where there are two.
+
+    Attributes
+    ----------
+    x, theta : array of float, shape (n, 2)
+        Place and angle of rays that escaped, as double-doubles.
+    collisions : array of int, shape (n,)
+    status : array of int, shape (n,)
+        Values of `Status`; 4 where no piece was met, which no ray should show, and 5 where rounding decides.
+    amplification : array of float, shape (n,)
+        Norm of the derivative of (x'/scale, theta') by (x/scale, theta), the scale being the cell plus the hollow's
+        size: an error e of the incoming ray is about this times e in the outgoing one.
+    rounding : array of float, shape (n,)
+        Bound, to first order, of the rounding error of the double-double ray in the same units.
+    """
+
+    x: Floats
+    theta: Floats
+    collisions: NDArray[np.int64]
+    status: NDArray[np.uint8]
+    amplification: Floats
+    rounding: Floats
+
+
+def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 2**62) -> RefinedTrace:
+    """Trace rays (two arrays of one dimension) in double-double arithmetic, whatever double precision makes of them."""
+    from .double_double.arcs import refined_arcs
+    from .double_double.rays import refined_rays
+
+    count = len(x)
+    circles = _rows(scene.circles, 19)
+    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, 19)]))
+    result = RefinedTrace(
+        np.empty((count, 2)), np.empty((count, 2)), np.empty(count, np.int64), np.empty(count, np.uint8),
+        np.empty(count), np.empty(count),
+    )  # fmt: skip
+    refined_rays(
+        np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64),
+        scene.hollows, scene.joints, _rows(scene.lines, 7), _rows(scene.pairs, 10), arcs, len(circles),
+        np.zeros((1, 14)) if scene.beziers is None else scene.beziers, _free_bands(scene),
+        scene.is_open, scene.cell, max_collisions, REFINED_FLIGHTS,
+        result.x, result.theta, result.collisions, result.status, result.amplification, result.rounding,
+    )  # fmt: skip
+    return result
+
+
+def retrace(
+    scene: Scene,
+    x: Floats,
+    theta: Floats,
+    max_collisions: int,
+    out_x: Floats,
+    out_theta: Floats,
+    collisions: NDArray[np.int64],
+    status: NDArray[np.uint8],
+) -> None:
+    """Settle, in place, the rays with the status corner or grazing that double-double arithmetic can settle.
+
+    A ray that meets a corner within half an ulp of its incoming angle keeps its status: among the angles that round
+    to its angle there is one that meets the corner.
+
+    Parameters
+    ----------
+    scene : Scene
+    x, theta : array of float, shape (n,)
+        The incoming rays.
+    max_collisions : int
+        The limit that was asked for; no ray is followed for more than ``REFINED_FLIGHTS``.
+    out_x, out_theta, collisions, status : arrays of shape (n,)
+        What double precision made of them.
+    """
+    flagged = np.flatnonzero((status == _CORNER) | (status == _GRAZING))
+    if len(flagged) == 0:
+        return
+    from .compiled.trigonometry import LAST_ANGLE
+
+    refined = refined_trace(scene, x[flagged], theta[flagged], max_collisions)
+    # a ray that is still inside after as many collisions as were asked for is settled, too
+    limited = (refined.status == _BOUNCE_LIMIT) & (refined.collisions >= max_collisions)
+    collisions[flagged[limited]], status[flagged[limited]] = refined.collisions[limited], _BOUNCE_LIMIT
+    settled = refined.status == _SETTLED
+    rays = flagged[settled]
+    out_x[rays], out_theta[rays] = refined.x[settled, 0], np.minimum(refined.theta[settled, 0], LAST_ANGLE)
+    collisions[rays], status[rays] = refined.collisions[settled], _SETTLED
+
+
+def _rows(table: Floats | None, columns: int) -> Floats:
+    return np.empty((0, columns)) if table is None else table
+
+
+def _free_bands(scene: Scene) -> Floats:
+    """The heights (low, high) of an open wall, shape (n, 2), at which no piece lies; none where rays stay in a cell."""
+    if not scene.is_open:
+        return np.empty((0, 2))
+    lines = np.flatnonzero(scene.joints[:, 3] > 0.0)
+    heights = [np.column_stack([scene.joints[lines, 1], scene.joints[lines + 1, 1]])]
+    for arcs in (_rows(scene.circles, 19), _rows(scene.ellipses, 19)):
+        # no point of an arc is further from both ends than half of its length
+        half = 0.5 * arcs[:, 11] / np.abs(arcs[:, 4]) / arcs[:, 12]
+        heights.append(
+            np.column_stack([np.minimum(*arcs[:, (14, 16)].T) - half, np.maximum(*arcs[:, (14, 16)].T) + half])
+        )
+    c0, c1, c2, c3 = _rows(scene.beziers, 14)[:, 1:8:2].T
+    heights.append(np.column_stack([c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3]))
+    slack = JOINT_ULPS * EPS * float(scene.hollows[0, 2])
+    extents = sorted((float(row.min()) - slack, float(row.max()) + slack) for part in heights for row in part)
+    bands, top = [], extents[0][1]
+    for low, high in extents:
+        if low > top:
+            bands.append((top, low))
+        top = max(top, high)
+    return np.array([*bands, (top, np.inf)])

@@ -1,0 +1,1 @@
+"""Walls: the class, the named ones and their catalogue, and what lies inside the solid."""

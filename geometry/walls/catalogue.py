@@ -1,0 +1,154 @@
+"""The named walls by name, with default parameters; what the command line calls WALL."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import cast
+
+from ...errors import InputError
+from ..cells.profile import Seam, read_profile
+from ..cells.toml import load_wall
+from ..disk.disk import Disk
+from .koch_curve import koch
+from .mushroom import mushrooms
+from .named import (
+    dispersing_arcs,
+    double_parabola,
+    elliptical_arcs,
+    flat,
+    focusing_arcs,
+    rectangular_teeth,
+    triangular_teeth,
+)
+from .wall import Wall
+
+
+@dataclass(frozen=True)
+class NamedWall:
+    """A wall's constructor with its name, default parameters and one line about it."""
+
+    name: str
+    constructor: Callable[..., Wall]
+    defaults: Mapping[str, float | int]
+    summary: str
+
+    def build(self, **parameters: float | int) -> Wall:
+        """Return the wall with the given parameters and the defaults for the others."""
+        return self.constructor(**{**self.defaults, **parameters})
+
+
+def _elliptical(half_angle: float, mass: float, inertia: float) -> Wall:
+    return elliptical_arcs(half_angle, Disk(mass, inertia))
+
+
+def _entry(name: str, constructor: Callable[..., Wall], summary: str, **defaults: float | int) -> NamedWall:
+    return NamedWall(name, constructor, MappingProxyType(defaults), summary)
+
+
+_ENTRIES = (
+    _entry("flat", flat, "a flat wall: specular reflection"),
+    _entry("triangular-teeth", triangular_teeth, "triangular teeth, apex angle in radians", angle=0.7),
+    _entry("rectangular-teeth", rectangular_teeth, "half flat tops, half crevices", height_to_width=1.0),
+    _entry("focusing-arcs", focusing_arcs, "one circular arc below each period's chord", half_angle=1.2),
+    _entry("dispersing-arcs", dispersing_arcs, "circular bumps that meet in corners", curvature=1.0),
+    _entry(
+        "elliptical-arcs",
+        _elliptical,
+        "arcs that the disk feels as circular",
+        half_angle=1.2,
+        mass=1.0,
+        inertia=0.5,
+    ),
+    _entry("double-parabola", double_parabola, "Plakhov's parabolas: nearly retroreflecting"),
+    _entry(
+        "mushrooms",
+        mushrooms,
+        "semicircular caps on straight stems",
+        stem_to_cap=0.2,
+        stem_aspect=0.5,
+        generations=1,
+    ),
+    _entry("koch", koch, "Koch's curve turned downwards", generations=4),
+)
+
+WALLS: Mapping[str, NamedWall] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
+
+
+def wall_from_text(text: str) -> Wall:
+    """Return the wall that a text describes: a name with parameters, a TOML file, or a file with a profile.
+
+    Parameters
+    ----------
+    text : str
+        ``"name"`` or ``"name:parameter=value,parameter=value"`` with a name from ``WALLS``; or the path of a file:
+        one that ends in ``.toml`` is read by ``load_wall``, any other by ``read_profile``. A path may be followed by
+        ``:seam=step`` or ``:seam=mirror`` (see ``Wall.from_profile``).
+
+    Raises
+    ------
+    InputError
+        If there is no such name and no such file (the message lists near matches and all names), a parameter is
+        unknown, or a value is not a number.
+
+    Examples
+    --------
+    >>> wall_from_text("rectangular-teeth:height_to_width=4").depth
+    2.0
+    """
+    if Path(text).is_file():
+        return _wall_from_file(Path(text), {})
+    name, _, tail = text.partition(":")
+    entry = WALLS.get(name.strip().lower().replace("_", "-"))
+    parameters = _parameters(text, tail)
+    if entry is not None:
+        return entry.build(**{key: _value(entry, key, value) for key, value in parameters.items()})
+    if Path(name).is_file():
+        return _wall_from_file(Path(name), parameters)
+    near = difflib.get_close_matches(name, WALLS, n=3)
+    guess = f" Did you mean {' or '.join(near)}?" if near else ""
+    raise InputError(f"{name!r} is neither a named wall nor a file.{guess} Named walls: {', '.join(WALLS)}")
+
+
+def _parameters(text: str, tail: str) -> dict[str, str]:
+    parameters: dict[str, str] = {}
+    for part in filter(None, (p.strip() for p in tail.split(","))):
+        key, equals, value = (word.strip() for word in part.partition("="))
+        if not (key and equals and value):
+            raise InputError(f"wall {text!r}: expected name:parameter=value,parameter=value, got {part!r}")
+        if key in parameters:
+            raise InputError(f"wall {text!r}: parameter {key!r} is given twice")
+        parameters[key.replace("-", "_")] = value
+    return parameters
+
+
+def _value(entry: NamedWall, key: str, value: str) -> float | int:
+    if key not in entry.defaults:
+        known = ", ".join(entry.defaults) or "it has none"
+        near = difflib.get_close_matches(key, entry.defaults, n=1)
+        guess = f"; did you mean {near[0]}?" if near else ""
+        raise InputError(f"wall {entry.name}: unknown parameter {key!r}{guess} (parameters: {known})")
+    kind = type(entry.defaults[key])
+    try:
+        return kind(value)
+    except ValueError as reason:
+        wanted = "a whole number" if kind is int else "a number"
+        raise InputError(f"wall {entry.name}, parameter {key}: expected {wanted}, got {value!r}") from reason
+
+
+def _wall_from_file(file: Path, parameters: Mapping[str, str]) -> Wall:
+    is_toml = file.suffix.lower() == ".toml"
+    unknown = [key for key in parameters if is_toml or key != "seam"]
+    if unknown:
+        raise InputError(f"{file}: unknown parameter {unknown[0]!r}; a profile takes seam=mirror or seam=step")
+    if is_toml:
+        return load_wall(file)
+    x, height = read_profile(file)
+    seam = parameters.get("seam", "mirror")
+    try:
+        return Wall.from_profile(x, height, cast(Seam, seam))
+    except InputError as reason:
+        raise type(reason)(f"{file}: {reason}") from reason

@@ -1,0 +1,178 @@
+"""Named walls made of a few pieces: period 1, touching y = 0 at x = 0 and x = 1."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ...checks import number_between, positive_number
+from ...errors import InputError
+from ..curves.arc import Arc
+from ..curves.bezier import Bezier
+from ..curves.segment import Segment
+from ..disk.disk import Disk
+from .wall import Wall
+
+
+def flat() -> Wall:
+    """Return the flat wall y = 0: every reflection is specular.
+
+    Examples
+    --------
+    >>> flat()
+    Wall(1 segment, period 1, depth 0, closes)
+    """
+    return Wall([Segment((0.0, 0.0), (1.0, 0.0))])
+
+
+def triangular_teeth(angle: float) -> Wall:
+    """Return triangular teeth with tips at the integers.
+
+    Parameters
+    ----------
+    angle : float
+        The apex angle psi in (0, pi), radians, of the teeth and of the notches between them; the depth is
+        cot(psi/2)/2.
+
+    Raises
+    ------
+    InputError
+        If the angle is outside (0, pi).
+
+    Notes
+    -----
+    Rudzis 2022, section 2.2.2, with the tooth function corrected.
+
+    Examples
+    --------
+    >>> bool(abs(triangular_teeth(math.pi / 2).depth - 0.5) < 1e-15)
+    True
+    """
+    psi = number_between("angle", angle, 0.0, math.pi)
+    return Wall.from_vertices([(0.0, 0.0), (0.5, -0.5 / math.tan(0.5 * psi)), (1.0, 0.0)])
+
+
+def rectangular_teeth(height_to_width: float) -> Wall:
+    """Return rectangular teeth: a flat top on [0, 1/2] and a crevice on [1/2, 1].
+
+    Parameters
+    ----------
+    height_to_width : float
+        r > 0: the depth of the crevice over its width 1/2, so that the depth is r/2.
+
+    Raises
+    ------
+    InputError
+        If ``height_to_width`` is not greater than 0.
+
+    Notes
+    -----
+    Rudzis 2022, sections 1.2.3 and 2.2.1, with the period corrected.
+
+    Examples
+    --------
+    >>> rectangular_teeth(2.0).vertices.tolist()
+    [[0.0, 0.0], [0.5, 0.0], [0.5, -1.0], [1.0, -1.0], [1.0, 0.0]]
+    """
+    floor = -0.5 * positive_number("height_to_width", height_to_width)
+    return Wall.from_vertices([(0.0, 0.0), (0.5, 0.0), (0.5, floor), (1.0, floor), (1.0, 0.0)])
+
+
+def focusing_arcs(half_angle: float) -> Wall:
+    """Return one circular arc a period, below its chord [0, 1].
+
+    Parameters
+    ----------
+    half_angle : float
+        xi in (0, pi/2], radians: the arc subtends 2 xi, its radius is 1/(2 sin xi) and its depth tan(xi/2)/2.
+
+    Raises
+    ------
+    InputError
+        If the half angle is outside (0, pi/2].
+
+    Notes
+    -----
+    Rudzis 2022, section 2.2.3.
+
+    Examples
+    --------
+    >>> focusing_arcs(math.pi / 2).arc_length == math.pi / 2
+    True
+    """
+    xi = number_between("half_angle", half_angle, 0.0, 0.5 * math.pi, closed="high")
+    radius = 0.5 / math.sin(xi)
+    arc = Arc((0.5, radius * math.cos(xi)), radius, -0.5 * math.pi - xi, -0.5 * math.pi + xi)
+    return Wall([arc.pinned((0.0, 0.0), (1.0, 0.0))])
+
+
+def dispersing_arcs(curvature: float) -> Wall:
+    """Return circular bumps with tops at the integers and a corner at x = 1/2.
+
+    Parameters
+    ----------
+    curvature : float
+        K in (0, 2]: the radius is 1/K. At K = 2 the corner is a cusp.
+
+    Raises
+    ------
+    InputError
+        If the curvature is outside (0, 2].
+
+    Examples
+    --------
+    >>> dispersing_arcs(2.0).depth
+    0.5
+    """
+    k = number_between("curvature", curvature, 0.0, 2.0, closed="high")
+    radius, span = 1.0 / k, math.asin(0.5 * k)
+    # R - R cos(span) without cancellation
+    corner = (0.5, -0.5 * k * 0.5 / (1.0 + math.cos(span)))
+    top = 0.5 * math.pi
+    fall = Arc((0.0, -radius), radius, top, top - span).pinned((0.0, 0.0), corner)
+    rise = Arc((1.0, -radius), radius, top + span, top).pinned(corner, (1.0, 0.0))
+    return Wall([fall, rise])
+
+
+def elliptical_arcs(half_angle: float, disk: Disk) -> Wall:
+    """Return the elliptical arcs whose foreshortened wall is ``focusing_arcs(half_angle)``.
+
+    Parameters
+    ----------
+    half_angle : float
+        xi in (0, pi/2], radians.
+    disk : Disk
+        The disk that is to feel circular arcs.
+
+    Raises
+    ------
+    InputError
+        If the half angle is outside (0, pi/2].
+
+    Notes
+    -----
+    Rudzis 2022, section 2.3.3, with the whole tooth function scaled by (1 + m/J)^(-1/2).
+
+    Examples
+    --------
+    >>> disk = Disk(mass=1.0, inertia=0.5)
+    >>> elliptical_arcs(0.9, disk).foreshorten(disk).pieces[0].is_circular
+    True
+    """
+    if not isinstance(disk, Disk):
+        raise InputError(f"disk: expected a Disk, got {disk!r}")
+    return focusing_arcs(half_angle).unforeshorten(disk)
+
+
+def double_parabola() -> Wall:
+    """Return Plakhov's pair of parabolas x = y^2/4 and x = 1 - y^2/4, which nearly retroreflects.
+
+    Examples
+    --------
+    >>> double_parabola().depth == math.sqrt(2.0)
+    True
+    """
+    depth = math.sqrt(2.0)
+    left: list[Any] = [(0.0, 0.0), (0.0, -0.5 * depth), (0.5, -depth)]
+    right: list[Any] = [(1.0 - x, y) for x, y in reversed(left)]
+    return Wall([Bezier(left), Bezier(right)])

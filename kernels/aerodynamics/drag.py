@@ -1,0 +1,174 @@
+"""Means of a function of the incoming and the outgoing angle, such as the resistance of a rough surface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, finite_array, positive_number
+from ...errors import InputError
+from ...estimates import Estimate, student_95
+from ..bases.basis import Basis
+from ..bases.measure import SINE, gauss_rule
+from ..bases.momentum import Directions
+from ..bases.panels import Panels
+from ..discretisation.discretisation import SEED_WITHOUT_RNG
+from ..discretisation.isometries import has_chain
+from ..discretisation.methods import MatrixMaker
+from ..laws.law import AngleFunction, Law
+from ..matrices.matrix import KernelMatrix
+from ..sampling.counts import half_width
+from ..sampling.monte_carlo import DEFAULT_SAMPLES
+
+CostFunction = Callable[[Floats, Floats], Floats]
+
+# A smooth cost is replaced by polynomials of this degree on panels of this width: cos and sin to 1e-14.
+DEGREE, WIDTH = 10, np.pi / 4.0
+# Panels are halved so often at most, until the cost is represented to the tolerance.
+MOST_HALVINGS = 3
+# The matrix may spend this share of the tolerance.
+MATRIX_SHARE = 0.5
+# Angles a panel, at Gauss nodes of another rule, at which the polynomials are compared with the cost.
+PROBES = 17
+
+
+def air_resistance(theta: Floats, outgoing: Floats) -> Floats:
+    """(3/4)(1 + cos(theta' - theta)): Plakhov's cost, whose mean is 1 for a smooth surface.
+
+    Examples
+    --------
+    Retroreflection costs most.
+
+    >>> float(air_resistance(np.array(1.25), np.array(1.25)))
+    1.5
+    """
+    return np.asarray(0.75 * (1.0 + np.cos(outgoing - theta)))
+
+
+def resistance(
+    law: Law,
+    tolerance: float = 1e-10,
+    *,
+    cost: CostFunction = air_resistance,
+    incoming: AngleFunction | None = None,
+    breakpoints: ArrayLike = (),
+) -> Estimate:
+    r"""E[c(theta, theta')]: the mean resistance of a surface with the given law.
+
+    By default R = (3/4) E[1 + cos(theta' - theta)] with theta distributed as sin(theta)/2 d theta: the resistance of a
+    rough convex body that tumbles in a thin medium, as a share of that of the smooth body.
+
+    Parameters
+    ----------
+    law : Law
+        In the paper's convention.
+    tolerance : float
+        Wanted error. Of a wall of few pieces that has to be traced it takes at most some forty million flights of
+        rays, 5 to 15 seconds; ``error`` says what these have reached.
+    cost : callable
+        ``cost(theta, theta_out)`` of two arrays that broadcast, radians; smooth between the breakpoints.
+    incoming : callable, optional
+        Density of the incoming angles with respect to sin(theta)/2 d theta, vectorised; by default 1. It need not
+        have the integral 1.
+    breakpoints : array_like, optional
+        Angles in (0, pi) at which the cost or the density is not smooth.
+
+    Returns
+    -------
+    Estimate
+        Its error has two parts: that of the law's matrix on `Panels`, and the distance of cost times density from
+        piecewise polynomials; the latter is measured at points between their nodes.
+
+    Raises
+    ------
+    InputError
+        If the law is in the specular frame, or the cost is not vectorised or not finite.
+
+    Notes
+    -----
+    Where c(theta, theta') rho(theta) = sum_ij c_ij e_i(theta) e_j(theta') in an orthonormal basis, the mean is
+    sum_ij c_ij S_ij, S the matrix of the law. So every law has a resistance, by its best method and with its error.
+
+    Source: A. Plakhov, "Billiards and two-dimensional problems of optimal resistance", Arch. Ration. Mech. Anal. 194
+    (2009); Rudzis 2022, section 1.2.7.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> round(float(resistance(ker.specular())), 12), round(float(resistance(ker.retroreflection())), 12)
+    (1.0, 1.5)
+    >>> round(float(resistance(ker.lambertian())), 12) == round(0.75 * (1 + np.pi**2 / 16), 12)
+    True
+    """
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    if law.frame != "paper":
+        raise InputError(f"law: expected one in the paper's convention, got {law!r}; call in_specular_frame() on it")
+    wanted = positive_number("tolerance", tolerance)
+
+    def weighted(theta: Floats, outgoing: Floats) -> Floats:
+        value = finite_array("cost", cost(theta, outgoing))
+        return value if incoming is None else value * finite_array("incoming", incoming(theta))
+
+    if cost is air_resistance and incoming is None and not has_chain(law):
+        # three functions do, where a product of laws needs a basis that can be refined
+        basis: Basis = Directions()
+        coefficients, missed = _projected(weighted, basis)
+    else:
+        basis, coefficients, missed = _represented(weighted, finite_array("breakpoints", breakpoints), 0.1 * wanted)
+    size = float(np.linalg.norm(coefficients))
+    source = np.random.default_rng(SEED_WITHOUT_RNG)
+    share = MATRIX_SHARE * wanted / max(size, 1.0)
+    matrix = MatrixMaker(basis, share, DEFAULT_SAMPLES, source, False, patient=False, thorough=True).make(law, "auto")
+    value = float(np.sum(coefficients * matrix.symmetric))
+    error = _error(matrix, coefficients) + missed
+    how = f"{matrix.method} on {basis!r} ({matrix.error.method})"
+    return Estimate(value, error, matrix.error.kind, how)
+
+
+def _error(matrix: KernelMatrix, coefficients: Floats) -> float:
+    """The error of sum_ij c_ij S_ij: that of S by Cauchy and Schwarz, but what comes of rays by their own spread."""
+    size, parts = float(np.linalg.norm(coefficients)), len(matrix.replicates)
+    if parts < 2:
+        return size * float(matrix.error)
+    each = [float(cast(Any, part * coefficients).sum()) for part in matrix.replicates]
+    other = max(float(matrix.error) - half_width(matrix.symmetric, matrix.replicates), 0.0)
+    return student_95(parts) * float(np.std(each, ddof=1)) / math.sqrt(parts) + size * other
+
+
+def _represented(function: CostFunction, breakpoints: Floats, tolerance: float) -> tuple[Panels, Floats, float]:
+    """Panels, the coefficients of a function of two angles, and how far it is from its polynomials, in L^1 or sup."""
+    inside = breakpoints[(breakpoints > 0.0) & (breakpoints < np.pi)]
+    pieces = round(np.pi / WIDTH)
+    for halving in range(MOST_HALVINGS + 1):
+        uniform = np.linspace(0.0, np.pi, pieces * 2**halving + 1)
+        basis = Panels(np.unique(np.concatenate((uniform, inside))), DEGREE)
+        coefficients, missed = _projected(function, basis)
+        if missed <= tolerance:
+            break
+    return basis, coefficients, missed
+
+
+def _projected(function: CostFunction, basis: Basis) -> tuple[Floats, float]:
+    angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval)
+    values = basis.evaluate(angle)
+    table = _table(function, angle)
+    coefficients = (values * weight[:, None]).T @ table @ (values * weight[:, None])
+    probe, _ = gauss_rule(basis.edges, PROBES)
+    at_probes = basis.evaluate(probe)
+    missed = np.abs(_table(function, probe) - at_probes @ coefficients @ at_probes.T)
+    return coefficients, float(missed.max())
+
+
+def _table(function: CostFunction, angle: Floats) -> Floats:
+    table = function(angle[:, None], angle)
+    try:
+        return np.broadcast_to(table, (angle.size, angle.size))
+    except ValueError as reason:
+        raise InputError(
+            f"cost: expected a vectorised function, values of shape {(angle.size,) * 2}, got {np.shape(table)}"
+        ) from reason

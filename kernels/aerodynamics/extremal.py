@@ -1,0 +1,152 @@
+"""The least and the greatest resistance of a rough surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...checks import Floats, positive_number, whole_number
+from ...errors import InputError
+from ...estimates import Estimate
+from ..bases.bins import Bins
+from ..discretisation.discretisation import discretise
+from ..laws.ideal import retroreflection
+from ..laws.interval_exchange import IntervalExchangeLaw
+from ..laws.law import Law
+from ..laws.least_resistance import LeastResistanceLaw
+from ..laws.matrix_law import MatrixLaw
+from ..matrices.matrix import KernelMatrix
+from ..matrices.matrix_algebra import frobenius_error
+from .drag import air_resistance
+from .dual_bounds import CostFunction, dual_bound, transport_plan
+
+# 3/4 of the second derivatives of the cosine, at most.
+AIR_CURVATURE = 0.75
+# Transport on a grid of n cells takes n^2 numbers of several arrays, and n^2 to n^3 steps: some seconds here.
+MOST_CELLS = 2048
+# Rounding of sums of thousands of cosines.
+ROUNDING = 1e-14
+
+
+@dataclass(frozen=True, eq=False)
+class ExtremalResistance:
+    """The extremal mean of a cost over all symmetric laws.
+
+    Attributes
+    ----------
+    lower, upper : float
+        Bounds of the extremum over all symmetric laws, not only those of a grid, to rounding.
+    plan : KernelMatrix
+        The optimal law, or one within the bounds, on bins.
+    law : Law
+        The law of the plan: in closed form for the resistance, else piecewise uniform.
+    """
+
+    lower: float
+    upper: float
+    plan: KernelMatrix
+    law: Law
+
+    @property
+    def value(self) -> Estimate:
+        """The middle between the bounds."""
+        half = 0.5 * (self.upper - self.lower)
+        return Estimate(self.lower + half, half, "bound", "primal and dual of optimal transport")
+
+    def involution(self) -> IntervalExchangeLaw:
+        """A deterministic law with the same matrix as the plan."""
+        return IntervalExchangeLaw(self.plan)
+
+
+def extremal_resistance(
+    n: int = 1024,
+    which: Literal["min", "max"] = "min",
+    *,
+    cost: CostFunction | None = None,
+    curvature: float | None = None,
+) -> ExtremalResistance:
+    r"""The least or greatest mean of a cost over all symmetric laws.
+
+    Every symmetric law is a limit of laws of walls (Plakhov), so these are the extremal resistances of rough surfaces.
+
+    Parameters
+    ----------
+    n : int
+        Cells of the grid on which bounds are computed, at least 8; the gap between the bounds falls like n^-2. For a
+        cost of one's own at most 2048, and that takes some seconds.
+    which : {"min", "max"}
+    cost : callable, optional
+        Symmetric ``cost(theta, theta_out)`` of two arrays that broadcast; by default that of `resistance`.
+    curvature : float
+        With a cost of one's own: a bound for the moduli of its second derivatives in either variable.
+
+    Returns
+    -------
+    ExtremalResistance
+
+    Raises
+    ------
+    InputError
+        If n is out of range, the cost is not symmetric, or its curvature is missing.
+
+    Notes
+    -----
+    The problem is optimal transport of sin(theta)/2 d theta to itself; symmetry costs nothing, since a plan may be
+    averaged with its transpose. The bounds come from weak duality: a law is an upper bound of a minimum, a pair of
+    potentials a lower one. For the resistance both are known in closed form (`LeastResistanceLaw`, retroreflection)
+    and only the inequality between potential and cost is checked on the grid, with what may happen between its
+    points. For other costs both come from the network simplex method of POT.
+
+    Examples
+    --------
+    >>> least = extremal_resistance(256)
+    >>> round(least.lower, 3), round(least.upper, 12)
+    (0.988, 0.987823750352)
+    >>> most = extremal_resistance(8, "max")
+    >>> most.lower, most.upper
+    (1.5, 1.5)
+    """
+    whole_number("n", n, 8)
+    if which not in ("min", "max"):
+        raise InputError(f"which: expected 'min' or 'max', got {which!r}")
+    if cost is not None:
+        return _by_transport(n, which, cost, curvature)
+    if which == "max":
+        # cos <= 1, and retroreflection attains it
+        return ExtremalResistance(1.5, 1.5, discretise(retroreflection(), Bins(n)), retroreflection())
+    law = LeastResistanceLaw()
+    # the potential of 1 + cos is that of cos and half of the 1 for each of the two angles
+    potential = 0.75 * (0.5 + law.potential(np.linspace(0.0, np.pi, n + 1)))
+    lower = dual_bound(potential, air_resistance, AIR_CURVATURE) - ROUNDING
+    return ExtremalResistance(lower, 0.75 * (1.0 + law.mean_cosine) + ROUNDING, discretise(law, Bins(n)), law)
+
+
+def _by_transport(n: int, which: str, cost: CostFunction, curvature: float | None) -> ExtremalResistance:
+    if curvature is None:
+        raise InputError("curvature: expected a bound of the second derivatives of the cost, got None")
+    bound = positive_number("curvature", curvature)
+    if n > MOST_CELLS:
+        raise InputError(f"n: expected at most {MOST_CELLS} cells for a cost of one's own, got {n}")
+    nodes = np.linspace(0.0, np.pi, n + 1)
+    table = np.asarray(cost(nodes[:, None], nodes), dtype=np.float64)
+    if table.shape != (n + 1, n + 1) or np.abs(table - table.T).max() > 1e-12 * np.abs(table).max():
+        raise InputError("cost: expected a symmetric, vectorised function of two angles")
+    sign = 1.0 if which == "min" else -1.0
+
+    def signed(theta: Floats, outgoing: Floats) -> Floats:
+        return np.asarray(sign * cost(theta, outgoing))
+
+    cells = Bins(nodes)
+    flux, potential, upper = transport_plan(signed, cells, bound)
+    lower = dual_bound(potential, signed, bound)
+    bounds = (lower, upper) if which == "min" else (-upper, -lower)
+    plan = _matrix(flux, cells, "optimal transport on the cells")
+    return ExtremalResistance(*bounds, plan, MatrixLaw(plan))
+
+
+def _matrix(flux: Floats, cells: Bins, law: str) -> KernelMatrix:
+    symmetric = flux * cells.heights[:, None] * cells.heights
+    error = frobenius_error(ROUNDING * cells.size, "bound", "masses of intervals, to rounding")
+    return KernelMatrix(symmetric, cells, error, method="exact", law=law, reversible=True)

@@ -1,0 +1,180 @@
+"""A convex body whose boundary reflects by a rough wall's law: its scattering law and its resistance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, finite_array, finite_number, frozen, generator, positive_number, whole_number
+from ...errors import InputError
+from ...estimates import Estimate
+from ..bases.measure import SINE
+from ..laws.law import Law
+from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score
+from .drag import resistance
+
+# Boundary elements of a smooth body: means over all directions converge geometrically, those of one direction, where
+# half of the boundary is in the shade, like their number to the power -2.
+ELEMENTS = 720
+# Directions told apart by the test of symmetry.
+DIRECTION_BINS = 24
+# The measure sin(theta) d theta has the mass 2.
+SINE_MASS = 2.0
+
+DirectionCost = Callable[[Floats, Floats], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class RoughBody:
+    r"""A convex body in the plane with a rough boundary: elements of its boundary, and the law by which they reflect.
+
+    A particle with velocity -u that meets an element with outer normal n leaves with velocity u'. The scattering law
+    is the measure nu(du du' dn) on triples of directions: the length of the boundary with this normal, times
+    (u . n)_+ du, times the law P~ of u' given u in the frame of the element. It is symmetric in u and u', as the law
+    of every wall is.
+
+    Parameters
+    ----------
+    normals : array_like, shape (elements,)
+        Directions of the outer normals, radians.
+    lengths : array_like, shape (elements,)
+        Lengths of the elements.
+    law : Law
+        In the paper's convention; of a wall much finer than the body.
+
+    Raises
+    ------
+    InputError
+        If lengths are not positive or do not fit the normals, the boundary does not close, or the law is in the
+        specular frame.
+
+    Notes
+    -----
+    Source: Rudzis 2022, section 1.2.7, corrected: the resistance is the integral of c(u, u') against nu, which already
+    contains (u . n)_+; A. Plakhov, "Exterior Billiards" (2012).
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> body = RoughBody.disk(ker.specular())
+    >>> round(float(body.resistance(cost=lambda u, v: np.ones(np.broadcast(u, v).shape))) / np.pi, 12)
+    4.0
+    >>> round(float(body.force(0.0)[0]), 4)          # a smooth disk: 8/3 along the stream
+    2.6667
+    """
+
+    normals: Floats
+    lengths: Floats
+    law: Law
+
+    def __post_init__(self) -> None:
+        normals = np.atleast_1d(finite_array("normals", self.normals))
+        lengths = np.atleast_1d(finite_array("lengths", self.lengths))
+        if normals.shape != lengths.shape or normals.ndim != 1:
+            raise InputError(f"lengths: expected one for each of {normals.size} normals, got shape {lengths.shape}")
+        if lengths.min() <= 0.0:
+            raise InputError(f"lengths: expected numbers greater than 0, got {lengths.min():g}")
+        gap = np.hypot(lengths @ np.cos(normals), lengths @ np.sin(normals))
+        if gap > 1e-9 * lengths.sum():
+            raise InputError(f"normals: expected the boundary of a body, got one that misses itself by {gap:.3g}")
+        if not isinstance(self.law, Law) or self.law.frame != "paper":
+            raise InputError(f"law: expected one in the paper's convention, got {self.law!r}")
+        object.__setattr__(self, "normals", frozen(normals))
+        object.__setattr__(self, "lengths", frozen(lengths))
+
+    @classmethod
+    def disk(cls, law: Law, radius: float = 1.0) -> RoughBody:
+        """A disk."""
+        return cls.ellipse(law, radius, radius)
+
+    @classmethod
+    def ellipse(cls, law: Law, a: float, b: float) -> RoughBody:
+        """An ellipse with the semi-axes a, along x1, and b."""
+        a, b = positive_number("a", a), positive_number("b", b)
+        normals = 2.0 * np.pi * (np.arange(ELEMENTS) + 0.5) / ELEMENTS
+        radii = (a * b) ** 2 / np.hypot(a * np.cos(normals), b * np.sin(normals)) ** 3
+        return cls(normals, radii * (2.0 * np.pi / ELEMENTS), law)
+
+    @classmethod
+    def polygon(cls, law: Law, vertices: ArrayLike) -> RoughBody:
+        """A convex polygon, its vertices against the clock, shape (n, 2)."""
+        points = finite_array("vertices", vertices)
+        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
+            raise InputError(f"vertices: expected at least three points, got shape {points.shape}")
+        side = np.roll(points, -1, axis=0) - points
+        turn = side[:, 0] * np.roll(side[:, 1], -1) - side[:, 1] * np.roll(side[:, 0], -1)
+        if turn.min() <= 0.0:
+            raise InputError("vertices: expected a convex polygon, its vertices against the clock")
+        return cls(np.arctan2(-side[:, 0], side[:, 1]), np.hypot(side[:, 0], side[:, 1]), law)
+
+    @property
+    def perimeter(self) -> float:
+        """The length of the boundary."""
+        return float(self.lengths.sum())
+
+    def resistance(self, tolerance: float = 1e-8, *, cost: DirectionCost | None = None) -> Estimate:
+        r"""The integral of c(u, u') against nu; ``cost(u, v)`` of two directions in radians, by default 1 + u . u'.
+
+        With the default it is 8/3 times the perimeter times the resistance of the law, whatever the shape: only the
+        law matters to a body that tumbles.
+        """
+        if cost is None:
+            found = resistance(self.law, tolerance)
+            return _scaled(found, SINE_MASS * self.perimeter / 0.75)
+        tangents = self.normals - 0.5 * np.pi
+
+        def averaged(theta: Floats, outgoing: Floats) -> Floats:
+            return np.asarray(
+                sum(
+                    length * np.asarray(cost(tangent + theta, tangent + outgoing), dtype=np.float64)
+                    for tangent, length in zip(tangents, self.lengths / self.perimeter, strict=True)
+                )
+            )
+
+        found = resistance(self.law, tolerance, cost=averaged)
+        return _scaled(found, SINE_MASS * self.perimeter)
+
+    def force(self, direction: float) -> Floats:
+        """The force of a stream of particles with velocity -u on the body, as components along -u and across it.
+
+        In units of the stream's momentum flux; u has the angle ``direction``. The force across is positive to the
+        left of the stream. It is the sum over the boundary elements, for a smooth body of 720 of them.
+        """
+        theta = finite_number("direction", direction) - self.normals + 0.5 * np.pi
+        theta = np.mod(theta, 2.0 * np.pi)
+        lit = (theta > 0.0) & (theta < np.pi)
+        incoming = theta[lit]
+        # momentum given to the body by a particle: -u - u', with -u along the stream
+        along = 1.0 + self.law.apply(lambda out: np.cos(out), incoming) * np.cos(incoming)
+        along += self.law.apply(lambda out: np.sin(out), incoming) * np.sin(incoming)
+        across = self.law.apply(lambda out: np.sin(out), incoming) * np.cos(incoming)
+        across -= self.law.apply(lambda out: np.cos(out), incoming) * np.sin(incoming)
+        flux = self.lengths[lit] * SINE_MASS * SINE.density(incoming)
+        return np.array([flux @ along, flux @ across])
+
+    def sample(self, n: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+        """Directions u, u' and n of ``n`` independent triples drawn from nu, divided by its mass, in [0, 2 pi)."""
+        whole_number("n", n, 1)
+        source = generator(rng)
+        normal = self.normals[source.choice(self.normals.size, size=n, p=self.lengths / self.perimeter)]
+        incoming = SINE.sample(n, source)
+        outgoing = self.law.sample(incoming, source)
+        tangent = normal - 0.5 * np.pi
+        u, v = (np.mod(tangent + angle, 2.0 * np.pi) for angle in (incoming, outgoing))
+        return u, v, np.mod(normal, 2.0 * np.pi)
+
+    def symmetry_defect(self, n: int, rng: np.random.Generator) -> SymmetryDefect:
+        """How far nu is from symmetric in u and u', from ``n`` samples, with the z-score of the difference."""
+        u, v, _ = self.sample(n, rng)
+        scale = DIRECTION_BINS / (2.0 * np.pi)
+        row, column = (np.minimum((angle * scale).astype(np.int64), DIRECTION_BINS - 1) for angle in (u, v))
+        counts = np.bincount(row * DIRECTION_BINS + column, minlength=DIRECTION_BINS**2)
+        table = counts.reshape(DIRECTION_BINS, DIRECTION_BINS)
+        return SymmetryDefect(relative_asymmetry(table.astype(np.float64)), z_score=reversibility_z_score(table))
+
+
+def _scaled(found: Estimate, factor: float) -> Estimate:
+    return Estimate(factor * found.value, factor * found.error, found.kind, found.method)

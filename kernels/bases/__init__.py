@@ -1,0 +1,1 @@
+"""The invariant measure, angles, and the orthonormal bases of functions on them."""

@@ -1,0 +1,31 @@
+"""Angles without loss of digits: near grazing, where cosines cannot tell them apart, and at the ends of (0, pi)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...checks import Floats
+from .measure import LARGEST_ANGLE, SMALLEST_ANGLE
+
+
+def kept_inside(angle: Floats) -> Floats:
+    """Move angles that rounding put on or past an end of (0, pi) to the nearest float64 inside it."""
+    return np.asarray(np.clip(angle, SMALLEST_ANGLE, LARGEST_ANGLE))
+
+
+def flipped(angle: Floats) -> Floats:
+    """Return pi - angle, inside (0, pi)."""
+    return kept_inside(np.pi - angle)
+
+
+def mixed_arccos(share: Floats, theta: Floats, half: float) -> tuple[Floats, Floats]:
+    """Return delta = arccos(share cos(theta - half) + (1 - share) cos(theta + half)) and pi - delta.
+
+    Both have full relative accuracy, however small: sin(delta/2)^2 and cos(delta/2)^2 are sums of non-negative terms.
+    Cosines near pi/2 are taken as sines of the complement, so that theta -> pi - theta changes nothing but names.
+    """
+    complement = np.pi - theta
+    sine = share * np.sin(0.5 * (theta - half)) ** 2 + (1.0 - share) * np.sin(0.5 * (theta + half)) ** 2
+    cosine = share * np.sin(0.5 * (complement + half)) ** 2 + (1.0 - share) * np.sin(0.5 * (complement - half)) ** 2
+    sine, cosine = np.sqrt(sine), np.sqrt(cosine)
+    return 2.0 * np.arctan2(sine, cosine), 2.0 * np.arctan2(cosine, sine)

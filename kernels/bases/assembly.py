@@ -1,0 +1,84 @@
+"""Sums of products e_i(theta) e_j(theta') over many pairs of angles, in the way that suits the basis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from .basis import Basis
+from .intervals import cell_among
+from .panels import Panels
+
+# Values of basis functions held at a time.
+CHUNK = 2**21
+
+
+def one_blas_thread() -> AbstractContextManager[Any]:
+    """BLAS on one thread: its threads spin, and a tall thin product gets slower by a hundred on a busy machine."""
+    return _blas().limit(limits=1, user_api="blas")  # type: ignore[no-any-return]
+
+
+@cache
+def _blas() -> Any:
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
+def cell_index(basis: Basis, angle: Floats) -> NDArray[np.int64]:
+    """The cell of each angle in a partition of (0, pi)."""
+    index = getattr(basis, "index", None)
+    return cell_among(basis.edges, angle) if index is None else np.asarray(index(angle), dtype=np.int64)
+
+
+def overlaps(basis: Basis, functions: Callable[[Floats], Floats], edges: Floats) -> Floats:
+    """<e_i, f_j>, shape (n, k), for functions f_j that are smooth between the edges: values of shape (angles, k)."""
+    angle, weight = basis.measure.quadrature(edges, basis.nodes_per_interval)
+    return np.asarray(basis.evaluate(angle).T @ (weight[:, None] * functions(angle)))
+
+
+def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats) -> None:
+    """Add the sum of weight e_i(incoming) e_j(outgoing) over the pairs to ``total``, shape (n, n)."""
+    if basis.is_partition:
+        add_masses(total, basis, cell_index(basis, incoming), cell_index(basis, outgoing), weight)
+        return
+    own = getattr(basis, "add_products", None)
+    if own is not None:
+        own(total, incoming, outgoing, weight)
+        return
+    if isinstance(basis, Panels):
+        (source, values), (target, images) = basis.local(incoming), basis.local(outgoing)
+        add_blocks(total, basis, source, target, values, weight[:, None] * images)
+        return
+    step = max(1, CHUNK // basis.size)
+    for start in range(0, incoming.size, step):
+        part = slice(start, start + step)
+        values, images = basis.evaluate(incoming[part]), weight[part, None] * basis.evaluate(outgoing[part])
+        with one_blas_thread():
+            total += values.T @ images
+
+
+def add_masses(total: Floats, basis: Basis, source: NDArray[np.int64], target: NDArray[np.int64], mass: Floats) -> None:
+    """Add masses that go from cells to cells of a partition to the Galerkin matrix ``total``."""
+    flux = np.bincount(source * basis.size + target, weights=mass, minlength=total.size).reshape(total.shape)
+    total += basis.heights[:, None] * flux * basis.heights
+
+
+def add_blocks(
+    total: Floats, basis: Panels, source: NDArray[np.int64], target: NDArray[np.int64], values: Floats, images: Floats
+) -> None:
+    """Add outer products of values on the panel ``source`` with images on the panel ``target``."""
+    width = basis.degree + 1
+    panels = basis.size // width
+    cell = source * panels + target
+    blocks = total.reshape(panels, width, panels, width)
+    for row in range(width):
+        for column in range(width):
+            sums = np.bincount(cell, weights=values[:, row] * images[:, column], minlength=panels * panels)
+            blocks[:, row, :, column] += sums.reshape(panels, panels)

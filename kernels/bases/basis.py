@@ -1,0 +1,86 @@
+"""What every basis of L^2(sin theta d theta) offers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from .measure import AngularMeasure
+
+
+class Basis(ABC):
+    """An orthonormal family e_0, ..., e_{n-1} in L^2 of a probability measure on (0, pi).
+
+    A kernel P is represented by the matrix S with entries <e_i, P e_j>, whatever the family. Two bases are equal where
+    their functions are.
+    """
+
+    @property
+    def is_partition(self) -> bool:
+        """Whether the functions are normalised indicators of cells, so that matrices of cell-to-cell masses exist."""
+        return False
+
+    @property
+    @abstractmethod
+    def measure(self) -> AngularMeasure:
+        """The measure in which the family is orthonormal."""
+
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """Number of functions n."""
+
+    @property
+    @abstractmethod
+    def edges(self) -> Floats:
+        """Increasing angles from 0 to pi between which every function is smooth."""
+
+    @property
+    @abstractmethod
+    def nodes_per_interval(self) -> int:
+        """Gauss nodes between two edges that integrate products of two functions to rounding."""
+
+    @property
+    @abstractmethod
+    def constant(self) -> Floats:
+        """Coefficients of the constant function 1, a unit vector of shape (n,)."""
+
+    @abstractmethod
+    def evaluate(self, angle: ArrayLike) -> Floats:
+        """Values of all functions, shape ``angle.shape + (n,)``."""
+
+    @property
+    def weights(self) -> Floats:
+        """Squared coefficients of the constant 1, shape (n,), sum 1: the measures of the cells of a partition."""
+        return np.asarray(self.constant**2)
+
+    @property
+    def heights(self) -> Floats:
+        """Value of each e_i on its cell for a partition, ones elsewhere: P.array = heights S / heights."""
+        return np.ones(self.size)
+
+    @abstractmethod
+    def key(self) -> tuple[object, ...]:
+        """What tells this basis from others: hashable."""
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and isinstance(other, Basis) and self.key() == other.key()
+
+    def __hash__(self) -> int:
+        return hash((type(self).__name__, self.key()))
+
+    @abstractmethod
+    def coarsened(self) -> tuple[Basis, Floats] | None:
+        """A basis of a subspace of about half the size, with the (coarse, n) matrix of its coefficients in this one.
+
+        ``None`` where there is none. The Galerkin matrix on the subspace is then R S R^T: two grids from one matrix.
+        """
+
+    def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:
+        """Coefficients <e_i, f> of a vectorised function of the angle, shape (n,)."""
+        angle, weight = self.measure.quadrature(self.edges, order or self.nodes_per_interval)
+        return np.asarray(self.evaluate(angle).T @ (weight * np.asarray(function(angle), dtype=np.float64)))

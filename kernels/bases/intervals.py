@@ -1,0 +1,61 @@
+"""Where many numbers or intervals lie among sorted edges, and what cuts leave of intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats
+from .measure import SINE
+from .ragged_lists import ragged
+
+
+def cell_among(edges: Floats, position: ArrayLike) -> NDArray[np.intp]:
+    """The cell [edges[i], edges[i + 1]) that holds each position; what is beyond an end is in the cell next to it.
+
+    Examples
+    --------
+    >>> cell_among(np.array([0.0, 1.0, 3.0]), np.array([-1.0, 0.0, 1.0, 3.0])).tolist()
+    [0, 0, 1, 1]
+    """
+    return np.asarray(np.clip(np.searchsorted(edges, position, side="right") - 1, 0, len(edges) - 2))
+
+
+def edges_inside(edges: Floats, low: Floats, high: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """All edges strictly between low[i] and high[i], of all i end to end: the number i of each, and the edge.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in edges_inside(np.arange(4.0), np.array([0.5, 2.0, 3.0]), np.array([2.5, 3.0, 1.0]))]
+    [[0, 0], [1.0, 2.0]]
+    """
+    first = np.searchsorted(edges, low, side="right")
+    owner, place = ragged(np.maximum(np.searchsorted(edges, high, side="left") - first, 0))
+    return owner, edges[first[owner] + place]
+
+
+def between_cuts(owner: NDArray[np.intp], cut: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
+    """The intervals between neighbouring cuts of the same owner, those of no length left out: owner, low, high.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in between_cuts(np.array([0, 1, 0, 0, 1]), np.array([3.0, 0.0, 1.0, 2.0, 0.0]))]
+    [[0, 0], [1.0, 2.0], [2.0, 3.0]]
+    """
+    order = np.lexsort((cut, owner))
+    owner, cut = owner[order], cut[order]
+    kept = np.flatnonzero((owner[1:] == owner[:-1]) & (cut[1:] > cut[:-1]))
+    return owner[kept], cut[kept], cut[kept + 1]
+
+
+def without_outermost(angles: Floats, number: int) -> tuple[Floats, float]:
+    """Sorted angles but for so many of them, half at either end, and the measure of what lies beyond those that stay.
+
+    Examples
+    --------
+    >>> kept, beyond = without_outermost(np.array([0.5, 1.0, 2.0]), 2)
+    >>> kept.tolist(), round(beyond, 12)
+    ([1.0], 1.0)
+    """
+    kept = angles[(number + 1) // 2 : angles.size - number // 2]
+    return kept, float(SINE.cdf(kept[0]) + SINE.mass(kept[-1], np.pi)) if kept.size else 1.0

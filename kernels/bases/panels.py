@@ -1,0 +1,218 @@
+"""Piecewise polynomials in the angle on panels that may be graded towards difficult angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats, frozen, number_between, whole_number
+from .basis import Basis
+from .bins import Bins
+from .measure import SINE, AngularMeasure, WeightName
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+
+# Degree 2 p polynomials times a sine on a panel of width up to pi: with p + EXTRA_NODES Gauss nodes the first
+# Chebyshev coefficient of the sine that is missed is (pi/2)^(2 EXTRA_NODES) / ((2 EXTRA_NODES)! 2^(2 EXTRA_NODES - 1)).
+EXTRA_NODES = 11
+# Graded panels: each is RATIO of its neighbour, down to SMALLEST times the distance to the next special angle.
+# A function that behaves like theta^s at grazing is then missed by SMALLEST^(s + 1) in L^2(sin theta d theta).
+RATIO, SMALLEST = 0.35, 1e-4
+WIDEST = np.pi / 24
+# Kinks xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this share of xi.
+KINK_SPACING = 0.05
+
+
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Panels(Basis):
+    r"""Polynomials of bounded degree in theta on each panel, orthonormal for the invariant measure.
+
+    Parameters
+    ----------
+    edges : array_like
+        Panel edges, increasing from 0 to pi, in radians.
+    degree : int
+        Largest degree on each panel; functions ``p (degree + 1), ..., p (degree + 1) + degree`` live on panel p.
+    weight : {"sin", "sin2"}
+        The measure.
+
+    Raises
+    ------
+    InputError
+        If the edges do not increase from 0 to pi or the degree is not a whole number of at least 0.
+
+    Notes
+    -----
+    For a smooth kernel the eigenvalues converge with order 2 (degree + 1) in the panel width.
+
+    Examples
+    --------
+    >>> basis = Panels([0, 1, 3.141592653589793], degree=2)
+    >>> basis.size, float((basis.constant ** 2).sum().round(12))
+    (6, 1.0)
+    """
+
+    _cells: Bins
+    degree: int
+    _coefficients: Floats
+
+    def __init__(self, edges: ArrayLike, degree: int, weight: WeightName = "sin") -> None:
+        cells = Bins(np.atleast_1d(edges), weight)
+        object.__setattr__(self, "_cells", cells)
+        object.__setattr__(self, "degree", whole_number("degree", degree, 0))
+        object.__setattr__(self, "_coefficients", frozen(self._orthonormalise()))
+
+    @classmethod
+    def for_wall(cls, wall: Wall | Any, degree: int = 6, smallest: float = SMALLEST) -> Panels:
+        """Panels for the law of a wall: graded towards grazing and, for one circular arc, its critical angles.
+
+        Parameters
+        ----------
+        wall : Wall
+            The wall, or anything with ``pieces``; of a wall those of its ``cell`` are looked at.
+        degree : int
+            Degree on each panel.
+        smallest : float
+            Width of the smallest panel as a share of its distance to the next special angle.
+
+        Notes
+        -----
+        The rows of the law of a circular arc of half angle xi have kinks at theta = xi (1 +- 1/N) and at their
+        mirror images; they accumulate at xi, towards which the panels are graded instead of following them all.
+        """
+        smallest = number_between("smallest", smallest, 1e-12, 0.5)
+        half_angle = _single_arc_half_angle(wall)
+        special = [0.0, np.pi]
+        followed: list[float] = []
+        if half_angle is not None:
+            special += [half_angle, np.pi - half_angle]
+            last = int(np.ceil(KINK_SPACING**-0.5))
+            kinks = [half_angle * (1.0 + sign / n) for n in range(1, last + 1) for sign in (-1.0, 1.0)]
+            followed = [angle for kink in kinks for angle in (kink, np.pi - kink) if 0.0 < angle < np.pi]
+        return cls(_graded_edges(special, followed, smallest), degree)
+
+    @property
+    def measure(self) -> AngularMeasure:
+        return self._cells.measure
+
+    @property
+    def size(self) -> int:
+        return self._cells.size * (self.degree + 1)
+
+    @property
+    def edges(self) -> Floats:
+        return self._cells.edges
+
+    @property
+    def order(self) -> int:
+        """Declared order of eigenvalues in the panel width, for smooth kernels."""
+        return 2 * (self.degree + 1)
+
+    @property
+    def nodes_per_interval(self) -> int:
+        return self.degree + EXTRA_NODES
+
+    @property
+    def constant(self) -> Floats:
+        unit = np.zeros((self._cells.size, self.degree + 1))
+        unit[:, 0] = self._cells.constant
+        return unit.ravel()
+
+    def key(self) -> tuple[object, ...]:
+        return (self._cells.key(), self.degree)
+
+    def local(self, angle: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
+        """The panel of each angle and the values of its own functions there, shape ``angle.shape + (degree + 1,)``."""
+        angle = np.asarray(angle, dtype=np.float64)
+        panel = self._cells.index(angle)
+        return panel, np.einsum("...k,...ki->...i", self.legendre(angle, panel), self._coefficients[panel])
+
+    def legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
+        """The Legendre polynomials of the given panels at the angles, shape ``angle.shape + (degree + 1,)``."""
+        low, high = self.edges[panel], self.edges[panel + 1]
+        return np.asarray(np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), self.degree))
+
+    def of_legendre(self, moments: Floats) -> Floats:
+        """Integrals of the functions, shape (..., size), from those of the panels' Legendre polynomials.
+
+        ``moments`` has shape (..., panels, degree + 1).
+        """
+        flat = moments.reshape(-1, *moments.shape[-2:])
+        turned = np.matmul(np.moveaxis(flat, 1, 0), self._coefficients)
+        return np.asarray(np.moveaxis(turned, 0, 1).reshape((*moments.shape[:-2], self.size)))
+
+    def legendre_series(self, vectors: Floats) -> Floats:
+        """Coefficients in the panels' Legendre polynomials, (panels, degree + 1, k), from ``vectors``, (size, k)."""
+        return np.asarray(np.matmul(self._coefficients, vectors.reshape(-1, self.degree + 1, vectors.shape[1])))
+
+    def evaluate(self, angle: ArrayLike) -> Floats:
+        angle = np.asarray(angle, dtype=np.float64)
+        panel, local = self.local(angle)
+        values = np.zeros((*angle.shape, self._cells.size, self.degree + 1))
+        np.put_along_axis(values, panel[..., None, None], local[..., None, :], axis=-2)
+        return values.reshape((*angle.shape, self.size))
+
+    def coarsened(self) -> tuple[Panels, Floats] | None:
+        if self.degree > 0:
+            coarse = Panels(self.edges, (self.degree - 1) // 2, self.measure.name)
+            kept = np.arange(self.size).reshape(self._cells.size, -1)[:, : coarse.degree + 1].ravel()
+            return coarse, np.eye(self.size)[kept]
+        merged = self._cells.coarsened()
+        return None if merged is None else (Panels(merged[0].edges, 0, self.measure.name), merged[1])
+
+    def _orthonormalise(self) -> Floats:
+        """Per panel the upper triangular matrix that turns Legendre polynomials into orthonormal functions."""
+        angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
+        shape = (self._cells.size, self.nodes_per_interval)
+        panel = np.repeat(np.arange(shape[0]), shape[1])
+        root = np.sqrt(weight)
+        table = (root[:, None] * self.legendre(angle, panel)).reshape((*shape, self.degree + 1))
+        triangle = np.linalg.qr(table, mode="r")
+        inverse = np.linalg.inv(triangle)
+        signs = np.sign(np.diagonal(triangle, axis1=-2, axis2=-1))
+        return np.asarray(inverse * signs[:, None, :])
+
+    def __repr__(self) -> str:
+        weight = "" if self.measure == SINE else f", weight={self.measure.name!r}"
+        return f"Panels(<{self._cells.size + 1} edges>, {self.degree}{weight})"
+
+
+def _single_arc_half_angle(wall: Any) -> float | None:
+    pieces = tuple(getattr(wall, "cell", wall).pieces)
+    if len(pieces) != 1 or not getattr(pieces[0], "is_circular", False):
+        return None
+    half_angle = float(getattr(pieces[0], "half_span", 0.0))
+    return half_angle if 0.0 < half_angle <= 0.5 * np.pi else None
+
+
+def _graded_edges(special: list[float], followed: list[float], smallest: float) -> Floats:
+    """Edges at all given angles, graded geometrically on both sides of the special ones, at most WIDEST apart.
+
+    Grazing (the first two special angles, 0 and pi) is approached down to ``smallest``, the others to its root:
+    the eigenfunctions are singular at grazing and have ever weaker kinks towards the others.
+    """
+    marks = np.unique(special)
+    edges = [marks, np.asarray(followed)]
+    for low, high in pairwise(marks):
+        half = 0.5 * (high - low)
+        upward = half * _grading(smallest if low == 0.0 else smallest**0.5)
+        downward = half * _grading(smallest if high == np.pi else smallest**0.5)
+        edges += [low + upward, high - downward, np.array([low + half])]
+    merged = np.unique(np.concatenate(edges))
+    merged = merged[np.concatenate(([True], np.diff(merged) > 0.1 * smallest))]
+    merged[-1] = np.pi
+    pieces = np.maximum(np.ceil(np.diff(merged) / WIDEST).astype(int), 1)
+    split = [
+        low + (high - low) * np.arange(n) / n for low, high, n in zip(merged[:-1], merged[1:], pieces, strict=True)
+    ]
+    return np.concatenate([*split, [np.pi]])
+
+
+def _grading(smallest: float) -> Floats:
+    levels = int(np.ceil(np.log(smallest) / np.log(RATIO)))
+    return np.asarray(RATIO ** np.arange(1, levels + 1, dtype=np.float64))

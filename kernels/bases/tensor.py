@@ -1,0 +1,125 @@
+"""Products of functions of several angles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from ...errors import InputError
+from .basis import Basis
+from .measure import AngularMeasure
+
+
+def _kron(parts: Sequence[Floats]) -> Floats:
+    product = parts[0]
+    for part in parts[1:]:
+        product = np.asarray(np.kron(product, part), dtype=np.float64)
+    return product
+
+
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class TensorBasis(Basis):
+    """All products e_i(theta) f_k(psi), the last factor running fastest: the basis of ``P.tensor(Q)``.
+
+    Parameters
+    ----------
+    factors : tuple of Basis
+        One basis an angle, two or more; factors that are tensor bases themselves are flattened.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two factors; and by `measure`, `edges` and `nodes_per_interval`, which every factor
+        has for itself.
+
+    Examples
+    --------
+    >>> from .bins import Bins
+    >>> TensorBasis((Bins(2), Bins(3, weight="sin2"))).size
+    6
+    """
+
+    factors: tuple[Basis, ...]
+
+    def __init__(self, factors: tuple[Basis, ...]) -> None:
+        flat = tuple(
+            part for factor in factors for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))
+        )
+        if len(flat) < 2 or not all(isinstance(factor, Basis) for factor in flat):
+            raise InputError(f"factors: expected two bases or more, got {factors!r}")
+        object.__setattr__(self, "factors", flat)
+
+    @property
+    def is_partition(self) -> bool:
+        """Whether every factor is a partition, so that the products are cells as well."""
+        return all(factor.is_partition for factor in self.factors)
+
+    @property
+    def size(self) -> int:
+        return int(np.prod([factor.size for factor in self.factors]))
+
+    @property
+    def measure(self) -> AngularMeasure:
+        self._refuse("measure")
+
+    @property
+    def edges(self) -> Floats:
+        self._refuse("edges")
+
+    @property
+    def nodes_per_interval(self) -> int:
+        self._refuse("nodes_per_interval")
+
+    @property
+    def constant(self) -> Floats:
+        return _kron([factor.constant for factor in self.factors])
+
+    @property
+    def weights(self) -> Floats:
+        return _kron([factor.weights for factor in self.factors])
+
+    @property
+    def heights(self) -> Floats:
+        return _kron([factor.heights for factor in self.factors])
+
+    def key(self) -> tuple[object, ...]:
+        return self.factors
+
+    def evaluate(self, angle: ArrayLike) -> Floats:
+        """Values of all products at points whose last axis has one angle a factor; shape ``(..., n)``."""
+        angle = np.asarray(angle, dtype=np.float64)
+        if angle.ndim == 0 or angle.shape[-1] != len(self.factors):
+            raise InputError(f"angle: expected a last axis of length {len(self.factors)}, got shape {angle.shape}")
+        values = self.factors[0].evaluate(angle[..., 0])
+        for axis, factor in enumerate(self.factors[1:], start=1):
+            product = values[..., :, None] * factor.evaluate(angle[..., axis])[..., None, :]
+            values = product.reshape((*angle.shape[:-1], -1))
+        return values
+
+    def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:
+        """Coefficients of a function of points whose last axis has one angle a factor, shape (n,)."""
+        rules = [f.measure.quadrature(f.edges, order or f.nodes_per_interval) for f in self.factors]
+        grid = np.stack(np.meshgrid(*[rule[0] for rule in rules], indexing="ij"), axis=-1)
+        values = np.asarray(function(grid), dtype=np.float64)
+        for factor, (angle, weight) in zip(self.factors, rules, strict=True):
+            # contract the first remaining axis; the new axis goes to the end, so that the order is kept
+            values = np.tensordot(values, weight[:, None] * factor.evaluate(angle), axes=(0, 0))
+        return values.ravel()
+
+    def coarsened(self) -> tuple[TensorBasis, Floats] | None:
+        parts = [factor.coarsened() for factor in self.factors]
+        if all(part is None for part in parts):
+            return None
+        kept = [part or (factor, np.eye(factor.size)) for part, factor in zip(parts, self.factors, strict=True)]
+        return TensorBasis(tuple(basis for basis, _ in kept)), _kron([table for _, table in kept])
+
+    def _refuse(self, what: str) -> NoReturn:
+        raise InputError(f"{what}: a tensor basis has one for every angle; use basis.factors[k].{what}")
+
+    def __repr__(self) -> str:
+        return "TensorBasis(" + ", ".join(map(repr, self.factors)) + ")"

@@ -1,0 +1,84 @@
+"""The true disk's collision as a random law of velocities: its place and angle are uniform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, finite_array, generator
+from ...errors import AccuracyError
+
+if TYPE_CHECKING:
+    from ...geometry import Disk, Wall
+
+# Contacts that double precision does not settle are drawn again; they have probability zero but for rounding.
+MOST_DRAWS = 20
+
+
+@dataclass(frozen=True)
+class SatelliteLaw:
+    """K^{Sigma, eps} with x1 uniform over a cell and alpha over one spacing: what a collision looks like from afar.
+
+    Parameters
+    ----------
+    wall : Wall
+        Of segments and arcs; not foreshortened, since the disk does that itself.
+    disk : Disk
+    scale : float
+        eps.
+    spacing : float, optional
+        rho; by default that of `geometry.collide`.
+
+    Raises
+    ------
+    InputError
+        As `geometry.collide`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> law = ker.SatelliteLaw(geo.flat(), geo.Disk(), scale=1e-12)
+    >>> law.sample([[0.25, -1.0, 0.5]], np.random.default_rng(0)).round(3).tolist()
+    [[0.25, 1.0, 0.5]]
+    """
+
+    wall: Wall
+    disk: Disk
+    scale: float
+    spacing: float | None = None
+
+    def __post_init__(self) -> None:
+        from ...geometry.collisions.configuration_space import ConfigurationSpace
+
+        object.__setattr__(self, "spacing", ConfigurationSpace(self.wall, self.disk, self.scale, self.spacing).spacing)
+
+    def sample(self, velocity: ArrayLike, rng: np.random.Generator) -> Floats:
+        """Draw an outgoing velocity (n, 3) for every incoming one with v2 < 0.
+
+        Raises
+        ------
+        AccuracyError
+            If some disk does not come back, whatever its place.
+        """
+        from ...geometry import collide
+
+        assert self.spacing is not None
+        moving = finite_array("velocity", velocity)
+        generator(rng)
+        out, rest = np.empty(moving.shape), np.arange(len(moving))
+        for _ in range(MOST_DRAWS):
+            place = rng.random((len(rest), 2)) * [self.scale * self.wall.period, self.spacing]
+            hit = collide(self.disk, self.wall, self.scale, place, moving[rest], self.spacing)
+            out[rest[hit.escaped]] = hit.velocity[hit.escaped]
+            rest = rest[~hit.escaped]
+            if not len(rest):
+                return out
+        raise AccuracyError(
+            f"{len(rest)} disks did not come back from the wall in {MOST_DRAWS} draws of their place; row "
+            f"{int(rest[0])} has the velocity {moving[rest[0]].tolist()}",
+            len(rest) / len(moving),
+        )

@@ -1,0 +1,255 @@
+"""How the true disk approaches its limit law: the distance of K^{Sigma, eps} from K, measured against eps."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, finite_array, frozen, generator, number_between, whole_number
+from ...errors import InputError
+from ...estimates import NORMAL_95, Estimate, student_95
+from ...rounding import EPS
+
+if TYPE_CHECKING:
+    from ...geometry import Disk, Wall
+
+# A slope needs two points, and its error three.
+FEWEST_SCALES = 3
+COLUMNS = ("distance", "floor", "psi_defect", "two_satellites", "strays", "drift", "shift")
+
+
+@dataclass(frozen=True)
+class LimitStudy:
+    """Measured figures of one wall and one disk at several scales; each column has one entry a scale.
+
+    Attributes
+    ----------
+    scales, spacings : array
+        eps and rho.
+    gap_share : array
+        2 delta_0/rho, the share of angles alpha at which two satellites can be below the tops (section 4.1): what the
+        paper's good set Z leaves out.
+    distance : array
+        Wasserstein distance of the law of (theta', psi') from that of K, with the metric of the sum of both angles'
+        differences, averaged over incoming theta. As K's psi' is one number, this is the distance in theta' plus
+        E of the difference of psi' from pi - psi.
+    floor : array
+        What the same samples give for the distance in theta' of the cylinder law, which has no error: the part of
+        ``distance`` that is due to sampling is about that.
+    psi_defect : array
+        E of the absolute difference of psi' from pi - psi.
+    two_satellites : array
+        Share of collisions in which two satellites touch the wall.
+    strays : array
+        Share of collisions in which the modified law K~, the true collision in the coordinates of the cylinder, differs
+        from the cylinder's law by more than 0.1 in a unit velocity.
+    drift : array
+        E of the larger of the displacements of x1 and alpha between both times at height 0.
+    shift : array
+        E[u u']/E[u^2] with u = -cos theta, less the same figure of the limit at the same incoming angles. The true
+        disk's correlation is <u, P~ u>/<u, u> plus this.
+    errors : dict of arrays
+        Standard errors of the seven columns above, from independent repetitions.
+    seconds : array
+        Processor time of the collisions.
+    collisions : int
+        Their number at each scale.
+    """
+
+    scales: Floats
+    spacings: Floats
+    gap_share: Floats
+    distance: Floats
+    floor: Floats
+    psi_defect: Floats
+    two_satellites: Floats
+    strays: Floats
+    drift: Floats
+    shift: Floats
+    errors: dict[str, Floats]
+    seconds: Floats
+    collisions: int
+
+    def order(self, column: str, against: str = "scales") -> Estimate:
+        """The exponent p of column ~ against^p, fitted by least squares with weights.
+
+        The error is the half width of an interval of 95 %: where the points scatter about the line by more than their
+        sampling errors by that scatter, with Student's quantile, else by the sampling errors.
+
+        Parameters
+        ----------
+        column : str
+            One of the measured columns.
+        against : {"scales", "spacings", "ratio"}
+            ``"ratio"`` is scale/spacing^2.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown, there are fewer than three scales, or an entry is not positive.
+        """
+        if column not in COLUMNS:
+            raise InputError(f"column: expected one of {', '.join(COLUMNS)}, got {column!r}")
+        bases = {"scales": self.scales, "spacings": self.spacings, "ratio": self.scales / self.spacings**2}
+        if against not in bases:
+            raise InputError(f"against: expected one of {', '.join(bases)}, got {against!r}")
+        values = getattr(self, column)
+        if len(values) < FEWEST_SCALES or not np.all(values > 0.0):
+            raise InputError(
+                f"{column}: expected at least {FEWEST_SCALES} positive entries for a slope, got {values.tolist()}"
+            )
+        spread = np.maximum(self.errors[column] / values, EPS)
+        x, y = np.log(bases[against]), np.log(values)
+        design = np.stack([x, np.ones_like(x)], axis=1) / spread[:, None]
+        inverse = np.linalg.inv(design.T @ design)
+        slope, offset = inverse @ design.T @ (y / spread)
+        # where the points scatter about the line by more than their sampling errors, the scatter counts
+        excess = np.sum(((y - slope * x - offset) / spread) ** 2) / (len(x) - 2)
+        standard_error = math.sqrt(float(inverse[0, 0]))
+        by_scatter = student_95(len(x) - 1) * math.sqrt(float(excess)) if excess > 1.0 else 0.0
+        error = standard_error * max(NORMAL_95, by_scatter)
+        return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales")
+
+
+def limit_study(
+    disk: Disk,
+    wall: Wall,
+    scales: ArrayLike,
+    rng: np.random.Generator,
+    *,
+    psi: float = 1.2,
+    spacing: Callable[[float], float] | None = None,
+    limit: Wall | None = None,
+    samples: tuple[int, int, int] = (16, 32, 32),
+    repetitions: int = 4,
+) -> LimitStudy:
+    """Collide true disks of random place and angle at each scale, and compare them with the limit law K.
+
+    Parameters
+    ----------
+    disk : Disk
+    wall : Wall
+        Of segments and arcs.
+    scales : array_like, shape (n,)
+        eps, each greater than 0.
+    rng : numpy.random.Generator
+    psi : float
+        Incoming psi in (0, pi), radians.
+    spacing : callable, optional
+        rho as a function of eps; by default that of `geometry.collide`.
+    limit : Wall, optional
+        The wall whose foreshortened law the samples are compared with; by default ``wall``.
+    samples : (int, int, int)
+        Numbers of incoming angles theta, of disk angles alpha for each, and of places x1 for each of these. All are
+        stratified: theta for sin(theta), alpha in one spacing, x1 in one cell.
+    repetitions : int
+        Independent repetitions, at least 2, from which the standard errors come.
+
+    Returns
+    -------
+    LimitStudy
+
+    Raises
+    ------
+    InputError
+        As `geometry.collide`, and for numbers out of range.
+
+    Source: Rudzis 2022, Theorem 5.1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> study = ker.limit_study(geo.Disk(1.0, 1.0), geo.triangular_teeth(1.2), [1e-3, 1e-4, 1e-5],
+    ...                         np.random.default_rng(0), samples=(8, 16, 16))
+    >>> bool(np.all(np.diff(study.psi_defect) < 0)), abs(float(study.order("psi_defect", "spacings")) - 1.0) < 0.2
+    (True, True)
+    """
+    from ...geometry.collisions.configuration_space import ConfigurationSpace
+
+    generator(rng)
+    eps = np.atleast_1d(finite_array("scales", scales))
+    number_between("psi", psi, 0.0, math.pi)
+    for name, number in zip(("angles", "turns", "places"), samples, strict=True):
+        whole_number(f"samples ({name})", number, 1)
+    whole_number("repetitions", repetitions, 2)
+    spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]
+    target = (wall if limit is None else limit).foreshorten(disk)
+    runs, seconds = np.empty((len(eps), repetitions, len(COLUMNS))), np.zeros(len(eps))
+    for i, space in enumerate(spaces):
+        for k in range(repetitions):
+            runs[i, k], spent = _measured(disk, wall, target, (space.scale, space.spacing), psi, samples, rng)
+            seconds[i] += spent
+    means, errors = runs.mean(axis=1), runs.std(axis=1, ddof=1) / math.sqrt(repetitions)
+    columns = {name: frozen(means[:, j]) for j, name in enumerate(COLUMNS)}
+    return LimitStudy(
+        scales=frozen(eps),
+        spacings=frozen([space.spacing for space in spaces]),
+        gap_share=frozen([2.0 * space.gap_radius / space.spacing for space in spaces]),
+        errors={name: frozen(errors[:, j]) for j, name in enumerate(COLUMNS)},
+        seconds=frozen(seconds),
+        collisions=repetitions * math.prod(samples),
+        **columns,
+    )
+
+
+def _measured(
+    disk: Disk,
+    wall: Wall,
+    target: Wall,
+    size: tuple[float, float],
+    psi: float,
+    samples: tuple[int, int, int],
+    rng: np.random.Generator,
+) -> tuple[list[float], float]:
+    """One repetition: the columns in the order of COLUMNS, and processor seconds."""
+    from ...geometry import collide, collide_cylinder, collide_modified, trace
+
+    scale, spacing = size
+    angles, turns, places = samples
+    u = -1.0 + 2.0 * _strata(angles, rng)
+    theta = np.arccos(-u)
+    alpha = spacing * (_strata(turns, rng, (angles,)) - 0.5)
+    x1 = scale * wall.period * _strata(places, rng, (angles, turns))
+    position = np.stack([x1, np.broadcast_to(alpha[..., None], x1.shape)], axis=-1).reshape(-1, 2)
+    velocity = -np.repeat(disk.from_angles(theta, psi), turns * places, axis=0)
+    begin = time.process_time()
+    true = collide(disk, wall, scale, position, velocity, spacing)
+    spent = time.process_time() - begin
+    outgoing, rolled = disk.to_angles(true.velocity)
+    straight, _ = disk.to_angles(collide_cylinder(disk, target.unforeshorten(disk), scale, position, velocity).velocity)
+    # the same random numbers as straightened states
+    modified = collide_modified(disk, wall, scale, position, velocity, spacing)
+    cylinder = collide_cylinder(disk, wall, scale, position, velocity)
+    per_angle = turns * places
+    # the midpoints of equal parts of the cell: quantiles of the limit to the order of 1/per_angle
+    entry = target.period * (np.arange(per_angle) + 0.5) / per_angle
+    limit = np.sort(trace(target, entry, theta[:, None]).theta, axis=1)
+    shape = (angles, per_angle)
+    psi_defect = float(np.mean(np.abs(rolled - (math.pi - psi))))
+    away = float(np.mean(np.abs(np.sort(outgoing.reshape(shape), axis=1) - limit)))
+    moved = np.abs(true.position - position).max(axis=1)
+    differ = np.abs(modified.velocity - cylinder.velocity).max(axis=1) > 0.1
+    # E[u^2] = 1/3 for the measure sin(theta) d theta
+    shift = 3.0 * float(np.mean(u[:, None] * (np.cos(limit) - np.cos(outgoing.reshape(shape)))))
+    columns = [
+        away + psi_defect,
+        float(np.mean(np.abs(np.sort(straight.reshape(shape), axis=1) - limit))),
+        psi_defect,
+        float(true.two_satellites.mean()),
+        float(differ.mean()),
+        float(moved.mean()),
+        shift,
+    ]
+    return columns, spent
+
+
+def _strata(n: int, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Floats:
+    """``shape`` times n random numbers, one in each n-th of (0, 1)."""
+    return np.asarray((np.arange(n) + rng.random((*shape, n))) / n)

@@ -1,0 +1,58 @@
+"""Collision laws that are linear in the velocity (v1, v2, omega): smooth, no-slip, and any isometry in the angle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from ...geometry.disk.kinetics import branch_block
+
+if TYPE_CHECKING:
+    from ...geometry import Disk
+
+
+def smooth_matrix(disk: Disk) -> Floats:
+    """A_smooth: the 3x3 matrix that reverses v2 and leaves v1 and omega.
+
+    It is K of specular reflection. Source: Rudzis 2022, eq. 2.25.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> (smooth_matrix(geo.Disk()).round(12) + 0.0).tolist()
+    [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]]
+    """
+    return isometry_matrix(disk, -1.0, np.pi)
+
+
+def no_slip_matrix(disk: Disk) -> Floats:
+    """A_no-slip = 2 chi chi^T - I in the kinetic-energy metric: reverses v2 and the slip v1 + omega.
+
+    It is K of retroreflection. Source: Rudzis 2022, eq. 2.25.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> (3 * no_slip_matrix(geo.Disk(mass=1.0, inertia=0.5))).round(12).tolist()
+    [[1.0, 0.0, -2.0], [0.0, -3.0, 0.0], [-4.0, 0.0, -1.0]]
+    """
+    return isometry_matrix(disk, 1.0, 0.0)
+
+
+def isometry_matrix(disk: Disk, sign: ArrayLike, offset: ArrayLike) -> Floats:
+    """The velocity matrix of theta' = sign theta + offset, psi' = pi - psi; shape ``sign.shape + (3, 3)``.
+
+    It takes the true incoming velocity (v2 < 0) to the outgoing one, preserves the kinetic energy and the rolling
+    momentum -m v1 + J omega, and is what Rudzis 2022, section 2.3.2 leaves out for triangular teeth.
+    """
+    sign, offset = np.broadcast_arrays(np.asarray(sign, dtype=np.float64), np.asarray(offset, dtype=np.float64))
+    inner = np.zeros((*sign.shape, 3, 3))
+    for row, entries in enumerate(branch_block(sign, np.cos(offset), np.sin(offset))):
+        for column, entry in enumerate(entries):
+            inner[..., row, column] = entry
+    frame = np.asarray(disk.frame)
+    metric = np.array([disk.mass, disk.mass, disk.inertia])
+    return np.asarray(frame.T @ inner @ (frame * metric))

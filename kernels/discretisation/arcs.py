@@ -1,0 +1,215 @@
+"""Matrices of the law of circular arcs: exact to rounding up to a number of hits, in any basis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...rounding import EPS
+from ..bases.angles import flipped, kept_inside
+from ..bases.assembly import add_blocks, add_masses, cell_index
+from ..bases.basis import Basis
+from ..bases.intervals import between_cuts, edges_inside
+from ..bases.measure import gauss_on_intervals
+from ..bases.mirror import is_mirror_symmetric, reflection_matrix
+from ..bases.panels import Panels
+from ..bases.ragged_lists import ragged
+
+# Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
+# pi - xi, both within 2 xi / MOST_HITS, and are counted there.
+MOST_HITS = 8192
+# Gauss nodes on pieces so short that functions of the basis are as smooth as sin(delta) there, and on other pieces of
+# bases without polynomials.
+NODES_SHORT, NODES_CELL = 5, 14
+SHORT = 0.1
+# Nodes times basis functions, or cells met by a row, held at a time.
+CHUNK = 2**21
+NOISE_PROBES = 5
+# Rows are integrals over delta in an interval of length 2 sin(xi) at most, with ends known to about pi eps.
+ROUNDING = 4.0 * np.pi * EPS
+
+
+def arc_matrix(half_angle: float, basis: Basis) -> tuple[Floats, float]:
+    r"""<e_i, P e_j> for focusing circular arcs of half angle xi, and an estimate of its Frobenius error.
+
+    With delta the chord's angle, S_ij is the integral of e_i(theta) e_j(theta') sin(delta) / (4 sin xi) over
+    |theta - xi| < delta < min(xi + theta, 2 pi - xi - theta), where theta' = pi + theta - 2 N delta for
+    (xi + theta)/(2 N + 1) < delta < (xi + theta)/(2 N - 1) and delta < pi/2, and the mirror image of this beyond
+    pi/2 (Rudzis 2022, section 2.2.3, corrected; see `CircularArcLaw`). For each N the domain is a polygon and theta'
+    is linear on it. The polygons are cut by the edges of the basis in theta and theta' into strips on which all
+    integrands are smooth, and Gauss rules do the rest.
+    """
+    total = np.zeros((basis.size, basis.size))
+    error = ROUNDING * float(np.sqrt(basis.size)) / np.sin(half_angle)
+    sides = (False,) if is_mirror_symmetric(basis) else (False, True)
+    for mirrored in sides:
+        edges = np.pi - basis.edges[::-1] if mirrored else basis.edges
+        strips = _strips(half_angle, edges)
+        counted = _add_strips(total, basis, edges, strips, half_angle, mirrored)
+        error += _add_rest(total, basis, half_angle, 0.5 - counted, mirrored)
+    if len(sides) == 1:
+        flip = reflection_matrix(basis)
+        return total + flip @ total @ flip, 2.0 * error
+    return total, error
+
+
+@dataclass(frozen=True)
+class _Strips:
+    """Intervals of theta with one number of hits, on which delta lies between two lines a theta + b."""
+
+    hits: Floats
+    low: Floats
+    high: Floats
+    lower: Floats  # shape (2, strips): a, b
+    upper: Floats
+
+    def part(self, chosen: NDArray[np.intp] | NDArray[np.bool_] | slice) -> _Strips:
+        return _Strips(
+            self.hits[chosen], self.low[chosen], self.high[chosen], self.lower[:, chosen], self.upper[:, chosen]
+        )
+
+
+def _strips(half_angle: float, edges: Floats) -> _Strips:
+    whole = _polygons(half_angle)
+    owners, angles = [np.arange(whole.hits.size)] * 2, [whole.low, whole.high]
+    # vertical cuts at the edges; slanted ones where the outgoing angle on a side of the polygon meets an edge
+    level = np.zeros((2, whole.hits.size))
+    along = [np.stack((level[0] + 1.0, level[1]))]
+    for side in (whole.lower, whole.upper):
+        along.append(np.stack((1.0 - 2.0 * whole.hits * side[0], np.pi - 2.0 * whole.hits * side[1])))
+    for slope, offset in along:
+        ends = slope * whole.low + offset, slope * whole.high + offset
+        owner, edge = edges_inside(edges, np.minimum(*ends), np.maximum(*ends))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            met = (edge - offset[owner]) / slope[owner]
+        inside = (met > whole.low[owner]) & (met < whole.high[owner])
+        owners.append(owner[inside])
+        angles.append(met[inside])
+    owner, low, high = between_cuts(np.concatenate(owners), np.concatenate(angles))
+    strips = whole.part(owner)
+    return _Strips(strips.hits, low, high, strips.lower, strips.upper)
+
+
+def _polygons(half_angle: float) -> _Strips:
+    """The polygons of all numbers of hits, cut into strips at their corners."""
+    hits = np.arange(1.0, MOST_HITS + 1.0)
+    one, xi = np.ones(hits.size), half_angle
+    lower = np.array([[one, -one, one / (2 * hits + 1)], [-xi * one, xi * one, xi / (2 * hits + 1)]])
+    upper = np.array(
+        [
+            [one, -one, 0.0 * one, one / (2 * hits - 1)],
+            [xi * one, (2 * np.pi - xi) * one, 0.5 * np.pi * one, xi / (2 * hits - 1)],
+        ]
+    )
+    lines = np.concatenate((lower, upper), axis=1)
+    first, second = np.triu_indices(lines.shape[1], 1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        corners = (lines[1, second] - lines[1, first]) / (lines[0, first] - lines[0, second])
+    corners = np.where((corners > 0.0) & (corners < np.pi), corners, 0.0)
+    corners = np.sort(np.concatenate((corners, [np.pi * one])), axis=0)
+    low, high = corners[:-1], corners[1:]
+    middle = 0.5 * (low + high)
+    below, above = (side[0, :, None] * middle + side[1, :, None] for side in (lower, upper))
+    place, column = np.nonzero((below.max(axis=0) < above.min(axis=0)) & (high > low))
+    lowest, highest = below.argmax(axis=0)[place, column], above.argmin(axis=0)[place, column]
+    return _Strips(
+        hits[column], low[place, column], high[place, column], lower[:, lowest, column], upper[:, highest, column]
+    )
+
+
+def _add_strips(
+    total: Floats, basis: Basis, edges: Floats, strips: _Strips, half_angle: float, mirrored: bool
+) -> float:
+    """Add the integrals over all strips; returns their mass."""
+    if basis.is_partition:
+        long_nodes = NODES_CELL
+        short = strips.high - strips.low < SHORT
+    else:
+        long_nodes = basis.nodes_per_interval
+        short = _reach(strips, edges) * long_nodes < 1.0
+    mass = 0.0
+    for chosen, order in ((short, NODES_SHORT), (~short, long_nodes)):
+        selected = np.flatnonzero(chosen)
+        step = max(1, CHUNK // (order * 32))
+        for start in range(0, selected.size, step):
+            part = strips.part(selected[start : start + step])
+            theta, weight = gauss_on_intervals(part.low, part.high, order)
+            row = part.part(np.repeat(np.arange(part.hits.size), order))
+            mass += _add_rows(total, basis, edges, row, theta, weight / (4.0 * np.sin(half_angle)), mirrored)
+    return mass
+
+
+def _reach(strips: _Strips, edges: Floats) -> Floats:
+    """How far incoming and outgoing angles move along a strip, as a share of the basis' intervals that they are in."""
+    length, middle, widths = strips.high - strips.low, 0.5 * (strips.low + strips.high), np.diff(edges)
+
+    def interval(angle: Floats) -> Floats:
+        return np.asarray(widths[np.clip(np.searchsorted(edges, angle) - 1, 0, widths.size - 1)])
+
+    reach = length / interval(middle)
+    for slope, offset in (strips.lower, strips.upper):
+        outgoing = np.pi + middle - 2.0 * strips.hits * (slope * middle + offset)
+        reach = np.maximum(reach, length * np.abs(1.0 - 2.0 * strips.hits * slope) / interval(outgoing))
+    return reach
+
+
+def _add_rows(
+    total: Floats, basis: Basis, edges: Floats, strips: _Strips, theta: Floats, weight: Floats, mirrored: bool
+) -> float:
+    lower, upper = (side[0] * theta + side[1] for side in (strips.lower, strips.upper))
+    upper = np.maximum(upper, lower)
+    # the outgoing angle falls with delta: cut it at the edges
+    first = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * upper, side="right")
+    last = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * lower, side="left")
+    number = np.maximum(last - first, 0) + 1
+    row, place = ragged(number)
+    above = np.clip(last[row] - place, 0, edges.size - 1)
+    cut = (np.pi + theta[row] - edges[above]) / (2.0 * strips.hits[row])
+    low = np.where(place == 0, lower[row], np.clip(cut, lower[row], upper[row]))
+    high = np.where(place == number[row] - 1, upper[row], np.append(low[1:], 0.0))
+    # the difference of two cosines as a product, so that it keeps its digits
+    mass = 2.0 * weight[row] * np.sin(0.5 * (low + high)) * np.sin(0.5 * (high - low))
+    incoming = np.pi - theta if mirrored else theta
+    if basis.is_partition:
+        target = np.clip(above - 1, 0, basis.size - 1)
+        target = basis.size - 1 - target if mirrored else target
+        add_masses(total, basis, cell_index(basis, incoming)[row], target, mass)
+        return float(mass.sum())
+    width = np.diff(edges)[np.clip(above - 1, 0, edges.size - 2)]
+    short = 2.0 * strips.hits[row] * (high - low) * basis.nodes_per_interval < width
+    for chosen, order in ((short, NODES_SHORT), (~short, basis.nodes_per_interval)):
+        selected = np.flatnonzero(chosen)
+        step = max(1, CHUNK // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))
+        for start in range(0, selected.size, step):
+            part = selected[start : start + step]
+            chord, share = gauss_on_intervals(low[part], high[part], order)
+            owner = row[part]
+            each = np.repeat(owner, order)
+            outgoing = np.pi + theta[each] - 2.0 * strips.hits[each] * chord
+            outgoing = flipped(outgoing) if mirrored else kept_inside(outgoing)
+            share = (share * np.sin(chord) * weight[each])[:, None]
+            if isinstance(basis, Panels):
+                panel, values = basis.local(outgoing)
+                image = (values * share).reshape(part.size, order, -1).sum(axis=1)
+                source, own = basis.local(incoming[owner])
+                # a piece ends at edges, so all its nodes are on the panel of the middle one
+                add_blocks(total, basis, source, panel[order // 2 :: order], own, image)
+            else:
+                image = (basis.evaluate(outgoing) * share).reshape(part.size, order, -1).sum(axis=1)
+                total += basis.evaluate(incoming[owner]).T @ image
+    return float(mass.sum())
+
+
+def _add_rest(total: Floats, basis: Basis, half_angle: float, rest: float, mirrored: bool) -> float:
+    """Put the rays with too many hits where they are to first order; returns how much that can be off."""
+    spread = half_angle / MOST_HITS * np.linspace(-1.0, 1.0, NOISE_PROBES)
+    sign, origin = (-1.0, np.pi) if mirrored else (1.0, 0.0)
+    incoming = basis.evaluate(origin + sign * (half_angle + spread))
+    outgoing = basis.evaluate(origin + sign * (np.pi - half_angle + 2.0 * spread))
+    middle = NOISE_PROBES // 2
+    centre = np.outer(incoming[middle], outgoing[middle])
+    total += rest * centre
+    return abs(rest) * max(float(np.linalg.norm(np.outer(e, f) - centre)) for e in incoming for f in outgoing)

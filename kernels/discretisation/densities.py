@@ -1,0 +1,288 @@
+"""Matrices of laws with a density, of deterministic laws, and of laws known by their action on functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats
+from ...errors import InputError
+from ...rounding import EPS
+from ..bases.assembly import add_products, cell_index
+from ..bases.basis import Basis
+from ..bases.legendre import Legendre
+from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
+from ..expectations.angle_panels import NODES, AnglePanels
+
+# Evaluations of a density, values of basis functions in `law.apply`, and points of a map that are affordable: each is
+# about a second or two.
+MOST_DENSITY_VALUES, MOST_APPLY_VALUES, MOST_MAP_POINTS = 2**25, 2**26, 2**20
+# Gauss nodes in theta' on an interval, by the largest share that it has of a panel on which the law's 16 nodes reach
+# rounding. The singularities are then 3/8 of the panel away from its ends, and q nodes on a share r miss rho^(-2 q)
+# with rho + 1/rho = 2 + 3/(2 r): 1e-12 or less in each case.
+SHARES, SHARE_NODES = np.array([1 / 32, 1 / 4]), (4, 8, 16)
+# Gauss nodes in theta on each interval of the coarsest level by rows: the most that are affordable. Rows that still
+# cost more than some seconds are left to product rules.
+ROW_NODES = (6, 4, 2)
+MOST_ROW_VALUES = 2**27
+# Edges are their own mirror images within this.
+MIRROR_TOLERANCE = 4.0 * EPS * np.pi
+# Numbers held at a time.
+CHUNK = 2**21
+# Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.
+ROW_CHUNK = 2**17
+# Kinks that panels begin with; the share of the tolerance that one of them may spend, and what rounding leaves.
+FIRST_KINKS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
+# Rows are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
+GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
+BISECTIONS = 60
+# A map is mostly singular where it jumps, as a square root if it comes from grazing or goes there.
+GRADING = 0.25 ** np.arange(1.0, 17.0)
+# A measure-preserving map keeps measures of intervals; rounding of the map and of the measure stays below this.
+JUMP_TOLERANCE = 1e-9
+JUMP_PROBES = 4096
+
+
+class HasDensity(Protocol):
+    """What is asked of a law with a density."""
+
+    def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats: ...
+    def panels(self, theta: Floats) -> Floats: ...
+    def incoming_edges(self, edges: Floats) -> Floats: ...
+    @property
+    def resolution(self) -> float: ...
+    @property
+    def mirror_symmetric(self) -> bool | None: ...
+
+
+class HasAction(Protocol):
+    """What is asked of a law known by its action on functions."""
+
+    def apply(self, function: Callable[[Floats], Floats], theta: ArrayLike) -> Floats: ...
+    def kinks(self, limit: int) -> tuple[Floats, float]: ...
+    @property
+    def fan_out(self) -> int: ...
+
+
+def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+    """<e_i, P e_j> by Gauss rules whose order doubles; the difference of the last two as error estimate.
+
+    Product rules, which do not see a peak narrower than the cells of a partition: there each row is integrated over
+    theta' by itself, between the edges of cells and of the law's own panels for that row.
+    """
+    edges = np.unique(np.concatenate((basis.edges, np.asarray(getattr(law, "breakpoints", ())))))
+    if basis.is_partition and law.resolution < np.diff(edges).max():
+        outer = np.unique(np.concatenate((edges, law.incoming_edges(edges))))
+        mirrored = law.mirror_symmetric is True and np.abs(edges + edges[::-1] - np.pi).max() <= MIRROR_TOLERANCE
+        if mirrored:
+            outer = np.append(outer[outer < 0.5 * np.pi - MIRROR_TOLERANCE], 0.5 * np.pi)
+        # two levels at least, or there is no estimate: the second has twice the nodes of the first
+        cost = [3 * _row_cost(law, edges, outer, order) for order in ROW_NODES]
+        affordable = [order for order, each in zip(ROW_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
+        order = affordable[0] if affordable else ROW_NODES[-1]
+        if min(cost) <= MOST_ROW_VALUES:
+            levels = _row_levels(law, basis, edges, outer, order)
+            return _until_settled((_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance)
+    return _until_settled(_density_levels(law, basis, edges), tolerance)
+
+
+def _with_mirror_image(half: Floats) -> Floats:
+    return half + half[::-1, ::-1]
+
+
+def _row_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
+    """About how often the density is evaluated: most intervals between cell edges are small shares of a panel."""
+    panels: int = law.panels(outer[:1]).shape[-1]
+    values: int = (outer.size - 1) * order * (SHARE_NODES[0] * edges.size + SHARE_NODES[-1] * panels)
+    return values
+
+
+def _row_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:
+    level, spent = 0, 0
+    while level < 2 or spent + _row_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
+        spent += _row_cost(law, edges, outer, order)
+        yield _row_rule(law, basis, edges, outer, order)
+        order, level = 2 * order, level + 1
+
+
+def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
+    angle, mass = SINE.quadrature(outer, order)
+    source = cell_index(basis, angle)
+    flux = np.zeros(basis.size**2)
+    step = max(1, ROW_CHUNK // (SHARE_NODES[0] * edges.size))
+    for start in range(0, angle.size, step):
+        part = slice(start, start + step)
+        row, low, high, nodes = row_intervals(law, edges, angle[part])
+        target = cell_index(basis, 0.5 * (low + high))
+        for count in SHARE_NODES:
+            chosen = nodes == count
+            outgoing, inner = gauss_on_intervals(low[chosen], high[chosen], count)
+            shape = (-1, count)
+            value = law.density(angle[part][row[chosen], None], outgoing.reshape(shape)) * inner.reshape(shape)
+            cell = source[part][row[chosen]] * basis.size + target[chosen]
+            flux += np.bincount(cell, weights=mass[part][row[chosen]] * value.sum(axis=1), minlength=flux.size)
+    return basis.heights[:, None] * flux.reshape(basis.size, basis.size) * basis.heights
+
+
+def row_intervals(
+    law: HasDensity, edges: Floats, theta: Floats
+) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
+    """Row, ends and number of Gauss nodes of the intervals into which cells and panels together cut (0, pi)."""
+    panels = law.panels(theta)
+    fixed = np.broadcast_to(edges, (theta.size, edges.size))
+    merged = np.concatenate((panels, fixed), axis=1)
+    # The panel of an interval is the one whose left edge came last.
+    widths = np.concatenate((np.diff(panels, axis=1), np.zeros((theta.size, 1 + edges.size))), axis=1)
+    number = np.concatenate((np.arange(panels.shape[1]), np.zeros(edges.size, dtype=np.int64)))
+    place = np.argsort(merged, axis=1, kind="stable")
+    merged = np.take_along_axis(merged, place, axis=1)
+    panel = np.maximum.accumulate(number[place], axis=1)[:, :-1]
+    width = np.diff(merged, axis=1)
+    row, column = np.nonzero(width > 0.0)
+    share = width[row, column] / widths[row, panel[row, column]]
+    nodes = np.asarray(SHARE_NODES)[np.searchsorted(SHARES, share)]
+    return row, merged[row, column], merged[row, column + 1], nodes
+
+
+def _density_levels(law: HasDensity, basis: Basis, edges: Floats) -> Iterator[Floats]:
+    intervals = edges.size - 1
+    order = basis.nodes_per_interval
+    if basis.is_partition:
+        order = 4 if intervals <= 512 else 2 if intervals <= 1024 else 1
+    level = 0
+    while level < 2 or (intervals * order) ** 2 <= MOST_DENSITY_VALUES:
+        yield _density_rule(law, basis, edges, order)
+        order, level = 2 * order, level + 1
+
+
+def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> Floats:
+    angle, weight = gauss_rule(edges, order)
+    mass = weight * SINE.density(angle)
+    total = np.zeros((basis.size, basis.size))
+    step = max(CHUNK // angle.size // order, 1) * order
+    owner = cell_index(basis, 0.5 * (edges[1:] + edges[:-1])) if basis.is_partition else None
+    values = basis.evaluate(angle) if owner is None else None
+    for start in range(0, angle.size, step):
+        rows = slice(start, start + step)
+        block = mass[rows, None] * law.density(angle[rows, None], angle) * weight
+        if values is not None:
+            total += values[rows].T @ (block @ values)
+            continue
+        assert owner is not None  # a basis is a partition or has values
+        block = block.reshape(-1, order, owner.size, order).sum(axis=(1, 3))
+        np.add.at(total, (owner[start // order : start // order + block.shape[0], None], owner), block)
+    return total if values is not None else basis.heights[:, None] * total * basis.heights
+
+
+def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: float) -> tuple[Floats, float]:
+    """<e_i, e_j o T> for a measure-preserving map T, whose jumps are found first; the error as for a density."""
+    ends = np.concatenate(([0.0], jumps_of_map(map_angle), [np.pi]))
+    width = np.diff(ends)[:, None] * GRADING
+    graded = (ends[:-1, None] + width).ravel(), (ends[1:, None] - width).ravel()
+    edges = np.unique(np.concatenate((basis.edges, ends, *graded)))
+    return _until_settled(_map_levels(map_angle, basis, edges), tolerance)
+
+
+def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floats) -> Iterator[Floats]:
+    pieces = 4
+    while pieces == 4 or pieces * edges.size * basis.nodes_per_interval <= MOST_MAP_POINTS:
+        share = np.arange(pieces) / pieces
+        fine = np.concatenate(((edges[:-1, None] + share * np.diff(edges)[:, None]).ravel(), [np.pi]))
+        if not isinstance(basis, Legendre):
+            fine = np.unique(np.concatenate((fine, _crossings(map_angle, basis, fine))))
+        if basis.is_partition:
+            angle, _ = gauss_rule(fine, 1)
+            mass = SINE.mass(fine[:-1], fine[1:])
+            total = np.zeros((basis.size, basis.size))
+            add_products(total, basis, angle, np.asarray(map_angle(angle), dtype=np.float64), mass)
+            yield total
+        else:
+            angle, mass = SINE.quadrature(fine, basis.nodes_per_interval)
+            total = np.zeros((basis.size, basis.size))
+            image = np.asarray(map_angle(angle), dtype=np.float64)
+            add_products(total, basis, angle, image, mass)
+            yield total
+        pieces *= 2
+
+
+def _crossings(map_angle: Callable[[Floats], Floats], basis: Basis, fine: Floats) -> Floats:
+    """Angles inside the given intervals at which the image passes from one cell to another, one an interval."""
+    inset = 1e-6 * np.diff(fine)
+    low, high = fine[:-1] + inset, fine[1:] - inset
+    first = cell_index(basis, np.asarray(map_angle(low), dtype=np.float64))
+    last = cell_index(basis, np.asarray(map_angle(high), dtype=np.float64))
+    changing = first != last
+    low, high, first = low[changing], high[changing], first[changing]
+    return _bisected(low, high, lambda middle: cell_index(basis, np.asarray(map_angle(middle))) == first)
+
+
+def jumps_of_map(map_angle: Callable[[Floats], Floats]) -> Floats:
+    """Where a measure-preserving map jumps or turns round: there the measure between two images changes."""
+    probe = SINE.quantile((np.arange(JUMP_PROBES) + 0.5) / JUMP_PROBES)
+    image = SINE.cdf(np.asarray(map_angle(probe), dtype=np.float64))
+    broken = np.abs(np.abs(np.diff(image)) - SINE.mass(probe[:-1], probe[1:])) > JUMP_TOLERANCE
+    low, high, start = probe[:-1][broken], probe[1:][broken], image[:-1][broken]
+
+    def still_whole(middle: Floats) -> NDArray[np.bool_]:
+        moved = np.abs(SINE.cdf(np.asarray(map_angle(middle), dtype=np.float64)) - start)
+        return np.asarray(np.abs(moved - SINE.mass(low, middle)) <= JUMP_TOLERANCE)
+
+    return _bisected(low, high, still_whole)
+
+
+def _bisected(low: Floats, high: Floats, before: Callable[[Floats], NDArray[np.bool_]]) -> Floats:
+    low, high = low.copy(), high.copy()
+    if low.size:
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            early = before(middle)
+            low, high = np.where(early, middle, low), np.where(early, high, middle)
+    return high
+
+
+def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+    """<e_i, P e_j> by Kronrod's rule in theta with P e_j from ``law.apply``, and an estimate of its Frobenius error.
+
+    Panels between edges and kinks are halved until each is settled or the work exceeds about a second. The error is the
+    sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
+    """
+    try:
+        kinks = law.kinks(FIRST_KINKS)[0]
+    except InputError:
+        kinks = np.empty(0)
+    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, kinks)))
+    low, high = edges[:-1], edges[1:]
+    total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0
+    values = NODES.size * basis.size * max(int(law.fan_out), 1)
+    while low.size:
+        spent += values * low.size
+        # the next round is twice as large at most
+        last = spent + 2 * values * low.size > MOST_APPLY_VALUES
+        settled = np.zeros(low.size, dtype=np.bool_)
+        step = max(1, CHUNK // max(values, basis.size**2))
+        for start in range(0, low.size, step):
+            panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
+            panels.image = law.apply(basis.evaluate, panels.angle)
+            difference = panels.differences(basis)
+            done = last | (difference <= max(PANEL_SHARE * tolerance, SETTLED))
+            settled[start : start + step] = done
+            total += panels.kept(done).values(basis).sum(axis=0)
+            error += float(difference[done].sum())
+        middle = 0.5 * (low + high)[~settled]
+        low, high = np.append(low[~settled], middle), np.append(middle, high[~settled])
+    return total, error
+
+
+def _until_settled(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:
+    """The first level that differs from the one before by no more than the tolerance, or the last; the difference."""
+    current = next(levels)
+    difference = np.inf
+    for finer in levels:
+        difference = float(np.linalg.norm(finer - current))
+        current = finer
+        if difference <= tolerance:
+            break
+    return current, difference

@@ -1,0 +1,113 @@
+"""The matrix of a law in a basis, by the method that suits the law."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+
+from ...checks import finite_number, generator, whole_number
+from ...errors import InputError
+from ..bases.basis import Basis
+from ..bases.measure import SINE
+from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
+from ..sampling.monte_carlo import DEFAULT_SAMPLES
+from ..sampling.sobol import PARTS
+from .methods import MatrixMaker, Method
+
+SEED_WITHOUT_RNG = 0
+
+
+def discretise(
+    law: Law,
+    basis: Basis,
+    method: Method = "auto",
+    tolerance: float = 1e-8,
+    samples: int | None = None,
+    rng: np.random.Generator | None = None,
+    *,
+    symmetrise: bool = False,
+) -> KernelMatrix:
+    r"""The Galerkin matrix <e_i, P e_j> of a law P in a basis of L^2(sin theta d theta).
+
+    Parameters
+    ----------
+    law : Law
+        Any law; of a combination each term is done by its best method.
+    basis : Basis
+        Bins, Legendre or Panels for theta.
+    method : {"auto", "exact", "quadrature", "qmc", "monte-carlo"}
+        ``"exact"``: laws of isometries, to rounding, plus a bound for beams of a polygonal wall that were not
+        resolved, or for kinks of a composition left out near grazing. ``"quadrature"``:
+        Gauss rules, refined until their error meets the tolerance or the work exceeds some seconds; what the error is
+        estimated from stands in its ``method``. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random
+        shifts of one; the error is from their spread; in a basis that is mirror-symmetric, as the law is, each ray
+        counts with its mirror image. ``"monte-carlo"``: independent rays; the error is from the variance of the
+        counts. The error of sampled matrices is a 95 % quantile. ``"auto"`` takes the first
+        of these that the law has, except that quadrature in the entry point comes after ``"qmc"`` for driven laws
+        without a wall. Of a wall without closed form it takes what promises the tolerance soonest: isometries of few
+        pieces; as many rays as the tolerance needs, where that is less than ``samples``; isometries of many pieces;
+        quadrature, unless a first look speaks against it; all rays; and of the last two the more exact matrix.
+        ``KernelMatrix.method`` says what was used.
+    tolerance : float
+        Wanted Frobenius error of ``symmetric``. If it is not met the matrix says so: in its ``error`` and its repr.
+    samples : int, optional
+        Number of rays where rays are sampled, of ``"auto"`` the largest; 2**20 by default. ``"qmc"`` rounds up to 8
+        times a power of two, for the quadrature of other driven laws it is the number of nodes.
+    rng : numpy.random.Generator, optional
+        Source of randomness; by default a fixed one, so that results are reproducible.
+    symmetrise : bool
+        For sampled matrices of reversible laws: count each ray both ways. The flux is then symmetric, and rows of
+        ``array`` sum to 1 within the sampling error only.
+
+    Returns
+    -------
+    KernelMatrix
+
+    Raises
+    ------
+    InputError
+        If the law does not have the method, the message says which it has; if an argument is not as described.
+    AccuracyError
+        If a bin received no ray, or more than 1e-4 of the rays did not escape from a wall.
+
+    Notes
+    -----
+    A composition is discretised as the operator that it is: the result is the Galerkin matrix of the product, not
+    the product of Galerkin matrices, which differs unless the basis is invariant. Compositions are simplified by the
+    algebra first: isometries are moved through mirror-symmetric laws, scatterings joined, mixtures multiplied out.
+
+    Examples
+    --------
+    >>> from asperity.kernels.bases.bins import Bins
+    >>> from asperity.kernels.laws.ideal import maxwell
+    >>> P = discretise(maxwell(0.5), Bins(2))
+    >>> P.array.round(12).tolist(), P.method
+    ([[0.25, 0.75], [0.75, 0.25]], 'quadrature + exact')
+    """
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    if not isinstance(basis, Basis):
+        raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
+    if basis.measure != SINE:
+        raise InputError(f"basis: expected one for theta, with weight 'sin', got {basis!r}")
+    if method not in get_args(Method):
+        raise InputError(f"method: expected one of {', '.join(get_args(Method))}, got {method!r}")
+    if finite_number("tolerance", tolerance) < 0.0:
+        raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
+    number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)
+    source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
+    if symmetrise and not law.reversible:
+        raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
+    maker = MatrixMaker(basis, tolerance, number, source, symmetrise, patient=method == "quadrature")
+    return replace(
+        maker.make(law, method),
+        law=repr(law),
+        reversible=law.reversible,
+        mirror_symmetric=law.mirror_symmetric,
+        frame=law.frame,
+        requested_tolerance=float(tolerance),
+        metadata={"numpy": np.__version__},
+    )

@@ -1,0 +1,104 @@
+"""Matrices of laws made of isometries, by quadrature between their kinks: exact to rounding."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from ..bases.assembly import add_products
+from ..bases.basis import Basis
+from ..bases.measure import gauss_on_intervals, gauss_rule
+from ..laws.branches import preimages
+from ..laws.composition import Composition, Power
+from ..laws.specular_frame import SpecularFrame
+from ..laws.weighted_sum import Combination
+
+# A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
+# misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
+# scale of the distance to grazing; NARROW is measured in both, and 6 nodes leave (0.05)^12 / 12! there.
+NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
+# Kinks that accumulate at grazing are followed until the omitted share is negligible or listing and using them would
+# take more than about a second.
+FEWEST_KINKS, KINK_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
+# Nodes times branches held at a time.
+CHUNK = 2**22
+
+
+class Branching(Protocol):
+    """What is asked of a law here."""
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
+    def kinks(self, limit: int) -> tuple[Floats, float]: ...
+    @property
+    def fan_out(self) -> int: ...
+
+
+def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+    """<e_i, P e_j> for a law of isometries, and a bound of its Frobenius error apart from rounding.
+
+    The interval (0, pi) is cut at the kinks of the law, the edges of the basis and the angles that a branch maps to
+    edges. On each piece every integrand is smooth. Where the law leaves kinks near grazing out, a share m of the
+    measure, both the integral and its approximation are averages of e(theta) e(theta')^T over a measure of mass m, so
+    they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
+    """
+    worst = 2.0 * largest_square_sum(basis)
+    limit = FEWEST_KINKS
+    kinks, omitted = law.kinks(limit)
+    most = KINK_WORK // law.fan_out**2
+    if not basis.is_partition:
+        most = min(most, FUNCTION_WORK // basis.size)
+    while omitted * worst > tolerance and 2 * limit <= most:
+        limit *= 2
+        kinks, omitted = law.kinks(limit)
+    edges = np.unique(np.concatenate((basis.edges, kinks)))
+    edges = np.unique(
+        np.concatenate((edges, preimages(law.branches, np.concatenate(([0.0], kinks, [np.pi])), basis.edges)))
+    )
+    total = np.zeros((basis.size, basis.size))
+    width, near = np.diff(edges), np.minimum(edges[1:], np.pi - edges[:-1])
+    narrow = (width < NARROW) & (width < NARROW * near)
+    order, order_narrow = NODES_WIDE, NODES_NARROW
+    if not basis.is_partition:
+        # on a piece this short the functions of the basis are as smooth as the probabilities
+        order = max(order, basis.nodes_per_interval)
+        tame = width * basis.nodes_per_interval < np.diff(basis.edges).min()
+        narrow, order_narrow = narrow & tame, NODES_NARROW + 2
+    for chosen, nodes in ((narrow, order_narrow), (~narrow, order)):
+        _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total)
+    return total, omitted * worst
+
+
+def has_chain(law: object) -> bool:
+    """Whether branches follow one another somewhere in the law, so that their numbers multiply."""
+    if isinstance(law, Combination):
+        return any(has_chain(term) for _, term in law.terms)
+    return isinstance(law, (Composition, Power)) or (isinstance(law, SpecularFrame) and has_chain(law.law))
+
+
+def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:
+    # large steps: every one adds up whole matrices
+    step = max(CHUNK // (order * law.fan_out), 1)
+    for start in range(0, low.size, step):
+        angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
+        _add_nodes(law, basis, angle, weight, total)
+
+
+def _add_nodes(law: Branching, basis: Basis, angle: Floats, weight: Floats, total: Floats) -> None:
+    mass = weight * basis.measure.density(angle)
+    probability, outgoing = law.branches(angle)
+    for slot in range(outgoing.shape[-1]):
+        used = probability[:, slot] > 0.0
+        share = (mass * probability[:, slot])[used]
+        add_products(total, basis, angle[used], outgoing[used, slot], share)
+
+
+def largest_square_sum(basis: Basis) -> float:
+    """sup over theta of the sum of e_i(theta)^2, from the nodes of the basis and points next to its edges."""
+    if basis.is_partition:
+        return float(np.max(basis.heights**2))
+    inside = np.clip(np.concatenate((basis.edges, basis.edges - 1e-12)), 0.0, np.pi)
+    angle, _ = gauss_rule(basis.edges, basis.nodes_per_interval)
+    return max(float(np.max(np.sum(basis.evaluate(part) ** 2, axis=-1))) for part in (inside, angle))

@@ -1,0 +1,396 @@
+"""The matrix of a law by the method that suits it: laws are taken apart, and each part is done on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from ...checks import Floats
+from ...errors import InputError
+from ...estimates import ErrorKind
+from ...rounding import EPS
+from ..bases.basis import Basis
+from ..bases.bins import Bins
+from ..bases.legendre import Legendre
+from ..bases.mirror import mirror_refinement, reflection_matrix
+from ..bases.momentum import Directions
+from ..laws.density import DensityLaw
+from ..laws.involution import InvolutionLaw
+from ..laws.law import DrivenLaw, Law
+from ..laws.least_resistance import LeastResistanceLaw
+from ..laws.phase_function import HenyeyGreensteinLaw
+from ..laws.random_map import responder
+from ..laws.specular_frame import SpecularFrame
+from ..laws.structure import holds_of_all, lists_branches
+from ..laws.weighted_sum import Combination
+from ..matrices.defects import SymmetryDefect
+from ..matrices.matrix import KernelMatrix
+from ..matrices.matrix_algebra import frobenius_error
+from ..sampling.counts import SampledArray
+from ..sampling.monte_carlo import independent_rays
+from ..sampling.sobol import PARTS, Net
+from ..walls.circular_arc import CircularArcLaw
+from ..walls.conditionals import is_few
+from ..walls.isometry_branches import table_of
+from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
+from ..walls.wall_law import WallLaw
+from ..walls.words import Word, factors_of, law_of, words_of
+from .arcs import arc_matrix
+from .auto_wall import wall_matrix
+from .densities import action_matrix, density_matrix, map_matrix
+from .entry_points import entry_matrix
+from .isometries import branch_matrix, has_chain
+from .isometry_tables import table_matrix
+from .products import product_matrix
+from .scattering import is_scattered, scattered_matrix
+from .traced import LARGEST_ROW, MOST_FLIGHTS, is_affordable, row_matrix
+
+Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
+
+# Rounding of an exact matrix: the edges of n cells carry a rounding error each, which moves a share of about n eps of
+# a cell's measure; 1.2e-13 was measured where n eps is 1.1e-13.
+ROUNDING = 8.0 * EPS
+# Edges and offsets of isometries are rounded to about an ulp. That moves a share of about n eps of each of some n
+# cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
+DISPLACED = EPS
+# Flights of adaptive rows that nobody asked for by name: they take about as long as two million rays; beyond them the
+# shortfall is reported.
+QUICK_FLIGHTS = 4_000_000
+# Flights of one row, as a share of all, where a thorough answer is wanted: in some steep Bezier hollows rows with a
+# fiftieth are not whole, and in bottles with a neck of a hundredth of their width rows have no end.
+THOROUGH_ROW = 0.25
+# Methods that a sum has if all its terms have them.
+SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
+
+
+@dataclass(frozen=True)
+class MatrixMaker:
+    """The arguments of `discretise`, which stay the same while a law is taken apart.
+
+    ``patient``: adaptive rows were asked for by name. ``thorough``: they may take some seconds where neither rays nor
+    rows met the tolerance in one.
+    """
+
+    basis: Basis
+    tolerance: float
+    samples: int
+    rng: np.random.Generator
+    symmetrise: bool
+    patient: bool
+    thorough: bool = False
+
+    def make(self, law: Law, method: Method) -> KernelMatrix:
+        """The matrix of a law; the facts of the whole law are put in by `discretise`."""
+        if isinstance(law, WallLaw) and law.closed_form is None and method in ("auto", "qmc", "monte-carlo"):
+            # before its exact law is looked for, which may take a second
+            return self._of_wall(law) if method == "auto" else self.sampled(law, method)
+        closed_form = _replacement(law)
+        if closed_form is not None and (method == "auto" or method in self.methods(closed_form)[:-1]):
+            return self.make(closed_form, method)
+        if has_chain(law) and method != "monte-carlo":
+            return self._chained(law, method)
+        if method != "auto":
+            return self._made_by(law, method)
+        best = self.methods(law)[0]
+        return self._sum(law, "auto") if isinstance(law, Combination) and best != "exact" else self._made_by(law, best)
+
+    def _of_wall(self, law: WallLaw) -> KernelMatrix:
+        found = wall_matrix(self, law)
+        if not self.thorough or float(found.error) <= self.tolerance or not is_few(law.wall):
+            return found
+        rows = self.rows(law, float("inf"), MOST_FLIGHTS, THOROUGH_ROW)
+        return min(found, rows, key=lambda matrix: float(matrix.error))
+
+    def sampled(self, law: Law, method: Method) -> KernelMatrix:
+        """The matrix by rays."""
+        if method == "qmc":
+            return self.from_net(Net(law, self.basis, self.rng), self.samples)
+        found = independent_rays(law, self.basis, self.samples, self.rng, self.symmetrise)
+        spread = "variance of multinomial counts" if self.basis.is_partition else "spread of parts"
+        return self._from_rays("monte-carlo", found, spread)
+
+    def from_net(self, net: Net, samples: int) -> KernelMatrix:
+        """The matrix by at least so many rays of a net."""
+        found = net.sampled(samples, symmetrise=self.symmetrise)
+        return self._from_rays("qmc", found, f"spread of {PARTS} nets")
+
+    def _from_rays(self, method: Method, found: tuple[SampledArray, int, float], how: str) -> KernelMatrix:
+        array, used, lost = found
+        if lost:
+            how += ", plus a bound for rays that did not escape"
+        return replace(
+            self._result(array.symmetric, method, array.error, "estimate", how),
+            counts=array.counts,
+            replicates=array.replicates,
+            symmetrised=self.symmetrise,
+            samples=used,
+            unresolved=lost,
+            raw_defect=array.raw_defect,
+        )
+
+    def rows(
+        self, law: WallLaw, useless: float, most_flights: int = QUICK_FLIGHTS, largest_row: float = LARGEST_ROW
+    ) -> KernelMatrix:
+        """The matrix by adaptive rows; unless they were asked for, within a second or so, if they can be of use."""
+        limits = (MOST_FLIGHTS, None) if self.patient else (most_flights, useless)
+        symmetric, error, rays = row_matrix(
+            law.wall, self.basis, self.tolerance, limits[0], useless=limits[1], largest_row=largest_row
+        )
+        how = (
+            f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
+            "plus undecided entry points"
+        )
+        return self._result(symmetric, "quadrature", error + ROUNDING * self.basis.size, "estimate", how)
+
+    def methods(self, law: Law) -> tuple[Method, ...]:
+        """The methods that a law has, the best first; ``"monte-carlo"``, which all have, last."""
+        closed_form = _replacement(law)
+        driven: tuple[Method, ...] = ("qmc",) if responder(law) is not None else ()
+        found: tuple[Method, ...]
+        if closed_form is not None:
+            found = (*self.methods(closed_form)[:-1], *driven)
+        elif has_chain(law):
+            found = _common([self._word_methods(word) for _, word in self._terms(law)])
+        elif lists_branches(law):
+            found = ("exact", "quadrature", *driven)
+        elif self._is_diagonal(law):
+            found = ("exact", "quadrature")
+        elif isinstance(law, Combination):
+            found = _common([self.methods(term) for _, term in law.terms_checked()])
+        elif isinstance(law, SpecularFrame):
+            found = tuple(name for name in self.methods(law.law)[:-1] if name != "exact")
+        elif isinstance(law, DrivenLaw):
+            rows = isinstance(law, WallLaw) and is_affordable(law.wall, self.basis)
+            accurate = isinstance(law, CircularArcLaw) or rows or self._acts_accurately(law)
+            found = ("quadrature", "qmc") if accurate else ("qmc", "quadrature")
+        else:
+            found = ("quadrature", *driven)
+        return (*dict.fromkeys(found), "monte-carlo")
+
+    def _check_method(self, law: Law, method: Method) -> None:
+        methods = self.methods(law)
+        if method != "auto" and method not in methods:
+            raise InputError(f"method: {law!r} has no method {method!r}; it has {', '.join(methods)}")
+
+    def _made_by(self, law: Law, method: Method) -> KernelMatrix:
+        self._check_method(law, method)
+        if method == "exact":
+            return self._sum(law, method) if _is_sum_of_others(law) else self._exact(law)
+        if method == "quadrature":
+            return self._quadrature(law)
+        if method == "qmc" and isinstance(law, Combination):
+            return self._sum(law, method)
+        return self.sampled(law, method)
+
+    def _is_diagonal(self, law: Law) -> bool:
+        return isinstance(law, HenyeyGreensteinLaw) and isinstance(self.basis, Legendre)
+
+    def _exact(self, law: Law) -> KernelMatrix:
+        if isinstance(law, HenyeyGreensteinLaw) and self._is_diagonal(law):
+            diagonal = np.diag(law.g ** np.arange(float(self.basis.size)))
+            how = "eigenvalues g^l of the polynomials of degree l, to rounding"
+            return self._result(diagonal, "exact", EPS * self.basis.size**0.5, "bound", how)
+        table = table_of(law)
+        symmetric, omitted = self._isometric(law, self.basis)
+        how, left = (
+            ("masses and Gauss rules on every piece of the table of isometries, to rounding", "unresolved beams")
+            if table is not None
+            else ("Gauss rules between the kinks of isometries, to rounding", "omitted kinks")
+        )
+        # two Markov kernels cannot be further apart than their norms together
+        furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(self.basis.size))
+        error = min(omitted + _rounding(self.basis), furthest)
+        found = self._result(symmetric, "exact", error, "bound", how + (f", plus {left}" if omitted else ""))
+        return found if table is None else replace(found, unresolved=table.unresolved)
+
+    def _isometric(self, law: Law, basis: Basis) -> tuple[Floats, float]:
+        """The matrix of a law of isometries, and a bound of its error apart from rounding."""
+        table = table_of(law)
+        if table is not None:
+            return table_matrix(table, basis)
+        inner = law.law if isinstance(law, SpecularFrame) else law
+        if isinstance(inner, RepeatedTeethLaw):
+            return repeated_teeth_matrix(inner, basis, exchanged=inner is not law)
+        return branch_matrix(law, basis, self.tolerance)
+
+    # ---- laws one after the other ----------------------------------------------------------------------------
+    def _terms(self, law: Law) -> list[tuple[float, Word]]:
+        """The law as a sum of chains; as one chain, of sums too, where that would be too many."""
+        words = words_of(law)
+        return [(1.0, factors_of(law))] if words is None else [(weight, word) for word, weight in words.items()]
+
+    def _word_methods(self, word: Word) -> tuple[Method, ...]:
+        if _is_short(word):
+            return self.methods(law_of(word))
+        if all(map(lists_branches, word)):
+            return ("exact", "quadrature", "monte-carlo")
+        return ("quadrature", "monte-carlo") if all(map(_is_computable, word)) else ("monte-carlo",)
+
+    def _chained(self, law: Law, method: Method) -> KernelMatrix:
+        self._check_method(law, method)
+        terms = self._terms(law)
+        made = [(weight, self._word(word, method)) for weight, word in terms]
+        return made[0][1] if len(terms) == 1 else self._summed(made)
+
+    def _word(self, word: Word, method: Method) -> KernelMatrix:
+        """The matrix of a chain: by the first way that meets the tolerance, or else with the least error."""
+        if _is_short(word):
+            return self.make(law_of(word), method)
+        found: list[KernelMatrix] = []
+        reasons: list[InputError] = []
+        for way in self._ways(word, method):
+            try:
+                found.append(way(word))
+            except InputError as reason:
+                # more branches than can be listed, or panels than can be held
+                reasons.append(reason)
+            if found and float(found[-1].error) <= self.tolerance:
+                break
+        if not found:
+            raise reasons[-1]
+        return min(found, key=lambda matrix: float(matrix.error))
+
+    def _ways(self, word: Word, method: Method) -> list[Callable[[Word], KernelMatrix]]:
+        methods = self._word_methods(word)
+        ways: list[Callable[[Word], KernelMatrix]] = []
+        if method != "quadrature" and "exact" in methods:
+            ways.append(lambda chain: self._exact(law_of(chain)))
+        if method != "exact" and "quadrature" in methods:
+            if is_scattered(word):
+                ways.append(self._scattered)
+            ways.append(self._product)
+        return ways or [lambda chain: self.sampled(law_of(chain), "monte-carlo")]
+
+    def _scattered(self, word: Word) -> KernelMatrix:
+        def isometric(chain: Sequence[Law], basis: Basis) -> tuple[Floats, float]:
+            symmetric, omitted = self._isometric(law_of(tuple(chain)), basis)
+            return symmetric, omitted + _rounding(basis)
+
+        symmetric, error = scattered_matrix(word, self.basis, isometric)
+        how = "eigenvalues of scatterings between isometries, to rounding, plus omitted kinks and polynomials"
+        return self._result(symmetric, "quadrature", error, "estimate", how)
+
+    def _product(self, word: Word) -> KernelMatrix:
+        share = self.tolerance / (2.0 * len(word))
+
+        def make(law: Law, panels: Basis) -> KernelMatrix:
+            return replace(self, basis=panels, tolerance=share).make(law, "auto")
+
+        symmetric, error = product_matrix(word, self.basis, make, self.tolerance)
+        how = "what panels leave out between the factors, from their last coefficients, plus the factors' errors"
+        return self._result(symmetric, "quadrature", error + _rounding(self.basis), "estimate", how)
+
+    def _quadrature(self, law: Law) -> KernelMatrix:
+        if isinstance(law, Combination):
+            return self._sum(law, "quadrature")
+        if isinstance(law, SpecularFrame):
+            return self._flipped(law)
+        if isinstance(law, WallLaw):
+            # asked for by name, or there is nothing else for the law that this one is a part of
+            return self.rows(law, useless=float("inf"))
+        how = "difference of the last two levels of quadrature"
+        if isinstance(law, DensityLaw) and not isinstance(self.basis, Directions):
+            # three smooth functions are integrated row by row below, on the law's own panels
+            symmetric, error = density_matrix(law, self.basis, self.tolerance)
+        elif isinstance(law, LeastResistanceLaw) and isinstance(self.basis, Bins):
+            symmetric, error = self.basis.heights[:, None] * law.flux(self.basis) * self.basis.heights, 0.0
+            how = "masses of intervals, to rounding"
+        elif isinstance(law, InvolutionLaw):
+            symmetric, error = map_matrix(law.map, self.basis, self.tolerance)
+        elif isinstance(law, CircularArcLaw):
+            symmetric, error = arc_matrix(law.half_angle, self.basis)
+            how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
+        elif isinstance(law, DrivenLaw) and not self._acts_accurately(law):
+            symmetric, error = entry_matrix(law, self.basis, self.samples)
+        else:
+            symmetric, error = action_matrix(law, self.basis, self.tolerance)
+            how = "difference of the rules of Gauss and Kronrod, panel by panel"
+            if law.reversible:
+                # an under-resolved row of a reversible law shows as asymmetry
+                error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
+        error += ROUNDING * self.basis.size
+        return self._result(symmetric, "quadrature", error, "estimate", how)
+
+    def _sum(self, law: Law, method: Method) -> KernelMatrix:
+        return self._summed([(weight, self.make(term, method)) for weight, term in Combination.of(law).terms_checked()])
+
+    def _summed(self, terms: list[tuple[float, KernelMatrix]]) -> KernelMatrix:
+        total = sum((weight * matrix for weight, matrix in terms[1:]), start=terms[0][0] * terms[0][1])
+        sampled = [(weight, matrix) for weight, matrix in terms if matrix.samples]
+        single = sampled[0] if len(sampled) == 1 else None
+        return replace(
+            total,
+            method=" + ".join(dict.fromkeys(matrix.method for _, matrix in terms)),
+            samples=sum(matrix.samples for _, matrix in sampled),
+            unresolved=sum(weight * matrix.unresolved for weight, matrix in sampled),
+            symmetrised=self.symmetrise and bool(sampled),
+            # the other terms are not random: the evidence against symmetry is that of the sampled one
+            raw_defect=_scaled_defect(single, total) if single else None,
+            error=replace(total.error, method="sum over the terms: " + total.error.method),
+            norm_bound=1.0,
+        )
+
+    def _flipped(self, law: SpecularFrame) -> KernelMatrix:
+        finer, restriction = mirror_refinement(self.basis)
+        inner = replace(self, basis=finer).make(law.law, "quadrature")
+        flip = reflection_matrix(finer)
+        return replace(
+            self._result(restriction @ inner.symmetric @ flip @ restriction.T, inner.method, 0.0, "bound", ""),
+            error=inner.error,
+        )
+
+    def _acts_accurately(self, law: DrivenLaw) -> bool:
+        """Whether ``law.apply`` is accurate for the functions of the basis.
+
+        A law driven by an entry point averages over a fixed rule, unless it has an `apply` of its own, which is then
+        accurate for smooth functions: those of Legendre, not those with edges.
+        """
+        return type(law)._apply is not DrivenLaw._apply and isinstance(self.basis, Legendre)
+
+    def _result(self, symmetric: Floats, method: str, error: float, kind: ErrorKind, how: str) -> KernelMatrix:
+        return KernelMatrix(symmetric, self.basis, frobenius_error(error, kind, how), method=method)
+
+
+def _replacement(law: Law) -> Law | None:
+    """The exact law of a wall, in closed form or as a table of isometries; None for other laws."""
+    found = getattr(law, "closed_form", None)
+    return getattr(law, "exact_law", None) if found is None else found
+
+
+def _is_sum_of_others(law: Law) -> bool:
+    return isinstance(law, Combination) and not lists_branches(law)
+
+
+def _common(each: Sequence[tuple[Method, ...]]) -> tuple[Method, ...]:
+    return tuple(name for name in SUMMABLE if all(name in names for names in each))
+
+
+def _is_short(word: Word) -> bool:
+    """Whether a chain is the identity, a single law, or that in the other frame."""
+    return len(word) < 2 or isinstance(law_of(word), SpecularFrame)
+
+
+def _is_computable(law: Law) -> bool:
+    """Whether no part of a law needs rays."""
+    return holds_of_all(
+        law,
+        lambda part: (
+            not isinstance(part, DrivenLaw)
+            or isinstance(part, CircularArcLaw)
+            or getattr(part, "exact_law", None) is not None
+        ),
+    )
+
+
+def _rounding(basis: Basis) -> float:
+    return float(ROUNDING * basis.size + DISPLACED * basis.size**1.5)
+
+
+def _scaled_defect(single: tuple[float, KernelMatrix], total: KernelMatrix) -> SymmetryDefect | None:
+    weight, matrix = single
+    raw = matrix.symmetry_defect()
+    share = weight * float(np.linalg.norm(matrix.symmetric)) / (float(np.linalg.norm(total.symmetric)) or 1.0)
+    return SymmetryDefect(share * float(raw), z_score=raw.z_score)

@@ -1,0 +1,218 @@
+"""Matrices of chains of laws through piecewise polynomials that are refined where the factors are rough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...checks import Floats
+from ...errors import InputError
+from ..bases.assembly import one_blas_thread
+from ..bases.basis import Basis
+from ..bases.legendre import Legendre
+from ..bases.measure import SINE
+from ..bases.panels import Panels
+from ..laws.involution import InvolutionLaw
+from ..laws.law import Law
+from ..laws.phase_function import HenyeyGreensteinLaw
+from ..laws.structure import lists_branches
+from ..laws.weighted_sum import Combination
+from ..matrices.matrix import KernelMatrix
+from .densities import jumps_of_map
+from .scattering import degrees_kept, local_values, split
+
+# Panels of this width and degree to begin with; narrower ones follow the polynomials of a basis, n of them on (0, pi).
+WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
+# Functions in all: a product of two matrices of this size takes about a second. A basis with more cells than this gets
+# panels of the lowest degree whose last two show how the rest falls off.
+MOST_FUNCTIONS, LOWEST_DEGREE = 1600, 2
+# Kinks of a factor that edges are put at from the start, and edges nearer than this to each other.
+KINKS, SAME_EDGE = 16, 1e-10
+# Matrices of that size held at a time, and what they may take.
+MATRICES, MOST_GIGABYTES = 5, 4.0
+# Coefficients of a function that jumps on a panel fall off like 1/k, so that what a panel of degree 9 leaves out is
+# about twice what its last two functions hold; half as much again for singularities that are worse.
+TAIL = 3.0
+# Images under isometries are compared with their projections at these shares of a panel, as kinks may be too dense for
+# the last coefficients to show them; the norm from so few angles is taken this many times.
+PROBES, PROBED = np.array([0.0711, 0.2939, 0.5387, 0.8123]), 2.0
+# Panels that together make up this share of the error are cut in so many: every time all factors are made again.
+MARKED, PARTS = 0.9, 4
+# Of scatterings nearer to a mirror than this the matrix is made as that of any other density.
+HIGHEST_DEGREE = 4096
+
+Maker = Callable[[Law, Basis], KernelMatrix]
+
+
+@dataclass(frozen=True)
+class _Level:
+    symmetric: Floats
+    # share of the error of each panel, which is what the products between factors lose there
+    lost: Floats
+    # errors of the factors' matrices
+    factors: float
+
+    @property
+    def error(self) -> float:
+        return float(self.lost.sum()) + self.factors
+
+
+def product_matrix(laws: Sequence[Law], basis: Basis, make: Maker, tolerance: float) -> tuple[Floats, float]:
+    r"""<e_i, P_1 P_2 ... e_j> with each factor's matrix on panels, and an estimate of its Frobenius error.
+
+    Between two factors stands the projection Q on the panels: what is lost there is <P_k* ... e_i, (1 - Q) P_{k+1} ...
+    e_j>, panel by panel at most the product of the norms of what the panel leaves out of either side. These are
+    estimated from the last coefficients on the panel, for isometries also from a few angles, and panels that lose much
+    are cut. One smooth side is enough.
+
+    Parameters
+    ----------
+    laws : sequence of Law
+        The factors, the first one first.
+    basis : Basis
+    make : callable
+        The matrix of a law in a basis, with its error.
+    tolerance : float
+        Wanted error. If the largest number of panels does not do, the error says so.
+    """
+    edges = _first_edges(laws, basis)
+    best: _Level | None = None
+    while True:
+        level = _level(laws, basis, _panels(edges, basis), make)
+        if best is None or level.error < best.error:
+            best = level
+        if level.lost.sum() <= max(0.5 * tolerance, 0.1 * level.factors):
+            return best.symmetric, best.error
+        order = np.argsort(level.lost)[::-1]
+        marked = order[: 1 + int(np.searchsorted(np.cumsum(level.lost[order]), MARKED * level.lost.sum()))]
+        cuts = edges[marked] + np.arange(1, PARTS)[:, None] / PARTS * (edges[marked + 1] - edges[marked])
+        finer = np.union1d(edges, cuts)
+        if (finer.size - 1) * (_panels(edges, basis).degree + 1) > MOST_FUNCTIONS:
+            return best.symmetric, best.error
+        edges = finer
+
+
+def _panels(edges: Floats, basis: Basis) -> Panels:
+    lowest, highest = LOWEST_DEGREE, DEGREE
+    if isinstance(basis, Panels):
+        # the last two functions of a panel are to be empty where nothing is left out
+        lowest, highest = (most + basis.degree for most in (lowest, LOWEST_DEGREE))
+        highest = max(highest, DEGREE)
+    degree = int(np.clip(MOST_FUNCTIONS // (edges.size - 1) - 1, lowest, highest))
+    gigabytes = 8e-9 * MATRICES * ((edges.size - 1) * (degree + 1)) ** 2
+    if gigabytes > MOST_GIGABYTES:
+        raise InputError(
+            f"basis: a product of laws on the {edges.size - 1} panels that {basis!r} needs takes {gigabytes:.0f} GB; "
+            "take fewer cells, or method='monte-carlo'"
+        )
+    return Panels(edges, degree)
+
+
+def _level(laws: Sequence[Law], basis: Basis, panels: Panels, make: Maker) -> _Level:
+    factors = {law: _Factor(_terms(law, panels, make)) for law in dict.fromkeys(laws)}
+    angle, mass = SINE.quadrature(panels.edges, _nodes(basis, panels))
+    ends = (local_values(basis, angle).T @ local_values(panels, angle).multiply(mass[:, None])).toarray().T
+    with one_blas_thread():
+        before, left = _passed_on(ends, [(factors[law], True) for law in laws], panels)
+        _, right = _passed_on(ends, [(factors[law], False) for law in reversed(laws)], panels)
+    # the functions on either side of the k-th place between the factors
+    lost = sum(one * other for one, other in zip(left, reversed(right), strict=True))
+    return _Level(before.T @ ends, np.asarray(lost), float(sum(factors[law].error for law in laws)))
+
+
+def _passed_on(
+    functions: Floats, factors: Sequence[tuple[_Factor, bool]], panels: Panels
+) -> tuple[Floats, list[Floats]]:
+    """The functions after all factors, or their adjoints, and what the panels leave out of them after each."""
+    left_out = [TAIL * _last_two(functions, panels)]
+    for factor, adjoint in factors:
+        image = (factor.matrix.T if adjoint else factor.matrix) @ functions
+        missed = TAIL * _last_two(image, panels)
+        for weight, law, matrix, _ in factor.terms:
+            if law.reversible and lists_branches(law):
+                missed = np.maximum(missed, PROBED * weight * _probed(law, matrix, functions, panels))
+        functions = image
+        left_out.append(missed)
+    return functions, left_out
+
+
+def _last_two(functions: Floats, panels: Panels) -> Floats:
+    """Norm on each panel of the last two coefficients of all functions, shape (size, n)."""
+    last = functions.reshape(-1, panels.degree + 1, functions.shape[1])[:, -2:]
+    return np.asarray(np.sqrt(np.sum(last * last, axis=(1, 2))))
+
+
+def _probed(law: Law, matrix: Floats, functions: Floats, panels: Panels) -> Floats:
+    """Norm on each panel of the difference of the law's images and their projections, from a few angles."""
+    edges = panels.edges
+    angle = (edges[:-1, None] + np.diff(edges)[:, None] * PROBES).ravel()
+    image = matrix @ functions
+    probability, outgoing = law.branches(angle)
+    difference = -(local_values(panels, angle) @ image)
+    for slot in range(outgoing.shape[1]):
+        difference += probability[:, slot, None] * (local_values(panels, outgoing[:, slot]) @ functions)
+    square = np.mean(np.sum(difference**2, axis=1).reshape(-1, PROBES.size), axis=1)
+    return np.asarray(np.sqrt(square * SINE.mass(edges[:-1], edges[1:])))
+
+
+@dataclass(frozen=True)
+class _Factor:
+    """A law as a weighted sum: weight, law, its matrix and the error of that."""
+
+    terms: list[tuple[float, Law, Floats, float]]
+
+    @cached_property
+    def matrix(self) -> Floats:
+        return np.asarray(sum(weight * matrix for weight, _, matrix, _ in self.terms))
+
+    @property
+    def error(self) -> float:
+        return sum(weight * error for weight, _, _, error in self.terms)
+
+
+def _terms(law: Law, panels: Panels, make: Maker) -> list[tuple[float, Law, Floats, float]]:
+    if isinstance(law, Combination):
+        parts = [(weight, _terms(term, panels, make)) for weight, term in law.terms_checked() if weight > 0.0]
+        return [(weight * share, one, matrix, error) for weight, terms in parts for share, one, matrix, error in terms]
+    if isinstance(law, HenyeyGreensteinLaw) and degrees_kept(law) <= HIGHEST_DEGREE:
+        polynomials = Legendre(degrees_kept(law))
+        angle, mass = SINE.quadrature(panels.edges, _nodes(polynomials, panels))
+        ends = local_values(panels, angle).T @ (mass[:, None] * polynomials.evaluate(angle))
+        return [(1.0, law, np.asarray((ends * law.g ** np.arange(polynomials.n)) @ ends.T), 0.0)]
+    matrix = make(law, panels)
+    return [(1.0, law, matrix.symmetric, float(matrix.error))]
+
+
+def _nodes(basis: Basis, panels: Panels) -> int:
+    """Gauss nodes on a panel for products of a function of the basis and one of the panels."""
+    widest = float(np.diff(panels.edges).max())
+    return panels.nodes_per_interval + (int(np.ceil(0.5 * basis.n * widest)) if isinstance(basis, Legendre) else 0)
+
+
+def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
+    """Edges of the basis and of the factors, at most WIDEST apart."""
+    special = [basis.edges]
+    for law in dict.fromkeys(_parts(laws)):
+        special.append(np.asarray(getattr(law, "breakpoints", ())))
+        if isinstance(law, InvolutionLaw):
+            jumps = jumps_of_map(law.map)
+            special += [jumps, np.asarray(law.map(basis.edges[1:-1]))] if jumps.size <= KINKS else []
+            continue
+        try:
+            special.append(law.kinks(KINKS)[0])
+        except InputError:
+            continue
+    found = np.unique(np.clip(np.concatenate(special), 0.0, np.pi))
+    found = found[np.append(True, np.diff(found) > SAME_EDGE)]
+    found[-1] = np.pi
+    widest = min(WIDEST, OSCILLATION / basis.n) if isinstance(basis, Legendre) else WIDEST
+    return split(found, widest)
+
+
+def _parts(laws: Sequence[Law]) -> list[Law]:
+    """The laws, sums as their terms."""
+    nested = [_parts([term for _, term in law.terms]) if isinstance(law, Combination) else [law] for law in laws]
+    return [law for parts in nested for law in parts]

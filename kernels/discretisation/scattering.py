@@ -1,0 +1,176 @@
+"""Matrices of chains of isometries and Henyey-Greenstein scatterings, to rounding.
+
+A scattering is diagonal in Legendre polynomials, HG(g) = sum over l of |P_l> g^l <P_l|, so it cuts a chain into pieces
+of isometries alone, whose integrals against polynomials are exact: only what g^l leaves out is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats
+from ..bases.assembly import cell_index, one_blas_thread
+from ..bases.basis import Basis
+from ..bases.legendre import DEGREES_PER_PANEL, DIGITS, Legendre
+from ..bases.measure import AngularMeasure
+from ..bases.panels import Panels
+from ..laws.law import Law
+from ..laws.phase_function import HenyeyGreensteinLaw
+from ..laws.structure import lists_branches
+
+# Polynomials that a scattering leaves with less than this factor are left out.
+NEGLIGIBLE = 1e-17
+# Polynomials of higher degree cost more than a fine basis does: |g| up to 0.96.
+HIGHEST_DEGREE = 1024
+# Values of functions held at a time.
+CHUNK = 2**21
+
+# The matrix of a chain of isometries in a basis, and a bound of its Frobenius error; None where none is known.
+IsometricMatrix = Callable[[Sequence[Law], Basis], tuple[Floats, float]]
+
+
+class JointBasis(Basis):
+    """The functions of a basis followed by the Legendre polynomials of degree below n; not orthonormal together."""
+
+    def __init__(self, basis: Basis, degrees: int) -> None:
+        self.first, self.polynomials = basis, Legendre(degrees)
+        self.polynomial_degree = degrees
+        # short enough for one rule on each to follow the polynomials
+        self._edges = split(basis.edges, DEGREES_PER_PANEL * np.pi / degrees)
+
+    @property
+    def measure(self) -> AngularMeasure:
+        return self.first.measure
+
+    @property
+    def size(self) -> int:
+        return self.first.size + self.polynomials.n
+
+    @property
+    def edges(self) -> Floats:
+        return self._edges
+
+    @property
+    def nodes_per_interval(self) -> int:
+        widest = float(np.diff(self._edges).max())
+        return self.first.nodes_per_interval + int(np.ceil(0.5 * self.polynomials.n * widest)) + DIGITS
+
+    @property
+    def constant(self) -> Floats:
+        unit = np.zeros(self.size)
+        unit[self.first.size] = 1.0
+        return unit
+
+    def key(self) -> tuple[object, ...]:
+        return (self.first, self.polynomials.n)
+
+    def evaluate(self, angle: ArrayLike) -> Floats:
+        return np.concatenate((self.first.evaluate(angle), self.polynomials.evaluate(angle)), axis=-1)
+
+    def coarsened(self) -> None:
+        return None
+
+    def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> None:
+        """As `products.add_products`, with the functions of the first basis as a sparse matrix."""
+        size = self.first.size
+        step = max(1, CHUNK // self.polynomials.n)
+        for start in range(0, incoming.size, step):
+            part = slice(start, start + step)
+            source, target = local_values(self.first, incoming[part]), local_values(self.first, outgoing[part])
+            before = self.polynomials.evaluate(incoming[part])
+            after = weight[part, None] * self.polynomials.evaluate(outgoing[part])
+            total[:size, size:] += source.T @ after
+            total[size:, :size] += (target.T @ (weight[part, None] * before)).T
+            total[:size, :size] += (source.T @ target.multiply(weight[part, None]).tocsr()).toarray()
+            with one_blas_thread():
+                total[size:, size:] += before.T @ after
+
+
+def split(edges: Floats, widest: float) -> Floats:
+    """The edges with more between them, equally spaced, so that none is further than that from the next.
+
+    Examples
+    --------
+    >>> split(np.array([0.0, 1.0, 3.0]), 1.0).tolist()
+    [0.0, 1.0, 2.0, 3.0]
+    """
+    pieces = np.maximum(np.ceil(np.diff(edges) / widest), 1.0)
+    parts = [np.linspace(edges[k], edges[k + 1], int(n), endpoint=False) for k, n in enumerate(pieces)]
+    return np.append(np.concatenate(parts), edges[-1])
+
+
+def local_values(basis: Basis, angle: Floats) -> Any:
+    """Values of the functions of a basis, shape (angles, n), as a sparse matrix: most have a small support."""
+    from scipy.sparse import csr_array
+
+    rows = np.arange(angle.size)
+    if basis.is_partition:
+        cell = cell_index(basis, angle)
+        return csr_array((basis.heights[cell], (rows, cell)), shape=(angle.size, basis.size))
+    if isinstance(basis, Panels):
+        panel, values = basis.local(angle)
+        width = basis.degree + 1
+        columns = panel[:, None] * width + np.arange(width)
+        owner = np.repeat(rows, width)
+        return csr_array((values.ravel(), (owner, columns.ravel())), shape=(angle.size, basis.size))
+    return csr_array(basis.evaluate(angle))
+
+
+def degrees_kept(law: HenyeyGreensteinLaw) -> int:
+    """How many polynomials the law leaves with more than a negligible factor; 1 for g = 0."""
+    return 1 if abs(law.g) <= NEGLIGIBLE else 1 + int(np.ceil(np.log(NEGLIGIBLE) / np.log(abs(law.g))))
+
+
+def is_scattered(laws: Sequence[Law]) -> bool:
+    """Whether a chain is made of isometries and scatterings that are not too near to a mirror."""
+    scatterings = [law for law in laws if isinstance(law, HenyeyGreensteinLaw)]
+    near = any(degrees_kept(law) > HIGHEST_DEGREE for law in scatterings)
+    others = [law for law in laws if not isinstance(law, HenyeyGreensteinLaw)]
+    return bool(scatterings) and not near and all(map(lists_branches, others))
+
+
+def scattered_matrix(laws: Sequence[Law], basis: Basis, isometric: IsometricMatrix) -> tuple[Floats, float]:
+    """<e_i, P_1 P_2 ... e_j> for a chain of scatterings and isometries, and a bound of its Frobenius error.
+
+    Operators between orthonormal families have norms of at most 1, so that the errors of the pieces add up.
+
+    Parameters
+    ----------
+    laws : sequence of Law
+        Scatterings, one at least, and laws of isometries.
+    basis : Basis
+    isometric : callable
+        The matrix of a chain of isometries, also of none at all, and its error.
+    """
+    pieces: list[tuple[Law, ...]] = [()]
+    scatterings: list[HenyeyGreensteinLaw] = []
+    for law in laws:
+        if isinstance(law, HenyeyGreensteinLaw):
+            scatterings.append(law)
+            pieces.append(())
+        else:
+            pieces[-1] = (*pieces[-1], law)
+    needed = [degrees_kept(law) for law in scatterings]
+    size = basis.size
+    if isinstance(basis, Legendre):
+        # a scattering at an end of the chain sees the polynomials of the basis alone
+        for place, piece in ((0, pieces[0]), (-1, pieces[-1])):
+            needed[place] = needed[place] if piece else size
+    degrees = min(max(needed), HIGHEST_DEGREE)
+    joint: Basis
+    if isinstance(basis, Legendre):
+        joint, inner = Legendre(max(degrees, size)), slice(0, degrees)
+    else:
+        joint, inner = JointBasis(basis, degrees), slice(size, size + degrees)
+    matrices = {piece: isometric(piece, joint) for piece in dict.fromkeys(pieces)}
+    product = matrices[pieces[0]][0][:size, inner]
+    lost = 0.0
+    for place, (law, wanted) in enumerate(zip(scatterings, needed, strict=True), start=1):
+        columns = inner if place < len(scatterings) else slice(0, size)
+        product = (product * law.g ** np.arange(degrees)) @ matrices[pieces[place]][0][inner, columns]
+        lost += abs(law.g) ** degrees * np.sqrt(size) if degrees < wanted else 0.0
+    return product, float(lost + sum(matrices[piece][1] for piece in pieces))

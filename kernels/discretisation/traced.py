@@ -1,0 +1,318 @@
+"""Matrices of the laws of traced walls to a tolerance: adaptive rows, and adaptive panels in the incoming angle."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...rounding import EPS
+from ..bases.basis import Basis
+from ..bases.legendre import Legendre
+from ..bases.mirror import is_mirror_symmetric, reflection_matrix
+from ..expectations.angle_panels import NODES, AnglePanels
+from ..expectations.basis_means import VALUES_AT_ONCE, means_of_basis
+from ..walls.conditionals import WallRows
+from ..walls.hollow_conditionals import NO_LIMIT
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+
+# Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
+# it has: some seconds. Who may give up gives one row this share of them, or so many: longer ones have pieces without
+# number.
+MOST_FLIGHTS, LARGEST_ROW, LEAST_LARGEST_ROW = 40_000_000, 0.02, 80_000
+# For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
+ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
+# The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
+# part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
+ASYMMETRY_FACTOR = 2.0
+# The error of Kronrod's rule as a share of its difference from Gauss's, in the root of the mean square over the places
+# in a panel where it may be: .38 at the root with which a piece is born, .26 at a kink. Its mean over the places is 0.
+KRONROD_SHARE = 0.5
+# Rows at a time, so that their nodes fit into memory.
+ROWS_AT_ONCE = 1500
+# The rows together may spend this share of the tolerance.
+ROW_SHARE = 0.1
+SMALLEST_ROW_TOLERANCE = 1e-14
+# Tolerances are approached in stages by this ratio, from one that is no coarser than this: where no more than a coarse
+# result can be had, its rows are coarse as well.
+STAGE_RATIO, COARSEST_STAGE = 1e-2, 0.1
+# The rows of a narrow panel may be coarser: the panel may spend this share of what all rows together may.
+FAIR_SHARE = 0.02
+COARSEST_ROW = 1e-4
+# Where a half has this share of its panel's difference of the two rules, or more, the integrand is not smooth: a kink
+# leaves 1/8 or more of it, a smooth integrand 2^-14.
+SMOOTH_SHRINKING = 1e-3
+# A smooth half's difference of the two rules is an error of Gauss, not of Kronrod: it is scaled by the ratio that was
+# measured on the whole panel, at least this, times a margin.
+LEAST_RATIO = 1e-3
+RATIO_MARGIN = 4.0
+NARROWEST = 1e-13
+# The error after the first rows tells whether the flights will do; later ones do not, because errors fall by jumps,
+# when the last of the pieces that matter are seen. The error of nine walls fell like the flights to a power of 1.6 to
+# 2.2, and rows are done again at each stage. On fourteen walls this told apart those whose rows were of use.
+PRESUMED_ORDER, ROWS_AGAIN = 1.75, 2.0
+# A stage that would leave more than this share of the error is not begun, nor one that would need a jump by more than
+# this to be of use.
+WORTHWHILE, LARGEST_JUMP = 0.5, 4.0
+# Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
+LEAST_CUT = 1e-7
+# Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error. Of their
+# error, which is that of all products but with the constants, fewer functions have the share of an even spread, times
+# a margin: measured on 37 walls, one product has a tenth in the root of the mean square.
+FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
+# Rounds in which rows are done again that have overlooked a piece.
+MOST_MENDINGS = 8
+
+
+def is_affordable(wall: Wall, basis: Basis) -> bool:
+    """Whether adaptive rows are likely to beat the sampling of rays: few pieces, and few functions with edges.
+
+    A row has several changes of itinerary a piece, each found by about 30 rays, and a matrix needs about a thousand
+    rows for an error of 1e-6 and as many kinks in theta as pieces: the cost grows like the square of the pieces. A
+    change of cell costs as much as one of itinerary, in each row, and the rows of each cell are integrated anew.
+    Where the wall overhangs, rays stay in its cavities for long, and rows have changes without end. Where it does not
+    close, rays near grazing pass cells without number: measured on three walls with islands, rows were behind rays.
+    """
+    pieces = len(wall.pieces) + sum(map(len, wall.islands))
+    cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
+    predicted = ROWS_A_PIECE * FLIGHTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
+    overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
+    return bool(wall.closes) and not overhangs and predicted <= MOST_FLIGHTS
+
+
+def row_matrix(
+    wall: Wall,
+    basis: Basis,
+    tolerance: float,
+    most_flights: int = MOST_FLIGHTS,
+    *,
+    useless: float | None = None,
+    largest_row: float = LARGEST_ROW,
+) -> tuple[Floats, float, int]:
+    """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
+
+    Where ``useless`` is given, it stops as soon as the first rows speak against an error below that with so many
+    flights, and rows without number are cut short, at the share ``largest_row`` of the flights; if it is infinite, only
+    these.
+
+    A panel's error is half the difference of Kronrod's and Gauss's rule where the rows have a kink, and that difference
+    scaled by what dividing the panel showed where they are smooth. Signs differ from panel to panel: their errors, and
+    ASYMMETRY_FACTOR times the asymmetry of the result, which other errors than these would show, are the sides of
+    right angles. The errors of the rows, which may all have one sign, are added.
+    """
+    inner, share = basis, 1.0
+    if isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS:
+        inner = Legendre(FEWEST_FUNCTIONS)
+        share = min(SPREAD_MARGIN * max(basis.size - 1, 1) / (FEWEST_FUNCTIONS - 1), 1.0)
+    wanted = None if useless is None else useless / share
+    matrix, error, rays = _Integrator(wall, inner, tolerance / share, most_flights, wanted, largest_row).run()
+    return np.ascontiguousarray(matrix[: basis.size, : basis.size]), share * error, rays
+
+
+def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS) -> tuple[Floats, float]:
+    """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
+    integrator = _Integrator(wall, basis, tolerance, most_flights, None)
+    _, error, _ = integrator.run()
+    edges = np.union1d(integrator.panels.low, integrator.panels.high)
+    return np.union1d(edges, np.pi - edges) if integrator.halved else edges, error
+
+
+class _Integrator:
+    """One matrix in the making."""
+
+    def __init__(
+        self,
+        wall: Wall,
+        basis: Basis,
+        tolerance: float,
+        most_flights: int,
+        useless: float | None,
+        largest_row: float = LARGEST_ROW,
+    ) -> None:
+        self.basis = basis
+        self.tolerance = max(tolerance, 8.0 * EPS * basis.size)
+        self.most_flights = most_flights
+        # an error that is of no use, where there is something else to turn to
+        self.useless = useless if useless is not None and math.isfinite(useless) else None
+        self.rays, self.flights, self.row_count = 0, 0, 0
+        self.judged, self.hopeless = False, False
+        self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
+        self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
+        inside, degree, least = np.empty(0), 1, 0
+        if isinstance(basis, Legendre):
+            degree = max(1, basis.size - 1)
+            self.scale = float(basis.size)
+        else:
+            inside = basis.edges[1:-1]
+            # piecewise polynomials of this degree, integrated after a substitution of degree 3
+            local = 0 if basis.is_partition else basis.nodes_per_interval
+            degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
+            middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
+            self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
+        longest = NO_LIMIT if useless is None else max(int(largest_row * most_flights), LEAST_LARGEST_ROW)
+        self.rows = WallRows(wall, degree, inside, least, longest)
+        edges = basis.edges
+        if self.halved:
+            edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
+        stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
+        self.first_tolerance = self.tolerance / STAGE_RATIO**stages
+        self.row_tolerance = ROW_SHARE * self.first_tolerance / self.scale
+        self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
+        self._add_panels(edges[:-1], edges[1:])
+
+    def run(self) -> tuple[Floats, float, int]:
+        """Divide panels until the error is small enough, or no flights are left: first for coarser tolerances.
+
+        The best matrix on the way is returned: a stage that has to stop may leave its rows worse than it found them.
+        """
+        tolerance = self.first_tolerance
+        while True:
+            self._begin(tolerance)
+            self._meet(tolerance)
+            if self.flights >= self.most_flights or self.hopeless or tolerance <= self.tolerance:
+                break
+            following = self._following(tolerance)
+            if following is None:
+                break
+            tolerance = following
+        return *self.best, self.rays
+
+    def _following(self, tolerance: float) -> float | None:
+        """The tolerance of the next stage; None if there is something else to turn to, and flights for little more."""
+        wanted = max(STAGE_RATIO * tolerance, self.tolerance)
+        if self.useless is None:
+            return wanted
+        error = self.best[1]
+        reachable = self._reachable(error)
+        hoped = min(WORTHWHILE * min(error, tolerance), LARGEST_JUMP * self.useless)
+        return max(wanted, reachable) if reachable < hoped else None
+
+    def _reachable(self, error: float) -> float:
+        """What the flights that are left are likely to make of an error now."""
+        return float(error / max(self.most_flights / (ROWS_AGAIN * self.flights), 1.0) ** PRESUMED_ORDER)
+
+    def _begin(self, tolerance: float) -> None:
+        """Begin a stage; rows whose error is too large for its tolerance are done again."""
+        self.row_tolerance = max(ROW_SHARE * tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
+        coarse = self.panels.row_errors(self.basis) > 2.0 * ROW_SHARE * tolerance * np.maximum(
+            self.panels.mass, FAIR_SHARE
+        )
+        self._fill(self.panels, np.broadcast_to(coarse[:, None], self.panels.angle.shape))
+        self._mend()
+
+    def _meet(self, tolerance: float) -> None:
+        """Divide panels until the error is below the tolerance, or no flights are left."""
+        goal = tolerance
+        while True:
+            matrix, panels, rows, hidden = self._state()
+            error = rows + math.hypot(panels, hidden)
+            if error < self.best[1]:
+                self.best = matrix, error
+            if error <= tolerance or self.flights >= self.most_flights or self._is_hopeless(error):
+                return
+            # errors that only the asymmetry shows lie in panels whose rules agree by chance
+            goal = min(goal, max(tolerance - hidden, 0.25 * (panels + rows)))
+            chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
+            if not chosen.any():
+                return
+            self._divide(chosen)
+
+    def _is_hopeless(self, error: float) -> bool:
+        """Whether the error of the first rows spoke against one that is of use."""
+        if not self.judged and self.useless is not None:
+            self.judged, self.hopeless = True, self._reachable(error) > self.useless
+        return self.hopeless
+
+    def _state(self) -> tuple[Floats, float, float, float]:
+        """The matrix, the errors that its panels and its rows are known to have, and what its asymmetry tells."""
+        matrix = np.zeros((self.basis.size, self.basis.size))
+        step = max(1, VALUES_AT_ONCE // self.basis.size**2)
+        for first in range(0, len(self.panels.low), step):
+            matrix += (
+                self.panels.kept(np.arange(first, min(first + step, len(self.panels.low)))).values(self.basis).sum(0)
+            )
+        panels = float(np.linalg.norm(self.panels.error))
+        rows = float(np.sum(self.panels.row_errors(self.basis)))
+        if self.halved:
+            flip = reflection_matrix(self.basis)
+            matrix, panels, rows = matrix + flip @ matrix @ flip.T, 2.0 * panels, 2.0 * rows
+        return matrix, panels, rows, ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
+
+    def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:
+        """The worst panels: those beyond which the others together have less than a part of the goal."""
+        panels = self.panels
+        able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.row_errors(self.basis))
+        order = np.argsort(panels.error)
+        together = np.sqrt(np.cumsum(panels.error[order] ** 2))
+        chosen = np.zeros(len(order), dtype=np.bool_)
+        chosen[order[together > 0.25 * goal]] = True
+        # a panel far below the worst waits for a later round
+        chosen &= able & (panels.error > 0.02 * np.max(panels.error, where=able, initial=0.0))
+        # no more than what is left of the budget buys, at the cost of a row so far
+        left = (self.most_flights - self.flights) * self.row_count / max(1, self.flights)
+        most = int(left) // (2 * len(NODES))
+        worst = np.zeros(len(order), dtype=np.bool_)
+        worst[order[max(0, len(order) - most) :]] = True
+        return np.asarray(chosen & worst)
+
+    def _divide(self, chosen: NDArray[np.bool_]) -> None:
+        parents = self.panels.kept(chosen)
+        before, whole = parents.differences(self.basis), parents.values(self.basis)
+        cuts = [self._cuts(low, high) for low, high in zip(parents.low.tolist(), parents.high.tolist(), strict=True)]
+        parts = [
+            np.concatenate(([low], cut, [high])) for low, cut, high in zip(parents.low, cuts, parents.high, strict=True)
+        ]
+        owner = np.repeat(np.arange(len(parts)), [len(part) - 1 for part in parts])
+        self.panels = self.panels.kept(~chosen)
+        self._add_panels(np.concatenate([p[:-1] for p in parts]), np.concatenate([p[1:] for p in parts]))
+        children = self.panels.kept(np.arange(-len(owner), 0))
+        after, value = children.differences(self.basis), children.values(self.basis)
+        total = np.zeros_like(whole)
+        np.add.at(total, owner, value)
+        actual = np.linalg.norm(total - whole, axis=(1, 2))
+        ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
+        smooth = after < SMOOTH_SHRINKING * before[owner]
+        self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, KRONROD_SHARE * after)
+
+    def _cuts(self, low: float, high: float) -> Floats:
+        """Where a panel is divided: at critical angles, in its middle if none is known inside it."""
+        margin = LEAST_CUT * (high - low)
+        cuts = self.rows.critical_angles(low + margin, high - margin)
+        cuts = cuts[np.concatenate(([True], np.diff(cuts) > margin))[: len(cuts)]]
+        return cuts if len(cuts) else np.array([0.5 * (low + high)])
+
+    def _add_panels(self, low: Floats, high: Floats) -> None:
+        """Append panels, with their rows."""
+        fresh = AnglePanels.between(low, high, self.basis.size)
+        self._fill(fresh, np.ones(fresh.angle.shape, dtype=np.bool_))
+        self.panels = self.panels.joined(fresh)
+        self._mend()
+
+    def _mend(self) -> None:
+        """Do rows again that turned out to have overlooked a piece."""
+        for _ in range(MOST_MENDINGS):
+            stale = np.isin(self.panels.angle, list(self.rows.stale))
+            self.rows.stale.clear()
+            if not stale.any():
+                break
+            self._fill(self.panels, stale)
+
+    def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
+        """Compute the rows at these nodes, and from the panels' differences of the rules their errors."""
+        share = FAIR_SHARE / np.maximum(panels.mass, np.finfo(np.float64).tiny)
+        tolerance = np.minimum(self.row_tolerance * np.maximum(1.0, share), COARSEST_ROW)
+        panel, node = np.nonzero(mask)
+        for first in range(0, len(panel), ROWS_AT_ONCE):
+            few = slice(first, first + ROWS_AT_ONCE)
+            rows = self.rows(panels.angle[panel[few], node[few]], tolerance[panel[few]])
+            self.rays, self.flights = self.rays + rows.rays, self.flights + rows.flights
+            self.row_count += len(rows.theta)
+            panels.image[panel[few], node[few]] = means_of_basis(self.basis, rows.nodes, rows.weights, rows.starts)
+            panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)
+        touched = np.unique(panel)
+        panels.error[touched] = KRONROD_SHARE * panels.kept(touched).differences(self.basis)

@@ -1,0 +1,1 @@
+"""Distances between laws, between matrices and between sequences of walls."""

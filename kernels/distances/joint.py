@@ -1,0 +1,156 @@
+"""Distances between flux measures on the square of incoming and outgoing angles: optimal transport in the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...checks import Floats
+from ...errors import AccuracyError
+from ...estimates import Estimate
+from ...rounding import EPS
+from ..bases.basis import Basis
+from ..bases.bins import Bins
+from ..discretisation.discretisation import discretise
+from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
+from ..matrices.matrix_pair import joint_kind
+from .cell_rows import cell_middles, stochastic_rows
+from .resampling import matrices_error
+from .rowwise import matrix_distance
+from .transport import Distributions, power_mean, wasserstein
+
+# Pairs of occupied cells up to which the transport problem is solved exactly; it takes some 40 bytes a pair, 160 MB,
+# and some seconds.
+MOST_PAIRS = 2**22
+MOST_PIVOTS = 10**8
+# Bins on which laws are compared, and the tolerance of their matrices.
+LAW_BINS, LAW_TOLERANCE = 128, 1e-7
+# The solver stops where reduced costs are those of rounding, 10 eps of the largest cost; as many again for its sums.
+SOLVER_ROUNDING = 64.0 * EPS
+# What that may do to a distance, before the bounds of a bracket are worth their while.
+SMALL_DOUBT = 1e-6
+# Directions of the lower bound by projection.
+DIRECTIONS = 32
+# Masses below this share of the whole are rounding.
+NO_MASS = 1e-15
+
+
+def joint_law_distance(first: Law, second: Law, order: float) -> Estimate:
+    """Between laws, on bins; the error from two levels."""
+    basis = Bins(LAW_BINS)
+    pair = [discretise(law, basis, tolerance=LAW_TOLERANCE) for law in (first, second)]
+    return joint_matrix_distance(pair[0], pair[1], order, of_laws=True)
+
+
+def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, of_laws: bool = False) -> Estimate:
+    r"""W_p between the flux measures of two matrices, as point masses in the middle of the cells.
+
+    Exact where the number of pairs of occupied cells is within ``MOST_PAIRS``. Beyond, neighbouring cells are merged
+    until it is. Merging moves masses by known distances, so the result is a bracket; it is cut further by W_p of the
+    rows, which is not smaller, and by W_p of projections to lines, which is not larger. The error is the difference
+    from the next coarser level where that is less than the bracket. At high orders the p-th powers of all but the
+    longest ways are lost in rounding, and the bracket is all that is known.
+    """
+    own = matrices_error(first, second, order, False)
+    flux, flux2 = (matrix.weights[:, None] * stochastic_rows(matrix) for matrix in (first, second))
+    levels = _levels(first.basis, flux, flux2, order)
+    basis, one, other, moved = next(level for level in levels if _pairs(*level[1:3], order) <= MOST_PAIRS)
+    merged = basis != first.basis
+    value, doubt = _solved(basis, one, other, order)
+    exact = joint_kind(first, second)
+    if not (merged or of_laws) and doubt <= SMALL_DOUBT:
+        return Estimate(value, own + doubt, exact, f"optimal transport between the occupied cells of {basis!r}")
+    upper = float(matrix_distance(first, second, order, False))
+    lower = _largest_projection(first.basis, flux, flux2, order)
+    moved += doubt
+    low, high = max(lower, value - moved), min(upper, value + moved)
+    coarser = next(levels, None) if merged or of_laws else None
+    step = np.inf if coarser is None else abs(_solved(*coarser[:3], order)[0] - value) + doubt
+    how = f"optimal transport on {basis!r}"
+    if of_laws:
+        moved += sum(_within_cells(first.basis, part, order) for part in (flux, flux2))
+        return Estimate(value, own + min(step, moved), "estimate", how + " and coarser")
+    value = float(np.clip(value, low, high)) if merged else 0.5 * (low + high)
+    bound = max(high - value, value - low)
+    if bound <= step:
+        return Estimate(value, own + bound, exact, how + f", bracketed by ({low:.6g}, {high:.6g})")
+    return Estimate(value, own + step, "estimate", how + f" and coarser, within ({low:.6g}, {high:.6g})")
+
+
+def _levels(basis: Basis, one: Floats, other: Floats, order: float) -> Iterator[tuple[Basis, Floats, Floats, float]]:
+    """Fluxes on coarser and coarser cells, and how far, in W_p, both masses together were moved."""
+    start = cell_middles(basis.edges)
+    parent = np.arange(basis.size)
+    fluxes = [one, other]
+    while True:
+        middles = cell_middles(basis.edges)[parent]
+        square = (start - middles) ** 2
+        step = np.sqrt(square[:, None] + square).ravel()
+        moved = sum(float(power_mean(step, flux.ravel(), order)) for flux in (one, other))
+        yield basis, fluxes[0], fluxes[1], moved
+        coarse = basis.coarsened()
+        if coarse is None:
+            return
+        owner = np.asarray(coarse[1].argmax(axis=0))
+        merge = (np.arange(coarse[0].size)[:, None] == owner).astype(np.float64)
+        fluxes = [merge @ flux @ merge.T for flux in fluxes]
+        basis, parent = coarse[0], owner[parent]
+
+
+def _masses(one: Floats, other: Floats, order: float) -> tuple[Floats, Floats]:
+    """What has to be carried: for p = 1, where common mass may stay where it is, only the differences."""
+    if order == 1.0:
+        one, other = np.maximum(one - other, 0.0), np.maximum(other - one, 0.0)
+    return np.where(one > NO_MASS, one, 0.0), np.where(other > NO_MASS, other, 0.0)
+
+
+def _pairs(one: Floats, other: Floats, order: float) -> int:
+    parts = _masses(one, other, order)
+    return int(np.count_nonzero(parts[0]) * np.count_nonzero(parts[1]))
+
+
+def _solved(basis: Basis, one: Floats, other: Floats, order: float) -> tuple[float, float]:
+    """W_p between fluxes on the cells, and what the rounding of its p-th power does to it."""
+    import ot
+    from scipy.spatial.distance import cdist
+
+    parts = _masses(one, other, order)
+    total = float(parts[0].sum())
+    if total <= NO_MASS or not parts[1].any():
+        return 0.0, 0.0
+    points = cell_middles(basis.edges)
+    source, target = (np.argwhere(part > 0.0) for part in parts)
+    length = cdist(points[source], points[target])
+    longest = float(length.max()) or 1.0
+    cost = (length / longest) ** order
+    weights = [part[part > 0.0] for part in parts]
+    value, log = ot.emd2(
+        weights[0] / weights[0].sum(), weights[1] / weights[1].sum(), cost, numItermax=MOST_PIVOTS, log=True
+    )
+    if log["warning"]:
+        raise AccuracyError(f"optimal transport: {log['warning']}", float("nan"))
+    power = max(total * float(value), 0.0)
+    low, found, high = (
+        longest * moved ** (1.0 / order)
+        for moved in (max(power - SOLVER_ROUNDING * total, 0.0), power, power + SOLVER_ROUNDING * total)
+    )
+    return found, max(high - found, found - low)
+
+
+def _largest_projection(basis: Basis, one: Floats, other: Floats, order: float) -> float:
+    """The largest W_p of the images on lines through the origin: no larger than W_p in the plane."""
+    points = cell_middles(basis.edges)
+    largest = 0.0
+    for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
+        place = (np.cos(angle) * points[:, None] + np.sin(angle) * points).reshape(1, -1)
+        first, second = (Distributions.of_atoms(place, flux.reshape(1, -1)) for flux in (one, other))
+        largest = max(largest, float(wasserstein(first, second, order)[0]))
+    return largest
+
+
+def _within_cells(basis: Basis, flux: Floats, order: float) -> float:
+    """How far, in W_p, a flux measure is at most from the point masses in the middle of its cells."""
+    half = 0.5 * np.diff(basis.edges)
+    return float(power_mean(np.hypot(half[:, None], half).ravel(), flux.ravel(), order))

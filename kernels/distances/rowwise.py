@@ -1,0 +1,144 @@
+"""Distances between laws and between kernel matrices, incoming angle by incoming angle."""
+
+from __future__ import annotations
+
+from itertools import count
+
+import numpy as np
+
+from ...checks import Floats
+from ...errors import InputError
+from ...estimates import Estimate
+from ..bases.measure import SINE, gauss_on_intervals
+from ..discretisation.densities import jumps_of_map
+from ..laws.density import DensityLaw
+from ..laws.involution import InvolutionLaw
+from ..laws.law import Law
+from ..laws.specular_frame import SpecularFrame
+from ..laws.weighted_sum import Combination
+from ..matrices.matrix import KernelMatrix
+from ..matrices.matrix_pair import joint_kind
+from .cell_rows import distance_of_rows, stochastic_rows
+from .distributions import ENTRY_POINTS, outgoing_distributions, parts_of
+from .resampling import matrices_error
+from .transport import power_mean, wasserstein
+
+# Gauss nodes on a panel in the incoming angle, panels without kinks, kinks and cells of the outgoing angle on the
+# coarsest level; every level doubles all of them.
+NODES, PANELS, KINKS, CELLS = 4, 12, 24, 64
+# Rows times cells of a level: some seconds. Rows without cells count as these many atoms.
+MOST_CORNERS, FEW_ATOMS = 2**22, 32
+# Any angle; whether rows have densities does not depend on it.
+PROBE = 1.0
+# Corners held at a time, counting every row with as many atoms as those of walls of many pieces have.
+CORNERS_AT_ONCE, MOST_ATOMS = 2**21, ENTRY_POINTS
+FEWEST_LEVELS = 3
+# A level halves the error at least where the distance jumps as a function of the incoming angle, at places unknown.
+# The difference of two levels is then the error of the finer one; chance may make it smaller, the one before it not.
+MEMORY = 0.25
+# A supremum at grazing, behind infinitely many kinks, is approached with order 1 exactly.
+SUPREMUM_FACTOR = 2.0
+# The supremum is approached from inside the panels, to this share of their width.
+INSET = 1e-9
+# Rounding of some hundred sums of angles and probabilities.
+ROUNDING = 1e-13
+
+
+def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: float) -> Estimate:
+    """The mean or the supremum over incoming angles of W_p, by Gauss rules that are refined until they settle.
+
+    The error is the difference of two levels, which differ in the nodes, in the kinks that are known to them, and in
+    the cells on which densities are resolved.
+    """
+    found: list[float] = []
+    error = np.inf
+    smooth = not (_is_atomic(first) and _is_atomic(second))
+    for level in count():
+        low, high = _panels(first, second, level)
+        edges = _edges(first, second, level) if smooth else np.array([0.0, np.pi])
+        corners = low.size * NODES * (edges.size + FEW_ATOMS)
+        if level >= FEWEST_LEVELS and corners > MOST_CORNERS:
+            break
+        angle, mass = _nodes(low, high, sup)
+        rows = _rows(first, second, angle, edges, order)
+        found.append(float(rows.max()) if sup else float(power_mean(rows, mass, order)))
+        if level == 0:
+            continue
+        steps = np.abs(np.diff(found))
+        error = float(steps[-1] if level == 1 else max(steps[-1], MEMORY * steps[-2]))
+        error = (SUPREMUM_FACTOR if sup else 1.0) * error + ROUNDING
+        if level >= FEWEST_LEVELS - 1 and error <= tolerance:
+            break
+    return Estimate(found[-1], error, "estimate", f"Gauss rules on {low.size} panels; difference of two refinements")
+
+
+def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> Estimate:
+    """The same between matrices on the same cells: rows are point masses in the middle of the cells."""
+    between = distance_of_rows(first, order, sup)
+    value = float(between(stochastic_rows(first), stochastic_rows(second)))
+    error = matrices_error(first, second, order, sup) + ROUNDING
+    how = "distribution functions on the cells, and the errors of both matrices"
+    return Estimate(value, error, joint_kind(first, second), how)
+
+
+def kinks_of(law: Law, limit: int) -> Floats:
+    """Incoming angles where rows are not smooth, as far as the law knows them."""
+    if isinstance(law, Combination):
+        return np.unique(np.concatenate([kinks_of(term, limit) for weight, term in law.terms if weight]))
+    if isinstance(law, SpecularFrame):
+        return kinks_of(law.law, limit)
+    if isinstance(law, InvolutionLaw):
+        return jumps_of_map(law.map)
+    if isinstance(law, DensityLaw):
+        return np.asarray(law.breakpoints)
+    try:
+        return law.kinks(limit)[0]
+    except InputError:
+        return np.empty(0)
+
+
+def _is_atomic(law: Law) -> bool:
+    """Whether rows consist of atoms, so that no cells are needed to resolve them."""
+    return not np.any(parts_of(law, np.array([PROBE]), np.array([0.0, np.pi]))[0])
+
+
+def _panels(first: Law, second: Law, level: int) -> tuple[Floats, Floats]:
+    limit = KINKS * 2**level
+    kinks = [kinks_of(law, limit) for law in (first, second)]
+    coarse = np.unique(np.concatenate((np.linspace(0.0, np.pi, PANELS + 1), *kinks)))
+    pieces = 2**level
+    fine = coarse[:-1, None] + np.arange(pieces) / pieces * np.diff(coarse)[:, None]
+    edges = np.append(fine.ravel(), np.pi)
+    return edges[:-1], edges[1:]
+
+
+def _edges(first: Law, second: Law, level: int) -> Floats:
+    jumps = [_density_jumps(law) for law in (first, second)]
+    return np.unique(np.concatenate((np.linspace(0.0, np.pi, CELLS * 2**level + 1), *jumps)))
+
+
+def _density_jumps(law: Law) -> Floats:
+    if isinstance(law, Combination):
+        return np.concatenate([_density_jumps(term) for _, term in law.terms])
+    if isinstance(law, SpecularFrame):
+        return np.asarray(np.pi - _density_jumps(law.law)[::-1])
+    return np.asarray(law.breakpoints) if isinstance(law, DensityLaw) else np.empty(0)
+
+
+def _nodes(low: Floats, high: Floats, sup: bool) -> tuple[Floats, Floats]:
+    angle, weight = gauss_on_intervals(low, high, NODES)
+    mass = weight * SINE.density(angle)
+    if sup:
+        inset = INSET * (high - low)
+        return np.concatenate((angle, low + inset, high - inset)), mass
+    return angle, mass / mass.sum()
+
+
+def _rows(first: Law, second: Law, angle: Floats, edges: Floats, order: float) -> Floats:
+    step = max(1, CORNERS_AT_ONCE // max(edges.size, MOST_ATOMS))
+    parts = []
+    for start in range(0, angle.size, step):
+        theta = angle[start : start + step]
+        one, other = (outgoing_distributions(law, theta, edges) for law in (first, second))
+        parts.append(wasserstein(one, other, order))
+    return np.concatenate(parts)

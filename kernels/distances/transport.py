@@ -1,0 +1,156 @@
+"""Wasserstein distances between probability measures on an interval, for many pairs at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...checks import Floats, finite_number
+from ...errors import InputError
+from ...rounding import EPS
+from ..bases.intervals import cell_among
+
+# Ends of a piece that agree to this share, over the order to the power 4/5, are integrated by two terms about the
+# middle: the divided difference below would lose more digits than the third term, 1/1920 of the fourth power, has.
+EQUAL_ENDS = (1920.0 * EPS) ** 0.2
+# A step of a cumulative distribution smaller than this is none.
+SMALLEST_STEP = 1e-300
+# Numbers at a time: they stay in the cache, which makes it three times faster.
+CHUNK = 2**15
+
+
+@dataclass(frozen=True)
+class Distributions:
+    """Cumulative distribution functions as polygons, one a row: jumps are vertical sides, densities slanted ones.
+
+    Parameters
+    ----------
+    position, level : arrays, shape (rows, corners)
+        Corners (x, F(x)), both non-decreasing along a row; F ends at 1.
+    """
+
+    position: Floats
+    level: Floats
+
+    @classmethod
+    def of_atoms(cls, position: Floats, probability: Floats) -> Distributions:
+        """Sums of point masses; both arrays of shape (rows, atoms), in any order."""
+        order = np.argsort(position, axis=1, kind="stable")
+        above = np.cumsum(np.take_along_axis(probability, order, axis=1), axis=1)
+        above /= above[:, -1:]
+        below = np.concatenate((np.zeros_like(above[:, :1]), above[:, :-1]), axis=1)
+        level = np.stack((below, above), axis=-1).reshape(len(above), -1)
+        return cls(np.repeat(np.take_along_axis(position, order, axis=1), 2, axis=1), level)
+
+    @classmethod
+    def of_parts(cls, edges: Floats, cumulative: Floats, position: Floats, probability: Floats) -> Distributions:
+        """A continuous part, linear between edges, shape (rows, edges), plus point masses, shape (rows, atoms)."""
+        if position.shape[1] == 0:
+            corners = np.broadcast_to(edges, cumulative.shape)
+            return cls(corners, cumulative / cumulative[:, -1:])
+        rows, count = cumulative.shape
+        cell = cell_among(edges, position)
+        share = (position - edges[cell]) / (edges[cell + 1] - edges[cell])
+        low = np.take_along_axis(cumulative, cell, axis=1)
+        at_atom = low + share * (np.take_along_axis(cumulative, cell + 1, axis=1) - low)
+        # every atom is two corners with the same place: before the jump and after it
+        corner = np.concatenate((np.broadcast_to(edges, (rows, count)), position, position), axis=1)
+        base = np.concatenate((cumulative, at_atom, at_atom), axis=1)
+        jump = np.concatenate((np.zeros((rows, count + position.shape[1])), probability), axis=1)
+        order = np.argsort(corner, axis=1, kind="stable")
+        level = np.take_along_axis(base, order, axis=1) + np.cumsum(np.take_along_axis(jump, order, axis=1), axis=1)
+        level = np.maximum.accumulate(level, axis=1)
+        return cls(np.take_along_axis(corner, order, axis=1), level / level[:, -1:])
+
+    def quantile(self, share: Floats) -> Floats:
+        """The inverse function at ``share``, shape (rows, any)."""
+        rows, corners = self.level.shape
+        # one search in all rows at once: row i occupies the values from 2 i to 2 i + 1
+        shift = 2.0 * np.arange(rows)[:, None]
+        place = np.searchsorted((self.level + shift).ravel(), (share + shift).ravel(), side="left").reshape(share.shape)
+        right = np.clip(place - corners * np.arange(rows)[:, None], 1, corners - 1)
+        low, high = (np.take_along_axis(self.level, right - back, axis=1) for back in (1, 0))
+        left_end, right_end = (np.take_along_axis(self.position, right - back, axis=1) for back in (1, 0))
+        part = np.clip((share - low) / np.maximum(high - low, SMALLEST_STEP), 0.0, 1.0)
+        return np.asarray(left_end + part * (right_end - left_end))
+
+
+def wasserstein(first: Distributions, second: Distributions, order: float = 1.0) -> Floats:
+    r"""W_p between corresponding rows, exactly, shape (rows,).
+
+    W_p^p is the integral over t in (0, 1) of the p-th power of the difference of the two quantile functions. Between
+    two neighbouring levels of either function the difference is linear in t, and its power is integrated in closed
+    form.
+
+    Examples
+    --------
+    >>> one = Distributions.of_atoms(np.array([[0.0, 1.0]]), np.array([[0.5, 0.5]]))
+    >>> other = Distributions.of_atoms(np.array([[0.5]]), np.array([[1.0]]))
+    >>> wasserstein(one, other, 2.0).tolist()
+    [0.5]
+    """
+    levels = np.sort(np.concatenate((first.level, second.level), axis=1), axis=1)
+    width = np.diff(levels, axis=1)
+    quarter, three = levels[:, :-1] + 0.25 * width, levels[:, :-1] + 0.75 * width
+    early = first.quantile(quarter) - second.quantile(quarter)
+    late = first.quantile(three) - second.quantile(three)
+    # steps of no width have no meaning at all
+    start, end = (np.where(width > 0.0, side, 0.0) for side in (1.5 * early - 0.5 * late, 1.5 * late - 0.5 * early))
+    # powers of the share of the largest: those of angles leave the range of numbers at high orders
+    largest = np.maximum(np.abs(start), np.abs(end)).max(axis=1, initial=0.0)
+    unit = np.where(largest > 0.0, largest, 1.0)[:, None]
+    power = np.sum(width * _mean_power(start / unit, end / unit, order), axis=1)
+    return np.asarray(largest * power ** (1.0 / order))
+
+
+def _mean_power(start: Floats, end: Floats, order: float) -> Floats:
+    """The mean of the p-th power of the modulus of a linear function between two values."""
+    rise, middle = end - start, 0.5 * (start + end)
+    flat = np.abs(rise) <= EQUAL_ENDS / order**0.8 * np.maximum(np.abs(start), np.abs(end))
+    bend = order * rise / np.where(flat & (middle != 0.0), middle, np.inf)
+    near = np.abs(middle) ** order * (1.0 + (1.0 - 1.0 / order) * bend**2 / 24.0)
+    primitive = [np.sign(value) * np.abs(value) ** (order + 1.0) / (order + 1.0) for value in (start, end)]
+    return np.where(flat, near, (primitive[1] - primitive[0]) / np.where(flat, 1.0, rise))
+
+
+def power_mean(values: Floats, weights: Floats, order: float) -> Floats:
+    """(sum_j w_j v_j^p)^(1/p) over the last axis, for values that are not negative and any order.
+
+    Examples
+    --------
+    >>> float(power_mean(np.array([3.0, 3.0]), np.array([0.5, 0.5]), 1e6))
+    3.0
+    """
+    largest = np.asarray(values.max(axis=-1, initial=0.0))
+    unit = np.where(largest > 0.0, largest, 1.0)
+    return np.asarray(largest * ((values / unit[..., None]) ** order @ weights) ** (1.0 / order))
+
+
+def wasserstein_order(order: float) -> float:
+    """The order p of a Wasserstein distance, checked: a finite number of at least 1."""
+    power = finite_number("order", order)
+    if power < 1.0:
+        raise InputError(f"order: expected a number of at least 1, got {order!r}")
+    return power
+
+
+def grid_wasserstein(first: Floats, second: Floats, points: Floats, order: float = 1.0) -> Floats:
+    """W_p between corresponding rows of probabilities of the same increasing points, shape ``first.shape[:-1]``.
+
+    For p = 1 it is the integral of the difference of the distribution functions: one sum, no sorting.
+    """
+    shape = first.shape[:-1]
+    flat = [np.reshape(array, (-1, points.size)) for array in (first, second)]
+    if order != 1.0:
+        position = np.broadcast_to(points, flat[0].shape)
+        one, other = (Distributions.of_atoms(position, array) for array in flat)
+        return wasserstein(one, other, order).reshape(shape)
+    gap, found = np.diff(points), np.empty(len(flat[0]))
+    step = max(1, CHUNK // points.size)
+    for start in range(0, found.size, step):
+        part = slice(start, start + step)
+        difference = flat[0][part] - flat[1][part]
+        np.cumsum(difference, axis=1, out=difference)
+        found[part] = np.abs(difference, out=difference)[:, :-1] @ gap
+    return found.reshape(shape)

@@ -1,0 +1,1 @@
+"""Conditional expectations of basis functions and of piecewise polynomials."""

@@ -1,0 +1,103 @@
+"""Panels in the incoming angle with the means of a basis at their nodes: Kronrod's rule, smoothed at both ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ..bases.basis import Basis
+from ..bases.measure import SINE
+
+# Kronrod's rule with 15 nodes and the Gauss rule with 7 among them (Piessens et al., QUADPACK, 1983).
+_NODES = (
+    0.991455371120812639206854697526329, 0.949107912342758524526189684047851,
+    0.864864423359769072789712788640926, 0.741531185599394439863864773280788,
+    0.586087235467691130294144691693, 0.405845151377397166906606412076961,
+    0.207784955007898467600689403773245, 0.0,
+)  # fmt: skip
+_KRONROD = (
+    0.022935322010529224963732008058970, 0.063092092629978553290700663189204,
+    0.104790010322250183839876322541518, 0.140653259715525918745189590510238,
+    0.169004726639267902826583426598550, 0.190350578064785409913256402421014,
+    0.204432940075298892414161999234649, 0.209482141084727828012999174891714,
+)  # fmt: skip
+_GAUSS = (
+    0.0, 0.129484966168869693270611432679082, 0.0, 0.279705391489276667901467771423780,
+    0.0, 0.381830050505118944950369775488975, 0.0, 0.417959183673469387755102040816327,
+)  # fmt: skip
+NODES = np.array([-x for x in _NODES[:-1]] + list(_NODES[::-1]))
+KRONROD = np.array(list(_KRONROD[:-1]) + list(_KRONROD[::-1]))
+GAUSS = np.array(list(_GAUSS[:-1]) + list(_GAUSS[::-1]))
+
+# theta = low + (high - low) s^2 (3 - 2 s): where pieces of a row are born or vanish, its means behave like a square
+# root, and cuts are made there.
+_S = 0.5 * (1.0 + NODES)
+PLACES, SLOPES = _S * _S * (3.0 - 2.0 * _S), 3.0 * _S * (1.0 - _S)
+
+
+@dataclass
+class AnglePanels:
+    """Some panels; every array has one entry, or row, a panel.
+
+    Attributes
+    ----------
+    low, high : array, shape (panels,)
+    angle, row_error : array, shape (panels, 15)
+        The nodes, and the errors of the rows there.
+    image : array, shape (panels, 15, size)
+        The means of the basis, E[e_j(Theta') | theta], at the nodes.
+    error : array, shape (panels,)
+        Estimated error of the integral, but for that of the rows.
+    """
+
+    low: Floats
+    high: Floats
+    angle: Floats
+    row_error: Floats
+    image: Floats
+    error: Floats
+
+    @staticmethod
+    def between(low: Floats, high: Floats, size: int) -> AnglePanels:
+        """Panels whose rows are not known yet."""
+        angle = low[:, None] + (high - low)[:, None] * PLACES
+        shape = angle.shape
+        return AnglePanels(low, high, angle, np.zeros(shape), np.zeros((*shape, size)), np.zeros(len(low)))
+
+    @property
+    def mass(self) -> Floats:
+        """Measure of every panel."""
+        return SINE.mass(self.low, self.high)
+
+    def kept(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> AnglePanels:
+        """Those chosen by a mask or by their numbers."""
+        return AnglePanels(*(getattr(self, field.name)[mask] for field in fields(self)))
+
+    def joined(self, other: AnglePanels) -> AnglePanels:
+        """These and the other ones."""
+        return AnglePanels(
+            *(np.concatenate((getattr(self, field.name), getattr(other, field.name))) for field in fields(self))
+        )
+
+    def _integrals(self, rule: Floats, basis: Basis) -> Floats:
+        """The integrals of e_i(theta) E[e_j(Theta') | theta] over each panel, shape (panels, size, size)."""
+        weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * rule
+        here = basis.evaluate(self.angle) * weight[..., None]
+        return np.asarray(np.matmul(here.transpose(0, 2, 1), self.image))
+
+    def values(self, basis: Basis) -> Floats:
+        """The integrals by Kronrod's rule."""
+        return self._integrals(KRONROD, basis)
+
+    def differences(self, basis: Basis) -> Floats:
+        """The norms of the differences between the two rules."""
+        return np.asarray(np.linalg.norm(self._integrals(KRONROD - GAUSS, basis), axis=(1, 2)))
+
+    def row_errors(self, basis: Basis) -> Floats:
+        """What the errors of the rows do to the integrals."""
+        weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * KRONROD
+        size = np.linalg.norm(basis.evaluate(self.angle), axis=2)
+        return np.asarray(np.sum(weight * size * self.row_error, axis=1))

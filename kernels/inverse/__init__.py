@@ -1,0 +1,1 @@
+"""Hollows for wanted laws."""

@@ -1,0 +1,96 @@
+"""Finite lists of branches: merging equal ones, chaining laws, and the kinks of a chain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from ...checks import Floats
+from ...errors import InputError
+from ...rounding import EPS
+from ..bases.angles import kept_inside
+from ..bases.intervals import edges_inside
+from .law import Law
+
+# Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
+SAME_ANGLE = 16.0 * EPS
+# Merging compares all pairs, and the number of branches of a chain grows exponentially unless they merge.
+MOST_BRANCHES = 64
+
+# Probabilities and outgoing angles, shape theta.shape + (branches,).
+Branches = Callable[[Floats], tuple[Floats, Floats]]
+
+
+def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
+    """Add up branches with equal outgoing angles; slots left with probability 0 get the angle of the first used one.
+
+    The order of slots stays, so that a slot that was one isometry between two kinks remains so.
+    """
+    probability, outgoing = probability.copy(), kept_inside(outgoing)
+    slots = probability.shape[-1]
+    for late in range(1, slots):
+        for early in range(late):
+            same = np.abs(outgoing[..., late] - outgoing[..., early]) <= SAME_ANGLE
+            same &= (probability[..., early] > 0.0) & (probability[..., late] > 0.0)
+            probability[..., early] += np.where(same, probability[..., late], 0.0)
+            probability[..., late] = np.where(same, 0.0, probability[..., late])
+    first = np.take_along_axis(outgoing, np.argmax(probability > 0.0, axis=-1)[..., None], axis=-1)
+    return probability, np.where(probability > 0.0, outgoing, first)
+
+
+def chained(laws: Sequence[Law], theta: Floats) -> tuple[Floats, Floats]:
+    """The branches of laws applied one after the other, merged after each."""
+    probability, outgoing = np.ones((*theta.shape, 1)), theta[..., None]
+    for law in laws:
+        step, angle = law.branches(outgoing)
+        shape = (*theta.shape, -1)
+        probability = (probability[..., None] * step).reshape(shape)
+        outgoing = angle.reshape(shape)
+        probability, outgoing = _compressed(*merged(*_compressed(probability, outgoing)))
+        if probability.shape[-1] > MOST_BRANCHES:
+            raise InputError(
+                f"branches: expected at most {MOST_BRANCHES} of a composition, got {probability.shape[-1]} after "
+                f"{law!r}; use sample() or discretise()"
+            )
+    return probability, outgoing
+
+
+def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
+    """Kinks of a chain, and the probability of those left out.
+
+    They are those of the first law, and where its branches meet kinks of the rest.
+    """
+    kinks, left_out = laws[0].kinks(limit)
+    for place in range(1, len(laws)):
+        target, more = laws[place].kinks(limit)
+        sources = preimages(partial(chained, laws[:place]), np.concatenate([[0.0], kinks, [np.pi]]), target)
+        kinks = np.unique(np.concatenate([kinks, sources]))
+        left_out += more
+    return kinks, min(left_out, 1.0)
+
+
+def preimages(branches: Branches, kinks: Floats, targets: Floats) -> Floats:
+    """Angles that some branch maps to a target, for every interval between kinks; both are sorted."""
+    low, high = kinks[:-1], kinks[1:]
+    proper = high > low
+    low, high = low[proper], high[proper]
+    probe = low + np.array([[0.25], [0.75]]) * (high - low)
+    # both probes in one call, so that a slot is the same isometry in both
+    probability, angle = branches(probe)
+    sign = np.sign(angle[1] - angle[0])
+    offset = angle[0] - sign * probe[0][:, None]
+    used = (probability.sum(axis=0) > 0.0) & (sign != 0.0)
+    piece, slot = np.nonzero(used)
+    sign, offset = sign[piece, slot], offset[piece, slot]
+    ends = sign * low[piece] + offset, sign * high[piece] + offset
+    owner, target = edges_inside(targets, np.minimum(*ends), np.maximum(*ends))
+    source = sign[owner] * (target - offset[owner])
+    return np.asarray(source[(source > low[piece][owner]) & (source < high[piece][owner])])
+
+
+def _compressed(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
+    """Drop the slots that no incoming angle uses."""
+    used = np.any(probability > 0.0, axis=tuple(range(probability.ndim - 1)))
+    return probability[..., used], outgoing[..., used]

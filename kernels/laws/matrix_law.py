@@ -1,0 +1,171 @@
+"""The law of a kernel matrix: piecewise uniform."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, finite_array, frozen
+from ...errors import InputError
+from ..bases.angles import kept_inside
+from ..bases.intervals import cell_among
+from ..bases.measure import SINE
+from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw
+from .law import AngleFunction, Frame, set_facts
+
+# Rows that were divided by their sum add up to 1 within a few roundings; rows of a matrix whose flux was symmetrised
+# instead do not, and are no law.
+ROW_SUM_TOLERANCE = 1e-9
+
+
+class _Binned(Protocol):
+    """What a KernelMatrix offers; the basis must be `Bins` in theta."""
+
+    @property
+    def array(self) -> Floats: ...
+    @property
+    def basis(self) -> object: ...
+
+
+class MatrixLaw(DensityLaw):
+    """From bin i the particle goes to bin j with probability P[i, j], uniformly in cos(theta) within bin j.
+
+    Parameters
+    ----------
+    matrix : KernelMatrix or array_like, shape (n, n)
+        A matrix on `Bins` in theta, or a plain row-stochastic array, whose bins are then equal in cos(theta).
+
+    Attributes
+    ----------
+    array : ndarray, shape (n, n)
+        The transition probabilities.
+    edges : ndarray, shape (n + 1,)
+        Angles between the bins, from 0 to pi.
+    reversible, mirror_symmetric : bool
+        Measured on the matrix.
+
+    Raises
+    ------
+    InputError
+        If the matrix is not square, not on bins in theta, has a negative entry, or a row does not sum to 1 within
+        1e-9; the message names the worst row.
+
+    Examples
+    --------
+    >>> law = MatrixLaw([[0.25, 0.75], [0.75, 0.25]])
+    >>> round(float(law.apply(lambda theta: theta < np.pi / 2, 1.0)), 14)
+    0.25
+    >>> law.reversible, law.fan_out
+    (True, 32)
+    """
+
+    array: Floats
+    edges: Floats
+    _masses: Floats
+
+    def __init__(self, matrix: _Binned | ArrayLike) -> None:
+        basis = getattr(matrix, "basis", None)
+        given: Any = matrix if basis is None else getattr(matrix, "array", None)
+        array = finite_array("matrix", given)
+        if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
+            raise InputError(f"matrix: expected a square array of probabilities, got shape {array.shape}")
+        size = array.shape[0]
+        edges = SINE.quantile(np.arange(size + 1) / size) if basis is None else _bin_edges(basis, size)
+        if array.min() < -NEGATIVE_TOLERANCE:
+            row, column = np.unravel_index(int(np.argmin(array)), array.shape)
+            raise InputError(
+                f"matrix: expected probabilities, got {array[row, column]:g} in row {row}, column {column}"
+            )
+        array = np.maximum(array, 0.0)
+        sums = array.sum(axis=1)
+        worst = int(np.argmax(np.abs(sums - 1.0)))
+        if abs(sums[worst] - 1.0) > ROW_SUM_TOLERANCE:
+            raise InputError(
+                f"matrix: expected rows that sum to 1, got {sums[worst]:.12g} in row {worst}; a matrix whose flux was "
+                "symmetrised is not a law until its rows are divided by their sums"
+            )
+        masses = SINE.mass(edges[:-1], edges[1:])
+        array = array / sums[:, None]
+        set_facts(self, array=frozen(array), edges=frozen(edges), breakpoints=frozen(edges[1:-1]), _masses=masses)
+        set_facts(self, frame=getattr(matrix, "frame", "paper"), fan_out=size * GAUSS_NODES)
+        flux = masses[:, None] * array
+        set_facts(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= SYMMETRY_TOLERANCE * np.max(flux)))
+        even = bool(np.max(np.abs(masses - masses[::-1])) <= SYMMETRY_TOLERANCE)
+        mirror = bool(np.max(np.abs(array - array[::-1, ::-1])) <= SYMMETRY_TOLERANCE)
+        # On bins that are not symmetric about pi/2 the entries alone do not tell.
+        set_facts(self, mirror_symmetric=mirror if even else None)
+
+    def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
+        """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
+        source, target = cell_among(self.edges, theta), cell_among(self.edges, theta_out)
+        return np.asarray(self.array[source, target] * SINE.density(theta_out) / self._masses[target])
+
+    def panels(self, theta: Floats) -> Floats:
+        """The edges of the bins."""
+        return np.broadcast_to(self.edges, (*theta.shape, self.edges.size))
+
+    def adjoint(self) -> MatrixLaw:
+        """The law of W^-1 P^T W, W the masses of the bins; an InputError if P does not preserve sin(theta) d theta."""
+        if self.reversible:
+            return self
+        reverse = self.array.T * self._masses / self._masses[:, None]
+        defect = float(np.max(np.abs(reverse.sum(axis=1) - 1.0)))
+        if defect > ROW_SUM_TOLERANCE:
+            raise InputError(
+                f"{self!r} does not preserve sin(theta) d theta (defect {defect:.2g}), so its adjoint is not a law"
+            )
+        return MatrixLaw(_OnBins(reverse, self.edges, self.frame))
+
+    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+        angle, weight = SINE.quadrature(self.edges, GAUSS_NODES)
+        value = np.asarray(function(angle), dtype=np.float64)
+        shape = (self._masses.size, GAUSS_NODES)
+        weight = weight.reshape(shape) / weight.reshape(shape).sum(axis=1, keepdims=True)
+        means = np.einsum("ij,ij...->i...", weight, value.reshape(shape + value.shape[1:]))
+        return np.asarray(np.tensordot(self.array, means, axes=1)[cell_among(self.edges, theta)])
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        cumulative = np.cumsum(self.array, axis=1)
+        cumulative /= cumulative[:, -1:]
+        start, size = cell_among(self.edges, theta), self._masses.size
+        # One search in all rows at once: row i occupies the values from i to i + 1, which costs log2(n) of 53 bits.
+        rows = cumulative + np.arange(size)[:, None]
+        place = np.searchsorted(rows.ravel(), start + rng.random(theta.shape), side="right") - size * start
+        place = np.clip(place, 0, size - 1)
+        return _uniform_between(self.edges[place], self.edges[place + 1], rng.random(theta.shape))
+
+    def __repr__(self) -> str:
+        return f"MatrixLaw({self.array.shape[0]} bins)"
+
+
+class _OnBins:
+    """An array with the edges of its bins, in the shape of a KernelMatrix."""
+
+    def __init__(self, array: Floats, edges: Floats, frame: Frame) -> None:
+        self.array, self.edges, self.frame, self.measure = array, edges, frame, SINE
+
+    @property
+    def basis(self) -> _OnBins:
+        return self
+
+
+def _bin_edges(basis: object, size: int) -> Floats:
+    edges, measure = getattr(basis, "edges", None), getattr(basis, "measure", None)
+    if edges is None or np.size(edges) != size + 1 or getattr(measure, "name", None) != "sin":
+        raise InputError(
+            f"matrix: expected a KernelMatrix on Bins in theta, got one on {basis!r}; discretise the law on Bins, or "
+            "pass a plain array of probabilities"
+        )
+    return np.asarray(edges, dtype=np.float64)
+
+
+def _uniform_between(low: Floats, high: Floats, share: Floats) -> Floats:
+    """The angle that splits the probability of (low, high) in the given ratio, accurate at both ends of (0, pi)."""
+    upper = low >= 0.5 * np.pi
+    low, high = np.where(upper, np.pi - high, low), np.where(upper, np.pi - low, high)
+    share = np.where(upper, 1.0 - share, share)
+    angle = SINE.quantile(SINE.cdf(low) + share * SINE.mass(low, high))
+    angle = np.clip(angle, low, high)
+    return kept_inside(np.where(upper, np.pi - angle, angle))

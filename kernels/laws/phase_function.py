@@ -1,0 +1,132 @@
+"""The Henyey-Greenstein law: the reference kernel of every spectral method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, number_between, whole_number
+from ..bases.angles import flipped, kept_inside
+from ..bases.measure import SINE
+from .density import GAUSS_NODES, DensityLaw
+
+
+@dataclass(frozen=True, repr=False)
+class HenyeyGreensteinLaw(DensityLaw):
+    r"""Scattering of the direction on the sphere with the Henyey-Greenstein phase function, seen in cos(theta).
+
+    With u = cos(theta), the kernel with respect to du' is
+
+        k(u, u') = sum over l of (2 l + 1)/2 g^l P_l(u) P_l(u')
+                 = (1 - g^2) E(m) / (pi (A - B) sqrt(A + B)),    m = 2 B / (A + B),
+
+    A = 1 + g^2 - 2 g u u', B = 2 g sin(theta) sin(theta'), E the complete elliptic integral. It is reversible with
+    respect to sin(theta) d theta, has the eigenvalues g^l on Legendre polynomials, and HG(g) HG(h) = HG(g h).
+
+    Parameters
+    ----------
+    g : float
+        Mean cosine of the scattering angle, -1 < g < 1. In the paper's convention g -> 1 tends to retroreflection
+        (theta' = theta), g -> -1 to specular reflection (theta' = pi - theta), and g = 0 is Lambertian.
+
+    Notes
+    -----
+    Source: L. G. Henyey and J. L. Greenstein, Astrophys. J. 93 (1941) 70; the azimuthal mean in closed form.
+
+    Examples
+    --------
+    >>> law = henyey_greenstein(0.5)
+    >>> law
+    henyey_greenstein(0.5)
+    >>> law.eigenvalue(3)
+    0.125
+    >>> round(float(law.apply(np.cos, np.pi / 3)), 14)         # g cos(theta)
+    0.25
+    """
+
+    g: float
+
+    reversible = True
+    mirror_symmetric = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "g", number_between("g", self.g, -1.0, 1.0))
+        object.__setattr__(self, "fan_out", (2 * self._doublings() + 4) * GAUSS_NODES)
+
+    def eigenvalue(self, degree: int) -> float:
+        """g^l, the eigenvalue of the Legendre polynomial of degree l in cos(theta)."""
+        return float(self.g ** whole_number("degree", degree, 0))
+
+    def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
+        """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
+        from scipy.special import elliprg
+
+        theta, theta_out = np.asarray(theta, dtype=np.float64), np.asarray(theta_out, dtype=np.float64)
+        weight = 2.0 * SINE.density(theta_out)
+        # g < 0 is g > 0 followed by theta' -> pi - theta'. A - B and A + B as sums of squares do not cancel.
+        g, target = abs(self.g), theta_out if self.g >= 0.0 else np.pi - theta_out
+        least = (1.0 - g) ** 2 + 4.0 * g * np.sin(0.5 * (theta - target)) ** 2
+        most = (1.0 - g) ** 2 + 4.0 * g * np.sin(0.5 * (theta + target)) ** 2
+        # E(m) = 2 R_G(0, 1 - m, 1) in Carlson's form takes 1 - m = (A - B)/(A + B), which is accurate near m = 1
+        elliptic = 2.0 * elliprg(0.0, least / most, 1.0)
+        return np.asarray(weight * (1.0 - g) * (1.0 + g) * elliptic / (np.pi * least * np.sqrt(most)))
+
+    def panels(self, theta: Floats) -> Floats:
+        """Edges that double their distance from the peak, whose width is about 1 - |g|."""
+        distance = (1.0 - abs(self.g)) * 2.0 ** np.arange(self._doublings())
+        peak = (theta if self.g >= 0.0 else np.pi - theta)[..., None]
+        ends = np.zeros_like(peak)
+        edges = [ends, peak - distance[::-1], peak, peak + distance, ends + np.pi]
+        return np.asarray(np.clip(np.concatenate(edges, axis=-1), 0.0, np.pi))
+
+    @property
+    def resolution(self) -> float:
+        """Width of the peak, 1 - |g|."""
+        return 1.0 - abs(self.g)
+
+    def incoming_edges(self, edges: Floats) -> Floats:
+        """Integrals between edges change where the peak passes an edge: distances from there that double."""
+        centre = edges if self.g >= 0.0 else np.pi - edges[::-1]
+        distance = self.resolution * 2.0 ** np.arange(self._doublings())
+        # up to the middle between two edges, from where the next edge is nearer
+        half = 0.5 * np.diff(centre)[:, None]
+        right, left = centre[:-1, None] + distance, centre[1:, None] - distance
+        near = distance <= half
+        # no interval between two edges is wider than the peak where both are near
+        halved = (0.5 * self.resolution < half) & (half < self.resolution)
+        middle = 0.5 * (centre[1:] + centre[:-1])[halved[:, 0]]
+        return np.unique(np.concatenate((centre[1:-1], middle, right[near], left[near])))
+
+    def _doublings(self) -> int:
+        return 1 + int(np.ceil(np.log2(np.pi / (1.0 - abs(self.g)))))
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        g, draw = abs(self.g), rng.random(theta.shape)
+        azimuth = 2.0 * np.pi * rng.random(theta.shape)
+        # The inverse cdf of the phase function, as sin^2 and cos^2 of half the scattering angle: nothing cancels.
+        scale = 1.0 - g + 2.0 * g * draw
+        half_sine = (1.0 - g) * np.sqrt((1.0 - draw) * (1.0 + g * draw)) / scale
+        half_cosine = (1.0 + g) * np.sqrt(draw * (1.0 - g + g * draw)) / scale
+        along, across = half_cosine**2 - half_sine**2, 2.0 * half_sine * half_cosine
+        forward = along * np.cos(theta) - across * np.cos(azimuth) * np.sin(theta)
+        upward = along * np.sin(theta) + across * np.cos(azimuth) * np.cos(theta)
+        outgoing = kept_inside(np.arctan2(np.hypot(upward, across * np.sin(azimuth)), forward))
+        return outgoing if self.g >= 0.0 else flipped(outgoing)
+
+    def __repr__(self) -> str:
+        return f"henyey_greenstein({self.g!r})"
+
+
+def henyey_greenstein(g: float) -> HenyeyGreensteinLaw:
+    """The Henyey-Greenstein law with mean cosine ``g``, -1 < g < 1; see `HenyeyGreensteinLaw`.
+
+    Raises an InputError if g is not in that range.
+
+    Examples
+    --------
+    >>> henyey_greenstein(-0.5).eigenvalue(3)
+    -0.125
+    """
+    return HenyeyGreensteinLaw(g)

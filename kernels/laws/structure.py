@@ -1,0 +1,94 @@
+"""Walking through the algebra of laws: what is known of the parts gives what is known of the whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from ...errors import InputError
+from .composition import Composition, Power
+from .law import BranchLaw, Law
+from .specular_frame import SpecularFrame
+from .weighted_sum import Combination
+
+Fact = TypeVar("Fact")
+# Asked of a law to see whether it lists isometries.
+FEW_KINKS, PROBE = 8, 1.0
+
+
+@dataclass(frozen=True)
+class Rules(Generic[Fact]):
+    """How a fact about laws passes through the algebra.
+
+    Parameters
+    ----------
+    leaf : callable
+        The fact of a law that is not a combination of others.
+    mixture : callable
+        From the (weight, fact) pairs of a weighted sum; terms of weight 0 are left out.
+    chain : callable
+        From the facts of laws applied one after the other, the first one first; of none for the identity.
+    turned : callable
+        From the fact of a law to that of the law in the other frame.
+    """
+
+    leaf: Callable[[Law], Fact]
+    mixture: Callable[[Sequence[tuple[float, Fact]]], Fact]
+    chain: Callable[[Sequence[Fact]], Fact]
+    turned: Callable[[Fact], Fact]
+
+
+def fold(law: Law, rules: Rules[Fact]) -> Fact:
+    """The fact of a law from those of its parts; a wall whose law is known in closed form counts as that law.
+
+    Examples
+    --------
+    How many reflections a law makes in the mean:
+
+    >>> from asperity.kernels.laws.ideal import retroreflection, specular
+    >>> count = Rules(lambda law: 1.0, lambda terms: sum(w * n for w, n in terms), sum, lambda n: n)
+    >>> fold(0.5 * specular() + 0.5 * (specular() @ retroreflection()) ** 2, count)
+    2.5
+    """
+    if isinstance(law, Combination):
+        return rules.mixture([(weight, fold(term, rules)) for weight, term in law.terms_checked() if weight > 0.0])
+    if isinstance(law, Composition):
+        return rules.chain([fold(part, rules) for part in law.laws])
+    if isinstance(law, Power):
+        return rules.chain([fold(law.law, rules)] * law.exponent)
+    if isinstance(law, SpecularFrame):
+        return rules.turned(fold(law.law, rules))
+    closed_form = getattr(law, "closed_form", None)
+    return rules.leaf(law) if closed_form is None else fold(closed_form, rules)
+
+
+def holds_of_all(law: Law, promise: Callable[[Law], bool]) -> bool:
+    """Whether every part of a law that is no combination of others keeps a promise."""
+    return fold(law, Rules(promise, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))
+
+
+def made_of_isometries(law: Law) -> bool:
+    """Whether a law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
+
+    So are the laws of walls of straight pieces, specular reflection, retroreflection, and all that is made of them.
+    """
+    return holds_of_all(law, _is_isometric)
+
+
+def lists_branches(law: Law) -> bool:
+    """Whether every part of a law answers when asked for its isometries: more than that it is made of them."""
+    return holds_of_all(law, _answers)
+
+
+def _is_isometric(law: Law) -> bool:
+    return isinstance(law, BranchLaw) or bool(getattr(law, "is_polygonal", False))
+
+
+def _answers(law: Law) -> bool:
+    try:
+        law.kinks(FEW_KINKS)
+        law.branches(PROBE)
+    except InputError:
+        return False
+    return True

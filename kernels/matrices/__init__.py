@@ -1,0 +1,1 @@
+"""Kernels as matrices in a basis: algebra, files, pictures and defects."""

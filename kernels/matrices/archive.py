@@ -1,0 +1,184 @@
+"""Kernel matrices as files: an .npz archive with every field, exact to the last bit."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...errors import FileExistsRefusal, InputError
+from ...estimates import Estimate
+from ..bases.basis import Basis
+from ..bases.bins import Bins
+from ..bases.legendre import Legendre
+from ..bases.panels import Panels
+from ..bases.tensor import TensorBasis
+from .defects import SymmetryDefect
+from .matrix import KernelMatrix
+
+FORMAT, VERSION = "asperity kernel matrix", 1
+PLAIN_FIELDS = (
+    "symmetrised",
+    "samples",
+    "method",
+    "law",
+    "reversible",
+    "mirror_symmetric",
+    "frame",
+    "requested_tolerance",
+    "unresolved",
+    "norm_bound",
+)
+
+
+def write_matrix(matrix: KernelMatrix, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write a matrix to exactly ``path``; the file appears when it is complete.
+
+    Raises
+    ------
+    FileExistsRefusal
+        If the file exists and ``overwrite`` is not given.
+    InputError
+        If the file cannot be written, the basis is of an unknown kind, or the metadata are not plain JSON values.
+    """
+    target = Path(path)
+    if target.exists() and not overwrite:
+        raise FileExistsRefusal(f"{target} exists; pass overwrite=True to replace it")
+    arrays: dict[str, np.ndarray[Any, Any]] = {"symmetric": matrix.symmetric}
+    if matrix.counts is not None:
+        arrays["counts"] = matrix.counts
+    record: dict[str, Any] = {"format": FORMAT, "version": VERSION}
+    record |= {name: getattr(matrix, name) for name in PLAIN_FIELDS}
+    error, defect = matrix.error, matrix.raw_defect
+    record["error"] = [error.value, error.error, error.kind, error.method]
+    record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
+    record["metadata"] = dict(matrix.metadata)
+    record["basis"] = _described(matrix.basis, arrays, "basis")
+    record["replicates"] = [_stored(part, arrays, f"replicate{k}") for k, part in enumerate(matrix.replicates)]
+    try:
+        arrays["record"] = np.array(json.dumps(record))
+    except TypeError as reason:
+        raise InputError(f"metadata: expected numbers, text, lists and dicts of these ({reason})") from reason
+    try:
+        _write_whole(target, arrays)
+    except OSError as reason:
+        raise InputError(f"cannot write {target}: {reason.strerror or reason}") from reason
+    return target
+
+
+def load_matrix(path: str | Path) -> KernelMatrix:
+    """Read a matrix that `KernelMatrix.save` wrote: every field, to the last bit.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not such a file.
+
+    Examples
+    --------
+    >>> load_matrix("no/such/file.npz")
+    Traceback (most recent call last):
+    asperity.errors.InputError: cannot read no/such/file.npz: No such file or directory
+    """
+    source = Path(path)
+    try:
+        with source.open("rb") as stream:
+            archive = np.load(stream, allow_pickle=False)
+            if not hasattr(archive, "files") or "record" not in archive.files:
+                raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
+            arrays = {name: archive[name] for name in archive.files}
+        record = json.loads(str(arrays["record"]))
+        if not isinstance(record, dict) or record.get("format") != FORMAT:
+            raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
+        if record["version"] != VERSION:
+            raise InputError(f"{source} has version {record['version']}, this asperity reads version {VERSION}")
+        return _restored(record, arrays)
+    except InputError:
+        raise
+    except FileNotFoundError as reason:
+        raise InputError(f"cannot read {source}: {reason.strerror}") from reason
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as reason:
+        raise InputError(
+            f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save ({reason})"
+        ) from reason
+
+
+def _restored(record: dict[str, Any], arrays: dict[str, np.ndarray[Any, Any]]) -> KernelMatrix:
+    defect = record["raw_defect"]
+    return KernelMatrix(
+        arrays["symmetric"],
+        _basis_from(record["basis"], arrays),
+        Estimate(*record["error"]),
+        counts=arrays.get("counts"),
+        replicates=tuple(_loaded(kind, arrays, f"replicate{k}") for k, kind in enumerate(record["replicates"])),
+        raw_defect=None if defect is None else SymmetryDefect(*defect),
+        metadata=record["metadata"],
+        **{name: record[name] for name in PLAIN_FIELDS},
+    )
+
+
+def _described(basis: Basis, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> dict[str, Any]:
+    if isinstance(basis, TensorBasis):
+        factors = [_described(factor, arrays, f"{name}.{k}") for k, factor in enumerate(basis.factors)]
+        return {"kind": "TensorBasis", "factors": factors}
+    weight = basis.measure.name
+    if isinstance(basis, Legendre):
+        return {"kind": "Legendre", "n": basis.n, "weight": weight}
+    if isinstance(basis, (Bins, Panels)):
+        arrays[name] = basis.edges
+        if isinstance(basis, Bins):
+            return {"kind": "Bins", "edges": name, "weight": weight}
+        return {"kind": "Panels", "edges": name, "degree": basis.degree, "weight": weight}
+    raise InputError(f"basis: expected Bins, Legendre, Panels or a TensorBasis of these, got {basis!r}")
+
+
+def _basis_from(described: dict[str, Any], arrays: dict[str, np.ndarray[Any, Any]]) -> Basis:
+    kind = described["kind"]
+    if kind == "TensorBasis":
+        return TensorBasis(tuple(_basis_from(factor, arrays) for factor in described["factors"]))
+    if kind == "Legendre":
+        return Legendre(described["n"], described["weight"])
+    edges = arrays[described["edges"]]
+    if kind == "Panels":
+        return Panels(edges, described["degree"], described["weight"])
+    equal = Bins(edges.size - 1, described["weight"])
+    # equal bins are known by their number, which also makes finding a bin faster
+    return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])
+
+
+def _stored(part: Any, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> str:
+    if isinstance(part, np.ndarray):
+        arrays[name] = part
+        return "dense"
+    arrays[f"{name}.data"], arrays[f"{name}.indices"], arrays[f"{name}.indptr"] = part.data, part.indices, part.indptr
+    arrays[f"{name}.shape"] = np.array(part.shape)
+    return "sparse"
+
+
+def _loaded(kind: str, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> Any:
+    if kind == "dense":
+        return arrays[name]
+    from scipy.sparse import csr_array
+
+    parts = tuple(arrays[f"{name}.{field}"] for field in ("data", "indices", "indptr"))
+    return csr_array(parts, shape=tuple(arrays[f"{name}.shape"]))
+
+
+def _write_whole(target: Path, arrays: dict[str, np.ndarray[Any, Any]]) -> None:
+    """Write beside the target and rename, so that a crash leaves no half of a file."""
+    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+        mask = os.umask(0)
+        os.umask(mask)
+        os.chmod(temporary, 0o666 & ~mask)
+        os.replace(temporary, target)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise

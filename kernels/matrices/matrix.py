@@ -1,0 +1,264 @@
+"""A kernel as a matrix in an orthonormal basis, with what is known about its error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats, finite_array, finite_number, frozen, whole_number
+from ...errors import InputError
+from ...estimates import Estimate
+from ..bases.basis import Basis
+from ..laws.law import AngleFunction, Frame
+from .defects import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry
+from .matrix_algebra import added, flipped_frame, multiplied, scaled, tensor_product, to_power
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import LinearOperator
+
+    Replicate: TypeAlias = "Floats | csr_array[Any, tuple[int, int]]"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class KernelMatrix:
+    r"""The matrix of a Markov kernel P in a basis of L^2 of the invariant measure.
+
+    Made by `discretise`, `estimate` or `load_matrix`, and by the algebra: ``P @ Q`` (first P, then Q),
+    ``a * P + b * Q``, ``P ** n``, ``P.adjoint()``, ``P.tensor(Q)``, ``P.in_specular_frame()``. The algebra is that of
+    the matrices: in general the product of two Galerkin matrices is not the Galerkin matrix of the product.
+
+    Parameters
+    ----------
+    symmetric : ndarray, shape (n, n)
+        <e_i, P e_j> in the orthonormal basis; a symmetric array where the kernel is reversible. Read-only.
+    basis : Basis
+        The basis, of n functions.
+    error : Estimate
+        The Frobenius error of ``symmetric``, in its ``.value`` and, being all that is known, in its ``.error`` too. Of
+        kind ``"bound"`` the distance from the exact matrix is within it; of kind ``"estimate"`` in 95 of 100 cases: of
+        a sampled matrix it is the 95 % quantile of that distance over the rays.
+    counts : ndarray of int64, shape (n, n), optional
+        Raw counts of sampled pairs (incoming bin, outgoing bin), before any symmetrisation.
+    replicates : tuple of arrays
+        ``symmetric`` from equal parts of the rays, dense or sparse; their mean is ``symmetric``. For errors.
+    symmetrised : bool
+        Whether each sampled pair was counted both ways.
+    samples : int
+        Number of sampled pairs, 0 where nothing was sampled.
+    method : str
+        The method that was used: ``"exact"``, ``"quadrature"``, ``"qmc"``, ``"monte-carlo"``, or how the matrix came.
+    law : str
+        The law, as its repr.
+    reversible, mirror_symmetric : bool or None
+        As for a law; None where it is not known.
+    frame : {"paper", "specular"}
+        The convention; see `in_specular_frame`.
+    requested_tolerance : float, optional
+        The Frobenius error that was asked for.
+    unresolved : float
+        Share of the flux whose way through the wall is not known: beams that were not resolved, or traced rays that
+        did not escape.
+    norm_bound : float
+        Upper bound of the operator norm of the exact matrix: 1 for Markov kernels that keep the measure.
+    raw_defect : SymmetryDefect, optional
+        The symmetry defect of the raw sample, with its z-score.
+    metadata : mapping
+        Anything else that belongs to the record, as plain JSON values.
+
+    Examples
+    --------
+    >>> from .bins import Bins
+    >>> P = KernelMatrix([[0.75, 0.25], [0.25, 0.75]], Bins(2), Estimate(0.0, 0.0, "bound", "given"))
+    >>> (P @ P).array.round(14).tolist(), float(P.symmetry_defect())
+    ([[0.625, 0.375], [0.375, 0.625]], 0.0)
+    """
+
+    symmetric: Floats
+    basis: Basis
+    error: Estimate
+    counts: NDArray[np.int64] | None = field(default=None, kw_only=True)
+    replicates: tuple[Replicate, ...] = field(default=(), kw_only=True)
+    symmetrised: bool = field(default=False, kw_only=True)
+    samples: int = field(default=0, kw_only=True)
+    method: str = field(default="given", kw_only=True)
+    law: str = field(default="", kw_only=True)
+    reversible: bool | None = field(default=None, kw_only=True)
+    mirror_symmetric: bool | None = field(default=None, kw_only=True)
+    frame: Frame = field(default="paper", kw_only=True)
+    requested_tolerance: float | None = field(default=None, kw_only=True)
+    unresolved: float = field(default=0.0, kw_only=True)
+    norm_bound: float = field(default=1.0, kw_only=True)
+    raw_defect: SymmetryDefect | None = field(default=None, kw_only=True)
+    metadata: Mapping[str, Any] = field(default_factory=dict, kw_only=True)
+
+    # numpy must leave ``mu @ P`` and ``np.float64(2) * P`` to this class
+    __array_ufunc__ = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.basis, Basis):
+            raise InputError(f"basis: expected a basis such as Bins(64), got {self.basis!r}")
+        symmetric = finite_array("symmetric", self.symmetric)
+        n = self.basis.size
+        if symmetric.shape != (n, n):
+            raise InputError(f"symmetric: expected shape {(n, n)} for {self.basis!r}, got {symmetric.shape}")
+        if not isinstance(self.error, Estimate):
+            raise InputError(f"error: expected an Estimate, got {self.error!r}")
+        object.__setattr__(self, "symmetric", frozen(symmetric))
+        if self.counts is not None:
+            counts = np.array(self.counts, dtype=np.int64)
+            if counts.shape != (n, n):
+                raise InputError(f"counts: expected shape {(n, n)}, got {counts.shape}")
+            counts.setflags(write=False)
+            object.__setattr__(self, "counts", counts)
+
+    # ---- the arrays ------------------------------------------------------------------------------------------
+    @property
+    def size(self) -> int:
+        """Number of basis functions."""
+        return self.basis.size
+
+    @property
+    def array(self) -> Floats:
+        """P[i, j] = P(bin i -> bin j) for partitions, <e_i, P e_j> for other bases; shape (n, n)."""
+        heights = self.basis.heights
+        return np.asarray(heights[:, None] * self.symmetric / heights)
+
+    @property
+    def weights(self) -> Floats:
+        """Invariant probability measure of the cells, sum 1 (squared coefficients of 1 for other bases)."""
+        return self.basis.weights
+
+    @property
+    def flux(self) -> Floats:
+        """Probability of going from cell i to cell j under the invariant measure: ``weights[:, None] * array``."""
+        if not self.basis.is_partition:
+            raise InputError(f"flux: {self.basis!r} has no cells; use Bins, or .symmetric for <e_i, P e_j>")
+        root = np.sqrt(self.weights)
+        return np.asarray(root[:, None] * self.symmetric * root)
+
+    @property
+    def tolerance_met(self) -> bool | None:
+        """Whether the error is within the tolerance that was asked for; None where none was."""
+        return None if self.requested_tolerance is None else float(self.error) <= self.requested_tolerance
+
+    def symmetry_defect(self) -> SymmetryDefect:
+        """Distance from reversibility: relative Frobenius norm of the antisymmetric part in an orthonormal basis.
+
+        For sampled kernels it is that of the raw sample, also when it was symmetrised, and ``.z_score`` says how
+        far it lies above the sampling noise.
+        """
+        if self.raw_defect is not None:
+            return self.raw_defect
+        return SymmetryDefect(relative_asymmetry(self.symmetric))
+
+    def stochastic_defect(self) -> Defect:
+        """How far P 1 is from 1: the largest row defect for partitions, the L^2 norm for other bases."""
+        if self.basis.is_partition:
+            return Defect(float(np.max(np.abs(self.array.sum(axis=1) - 1.0))), STOCHASTIC_NORM_CELLS)
+        constant = self.basis.constant
+        return Defect(float(np.linalg.norm(self.symmetric @ constant - constant)), STOCHASTIC_NORM)
+
+    # ---- the algebra -----------------------------------------------------------------------------------------
+    @overload
+    def __matmul__(self, other: KernelMatrix) -> KernelMatrix: ...
+    @overload
+    def __matmul__(self, other: ArrayLike | AngleFunction) -> Floats: ...
+    def __matmul__(self, other: KernelMatrix | ArrayLike | AngleFunction) -> KernelMatrix | Floats:
+        """``P @ Q``: first P, then Q. ``P @ f``: the operator on values in the cells (or coefficients), or on a
+        function of the angle, which is projected."""
+        if isinstance(other, KernelMatrix):
+            return multiplied(self, other)
+        return np.asarray(self.array @ self._coordinates(other, "f"))
+
+    def __rmatmul__(self, measure: ArrayLike | AngleFunction) -> Floats:
+        """``mu @ P``: the measure after one step, from the masses of the cells (for other bases the integrals of
+        the e_i), or from a density with respect to the invariant measure."""
+        if callable(measure):
+            return np.asarray((self._coordinates(measure, "mu") / self.basis.heights**2) @ self.array)
+        return np.asarray(self._coordinates(measure, "mu", axis=-1) @ self.array)
+
+    def __mul__(self, factor: float) -> KernelMatrix:
+        return scaled(self, finite_number("factor", factor))
+
+    __rmul__ = __mul__
+
+    def __neg__(self) -> KernelMatrix:
+        return -1.0 * self
+
+    def __add__(self, other: KernelMatrix) -> KernelMatrix:
+        return added(self, other) if isinstance(other, KernelMatrix) else NotImplemented
+
+    def __sub__(self, other: KernelMatrix) -> KernelMatrix:
+        return added(self, -1.0 * other) if isinstance(other, KernelMatrix) else NotImplemented
+
+    def __pow__(self, exponent: int) -> KernelMatrix:
+        return to_power(self, whole_number("exponent", exponent, 0))
+
+    def adjoint(self) -> KernelMatrix:
+        """The matrix of the adjoint kernel in L^2 of the invariant measure."""
+        return replace(
+            self,
+            symmetric=self.symmetric.T,
+            counts=None if self.counts is None else self.counts.T,
+            replicates=tuple(cast(Any, part).T for part in self.replicates),
+            law=self.law if self.reversible else f"adjoint of {self.law or self.method}",
+        )
+
+    def tensor(self, other: KernelMatrix) -> KernelMatrix:
+        """The kernel that applies this one to the first angle and the other to the second, independently."""
+        return tensor_product(self, other)
+
+    def in_specular_frame(self) -> KernelMatrix:
+        """P J, J f(theta) = f(pi - theta): Feres' convention, where specular reflection is the identity.
+
+        Of a matrix that is in that convention already this gives back the paper's, as for laws.
+        Raises an InputError where J does not keep the span of the basis; discretise the law's own
+        ``in_specular_frame()`` then.
+        """
+        return flipped_frame(self)
+
+    def as_linear_operator(self) -> LinearOperator:
+        """``array`` as a scipy LinearOperator, with its transpose."""
+        from scipy.sparse.linalg import aslinearoperator
+
+        return aslinearoperator(self.array)
+
+    # ---- files and pictures ----------------------------------------------------------------------------------
+    def save(self, path: str | Path, overwrite: bool = False) -> Path:
+        """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``."""
+        from .archive import write_matrix
+
+        return write_matrix(self, path, overwrite=overwrite)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the density with respect to the invariant measure; returns the axes."""
+        from .plot import draw_matrix
+
+        return draw_matrix(self, ax)
+
+    def __repr__(self) -> str:
+        error = f"error {float(self.error):.2g} ({self.error.kind})"
+        parts = [repr(self.basis), self.law, self.method, error]
+        if self.samples:
+            parts.append(f"{self.samples} samples")
+        if self.frame == "specular":
+            parts.append("specular frame")
+        if self.tolerance_met is False:
+            parts.append(f"tolerance {self.requested_tolerance:g} not met")
+        return f"KernelMatrix({', '.join(part for part in parts if part)})"
+
+    # ---- internals -------------------------------------------------------------------------------------------
+    def _coordinates(self, other: ArrayLike | AngleFunction, name: str, axis: int = 0) -> Floats:
+        if callable(other):
+            return np.asarray(self.basis.heights * self.basis.project(other))
+        values = finite_array(name, other)
+        if values.ndim == 0 or values.shape[axis] != self.size:
+            raise InputError(f"{name}: expected {self.size} entries for {self.basis!r}, got shape {values.shape}")
+        return values

@@ -1,0 +1,1 @@
+"""Kernel matrices from sampled rays, with their sampling errors."""

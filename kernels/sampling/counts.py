@@ -1,0 +1,282 @@
+"""From counted pairs of angles to kernel matrices: estimates, their errors, and the test of symmetry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...errors import AccuracyError
+from ...estimates import LEVEL
+from ...rounding import EPS
+from ..bases.assembly import add_products, cell_index
+from ..bases.basis import Basis
+from ..matrices.defects import SymmetryDefect, relative_asymmetry, replicate_z_score, reversibility_z_score
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    Replicate: TypeAlias = "Floats | csr_array[Any, tuple[int, int]]"
+
+Counts: TypeAlias = NDArray[np.int64]
+
+# Parts of independent rays whose spread gives errors: 32 tell it within an eighth, and its shape.
+BATCHES = 32
+# Beyond this the replicates are not kept: they serve error estimates of eigenvalues, for which counts do as well.
+LARGEST_REPLICATES = 2**28
+# Over the degrees of freedom of the spread, the share of the dimensions that is not counted on: the estimate of their
+# number is too large where a few of them rule. The coverage of simulated normal parts, of eleven spectra, is 93.6 to
+# 96.4 % of 8 parts, and 94.6 to 95.8 % of 32.
+UNSURE_DIMENSIONS = 1.5
+# Entries of a part that are compared with those of the others; of larger arrays some rows, of fewer dimensions.
+MOST_COMPARED = 2**20
+WORST_NAMED = 8
+
+
+@dataclass(frozen=True)
+class SampledArray:
+    """A symmetric array from samples with its error, replicates and raw symmetry defect.
+
+    The error is the 95 % quantile of the Frobenius norm of what the rays' randomness does.
+    """
+
+    symmetric: Floats
+    error: float
+    replicates: tuple[Replicate, ...]
+    raw_defect: SymmetryDefect
+    counts: Counts | None
+
+
+def count_pairs(basis: Basis, incoming: Floats, outgoing: Floats) -> Counts:
+    """Numbers of pairs from cell i to cell j, shape (n, n)."""
+    n = basis.size
+    cell = cell_index(basis, incoming).ravel() * n + cell_index(basis, outgoing).ravel()
+    return np.bincount(cell, minlength=n * n).reshape(n, n).astype(np.int64, copy=False)
+
+
+def sum_products(basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats | None = None) -> Floats:
+    """Sum over the pairs of e_i(theta) e_j(theta'), shape (n, n)."""
+    total = np.zeros((basis.size, basis.size))
+    add_products(total, basis, incoming, outgoing, np.ones(incoming.size) if weight is None else weight)
+    return total
+
+
+def array_from_counts(
+    parts: Sequence[Counts | Floats], basis: Basis, *, symmetrise: bool, independent: bool
+) -> SampledArray:
+    r"""The estimate from counts C of pairs whose incoming angles follow the invariant measure.
+
+    Parameters
+    ----------
+    parts : sequence of (n, n) arrays
+        One array for pairs that are independent; several, of batches of the same size or parts of a randomised net,
+        for others. Weights may stand for counts in the latter case.
+    basis : Basis
+        The partition that was counted in.
+    symmetrise : bool
+        False: P[i, j] = C_ij / N_i, so that rows sum to 1. True: every pair counts both ways, and the flux is
+        (C_ij + C_ji) / (2 N).
+    independent : bool
+        Whether the pairs are independent, so that counts are multinomial; else errors come from the parts.
+
+    Raises
+    ------
+    AccuracyError
+        If a bin has no pairs; ``defect`` is the measure of such bins.
+    """
+    counts = parts[0] if len(parts) == 1 else _summed(parts)
+    number, rows = float(counts.sum()), counts.sum(axis=1)
+    _check_occupied(rows + counts.sum(axis=0) if symmetrise else rows, basis)
+    scale = basis.heights[:, None] * basis.heights  # from fluxes to the orthonormal basis
+    flux = (counts + counts.T) / (2.0 * number) if symmetrise else counts * (basis.weights / rows)[:, None]
+    symmetric = scale * flux
+    replicates = _Replicates(symmetric, len(parts))
+    if independent:
+        error = _quantile(*_moments_of_counts(counts, basis, symmetrise))
+        z_score = reversibility_z_score(np.asarray(counts, dtype=np.int64))
+    else:
+        for part in parts:
+            # the part's influence on the estimate: its numerators minus its denominators times the whole estimate
+            if symmetrise:
+                excess = (part + part.T) / (2.0 * number) - float(part.sum()) / number * flux
+            else:
+                excess = (part - (part.sum(axis=1) / rows)[:, None] * counts) * (basis.weights / rows)[:, None]
+            replicates.add(len(parts) * scale * excess)
+        error = replicates.half_width()
+        pairs = np.nonzero(np.triu(counts + counts.T, 1))
+        root = np.sqrt((counts + counts.T)[pairs])
+        z_score = replicate_z_score([(part[pairs] - part.T[pairs]) / root for part in parts])
+    raw = relative_asymmetry(scale * counts / number)
+    whole = np.asarray(counts, dtype=np.int64) if np.issubdtype(counts.dtype, np.integer) else None
+    return SampledArray(symmetric, error, replicates.kept(), SymmetryDefect(raw, z_score=z_score), whole)
+
+
+def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
+    """The estimate from means of e_i(theta) e_j(theta') over batches of the same size or parts of a net.
+
+    What is known is put in: P 1 = 1, and where the law keeps the measure also the same for the adjoint. Errors are
+    those of the spread over these.
+    """
+    raw = np.mean(means, axis=0)
+    scale = float(np.linalg.norm(raw)) or 1.0
+    z_score = replicate_z_score([(mean - mean.T) / scale for mean in means])
+    fixed = [_with_constant(mean, basis.constant, keeps_measure or symmetrise) for mean in means]
+    if symmetrise:
+        fixed = [0.5 * (mean + mean.T) for mean in fixed]
+    symmetric = np.asarray(np.mean(fixed, axis=0))
+    replicates = _Replicates(symmetric, len(means))
+    for mean in fixed:
+        replicates.add(mean - symmetric)
+    defect = SymmetryDefect(relative_asymmetry(raw), z_score=z_score)
+    return SampledArray(symmetric, replicates.half_width(), replicates.kept(), defect, None)
+
+
+def half_width(symmetric: Floats, replicates: Sequence[Replicate]) -> float:
+    """What the randomness of the rays has in the error of a matrix from several parts of them."""
+    found = _Replicates(symmetric, len(replicates))
+    for part in replicates:
+        found.add(np.asarray(part - symmetric))
+    return found.half_width()
+
+
+class _Replicates:
+    """The arrays of the parts, collected one by one; sparse where that is smaller, dropped if too large."""
+
+    def __init__(self, symmetric: Floats, number: int) -> None:
+        self.symmetric, self.number = symmetric, number
+        self.squares = 0.0
+        self.arrays: list[Replicate] = []
+        self.rows = slice(None, None, -(-symmetric.size // MOST_COMPARED))
+        self.differences: list[Floats] = []
+
+    def add(self, difference: Floats) -> None:
+        self.squares += float(np.sum(difference**2))
+        self.differences.append(difference[self.rows].ravel())
+        if self.symmetric.nbytes * self.number > LARGEST_REPLICATES:
+            return
+        replicate = self.symmetric + difference
+        if 4 * np.count_nonzero(replicate) > replicate.size:
+            replicate.setflags(write=False)
+            self.arrays.append(replicate)
+            return
+        from scipy.sparse import csr_array
+
+        self.arrays.append(csr_array(replicate))
+
+    def half_width(self) -> float:
+        """The 95 % quantile of the norm of the error of the mean of the parts.
+
+        With one dimension that is Student's; with d equally important ones the square over its estimate follows F with
+        d and (parts - 1) d degrees of freedom. In general d is (tr C)^2 / tr C^2, C the covariance of the parts, and
+        the ratio is that F whose numbers of degrees belong to w = (tr C^2)^3 / (tr C^3)^2 <= d, drawn together to the
+        variance of d: so that mean, variance and skewness of the square are those of normal parts.
+        """
+        from scipy.special import fdtri
+
+        if self.squares == 0.0:
+            return 0.0
+        freedom = self.number - 1
+        sure = 1.0 - UNSURE_DIMENSIONS / freedom
+        spread, skew = (max(sure * number, 1.0) for number in _dimensions(np.array(self.differences)))
+        beyond = float(fdtri(skew, freedom * skew, LEVEL)) - 1.0
+        quantile = 1.0 + beyond * math.sqrt(skew / spread)
+        return math.sqrt(quantile * self.squares / (self.number * freedom))
+
+    def kept(self) -> tuple[Replicate, ...]:
+        return tuple(self.arrays)
+
+
+def _dimensions(differences: Floats) -> tuple[float, float]:
+    """(tr C)^2 / tr C^2 and (tr C^2)^3 / (tr C^3)^2 of normal vectors from their differences from their mean.
+
+    Means of products of traces of Wishart's matrices give (tr C)^2, tr C^2 and tr C^3 without bias. What no covariance
+    can have is moved to what one can: the second number is at most the first, and at least 1.
+    """
+    freedom = len(differences) - 1
+    gram = differences @ differences.T / freedom
+    trace, square, cube = float(np.trace(gram)), float(np.sum(gram**2)), float(np.sum((gram @ gram) * gram))
+    of_square = (square - trace**2 / freedom) * freedom**2 / ((freedom - 1) * (freedom + 2))
+    # a smaller share than that of rounding is none
+    of_square = max(of_square, EPS * trace**2)
+    squared = max(trace**2 - 2.0 * of_square / freedom, of_square)
+    of_trace = math.sqrt(squared)
+    rest = 3.0 * of_square * of_trace * (1.0 + 1.0 / freedom) / freedom + of_trace**3 / freedom**2
+    of_cube = (cube - rest) / (1.0 + 3.0 / freedom + 4.0 / freedom**2)
+    of_cube = min(max(of_cube, of_square**2 / of_trace), of_square**1.5)
+    return squared / of_square, of_square**3 / of_cube**2
+
+
+def _with_constant(array: Floats, constant: Floats, both: bool) -> Floats:
+    array = array - np.outer(array @ constant - constant, constant)
+    return array - np.outer(constant, constant @ array - constant) if both else array
+
+
+def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:
+    total = parts[0].copy()
+    for part in parts[1:]:
+        total += part
+    return total
+
+
+def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) -> tuple[float, float]:
+    """Mean and variance of the squared Frobenius norm of the error, where counts are multinomial."""
+    weights, heights = basis.weights, basis.heights
+    if not symmetrise:
+        # an entry (i, j) of the array is C_ij times w_i h_i h_j / N_i, and each row a multinomial of its own
+        rows = counts.sum(axis=1)
+        mean, variance = _squared_norms(counts, heights**2, rows)
+        scale = (weights * heights / rows) ** 2
+        return float(scale @ mean), float(scale**2 @ variance)
+    # a pair is counted by half at each of its two places, or fully on the diagonal
+    number = float(counts.sum())
+    squares = np.outer(heights, heights) ** 2 / number**2
+    upper = np.triu_indices(len(weights), 1)
+    pairs = np.concatenate([np.diagonal(counts), (counts + counts.T)[upper]])
+    weight = np.concatenate([np.diagonal(squares), 0.5 * squares[upper]])
+    mean, variance = _squared_norms(pairs[None], weight, np.array([number]))
+    return float(mean[0]), float(variance[0])
+
+
+def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Floats) -> tuple[Floats, Floats]:
+    """Mean and variance of sum_j w_j (C_j - N p_j)^2 for multinomial rows C of N pairs, both estimated from C.
+
+    The sum is that of k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
+    that its variance is N Var k(x, x) + 2 N (N - 1) E k(x, y)^2. Without the first term, which rules where most counts
+    are 0 or 1, counts would be taken for normal.
+    """
+    number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs may be beyond int64
+    share = counts / number[:, None]
+    # without bias, as p^2 alone matters where counts are small
+    square = np.maximum(share * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
+    spread = np.einsum("ij,j->i", share * (1.0 - share), weight)
+    # a single pair says nothing about its spread, which is then taken as large
+    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * spread, share @ weight)
+    turned = weight * (1.0 - 2.0 * share)
+    own = np.einsum("ij,ij->i", share, turned**2) - np.einsum("ij,ij->i", share, turned) ** 2
+    other = np.einsum("ij,j->i", square * (1.0 - 2.0 * share), weight**2) + (square @ weight) ** 2
+    return mean, number * np.maximum(own, 0.0) + 2.0 * number * (number - 1.0) * np.maximum(other, 0.0)
+
+
+def _quantile(mean: float, variance: float) -> float:
+    """The 95 % quantile of a norm, from the mean and the variance of its square, by a scaled chi-square of these."""
+    from scipy.special import chdtri
+
+    if mean == 0.0 or variance == 0.0:
+        return math.sqrt(mean)
+    return math.sqrt(0.5 * variance / mean * float(chdtri(2.0 * mean**2 / variance, 1.0 - LEVEL)))
+
+
+def _check_occupied(rows: Counts | Floats, basis: Basis) -> None:
+    empty = np.flatnonzero(rows <= 0)
+    if empty.size:
+        named = ", ".join(map(str, empty[:WORST_NAMED])) + (", ..." if empty.size > WORST_NAMED else "")
+        raise AccuracyError(
+            f"{empty.size} of {basis.size} bins have no incoming pair (bins {named}); use more samples, samples that "
+            "cover all angles, or fewer bins",
+            float(basis.weights[empty].sum()),
+        )

@@ -1,0 +1,134 @@
+"""Kernel matrices from any pairs of incoming and outgoing angles, a user's own included."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, angles
+from ...errors import InputError
+from ..bases.basis import Basis
+from ..bases.bins import Bins
+from ..bases.measure import SINE
+from ..matrices.defects import invariance_z_score
+from ..matrices.matrix import KernelMatrix
+from ..matrices.matrix_algebra import frobenius_error
+from .counts import BATCHES, array_from_counts, array_from_sums, count_pairs, sum_products
+
+# Incoming angles whose bin totals lie this many standard deviations from the invariant measure were not drawn from it.
+NOT_INVARIANT_Z = 4.0
+# The totals are looked at in the basis' own bins, or in this many where it has none.
+TEST_BINS = 32
+# Batches of weighted pairs whose spread gives their errors: smaller ones would have less even weights.
+WEIGHTED_BATCHES = 8
+
+
+def estimate(
+    theta_in: ArrayLike,
+    theta_out: ArrayLike,
+    basis: Basis,
+    symmetrise: bool = False,
+    *,
+    invariant: bool | None = None,
+) -> KernelMatrix:
+    r"""The matrix of the law behind pairs (theta, theta') that were measured, traced or simulated.
+
+    Parameters
+    ----------
+    theta_in, theta_out : array_like
+        Incoming and outgoing angles in (0, pi), radians, in the same shape; independent pairs.
+    basis : Basis
+        Bins, Legendre or Panels.
+    symmetrise : bool
+        Count each pair both ways, as is right for a reversible law. The flux is then symmetric but rows of ``array``
+        sum to 1 within the sampling error only; `KernelMatrix.symmetry_defect` is still that of the raw pairs.
+        Without it rows sum to 1.
+    invariant : bool, optional
+        Whether the incoming angles follow sin(theta) d theta. By default decided by a test of their totals in bins.
+        Where they do not, C - C^T says nothing about reversibility, and rows of counts are not even averages over
+        their bins; every pair is then weighted by the measure of the angles that are nearer to its own incoming
+        angle than to any other of its batch.
+
+    Returns
+    -------
+    KernelMatrix
+        With the raw ``counts`` for Bins and in ``error`` the 95 % quantile of the sampling error, from the variance of
+        multinomial counts, or from the spread of batches: 32 in bases without cells, 8 of weighted pairs. The
+        truncation to the basis is not part of it.
+
+    Raises
+    ------
+    InputError
+        If the shapes differ, an angle is outside (0, pi), or there are fewer pairs than can be estimated from.
+    AccuracyError
+        If a bin has no incoming pair; use more pairs or fewer bins.
+
+    Examples
+    --------
+    >>> P = estimate([0.5, 1.0, 2.0, 2.5], [0.5, 2.0, 1.0, 2.5], Bins(2))
+    >>> P.array.round(14).tolist(), P.counts.tolist()
+    ([[0.5, 0.5], [0.5, 0.5]], [[1, 1], [1, 1]])
+    """
+    incoming, outgoing = angles("theta_in", theta_in), angles("theta_out", theta_out)
+    if incoming.shape != outgoing.shape:
+        raise InputError(
+            f"theta_out: expected the shape of theta_in, {incoming.shape}, got {outgoing.shape}; pass pairs"
+        )
+    if not isinstance(basis, Basis):
+        raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
+    if basis.measure != SINE:
+        raise InputError(f"basis: expected one for sin(theta), got {basis!r}")
+    incoming, outgoing = incoming.ravel(), outgoing.ravel()
+    least = 1 if basis.is_partition else 2 * WEIGHTED_BATCHES
+    if incoming.size < least:
+        raise InputError(f"theta_in: expected at least {least} pairs for {basis!r}, got {incoming.size}")
+    follows = _follows_measure(incoming, basis) if invariant is None else bool(invariant)
+    counts = count_pairs(basis, incoming, outgoing) if basis.is_partition else None
+    if counts is not None and (follows or incoming.size < 2 * WEIGHTED_BATCHES):
+        array = array_from_counts([counts], basis, symmetrise=symmetrise, independent=True)
+        method = "variance of multinomial counts"
+    else:
+        means = _batch_means(basis, incoming, outgoing, follows)
+        method = f"spread of {len(means)} batches"
+        if counts is not None:
+            fluxes = [mean / (basis.heights[:, None] * basis.heights) for mean in means]
+            array = array_from_counts(fluxes, basis, symmetrise=symmetrise, independent=False)
+        else:
+            array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=False)
+    return KernelMatrix(
+        array.symmetric,
+        basis,
+        frobenius_error(array.error, "estimate", method),
+        counts=counts,
+        replicates=array.replicates,
+        symmetrised=symmetrise,
+        samples=incoming.size,
+        method="pairs",
+        raw_defect=array.raw_defect,
+        reversible=True if symmetrise else None,
+        metadata={"incoming_angles_follow_measure": follows},
+    )
+
+
+def _follows_measure(incoming: Floats, basis: Basis) -> bool:
+    bins = basis if isinstance(basis, Bins) else Bins(TEST_BINS)
+    totals = np.bincount(bins.index(incoming), minlength=bins.size)
+    return invariance_z_score(totals, bins.weights) < NOT_INVARIANT_Z
+
+
+def _batch_means(basis: Basis, incoming: Floats, outgoing: Floats, follows: bool) -> list[Floats]:
+    """Means of e_i(theta) e_j(theta') over batches, of at least two pairs."""
+    means, number = [], min(BATCHES, incoming.size // 2) if follows else WEIGHTED_BATCHES
+    for batch in range(number):
+        theta, image = incoming[batch::number], outgoing[batch::number]
+        weight = np.full(theta.size, 1.0 / theta.size) if follows else _nearest_measure(theta)
+        means.append(sum_products(basis, theta, image, weight))
+    return means
+
+
+def _nearest_measure(theta: Floats) -> Floats:
+    """Measure of the angles nearest to each; equal angles share theirs."""
+    distinct, owner, number = np.unique(theta, return_inverse=True, return_counts=True)
+    middle = 0.5 * (distinct[1:] + distinct[:-1])
+    mass = SINE.mass(np.concatenate(([0.0], middle)), np.concatenate((middle, [np.pi])))
+    return np.asarray((mass / number)[owner])

@@ -1,0 +1,104 @@
+"""What rays add up to, a table for each part of them, and the matrix with its error that follows."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...errors import AccuracyError
+from ..bases.basis import Basis
+from ..bases.mirror import reflection_matrix
+from ..discretisation.isometries import largest_square_sum
+from ..laws.law import Law
+from ..walls.wall_law import LOST_TOLERANCE
+from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
+
+# Rays at a time; more where adding up the matrices of counts would take longer than the rays.
+SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
+SLOW_SECONDS = 2.0
+
+
+class RaySums:
+    """Counts of pairs (theta, theta') of cells, or sums of e_i(theta) e_j(theta') over rays.
+
+    Attributes
+    ----------
+    tables : ndarray of shape (parts, n, n)
+        Integers in bases of cells.
+    each : int
+        Rays of every part.
+    lost : int
+        Rays that did not escape, of all parts. They count as sent back.
+    """
+
+    def __init__(self, law: Law, basis: Basis, parts: int) -> None:
+        self.law, self.basis = law, basis
+        shape = parts, basis.size, basis.size
+        self.tables = np.zeros(shape, dtype=np.int64 if basis.is_partition else np.float64)
+        self.each, self.lost = 0, 0
+
+    @property
+    def chunk(self) -> int:
+        """Rays at a time; a power of two, which keeps the balance of nets."""
+        cells = self.basis.size**2 if self.basis.is_partition else 0
+        return max(SMALLEST_CHUNK, 1 << (cells // CELLS_A_RAY).bit_length())
+
+    def add(self, table: int, incoming: Floats, outgoing: Floats) -> None:
+        """Add rays to one of the tables."""
+        found = (count_pairs if self.basis.is_partition else sum_products)(self.basis, incoming, outgoing)
+        self.tables[table] += found
+
+    def count_lost(self, escaped: NDArray[np.bool_] | None) -> None:
+        """Count the rays that did not escape."""
+        self.lost += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
+
+    def array(self, *, symmetrise: bool, mirrored: bool = False) -> tuple[SampledArray, int, float]:
+        """The matrix, the rays used, and the share of them that did not escape.
+
+        Twice that share times sup |e|^2 is in the error. With ``mirrored`` every ray counts with its mirror image.
+
+        Raises
+        ------
+        AccuracyError
+            If more than a share of 1e-4 did not escape, or a bin has no ray.
+        """
+        used = len(self.tables) * self.each
+        share = self.lost / used
+        if share > LOST_TOLERANCE:
+            raise AccuracyError(
+                f"{self.law!r}: {share:.2g} of {used} rays did not escape, more than {LOST_TOLERANCE:g}; "
+                "geometry.trace(wall, x, theta).counts() says how they ended",
+                share,
+            )
+        parts: list[Any] = [table + self._mirror_image(table) if mirrored else table for table in self.tables]
+        if self.basis.is_partition:
+            array = array_from_counts(parts, self.basis, symmetrise=symmetrise, independent=len(parts) == 1)
+        else:
+            means = [part / (2 * self.each if mirrored else self.each) for part in parts]
+            keeps_measure = bool(self.law.reversible)
+            array = array_from_sums(means, self.basis, symmetrise=symmetrise, keeps_measure=keeps_measure)
+        if share > 0.0:
+            extra = 2.0 * share * largest_square_sum(self.basis)
+            array = SampledArray(array.symmetric, array.error + extra, array.replicates, array.raw_defect, array.counts)
+        return array, used, share
+
+    def _mirror_image(self, table: Any) -> Any:
+        """The table of the rays (pi - theta, pi - theta')."""
+        if self.basis.is_partition:
+            return table[::-1, ::-1]
+        flip = reflection_matrix(self.basis)
+        return flip @ table @ flip.T
+
+
+def progress_bar(total: int) -> AbstractContextManager[Any]:
+    """A bar for runs that take more than a few seconds."""
+    from tqdm import tqdm
+
+    bar: AbstractContextManager[Any] = tqdm(
+        total=total, unit="ray", unit_scale=True, delay=SLOW_SECONDS, disable=None, leave=False
+    )
+    return bar

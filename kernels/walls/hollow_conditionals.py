@@ -1,0 +1,225 @@
+"""Rows of one hollow, which remember where their neighbours' pieces are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+
+if TYPE_CHECKING:
+    from ...geometry.scene.scene import Scene
+
+# Collisions after which a ray counts as lost, and those that count as flights where runs of them are done in one.
+MOST_COLLISIONS, MOST_IN_RUNS = 100_000, 8
+# A row may take as many flights as it needs, unless its owner says otherwise; a ray in a channel as many collisions.
+NO_LIMIT = 2**62
+# Rounds in which rows are done again because a neighbour has a piece that they have overlooked.
+MOST_ROUNDS = 8
+# Critical angles looked for at a time, and the least width of their pieces as a share of the widest of them.
+MOST_CUTS, CUT_SHARE = 6, 0.1
+
+
+class Row(NamedTuple):
+    """Outgoing angles with the widths of the opening that go there, the error of their integral, and the width lost."""
+
+    nodes: Floats
+    widths: Floats
+    error: float
+    lost: float
+
+
+class _Pieces(NamedTuple):
+    low: Floats
+    high: Floats
+    label: NDArray[np.uint64]
+    width_that_matters: float
+
+
+@dataclass
+class HollowRows:
+    """The rows of one hollow for one kind of functions; see `WallRows`.
+
+    A piece that is narrower than the distance of the samples can be overlooked in a row. Its neighbours in theta may
+    have seen it: so rows are compared with those on either side, whenever either was computed.
+    """
+
+    scene: Scene
+    hollow: int
+    degree: int
+    edges: Floats
+    least_level: int
+    most_flights: int = NO_LIMIT
+
+    def __post_init__(self) -> None:
+        self.rays, self.flights = 0, 0
+        self._theta = np.empty(0)
+        self._pieces: dict[float, _Pieces] = {}
+        self._overlooked: dict[float, list[float]] = {}
+        self._critical: dict[tuple[int, float, float], float] = {}
+
+    @property
+    def width(self) -> float:
+        """That of the opening."""
+        left, right = self.scene.hollows[self.hollow, :2]
+        return float(right - left)
+
+    @cached_property
+    def _bounds(self) -> tuple[Any, ...]:
+        scene = self.scene
+        # empty tables instead of absent ones, so that one compiled version serves all walls: compiling takes 20 s
+        tables = (
+            scene.joints,
+            np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines,
+            *(
+                np.zeros((0, columns)) if table is None else table
+                for columns, table in (
+                    (19, scene.circles),
+                    (19, scene.ellipses),
+                    (14, scene.beziers),
+                    (10, scene.pairs),
+                )
+            ),
+            # so many lines that they have a grid are rare enough for a version of their own
+            scene.grid,
+        )
+        period = scene.cell if scene.is_open else None
+        has_channels = scene.pairs is not None
+        has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, 10] > 0.0)))
+        most = NO_LIMIT if has_channels else MOST_COLLISIONS
+        limits = most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_flights
+        return scene.hollows[self.hollow], tables, period, limits, self.edges
+
+    def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Row], set[float]]:
+        """Rows at angles that increase, and those angles of earlier calls whose rows are now known to be wrong."""
+        rows: dict[float, Row] = {}
+        asked, stale = set(theta.tolist()), set[float]()
+        pending = np.ones(len(theta), dtype=np.bool_)
+        for _ in range(MOST_ROUNDS):
+            rows.update(self._march_once(theta[pending], tolerances[pending]))
+            overlooked = self._compare(theta[pending])
+            stale |= overlooked - asked
+            pending = np.isin(theta, list(overlooked & asked))
+            if not pending.any():
+                break
+        return rows, stale
+
+    def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Row]:
+        from ...geometry.itineraries.compiled.gauss import gauss_tables
+        from ...geometry.itineraries.compiled.march import march_rows
+        from ...geometry.tracing.threads import interruptibly
+
+        seeds = [
+            self._seeds(angle, least) for angle, least in zip(theta.tolist(), tolerances * self.width, strict=True)
+        ]
+        found = interruptibly(
+            lambda: march_rows(
+                theta, tolerances, self._bounds, self.degree, gauss_tables(), self.least_level,
+                np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
+            )
+        )  # fmt: skip
+        (nodes, widths), node_starts, pieces, piece_starts, errors, lost, rays, flights = found
+        self.rays += int(rays.sum())
+        self.flights += int(flights.sum())
+        rows = {}
+        for k, angle in enumerate(theta.tolist()):
+            own = slice(node_starts[k], node_starts[k + 1])
+            rows[angle] = Row(nodes[own], widths[own], float(errors[k]), float(lost[k]))
+            own = slice(piece_starts[k], piece_starts[k + 1])
+            low, high, label = (part[own].copy() for part in pieces)
+            # a row without flights for all its pieces has overlooked some, and says so
+            matters = np.inf if flights[k] >= self.most_flights else float(tolerances[k] * self.width)
+            self._pieces[angle] = _Pieces(low, high, label, matters)
+        self._theta = np.union1d(self._theta, theta)
+        return rows
+
+    def _seeds(self, angle: float, least: float) -> Floats:
+        """Where the samples of a row begin, in increasing order.
+
+        Also in the pieces of the nearest rows that are known, and where this row has overlooked some.
+        """
+        from ...geometry.itineraries.compiled.march import wide_middles
+        from ...geometry.itineraries.entry_nodes import first_places
+
+        k = int(np.searchsorted(self._theta, angle))
+        known = [self._pieces[near] for near in self._theta[max(0, k - 1) : k + 2].tolist()]
+        left, right = self.scene.hollows[self.hollow, :2].tolist()
+        places = [first_places(angle, left, right, least), *(wide_middles(row.low, row.high, least) for row in known)]
+        if angle in self._pieces:
+            # its own changes are known already, up to the gaps that were left
+            places += [self._pieces[angle].low, self._pieces[angle].high]
+        return np.sort(np.concatenate([*places, np.array(self._overlooked.get(angle, []), dtype=np.float64)]))
+
+    def _compare(self, theta: Floats) -> set[float]:
+        """The angles among these and their neighbours whose rows have overlooked pieces."""
+        from ...geometry.itineraries.compiled.neighbours import find_overlooked
+        from ...geometry.tracing.threads import interruptibly
+
+        place = np.searchsorted(self._theta, theta)
+        near = np.unique(np.clip(np.concatenate((place - 1, place, place + 1)), 0, len(self._theta) - 1))
+        fresh = np.isin(near, place)
+        linked = (np.diff(near) == 1) & (fresh[1:] | fresh[:-1])
+        angles = self._theta[near]
+        rows = [self._pieces[angle] for angle in angles.tolist()]
+        pieces = tuple(np.concatenate([row[part] for row in rows]) for part in range(3))
+        starts = np.cumsum([0, *(len(row.low) for row in rows)])
+        least = np.array([row.width_that_matters for row in rows])
+        found = interruptibly(lambda: find_overlooked(angles, least, pieces, starts, linked, self._bounds, self.degree))
+        owner, places, rays, flights = found
+        self.rays, self.flights = self.rays + rays, self.flights + flights
+        for angle, x in zip(angles[owner].tolist(), places.tolist(), strict=True):
+            self._overlooked.setdefault(angle, []).append(x)
+        return set(angles[owner].tolist())
+
+    def critical_angles(self, low: float, high: float) -> list[tuple[float, float]]:
+        """Angles in (low, high) where a piece is born or vanishes, with the width of that piece in the nearest row.
+
+        Only those that the rows known so far on either side of them show.
+        """
+        first = max(0, int(np.searchsorted(self._theta, low)) - 1)
+        last = int(np.searchsorted(self._theta, high, side="right")) + 1
+        angles = self._theta[first:last].tolist()
+        found = []
+        for before, after in pairwise(angles):
+            for present, absent in ((before, after), (after, before)):
+                there = set(self._pieces[absent].label.tolist())
+                row = self._pieces[present]
+                for k, label in enumerate(row.label.tolist()):
+                    if label not in there and row.high[k] - row.low[k] > row.width_that_matters:
+                        found.append((float(row.high[k] - row.low[k]), label, present, absent, k))
+        found.sort(reverse=True)
+        cuts = []
+        for width, label, present, absent, k in found[:MOST_CUTS]:
+            if width < CUT_SHARE * found[0][0]:
+                break
+            angle = self._located(label, present, absent, k)
+            if low < angle < high:
+                cuts.append((angle, width))
+        return cuts
+
+    def _located(self, label: int, present: float, absent: float, k: int) -> float:
+        from ...geometry.itineraries.compiled.critical_angles import find_critical
+
+        key = (label, min(present, absent), max(present, absent))
+        for (name, low, high), angle in self._critical.items():
+            if name == label and low <= angle <= high and key[1] <= angle <= key[2]:
+                return angle
+        row = self._pieces[present]
+        low, high = float(row.low[k]), float(row.high[k])
+        place = int(np.searchsorted(self._theta, present)) + (1 if absent < present else -1)
+        drift = 0.0
+        if 0 <= place < len(self._theta):
+            beyond = float(self._theta[place])
+            other = np.flatnonzero(self._pieces[beyond].label == np.uint64(label))
+            if len(other) == 1:
+                there = self._pieces[beyond]
+                middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
+                drift = (0.5 * (low + high) - middle) / (present - beyond)
+        angle = float(find_critical(np.uint64(label), present, absent, low, high, drift, self._bounds, self.degree))
+        self._critical[key] = angle
+        return angle

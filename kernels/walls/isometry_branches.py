@@ -1,0 +1,72 @@
+"""Which isometry each branch of a law is: theta' = sign theta + offset."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, angles
+from ..laws.ideal import IsometryLaw
+from ..laws.law import Law
+from ..laws.specular_frame import SpecularFrame
+from ..laws.weighted_sum import Combination
+from .isometry_table import IsometryTable
+
+# Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.
+KINKS = 20_000
+
+
+def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Probability, sign and offset of every branch of a law at the angles ``theta``.
+
+    A law with a table says so itself. For others: between two kinks every branch is one isometry, so a second angle
+    of the same interval gives the sign.
+
+    Parameters
+    ----------
+    law : Law
+        Made of isometries; other laws raise an InputError.
+    theta : array_like
+        Incoming angles in (0, pi), radians.
+
+    Returns
+    -------
+    probability, sign, offset : arrays of shape ``theta.shape + (branches,)``
+        theta' = sign theta + offset, sign = +1 or -1.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> probability, sign, offset = isometries(ker.specular(), 1.0)
+    >>> probability.tolist(), sign.tolist(), (offset / np.pi).tolist()
+    ([1.0], [-1.0], [1.0])
+    """
+    incoming = angles("theta", theta)
+    table = table_of(law)
+    if table is not None:
+        return table.rows(incoming)
+    edges = np.concatenate([[0.0], law.kinks(KINKS)[0], [np.pi]])
+    right = np.clip(np.searchsorted(edges, incoming, side="right"), 1, len(edges) - 1)
+    low, high = edges[right - 1], edges[right]
+    # the midpoint towards the farther end of the interval
+    second = 0.5 * (incoming + np.where(incoming - low > high - incoming, low, high))
+    # one call for both angles, so that the slots are the same
+    probability, outgoing = law.branches(np.stack([incoming, second]))
+    rises = (outgoing[1] - outgoing[0]) * (second - incoming)[..., None] >= 0.0
+    sign = np.where(rises, 1.0, -1.0)
+    return probability[0], sign, outgoing[0] - sign * incoming[..., None]
+
+
+def table_of(law: Law) -> IsometryTable | None:
+    """The table of a law, or None for a law that has none: one that is not made of isometries, or is a composition."""
+    if isinstance(law, IsometryLaw):
+        return IsometryTable.sent_back(1.0) if law.retro else IsometryTable.flat(1.0)
+    if isinstance(law, SpecularFrame):
+        table = table_of(law.law)
+        return None if table is None else table.in_specular_frame()
+    if isinstance(law, Combination):
+        terms = [(weight, table_of(term)) for weight, term in law.terms_checked() if weight > 0.0]
+        tables = [table.scaled(weight) for weight, table in terms if table is not None]
+        return IsometryTable.joined(tables) if len(tables) == len(terms) else None
+    made = getattr(law, "table", None)
+    return None if made is None else made()

@@ -1,0 +1,300 @@
+"""A law of isometries as a table: which isometry acts on which angles, with which probability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import KW_ONLY, dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats, angles, frozen
+from ...errors import InputError
+from ...rounding import EPS
+from ..bases.angles import kept_inside
+from ..bases.intervals import without_outermost
+from ..bases.ragged_lists import ragged
+
+Whole = NDArray[np.int64]
+
+# Offsets are sums of a few angles of the wall, found along different routes: dozens of roundings of numbers below 2 pi.
+SAME_OFFSET = 64.0 * np.pi * EPS
+# Rows of a table that misses nothing sum to 1 within the rounding of their many terms; below this it is made good.
+ROUNDED_ROW = 1e-9
+# Candidates a query looks at are held at a time.
+CHUNK = 2**21
+# Buckets of the index hold about this many entries a piece in all.
+ENTRIES_PER_PIECE = 4.0
+
+
+@dataclass(frozen=True)
+class Crevice:
+    """A rectangular hollow: infinitely many pieces that accumulate at grazing, so it is listed by its shape.
+
+    Parameters
+    ----------
+    share : float
+        Its opening as a share of the period.
+    height_to_width : float
+        Depth over width, r. With d = 2 r |cot theta|, retroreflection has probability ``share`` times the distance
+        from d to the nearest even number, specular reflection the rest of ``share``.
+    exchanged : bool
+        Whether the two outcomes are exchanged: so it is in the specular frame.
+    """
+
+    share: float
+    height_to_width: float
+    exchanged: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class IsometryTable:
+    r"""Pieces theta' = sign theta + offset for low < theta < high, and rectangular crevices.
+
+    On a piece the probability is a + b cot(theta); times sin(theta) it is a sinusoid, given here by its values at the
+    two ends. Between them it is the sum of two terms that are not negative, so that nothing cancels,
+
+        p(theta) sin(theta) = (start sin(high - theta) + end sin(theta - low)) / sin(high - low).
+
+    Parameters
+    ----------
+    sign, offset, low, high, start, end : array_like, shape (pieces,)
+        One entry a piece; no piece is longer than pi/2.
+    crevices : tuple of Crevice
+    unresolved : float
+        A bound of the share of the measure for which the table sends rays back without knowing where they go.
+
+    Examples
+    --------
+    A mirror, cut at pi/2:
+
+    >>> import numpy as np
+    >>> table = IsometryTable.flat(1.0)
+    >>> probability, sign, offset = table.rows(1.0)
+    >>> probability.round(15).tolist(), sign.tolist(), (offset / np.pi).tolist()
+    ([1.0], [-1.0], [1.0])
+    """
+
+    sign: Floats
+    offset: Floats
+    low: Floats
+    high: Floats
+    start: Floats
+    end: Floats
+    _: KW_ONLY
+    crevices: tuple[Crevice, ...] = ()
+    unresolved: float = 0.0
+
+    def __post_init__(self) -> None:
+        names = ("sign", "offset", "low", "high", "start", "end")
+        columns = [np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64)) for name in names]
+        shapes = {column.shape for column in columns}
+        if len(shapes) != 1 or columns[0].ndim != 1:
+            raise InputError(f"table: expected columns of the same length, got shapes {sorted(shapes)}")
+        columns[4:] = (np.maximum(column, 0.0) for column in columns[4:])
+        used = (columns[3] > columns[2]) & ((columns[4] > 0.0) | (columns[5] > 0.0))
+        if np.any(columns[3] - columns[2] > 0.5 * np.pi * (1.0 + 1e-15)):
+            raise InputError("table: expected pieces not longer than pi/2; cut the others at pi/2")
+        for name, column in zip(names, columns, strict=True):
+            object.__setattr__(self, name, frozen(column[used]))
+
+    # ---- how tables are made -----------------------------------------------------------------------------------
+    @classmethod
+    def of_pieces(
+        cls,
+        sign: ArrayLike,
+        offset: ArrayLike,
+        low: ArrayLike,
+        high: ArrayLike,
+        sine: ArrayLike,
+        cosine: ArrayLike,
+        unresolved: float = 0.0,
+    ) -> IsometryTable:
+        """The table of pieces with probability ``sine + cosine cot(theta)``, of any length; they are cut at pi/2."""
+        columns = np.broadcast_arrays(*np.atleast_1d(sign, offset, low, high, sine, cosine))
+        sign, offset, low, high, sine, cosine = (np.asarray(column, dtype=np.float64) for column in columns)
+        right = 0.5 * np.pi
+        lows = np.concatenate([low, np.maximum(low, right)])
+        highs = np.concatenate([np.minimum(high, right), high])
+        sines, cosines = np.tile(sine, 2), np.tile(cosine, 2)
+        start, end = (sines * np.sin(at) + cosines * np.cos(at) for at in (lows, highs))
+        return cls(np.tile(sign, 2), np.tile(offset, 2), lows, highs, start, end, unresolved=unresolved)
+
+    @classmethod
+    def flat(cls, share: float) -> IsometryTable:
+        """Specular reflection with probability ``share``."""
+        return cls.of_pieces(-1.0, np.pi, 0.0, np.pi, share, 0.0)
+
+    @classmethod
+    def sent_back(cls, share: float) -> IsometryTable:
+        """Retroreflection with probability ``share``."""
+        return cls.of_pieces(1.0, 0.0, 0.0, np.pi, share, 0.0)
+
+    @classmethod
+    def of_crevice(cls, share: float, height_to_width: float) -> IsometryTable:
+        """One rectangular crevice."""
+        return cls(*(np.empty(0),) * 6, crevices=(Crevice(share, height_to_width),))
+
+    @classmethod
+    def joined(cls, tables: Iterable[IsometryTable]) -> IsometryTable:
+        """The sum of tables whose shares sum to 1."""
+        parts = list(tables)
+        if not parts:
+            raise InputError("tables: expected at least one, got none")
+        columns = [np.concatenate([table._columns()[k] for table in parts]) for k in range(6)]
+        crevices: dict[tuple[float, bool], float] = {}
+        for crevice in (crevice for table in parts for crevice in table.crevices):
+            key = crevice.height_to_width, crevice.exchanged
+            crevices[key] = crevices.get(key, 0.0) + crevice.share
+        kept = tuple(Crevice(share, *key) for key, share in crevices.items())
+        return cls(*columns, crevices=kept, unresolved=sum(table.unresolved for table in parts))
+
+    def scaled(self, share: float) -> IsometryTable:
+        """The table with every probability multiplied by ``share``."""
+        crevices = tuple(replace(crevice, share=share * crevice.share) for crevice in self.crevices)
+        columns = [*self._columns()[:4], share * self.start, share * self.end]
+        return IsometryTable(*columns, crevices=crevices, unresolved=share * self.unresolved)
+
+    def mirrored(self) -> IsometryTable:
+        """The table of the mirror image of the wall: both angles replaced by pi minus them."""
+        offset = np.where(self.sign > 0.0, -self.offset, 2.0 * np.pi - self.offset)
+        columns = (self.sign, offset, np.pi - self.high, np.pi - self.low, self.end, self.start)
+        return IsometryTable(*columns, crevices=self.crevices, unresolved=self.unresolved)
+
+    def in_specular_frame(self) -> IsometryTable:
+        """The table with outgoing angles replaced by pi minus them."""
+        crevices = tuple(replace(crevice, exchanged=not crevice.exchanged) for crevice in self.crevices)
+        columns = (-self.sign, np.pi - self.offset, *self._columns()[2:])
+        return IsometryTable(*columns, crevices=crevices, unresolved=self.unresolved)
+
+    # ---- what it says ------------------------------------------------------------------------------------------
+    @cached_property
+    def isometries(self) -> tuple[Floats, Floats, Whole]:
+        """Sign and offset of the different isometries, and the number of the one that each piece belongs to.
+
+        The first two are specular reflection and retroreflection, whether the table has them or not.
+        """
+        sign = np.concatenate([[-1.0, 1.0], self.sign])
+        offset = np.concatenate([[np.pi, 0.0], self.offset])
+        order = np.lexsort((offset, sign))
+        fresh = np.diff(sign[order], prepend=0.0) != 0.0
+        fresh |= np.diff(offset[order], prepend=-np.inf) > SAME_OFFSET
+        number = np.empty(order.size, dtype=np.int64)
+        number[order] = np.cumsum(fresh) - 1
+        # rows at the first piece of each group; the two ideal ones come first, so that they keep their exact offsets
+        _, first = np.unique(number, return_index=True)
+        rank = np.argsort(np.argsort(first))
+        where = np.sort(first)
+        return sign[where], offset[where], np.asarray(rank[number][2:], dtype=np.int64)
+
+    @cached_property
+    def ends(self) -> Floats:
+        """The different ends of pieces inside (0, pi): the kinks of the law, those of crevices apart."""
+        ends = np.unique(np.concatenate([self.low, self.high]))
+        return ends[(ends > 0.0) & (ends < np.pi)]
+
+    def mass(self) -> float:
+        """The total measure of all pieces and crevices: 1 but for rounding where the table is complete."""
+        middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
+        return float(np.sum(np.sin(half) * self.density(middle)) + sum(crevice.share for crevice in self.crevices))
+
+    def density(self, theta: Floats, piece: Whole | slice = slice(None)) -> Floats:
+        """p(theta) sin(theta) of one piece for each angle."""
+        low, high = self.low[piece], self.high[piece]
+        raised = self.start[piece] * np.sin(high - theta) + self.end[piece] * np.sin(theta - low)
+        return np.asarray(raised / np.sin(high - low))
+
+    def rows(self, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """Probability, sign and offset of the branches at each angle, shape ``theta.shape + (branches,)``.
+
+        Between two kinks every slot is one isometry. Unused slots have probability 0 and repeat the first isometry.
+        """
+        incoming = angles("theta", theta)
+        flat = incoming.ravel()
+        sign, offset, _ = self.isometries
+        owner, isometry, probability = self._entries(flat)
+        key, place = np.unique(owner * sign.size + isometry, return_inverse=True)
+        total = np.bincount(place, weights=probability, minlength=key.size)
+        key, total = key[total > 0.0], total[total > 0.0]
+        query, number = np.divmod(key, sign.size)
+        whole = np.bincount(query, weights=total, minlength=flat.size)
+        share = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
+        count = np.bincount(query, minlength=flat.size)
+        _, slot = ragged(count)
+        slots = int(count.max(initial=1))
+        filled = np.zeros((flat.size, slots))
+        which = np.zeros((flat.size, slots), dtype=np.int64)
+        filled[query, slot] = share
+        which[query, slot] = number
+        which = np.where(filled > 0.0, which, which[:, :1])
+        shape = (*incoming.shape, slots)
+        return filled.reshape(shape), sign[which].reshape(shape), offset[which].reshape(shape)
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        """Probabilities and outgoing angles, as `rows`."""
+        probability, sign, offset = self.rows(theta)
+        return probability, kept_inside(sign * np.asarray(theta, dtype=np.float64)[..., None] + offset)
+
+    def _entries(self, theta: Floats) -> tuple[Whole, Whole, Floats]:
+        """All (angle, isometry, probability) with pieces of the same isometry still apart."""
+        number = self.isometries[2]
+        first, members = self._index
+        buckets = first.size - 1
+        found: list[tuple[Whole, Whole, Floats]] = []
+        bucket = np.clip((theta * (buckets / np.pi)).astype(np.int64), 0, buckets - 1)
+        size = first[bucket + 1] - first[bucket]
+        step = max(CHUNK // max(int(size.max(initial=1)), 1), 1)
+        for begin in range(0, theta.size, step):
+            part = slice(begin, begin + step)
+            owner, place = ragged(size[part])
+            query = begin + owner
+            piece = members[first[bucket[query]] + place]
+            at = theta[query]
+            # a kink belongs to the piece on its right
+            inside = (self.low[piece] <= at) & (at < self.high[piece])
+            query, piece, at = query[inside], piece[inside], at[inside]
+            found.append((query, number[piece], self.density(at, piece) / np.sin(at)))
+        everyone = np.arange(theta.size)
+        for crevice in self.crevices:
+            from .rectangular import crevice_retro
+
+            retro = crevice.share * crevice_retro(crevice.height_to_width, theta)
+            outcomes = (1, 0) if crevice.exchanged else (0, 1)
+            for isometry, probability in zip(outcomes, (crevice.share - retro, retro), strict=True):
+                found.append((everyone, np.full(theta.size, isometry), probability))
+        query, number, probability = (np.concatenate(column) for column in zip(*found, strict=True))
+        return query, number, probability
+
+    @cached_property
+    def _index(self) -> tuple[Whole, Whole]:
+        """For every bucket of angles the pieces that meet it: first entries, and the list."""
+        width = float(np.sum(self.high - self.low))
+        buckets = int(np.clip(ENTRIES_PER_PIECE * self.low.size * np.pi / max(width, 1e-300), 1, 2**20))
+        left = np.clip((self.low * (buckets / np.pi)).astype(np.int64) - 1, 0, buckets - 1)
+        right = np.clip((self.high * (buckets / np.pi)).astype(np.int64) + 1, 0, buckets - 1)
+        piece, place = ragged(right - left + 1)
+        bucket = left[piece] + place
+        order = np.argsort(bucket, kind="stable")
+        first = np.concatenate([[0], np.cumsum(np.bincount(bucket, minlength=buckets))])
+        return np.asarray(first, dtype=np.int64), np.asarray(piece[order], dtype=np.int64)
+
+    def _columns(self) -> tuple[Floats, ...]:
+        return self.sign, self.offset, self.low, self.high, self.start, self.end
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of those left out."""
+        from .rectangular import crevice_kinks
+
+        lists, left_out = [self.ends], 0.0
+        for crevice in self.crevices:
+            kinks, omitted = crevice_kinks(crevice.height_to_width, max(limit // len(self.crevices), 1))
+            lists.append(kinks)
+            left_out = max(left_out, omitted)
+        found = np.unique(np.concatenate(lists))
+        surplus = self.ends.size - limit
+        if surplus <= 0:
+            return found, left_out
+        # too many everywhere: those nearest to pi/2 stay
+        found, beyond = without_outermost(found, surplus)
+        return found, min(left_out + beyond, 1.0)

@@ -1,0 +1,173 @@
+"""The exact law of a polygonal wall."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, positive_number, whole_number
+from ...errors import InputError
+from ...estimates import Estimate
+from ..laws.law import BranchLaw
+from .isometry_table import IsometryTable
+from .triangular import TriangularTeethLaw
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+    from ...geometry.cells.hollow_shape import HollowShape
+    from ...geometry.polygons.beams import Beams
+
+BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
+# Angles looked at to tell how many branches there are: it is the cost of `apply`, and need not be exact.
+MOST_PROBES = 512
+
+
+@dataclass(frozen=True)
+class PolygonLaw(BranchLaw):
+    r"""The law P~ of a wall made of segments, without sampling: a finite list of isometries and their probabilities.
+
+    Each hollow is resolved into beams, sets of rays that hit the same segments in the same order: all of them leave by
+    one isometry theta' = +-theta + const, and the probability of a beam given theta is piecewise linear in cot(theta).
+
+    Parameters
+    ----------
+    wall : Wall
+        Polygonal, and closing (conditions B5 and B5': it has no islands).
+    tolerance : float
+        Share of a hollow's flux that may stay unresolved.
+    max_beams : int
+        Beams a hollow at most; what is left then stays unresolved.
+
+    Attributes
+    ----------
+    unresolved : Estimate
+        A bound of the flux whose way through the wall was not found. Such rays are sent back, theta' = theta: the law
+        stays Markov and reversible, and its distance in total variation is at most this share.
+    mirror_symmetric : bool or None
+        True if the wall's cell is; otherwise not known.
+
+    Raises
+    ------
+    InputError
+        If the wall has curved pieces or does not close.
+
+    Notes
+    -----
+    The beams are computed on first use. Hollows of the same shape, also in another size or mirrored, are computed
+    once, and of those that are their own mirror images half; rectangles and isosceles triangles have closed forms, so
+    that a rectangle of any depth costs nothing.
+
+    Examples
+    --------
+    A corner of a right angle sends every ray back that hits both of its sides, whichever way it is turned.
+
+    >>> from asperity import geometry as geo
+    >>> law = PolygonLaw(geo.triangular_teeth(np.pi / 2))
+    >>> probability, outgoing = law.branches(np.pi / 2)
+    >>> probability.round(14).tolist(), (outgoing / np.pi).round(14).tolist()
+    ([1.0], [0.5])
+    """
+
+    wall: Wall
+    tolerance: float = BEAM_TOLERANCE
+    max_beams: int = MOST_BEAMS
+
+    mirror_symmetric: bool | None = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        wall = self.wall
+        if not hasattr(wall, "hollows"):
+            raise InputError(f"wall: expected a Wall such as geo.triangular_teeth(0.7), got {wall!r}")
+        if not wall.is_polygonal:
+            raise InputError(f"wall: expected segments only, got {wall!r}; use WallLaw(wall), which traces curves")
+        if not wall.closes:
+            raise InputError(
+                f"wall: expected one without islands, got {wall!r}; use WallLaw(wall), which traces with periodic wrap"
+            )
+        positive_number("tolerance", self.tolerance)
+        whole_number("max_beams", self.max_beams, 1)
+        object.__setattr__(self, "mirror_symmetric", True if wall.is_mirror_symmetric else None)
+
+    @cached_property
+    def _table(self) -> IsometryTable:
+        from ...geometry.cells.hollow_shape import distinct_hollows
+
+        wall = self.wall
+        parts = [IsometryTable.flat(wall.flat_top / wall.period)]
+        known: list[tuple[HollowShape, IsometryTable]] = []
+        for shape, hollows in distinct_hollows(wall):
+            image = shape.mirrored()
+            table = next((found.mirrored() for other, found in known if image.same_as(other)), None)
+            if table is None:
+                table = self._of_shape(shape, image.same_as(shape))
+                known.append((shape, table))
+            parts.append(table.scaled(math.fsum(hollow.width for hollow in hollows) / wall.period))
+        return IsometryTable.joined(parts)
+
+    def _of_shape(self, shape: HollowShape, symmetric: bool) -> IsometryTable:
+        """The table of a hollow whose opening is the whole period."""
+        if shape.height_to_width is not None:
+            return IsometryTable.of_crevice(1.0, shape.height_to_width)
+        if shape.apex_angle is not None:
+            table = TriangularTeethLaw(shape.apex_angle).table()
+            if table is not None:
+                return table
+        from ...geometry.polygons.beams import beams_of
+
+        beams = beams_of(shape.vertices, tolerance=self.tolerance, max_beams=self.max_beams, mirror_symmetric=symmetric)
+        return table_of_beams(beams)
+
+    def table(self) -> IsometryTable:
+        """All isometries with their probabilities."""
+        return self._table
+
+    @property
+    def unresolved(self) -> Estimate:
+        """The share of the flux that is sent back because its way through the wall was not found."""
+        share = self._table.unresolved
+        return Estimate(share, share, "bound", f"beams of at most {self.max_beams} a hollow")
+
+    @cached_property
+    def fan_out(self) -> int:  # type: ignore[override]
+        """The largest number of branches at an angle, of up to a few hundred angles spread over (0, pi)."""
+        edges = np.concatenate([[0.0], self._table.ends, [np.pi]])
+        edges = edges[:: edges.size // MOST_PROBES + 1]
+        return int(self._table.rows(0.5 * (edges[:-1] + edges[1:]))[0].shape[-1])
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        """Probabilities and outgoing angles, merged by isometry, shape ``theta.shape + (branches,)``."""
+        return self._table.branches(theta)
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        return self._table.kinks(limit)
+
+    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
+        from .wall_law import WallLaw
+
+        return WallLaw(self.wall).respond(x, theta)
+
+
+def table_of_beams(beams: Beams) -> IsometryTable:
+    """The table of one hollow, its opening the whole period; unresolved beams are sent back."""
+    columns = beams.sign, beams.offset, beams.low, beams.high, beams.sine, beams.cosine
+    resolved = IsometryTable.of_pieces(*columns, unresolved=float(beams.rounding))
+    parts = [resolved]
+    if np.size(beams.unresolved_low):
+        parts.append(
+            IsometryTable.of_pieces(
+                1.0,
+                0.0,
+                beams.unresolved_low,
+                beams.unresolved_high,
+                beams.unresolved_sine,
+                beams.unresolved_cosine,
+                unresolved=float(beams.unresolved),
+            )
+        )
+    return IsometryTable.joined(parts)

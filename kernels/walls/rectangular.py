@@ -1,0 +1,181 @@
+"""The law of rectangular teeth, in closed form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats, angles, positive_number
+from ..bases.angles import flipped
+from ..bases.measure import SINE
+from ..laws.law import BranchLaw, entry_points
+from .isometry_table import IsometryTable
+
+# d = 2 r |cot theta| carries a relative error of about 2 eps. Above the first number that is too much for the rest of a
+# division by 2, which is then found in double-double arithmetic, and above the second in as many digits as it takes.
+# Both numbers are those of the given float64 theta and r, however fast the rest changes with them.
+LARGEST_PLAIN, LARGEST_DOUBLE_DOUBLE = 2.0**6, 2.0**48
+# Bits beyond those of d itself.
+MORE_BITS = 80
+LARGEST_COUNT = 2.0**62
+SPACING = float(np.spacing(np.pi))
+
+
+@dataclass(frozen=True)
+class RectangularTeethLaw(BranchLaw):
+    r"""Rectangular teeth: a flat top on the first half of the period, a crevice on the second half.
+
+    With d = 2 r |cot theta|, the number of crevice widths that a ray crosses on its way down and up again,
+    specular reflection has probability 1 - {d}/2 if floor(d) is even and 1/2 + {d}/2 if it is odd; otherwise the
+    ray is retroreflected. That is 1 - (distance from d to the nearest even number)/2.
+
+    Parameters
+    ----------
+    height_to_width : float
+        r > 0, depth of the crevice over its width.
+
+    Raises
+    ------
+    InputError
+        If it is not a finite number above 0.
+
+    Notes
+    -----
+    The law is that of the given float64 angle, to rounding, however many crossings it has. Where d is large it changes
+    completely from one float64 to the next; an angle that is not exact to its last digit has, for all that is known,
+    the mean over a period of d: specular with probability 3/4.
+
+    Source: Rudzis 2022, section 2.2.1, corrected (the even and odd cases are swapped in print).
+
+    Examples
+    --------
+    >>> law = RectangularTeethLaw(0.5)
+    >>> probability, outgoing = law.branches(np.pi / 4)      # d = 1: half of the wall, all of the crevice
+    >>> probability.round(15)
+    array([0.5, 0.5])
+    >>> law
+    RectangularTeethLaw(height_to_width=0.5)
+    """
+
+    height_to_width: float
+
+    mirror_symmetric = True
+    fan_out = 2
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "height_to_width", positive_number("height_to_width", self.height_to_width))
+
+    def crossings(self, theta: ArrayLike) -> Floats:
+        """d = 2 r |cot theta|: crevice widths crossed between entry and exit."""
+        with np.errstate(over="ignore"):
+            return np.asarray(2.0 * self.height_to_width / np.abs(np.tan(angles("theta", theta))))
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        """Probabilities and angles, shape ``theta.shape + (2,)``: specular first, then retroreflection."""
+        theta = angles("theta", theta)
+        retro = 0.5 * crevice_retro(self.height_to_width, theta)
+        return np.stack([1.0 - retro, retro], axis=-1), np.stack([flipped(theta), theta], axis=-1)
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """The angles where d is a whole number, cot theta = k / (2 r), and the probability beyond the last of them."""
+        return crevice_kinks(self.height_to_width, limit)
+
+    def table(self) -> IsometryTable:
+        """Half of it flat tops, half of it crevices."""
+        return IsometryTable.joined([IsometryTable.flat(0.5), IsometryTable.of_crevice(0.5, self.height_to_width)])
+
+    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+        """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left end of the flat top."""
+        x, theta = entry_points(x), angles("theta", theta)
+        sides = _sides_hit(x, theta, crossings_modulo_two(self.height_to_width, theta))
+        return np.where(np.mod(sides, 2.0) == 0.0, flipped(theta), theta)
+
+    def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
+        """Number of reflections, a hit of the flat top counting as one; at most 2^62 are counted.
+
+        The parity is right; beyond 2^52 the number itself has the error of float64.
+        """
+        x, theta = entry_points(x), angles("theta", theta)
+        rest = crossings_modulo_two(self.height_to_width, theta)
+        # whole numbers of pairs, so that the parity is right where d has more digits than a float64
+        pairs = np.rint(0.5 * (np.minimum(self.crossings(theta), LARGEST_COUNT) - rest)).astype(np.int64)
+        sides = 2 * pairs + _sides_hit(x, theta, rest).astype(np.int64)
+        return np.asarray(1 + np.where(x <= 0.5, 0, sides))
+
+
+def _sides_hit(x: Floats, theta: Floats, crossings: Floats) -> Floats:
+    # Distance, in crevice widths, from the entry point to the side that the ray flies towards.
+    ahead = np.where(theta < 0.5 * np.pi, 2.0 * x - 1.0, 2.0 - 2.0 * x)
+    return np.where(x <= 0.5, 0.0, np.maximum(np.ceil(crossings - ahead), 0.0))
+
+
+def crossings_modulo_two(height_to_width: float, theta: Floats) -> Floats:
+    """d mod 2, in [0, 2], with an error below 1e-13 for every float64 theta.
+
+    Examples
+    --------
+    >>> rest = crossings_modulo_two(1.5, np.array([2.0**-30]))[0]    # d = 3 2^30 - 2^-30 + ...
+    >>> float(2.0 - rest) == 2.0**-30
+    True
+    """
+    theta = np.asarray(theta, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        crossings = np.asarray(2.0 * height_to_width / np.abs(np.tan(theta)))
+    # theta = pi/2 is the float64 nearest to it
+    rest = np.asarray(np.mod(np.where(crossings <= LARGEST_PLAIN, crossings, 0.0), 2.0))
+    many = crossings > LARGEST_PLAIN
+    if np.any(many):
+        from ...geometry.tracing.double_double.crevice import crossings_modulo_two as in_double_double
+
+        exceeding = many & (crossings > LARGEST_DOUBLE_DOUBLE)
+        rest[many] = in_double_double(2.0 * height_to_width, theta[many])
+        rest[exceeding] = [_in_many_digits(height_to_width, float(angle)) for angle in theta[exceeding]]
+    return rest
+
+
+def _in_many_digits(height_to_width: float, theta: float) -> float:
+    import mpmath
+
+    # d is below 2^(exponent of r - exponent of the sine + 2), and the sine not below the spacing of float64 at pi
+    bits = math.frexp(height_to_width)[1] - math.frexp(min(theta, SPACING))[1] + MORE_BITS
+    with mpmath.workprec(max(bits, 0) + MORE_BITS):
+        return float(mpmath.fmod(2 * mpmath.mpf(height_to_width) * abs(mpmath.cot(mpmath.mpf(theta))), 2))
+
+
+def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
+    """The probability of retroreflection in a crevice: the distance from d to the nearest even number."""
+    rest = crossings_modulo_two(height_to_width, theta)
+    return np.asarray(np.minimum(rest, 2.0 - rest))
+
+
+def crevice_kinks(height_to_width: float, limit: int) -> tuple[Floats, float]:
+    """The angles where d is a whole number, at most about ``limit``, and the measure of the angles beyond them."""
+    last = max((limit - 1) // 2, 0)
+    if last == 0:
+        return np.empty(0), 1.0
+    steep = np.arctan(2.0 * height_to_width / np.arange(last, 0, -1))
+    kinks = np.concatenate([steep, [0.5 * np.pi], np.pi - steep[::-1]])
+    return kinks, float(2.0 * SINE.cdf(steep[0]))
+
+
+def crevice_pieces(height_to_width: float, last: int) -> IsometryTable:
+    """The pieces of a crevice with d < ``last``; the opening counts as the whole period."""
+    number = np.arange(last)
+    high = np.arctan2(2.0 * height_to_width, number)
+    low = np.arctan2(2.0 * height_to_width, number + 1)
+    # at a whole number d = k one outcome is certain: retroreflection where k is odd
+    start, end = (np.where(at % 2 == 1, np.sin(angle), 0.0) for at, angle in ((number + 1, low), (number, high)))
+    one, zero = np.ones(last), np.zeros(last)
+    other = np.sin(low) - start, np.sin(high) - end
+    right = IsometryTable(
+        np.concatenate([one, -one]),
+        np.concatenate([zero, np.pi * one]),
+        np.concatenate([low, low]),
+        np.concatenate([high, high]),
+        np.concatenate([start, other[0]]),
+        np.concatenate([end, other[1]]),
+    )
+    return IsometryTable.joined([right, right.mirrored()])

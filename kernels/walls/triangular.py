@@ -1,0 +1,176 @@
+"""The law of triangular teeth, in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats, angles, number_between
+from ...rounding import EPS
+from ..bases.angles import flipped, kept_inside, mixed_arccos
+from ..bases.intervals import without_outermost
+from ..laws.branches import merged
+from ..laws.law import BranchLaw, entry_points
+from .isometry_table import IsometryTable
+
+# Kinks closer together than this are one kink computed in two ways.
+KINK_SPACING = 16.0 * EPS
+# A table has four pieces between two kinks; laws with more kinks than this have none.
+MOST_LISTED_KINKS = 2**17
+
+
+@dataclass(frozen=True)
+class TriangularTeethLaw(BranchLaw):
+    r"""Triangular teeth of apex angle psi, one hollow a period between two tips.
+
+    A ray that passes the bottom of its hollow on its left (c > 0, with c the cosine of the angle h below) turns
+    around it; unfolded, the sides are rays from the bottom at multiples of psi, of which it crosses n = N - 1 or N,
+    N = ceil(2 theta / psi). With X uniform in (0, 1) from the left tip,
+
+        h = arccos((1 - X) cos(theta - psi/2) + X cos(theta + psi/2)),
+        n = floor((theta + h) / psi + 1/2),
+        theta' = pi + theta - n psi (n even),  n psi - theta (n odd),
+
+    and if c < 0 the mirror image of this. As a distribution: c > 0 for X < X_c = cos(theta - psi/2) / D with
+    D = 2 sin(theta) sin(psi/2), and n = N - 1 for X < 2 sin((N - 1) psi/2) sin(N psi/2 - theta) / D.
+
+    Parameters
+    ----------
+    angle : float
+        Apex angle psi in (0, pi), radians.
+
+    Raises
+    ------
+    InputError
+        If it is not in that range.
+
+    Notes
+    -----
+    Source: Rudzis 2022, section 2.2.2, corrected and completed: the printed law holds for theta <= (pi - psi)/2
+    only, with floor for ceil and without a stray -theta.
+
+    Examples
+    --------
+    Right-angled teeth are corner reflectors: every ray that hits both sides goes back where it came from.
+
+    >>> law = TriangularTeethLaw(np.pi / 2)
+    >>> float(law.respond(0.5, 1.5)), int(law.hits(0.5, 1.5))
+    (1.5, 2)
+    """
+
+    angle: float
+
+    mirror_symmetric = True
+    fan_out = 4
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "angle", number_between("angle", self.angle, 0.0, np.pi))
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        """Probabilities and angles, shape ``theta.shape + (4,)``.
+
+        In this order: left of the bottom with N - 1 hits, with N hits, right of it with N hits, with N - 1 hits,
+        where N is counted for theta on the left and for pi - theta on the right.
+        """
+        theta = angles("theta", theta)
+        mirror = np.pi - theta
+        # cos(theta - psi/2) as a sine keeps its digits where psi is close to pi
+        left = np.sin(theta + 0.5 * (np.pi - self.angle)) / (2.0 * np.sin(theta) * np.sin(0.5 * self.angle))
+        left = np.clip(left, 0.0, 1.0)
+        most, most_mirror = self._most_hits(theta), self._most_hits(mirror)
+        fewer = np.clip(self._share_of_fewer(theta, most), 0.0, left)
+        fewer_mirror = np.clip(self._share_of_fewer(mirror, most_mirror), 0.0, 1.0 - left)
+        probability = np.stack([fewer, left - fewer, 1.0 - left - fewer_mirror, fewer_mirror], axis=-1)
+        outgoing = np.stack(
+            [
+                self._turned(theta, most - 1.0),
+                self._turned(theta, most),
+                np.pi - self._turned(mirror, most_mirror),
+                np.pi - self._turned(mirror, most_mirror - 1.0),
+            ],
+            axis=-1,
+        )
+        return merged(probability, outgoing)
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """The angles where N or an active bound on X changes; where there are too many, those nearest to pi/2."""
+        psi = self.angle
+        # No ray passes on the left from theta = (pi + psi)/2 on, so larger multiples of psi/2 play no part.
+        last = int(np.ceil((np.pi + psi) / psi))
+        first = max(1, last - limit)
+        around = np.floor(np.pi / psi) + np.array([-1.0, 0.0, 1.0])
+        left = np.concatenate(
+            [
+                0.5 * psi * np.arange(first, last + 1),
+                [0.5 * (np.pi - psi), 0.5 * (np.pi + psi)],
+                (around + 0.5) * psi - 0.5 * np.pi,
+            ]
+        )
+        kinks = np.sort(np.concatenate([left, np.pi - left]))
+        kinks = kinks[(kinks > KINK_SPACING) & (kinks < np.pi - KINK_SPACING)]
+        kinks = kinks[np.diff(kinks, prepend=-1.0) > KINK_SPACING]
+        if first == 1 and kinks.size <= limit:
+            return kinks, 0.0
+        return without_outermost(kinks, max(kinks.size - limit, 0))
+
+    def table(self) -> IsometryTable | None:
+        """The pieces between the kinks, or None where there are too many."""
+        if 4.0 * np.pi / self.angle > MOST_LISTED_KINKS:
+            return None
+        kinks, _ = self.kinks(2 * MOST_LISTED_KINKS)
+        edges = np.unique(np.concatenate([[0.0], kinks, [0.5 * np.pi, np.pi]]))
+        low, high = edges[:-1], edges[1:]
+        middle = 0.5 * (low + high)
+        most, most_mirror = self._most_hits(middle), self._most_hits(np.pi - middle)
+        # the four probabilities of `branches`, times sin(theta), which stays finite at the ends
+        ends = []
+        for theta in (low, high):
+            sine, mirror = np.sin(theta), np.pi - theta
+            left = np.sin(theta + 0.5 * (np.pi - self.angle)) / (2.0 * np.sin(0.5 * self.angle))
+            left = np.clip(left, 0.0, sine)
+            fewer = np.clip(self._density_of_fewer(theta, most), 0.0, left)
+            fewer_mirror = np.clip(self._density_of_fewer(mirror, most_mirror), 0.0, sine - left)
+            ends.append(np.concatenate([fewer, left - fewer, sine - left - fewer_mirror, fewer_mirror]))
+        count = np.concatenate([most - 1.0, most, most_mirror, most_mirror - 1.0])
+        left_side = np.repeat([True, True, False, False], low.size)
+        even, turn = np.mod(count, 2.0) == 0.0, count * self.angle
+        offset = np.where(even, np.pi - turn, turn)
+        offset = np.where(left_side, offset, np.where(even, -offset, 2.0 * np.pi - offset))
+        return IsometryTable(np.where(even, 1.0, -1.0), offset, np.tile(low, 4), np.tile(high, 4), *ends)
+
+    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+        """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
+        right, base, count = self._unfolded(entry_points(x), angles("theta", theta))
+        outgoing = kept_inside(self._turned(base, count))
+        return np.where(right, flipped(outgoing), outgoing)
+
+    def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
+        """Number of reflections of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
+        return np.asarray(self._unfolded(entry_points(x), angles("theta", theta))[2].astype(np.int64))
+
+    def _unfolded(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats]:
+        """Whether the ray passes right of the bottom, its angle or else the mirror image's, and its hits."""
+        angle, complement = mixed_arccos(1.0 - x, theta, 0.5 * self.angle)
+        right = angle > complement
+        base = np.where(right, np.pi - theta, theta)
+        most = self._most_hits(base)
+        count = np.floor((base + np.minimum(angle, complement)) / self.angle + 0.5)
+        # The bounds are exact; without them rounding could turn the single hit of a grazing ray into none.
+        return right, base, np.clip(count, np.maximum(most - 1.0, 1.0), most)
+
+    def _most_hits(self, theta: Floats) -> Floats:
+        return np.maximum(np.ceil(2.0 * theta / self.angle), 1.0)
+
+    def _share_of_fewer(self, theta: Floats, most: Floats) -> Floats:
+        """The X below which a ray left of the bottom is hit N - 1 times: a product, so that nothing cancels."""
+        return np.asarray(self._density_of_fewer(theta, most) / np.sin(theta))
+
+    def _density_of_fewer(self, theta: Floats, most: Floats) -> Floats:
+        half = 0.5 * self.angle
+        return np.asarray(np.sin((most - 1.0) * half) * np.sin(most * half - theta) / np.sin(half))
+
+    def _turned(self, theta: Floats, count: Floats) -> Floats:
+        turn = count * self.angle
+        return np.where(np.mod(count, 2.0) == 0.0, np.pi + theta - turn, turn - theta)

@@ -1,0 +1,266 @@
+"""The law of a wall: in closed form where its hollows allow it, else by tracing rays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...checks import Floats, angles
+from ...errors import AccuracyError, InputError
+from ...rounding import EPS
+from ..laws.ideal import specular
+from ..laws.law import AngleFunction, DrivenLaw, Law, entry_points
+from ..laws.weighted_sum import Combination
+from .circular_arc import CircularArcLaw
+from .conditionals import AdaptiveRows, adaptive_rows, is_few
+from .isometry_branches import table_of
+from .isometry_table import IsometryTable
+from .polygon import PolygonLaw
+from .rectangular import RectangularTeethLaw
+from .triangular import TriangularTeethLaw
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+    from ...geometry.cells.hollow import Hollow
+    from ...geometry.curves.curve import Curve
+
+# Widths add up to the period, and an arc is a semicircle, to this share: sums and angles of a handful of operations.
+ROUNDED = 64.0 * EPS
+# The hollows with closed forms have at most this many pieces.
+MOST_PIECES_KNOWN = 3
+# Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
+# error in total variation; above this it would show in a kernel estimated from a million rays.
+LOST_TOLERANCE = 1e-4
+# Polygonal walls are resolved into beams where that takes about a second (a few microseconds a beam, the table and the
+# triangles included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
+MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
+# Walls of more pieces are tried with fewer beams first; where what these leave is rounding, they do. Rough profiles of
+# 40 to 800 pieces resolved completely with 10 to 140 beams a piece, most with less than 50; cavities never do.
+FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
+# `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
+APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
+
+
+@dataclass(frozen=True)
+class WallLaw(DrivenLaw):
+    """The law P~ of a wall: a ray enters at a uniform point of the period.
+
+    `respond` and `outcomes` trace rays. `sample` and `apply` use the closed form if there is one, else they trace;
+    `branches`, `kinks` and `discretise` use the exact law if there is one.
+
+    Parameters
+    ----------
+    wall : Wall
+
+    Attributes
+    ----------
+    closed_form : Law or None
+        The exact law if the wall consists of flat tops and hollows that are isosceles triangles, rectangles (not
+        wider, all together, than the flat tops), or circular arcs up to a semicircle; a Combination if there are
+        several different ones. Recognised by their shape, whatever constructor made the wall.
+    exact_law : Law or None
+        The closed form; or else, for a polygonal wall that closes and is resolved within about a second, its
+        `PolygonLaw`. Computed on first use.
+    mirror_symmetric : bool or None
+        True if the wall's cell is; otherwise not known.
+
+    Raises
+    ------
+    AccuracyError
+        By `respond`, `sample` and `apply` if more than a share of 1e-4 of the rays did not escape; ``defect`` is the
+        share.
+
+    Notes
+    -----
+    A ray that does not escape (corner, grazing, bounce limit) is returned as retroreflected, theta' = theta: on a set
+    of rays that the true map takes to itself the identity preserves sin(theta) dx d theta and is an involution, so
+    the law stays Markov and reversible, and its error in total variation is at most the share of these rays.
+    `outcomes` says which they were.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> WallLaw(geo.rectangular_teeth(0.75)).closed_form
+    RectangularTeethLaw(height_to_width=0.75)
+    >>> WallLaw(geo.flat()).closed_form
+    specular()
+    """
+
+    wall: Wall
+
+    reversible = True
+    mirror_symmetric: bool | None = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not hasattr(self.wall, "hollows"):
+            raise InputError(f"wall: expected a Wall such as geo.focusing_arcs(0.9), got {self.wall!r}")
+        # An asymmetric cell may still have a symmetric law, so its absence proves nothing.
+        object.__setattr__(self, "mirror_symmetric", True if self.wall.is_mirror_symmetric else None)
+        if self.closed_form is not None:
+            object.__setattr__(self, "fan_out", self.closed_form.fan_out)
+            object.__setattr__(self, "mirror_symmetric", self.closed_form.mirror_symmetric)
+
+    @property
+    def is_polygonal(self) -> bool:
+        """Whether every piece of the wall is straight, so that the law is made of isometries."""
+        return self.wall.is_polygonal
+
+    @cached_property
+    def closed_form(self) -> Law | None:
+        return _closed_form(self.wall)
+
+    @cached_property
+    def exact_law(self) -> Law | None:
+        if self.closed_form is not None:
+            return self.closed_form
+        wall = self.wall
+        if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
+            return None
+        if len(wall.pieces) > FEW_PIECES:
+            # with the other beams what these leave falls by a hundred at most
+            few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.pieces))
+            probe = PolygonLaw(wall, max_beams=min(few, MOST_BEAMS))
+            if float(probe.unresolved) > 100.0 * EXACT_ENOUGH:
+                return None
+            if float(probe.unresolved) <= RESOLVED:
+                return probe
+        law = PolygonLaw(wall, max_beams=MOST_BEAMS)
+        return law if float(law.unresolved) <= EXACT_ENOUGH else None
+
+    def outcomes(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+        """Outgoing angles by tracing, and the mask of the rays that escaped; the others are sent back.
+
+        ``x`` in (0, 1) is the entry point as a share of the period. Never raises an AccuracyError.
+        """
+        from ...geometry.tracing.tracing import trace
+
+        x, theta = np.broadcast_arrays(entry_points(x), angles("theta", theta))
+        traced = trace(self.wall, x * self.wall.period, theta)
+        escaped = np.asarray(traced.escaped)
+        return np.where(escaped, traced.theta, theta), escaped
+
+    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
+        outgoing, escaped = self.outcomes(x, theta)
+        lost = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
+        if lost > LOST_TOLERANCE:
+            raise AccuracyError(
+                f"{self!r}: {lost:.2g} of {escaped.size} rays did not escape, more than {LOST_TOLERANCE:g}; "
+                "geometry.trace(wall, x, theta).counts() says how they ended, outcomes() which they were",
+                lost,
+            )
+        return outgoing
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        return super().branches(theta) if self.exact_law is None else self.exact_law.branches(theta)
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """Those of the exact law."""
+        return super().kinks(limit) if self.exact_law is None else self.exact_law.kinks(limit)
+
+    def table(self) -> IsometryTable | None:
+        """That of the exact law, or None."""
+        return None if self.exact_law is None else table_of(self.exact_law)
+
+    def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
+        return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
+
+    def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
+        if self.closed_form is not None:
+            return self.closed_form.apply(function, theta)
+        incoming = angles("theta", theta)
+        if incoming.size == 0 or not is_few(self.wall):
+            return super().apply(function, incoming)
+        mean = self.rows(incoming).mean(function)
+        return mean.reshape(incoming.shape + mean.shape[1:])
+
+    def rows(self, theta: ArrayLike, tolerance: float = APPLY_TOLERANCE, degree: int = APPLY_DEGREE) -> AdaptiveRows:
+        """Rows of the traced law with an error each: ``rows.mean(f)`` is what `apply` gives, ``rows.error`` its error.
+
+        Parameters
+        ----------
+        theta : array_like
+            Incoming angles in (0, pi), radians.
+        tolerance : float
+            Wanted error of the mean of a function of sup norm 1.
+        degree : int
+            The functions are as smooth as trigonometric polynomials of this degree.
+
+        Returns
+        -------
+        AdaptiveRows
+            One row an angle, in their order.
+
+        Raises
+        ------
+        AccuracyError
+            If more than a share of 1e-4 of the rays did not escape.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> rows = WallLaw(geo.focusing_arcs(1.2)).rows([0.5, 1.5])
+        >>> rows.mean(np.cos).round(6).tolist(), bool(rows.error.max() < 1e-7)
+        ([0.330126, 0.006489], True)
+        """
+        found = adaptive_rows(self.wall, angles("theta", theta).ravel(), tolerance, degree)
+        lost = float(np.mean(found.lost))
+        if lost > LOST_TOLERANCE:
+            raise AccuracyError(f"{self!r}: {lost:.2g} of the rays did not escape, more than {LOST_TOLERANCE:g}", lost)
+        return found
+
+
+def _closed_form(wall: Wall) -> Law | None:
+    """The sum of the laws of flat tops and hollows, by their share of the period, or None."""
+    if not wall.closes:
+        return None
+    wall = wall.cell
+    terms: dict[Law, float] = {}
+    level = wall.flat_top
+    for hollow in wall.hollows:
+        law = _of_hollow(wall, hollow)
+        if law is None:
+            return None
+        width = hollow.width
+        if isinstance(law, RectangularTeethLaw):
+            level, width = level - width, 2.0 * width
+        terms[law] = terms.get(law, 0.0) + width
+    if level < -ROUNDED * wall.period:
+        return None
+    if level > ROUNDED * wall.period:
+        terms[specular()] = level
+    if len(terms) == 1:
+        return next(iter(terms))
+    total = math.fsum(terms.values())
+    return Combination(tuple((width / total, law) for law, width in terms.items()))
+
+
+def _of_hollow(wall: Wall, hollow: Hollow) -> Law | None:
+    """The closed form of one hollow; that of a rectangle has a flat top as wide as its crevice besides."""
+    from ...geometry.cells.hollow_shape import HollowShape
+
+    pieces = wall.pieces[hollow.first : hollow.last]
+    if len(pieces) > MOST_PIECES_KNOWN:
+        return None
+    shape = HollowShape.of(wall, hollow)
+    if shape.apex_angle is not None:
+        return TriangularTeethLaw(shape.apex_angle)
+    if shape.height_to_width is not None:
+        return RectangularTeethLaw(shape.height_to_width)
+    return _arc(pieces)
+
+
+def _arc(pieces: tuple[Curve, ...]) -> Law | None:
+    from ...geometry import Arc
+
+    arc = pieces[0]
+    if len(pieces) != 1 or not isinstance(arc, Arc) or not arc.is_circular or arc.direction < 0:
+        return None
+    if arc.half_span > 0.5 * np.pi * (1.0 + ROUNDED):
+        return None
+    return CircularArcLaw(min(arc.half_span, 0.5 * np.pi))

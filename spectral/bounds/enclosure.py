@@ -1,0 +1,432 @@
+"""Intervals that hold eigenvalues of a law itself, each with what its claim rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats, whole_number
+from ...errors import InputError
+from ...estimates import ErrorKind
+from ...kernels import (  # fmt: skip
+    Basis,
+    Bins,
+    CollisionLaw,
+    Composition,
+    DensityLaw,
+    Law,
+    Legendre,
+    MatrixLaw,
+    Power,
+    discretise,
+)
+from ...kernels.bases.measure import SINE
+from ...kernels.expectations.basis_means import integrates_panels, traces_rows
+from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.phase_function import HenyeyGreensteinLaw
+from ...kernels.laws.structure import made_of_isometries
+from ...rounding import EPS
+from ..eigenvalues.parity import Parity, halves, outermost_by_parity
+from ..eigenvalues.spectra import check_reversible
+from .contraction import refuse_unless_self_adjoint
+from .operator_residuals import Residuals, image_rule, residuals
+from .scattered import ScatteredSpectrum, scattered_spectrum, scattered_words
+from .separation import Separation, rest_of_spectrum
+from .trial_space import adapted_trials
+
+Label = Literal["indexed", "contains-spectrum"]
+
+# Trial functions beyond those asked for: the first ones of them show what comes next.
+LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
+MATRIX_TOLERANCE = 1e-8
+# The squared residuals of adapted trial functions, and the errors of their quotients, may take this share of an
+# enclosure each. Rows that may be spent on the quotients: where they are traced, and where they have a closed form.
+TRIAL_SHARE, MOST_TRACED_ROWS, MOST_EXACT_ROWS = 0.3, 4_000, 40_000
+# Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
+QUOTIENT_ROUNDING = 4.0 * EPS
+# Laws whose images of polynomials are found to rounding.
+ROUNDED = (HenyeyGreensteinLaw, LambertianLaw)
+
+
+@dataclass(frozen=True)
+class Enclosure:
+    """An interval with spectrum of a law in it.
+
+    Attributes
+    ----------
+    value : float
+        The Rayleigh quotient of the trial function.
+    low, high : float
+        The interval.
+    label : {"indexed", "contains-spectrum"}
+        ``"indexed"``: as many eigenvalues of the law as there are enclosures whose moduli overlap this one's lie in
+        their union, and it is known how many are larger: ``index`` counts the eigenvalues by modulus, the constants' is
+        0. Which of those that overlap is larger is not known; ``reason`` says so.
+        ``"contains-spectrum"``: some point of the spectrum is in the interval, nothing more.
+    index : int or None
+    residual : float
+        ||P v - rho v||.
+    kind : {"bound", "estimate"}
+        ``"bound"``: to rounding; ``"estimate"`` where a quadrature or the separation is estimated.
+    reason : str
+        What the label rests on, or why the eigenvalue could not be indexed.
+    parity : {"even", "odd", "none"}
+        Of the trial function under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric.
+    """
+
+    value: float
+    low: float
+    high: float
+    label: Label
+    index: int | None
+    residual: float
+    kind: ErrorKind
+    reason: str
+    parity: Parity = "none"
+
+    @property
+    def width(self) -> float:
+        """``high - low``."""
+        return self.high - self.low
+
+    def __contains__(self, number: float) -> bool:
+        return self.low <= number <= self.high
+
+    def __str__(self) -> str:
+        name = self.label if self.index is None else f"{self.label} {self.index}"
+        parity = "" if self.parity == "none" else f", {self.parity}"
+        return f"[{self.low:.15g}, {self.high:.15g}] {name}{parity} ({self.kind}: {self.reason})"
+
+
+@dataclass(frozen=True)
+class Enclosures:
+    """Enclosures in the order of their values, descending; iterate over it or index it.
+
+    Attributes
+    ----------
+    items : tuple of Enclosure
+    separation : Separation
+        What the indices rest on.
+    convention : {"paper", "specular"}
+    method : str
+    """
+
+    items: tuple[Enclosure, ...]
+    separation: Separation
+    convention: str
+    method: str
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def __iter__(self) -> Iterator[Enclosure]:
+        return iter(self.items)
+
+    def __getitem__(self, place: int) -> Enclosure:
+        return self.items[place]
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.convention} convention, {self.method}", *map(str, self.items)])
+
+
+def enclosures(
+    law: Law | CollisionLaw, k: int = 4, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
+) -> Enclosures:
+    r"""Enclose the k eigenvalues of largest modulus of a reversible law: of the operator, not of a matrix.
+
+    Parameters
+    ----------
+    law : Law or CollisionLaw
+        Reversible, in the convention that it carries; of a collision law its P~.
+    k : int
+        Number of eigenvalues, the constants' included.
+    basis : Basis, optional
+        Where the trial functions are sought. By default panels that adapt to the law, for walls, arcs, Lambertian
+        reflection and sums of these; Legendre polynomials for other laws.
+    tolerance : float
+        Wanted half width of the enclosures, where the panels adapt; else the wanted Frobenius error of the matrix that
+        gives the trial functions. It makes them better, not truer.
+
+    Returns
+    -------
+    Enclosures
+
+    Raises
+    ------
+    InputError
+        If the errors of the means that `apply` gives are not known: of compositions with laws whose means are integrals
+        by quadrature, of walls of more than 64 pieces, of a user's law that does not promise to be exact
+        (``exact_apply``). Or if a scattering in a composition is too near to a mirror.
+    AccuracyError
+        If the law is not symmetric within its error. Of a law that is self-adjoint in the other convention only, the
+        message says what is true in this one.
+
+    Notes
+    -----
+    For a unit vector v with quotient rho and residual r, [rho - r, rho + r] meets the spectrum. If all of the spectrum
+    but m listed points has a modulus of at most s, and the m intervals widened by the joint residual stay beyond s,
+    then they hold m eigenvalues in order of their trial functions (Kahan), and the Kato-Temple bound
+    r^2/(distance to the rest of the spectrum) replaces r. The quadratures' own errors are in r and in rho.
+
+    Source: B. N. Parlett, *The Symmetric Eigenvalue Problem* (1980), sections 10.5 and 11.5; T. Kato, J. Phys. Soc.
+    Japan 4 (1949) 334.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker, spectral as spec
+    >>> found = spec.enclosures(ker.henyey_greenstein(0.5), 3)
+    >>> [item.label for item in found], all(0.5**l in found[l] for l in range(3))
+    (['indexed', 'indexed', 'indexed'], True)
+    >>> max(item.width for item in found) < 1e-13
+    True
+    """
+    whole_number("k", k, 1)
+    if isinstance(law, CollisionLaw):
+        law = law.law
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    refuse_unless_self_adjoint(law)
+    words = None if isinstance(law, DensityLaw) else scattered_words(law)
+    if words is not None:
+        only = next(iter(words)) if len(words) == 1 else ()
+        if len(only) == 1 and isinstance(only[0], DensityLaw):
+            # a product of scatterings is one scattering
+            return replace(enclosures(only[0], k, basis, tolerance), convention=law.frame)
+        if basis is None:
+            return _of_scattered(scattered_spectrum(law, words, k, tolerance), law.frame)
+    power = as_power(law)
+    if power is not None:
+        return _raised(enclosures(power[0], k, basis, tolerance / power[1]), power[1])
+    return enclosed_trials(law, k, basis, tolerance).enclosures
+
+
+@dataclass(frozen=True)
+class EnclosedTrials:
+    """Enclosures with their trial functions, coefficients in ``basis``, shape (n, k)."""
+
+    enclosures: Enclosures
+    basis: Basis
+    vectors: Floats
+
+    @property
+    def worst(self) -> float:
+        """Half of the largest width."""
+        return 0.5 * max(item.width for item in self.enclosures)
+
+    @property
+    def indexed(self) -> bool:
+        """Whether all are."""
+        return all(item.label == "indexed" for item in self.enclosures)
+
+
+def enclosed_trials(
+    law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
+) -> EnclosedTrials:
+    """`enclosures` of a law that is self-adjoint, with the trial functions."""
+    if basis is None and integrates_panels(law):
+        trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
+        basis, values, vectors, names = trials.basis, trials.values, trials.vectors, trials.parities
+        # rows are what costs: the functions that come next are looked at in the same ones
+        both = residuals(
+            law, basis, np.column_stack([vectors, trials.following]), np.append(values, trials.following_values),
+            MOST_TRACED_ROWS if traces_rows(law) else MOST_EXACT_ROWS,
+            mirrored=trials.mirrored, quotient_error=TRIAL_SHARE * tolerance, leading=len(values),
+        )  # fmt: skip
+        found, after = both.split(len(values))
+        next_value = _reach(after)
+    else:
+        if basis is None:
+            basis = Bins(law.edges) if isinstance(law, MatrixLaw) else Legendre(max(LEAST_DEGREE, 2 * k + MORE_DEGREES))
+        values, vectors, names, next_value = _trial(law, basis, k, tolerance)
+        found = residuals(law, basis, vectors, values)
+    order = np.argsort(-np.abs(found.quotients), kind="stable")
+    apart = _first_that_separates(law, found, order, next_value)
+    method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.rows} rows"
+    # images by quadratures that follow them to rounding, or by sums; else the difference of two rules is an estimate
+    exact = isinstance(law, ROUNDED if isinstance(basis, Legendre) else MatrixLaw)
+    items = [_enclosed(found, apart, order, place, names, exact) for place in range(len(values))]
+    return EnclosedTrials(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
+
+
+def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
+    """With a word in the reason where the moduli of indexed enclosures overlap: their order is not known."""
+    listed = []
+    for item in items:
+        others = [other for other in items if other is not item and other.index is not None]
+        tied = [other for other in others if item.index is not None and _moduli_overlap(item, other)]
+        words = ", ".join(sorted(str(other.index) for other in tied))
+        listed.append(replace(item, reason=f"{item.reason}; may change places with {words}") if tied else item)
+    return tuple(listed)
+
+
+def _moduli_overlap(one: Enclosure, other: Enclosure) -> bool:
+    # of an interval [a, b] the moduli run from max(a, -b, 0) to max(-a, b)
+    least = max(max(item.low, -item.high, 0.0) for item in (one, other))
+    return least <= min(max(-item.low, item.high) for item in (one, other))
+
+
+def as_power(law: Law) -> tuple[Law, int] | None:
+    """The law and the exponent of a power, also of one written as a product; None where powers tell nothing.
+
+    A first power is one, so that ``law ** 1`` has all that is known of the law.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> g = ker.henyey_greenstein(0.5)
+    >>> as_power(g @ g) == as_power(g**2) == (g, 2), as_power(g) is None
+    (True, True)
+    """
+    if isinstance(law, Power) and law.exponent >= 1:
+        base, exponent = law.law, law.exponent
+    elif isinstance(law, Composition) and len(law.laws) > 1 and all(part == law.laws[0] for part in law.laws):
+        base, exponent = law.laws[0], len(law.laws)
+    else:
+        return None
+    return (base, exponent) if base.reversible and not made_of_isometries(base) else None
+
+
+def _raised(found: Enclosures, exponent: int) -> Enclosures:
+    """Enclosures of the eigenvalues of a power, in order of their values."""
+    items = []
+    for item in found:
+        ends = [item.low**exponent, item.high**exponent]
+        if exponent % 2 == 0 and item.low < 0.0 < item.high:
+            ends.append(0.0)
+        # lambda^n - rho^n is lambda - rho times a sum of products, in which lambda may be any of the spectrum
+        slope = sum(min(abs(item.value), 1.0) ** degree for degree in range(exponent))
+        items.append(
+            replace(
+                item, value=item.value**exponent, low=min(ends), high=max(ends), residual=slope * item.residual,
+                reason=f"power {exponent}; {item.reason}",
+            )
+        )  # fmt: skip
+    apart = replace(
+        found.separation,
+        radius=found.separation.radius**exponent,
+        reason=f"power {exponent}: {found.separation.reason}",
+    )
+    items.sort(key=lambda item: (item.index != 0, -item.value))
+    return replace(found, items=tuple(items), separation=apart, method=f"power {exponent}; {found.method}")
+
+
+def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:
+    """Enclosures from eigenvalues of a matrix that the law is near to."""
+    reason = f"the law is a matrix in {found.degrees} Legendre polynomials within {found.distance:.2g}"
+    if found.essential > 0.0:
+        reason += f", beyond them the essential spectrum of modulus {found.essential:.6g}"
+    items = [Enclosure(1.0, 1.0, 1.0, "indexed", 0, 0.0, found.kind, f"P 1 = 1; {reason}", found.parities[0])]
+    for place in range(1, len(found.values)):
+        value, certain = float(found.values[place]), found.certain[place]
+        label: Label = "indexed" if certain else "contains-spectrum"
+        why = reason if certain else f"not indexed: another value, or the essential spectrum, may be as large; {reason}"
+        low, high = value - found.distance, min(value + found.distance, 1.0)
+        index = place if certain else None
+        items.append(Enclosure(value, low, high, label, index, found.distance, found.kind, why, found.parities[place]))
+    items.sort(key=lambda item: (item.index != 0, -item.value))
+    apart = Separation(found.essential + found.distance, found.kind, reason)
+    return Enclosures(tuple(items), apart, convention, "eigenvalues of a matrix that the law is near to")
+
+
+def _first_that_separates(
+    law: Law, found: Residuals, order: NDArray[np.intp], next_value: float
+) -> tuple[int, Separation]:
+    """The largest number of leading values that the rest of the spectrum stays away from, and why it does."""
+    modulus = np.abs(found.quotients[order])
+    following = np.append((modulus + found.norms[order])[1:], next_value)
+    refused: Separation | None = None
+    for number in range(len(order), 0, -1):
+        listed = found.quotients[order[:number]]
+        joint = float(np.linalg.norm(found.norms[order[:number]]))
+        if modulus[number - 1] - joint <= following[number - 1] and number > 1:
+            # the next trial function itself is not apart: a multiple value, or one that is not resolved
+            continue
+        apart = rest_of_spectrum(law, listed, joint, float(following[number - 1]))
+        if modulus[number - 1] - joint > apart.radius:
+            return number, apart
+        refused = apart if refused is None else refused
+    return 0, refused or Separation(np.inf, "estimate", "no trial function is apart from the next")
+
+
+def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Floats, tuple[Parity, ...], float]:
+    """Pairs of largest modulus, descending, constants first, with their parities; what comes next with its residual."""
+    symmetric = _galerkin(law, basis, tolerance)
+    constant = np.asarray(basis.constant)
+    found, names = outermost_by_parity(symmetric, halves(basis, law), constant, len(symmetric), "largest")
+    rest, inner = found.values, found.vectors
+    order = np.argsort(-np.abs(rest), kind="stable")
+    chosen = np.sort(order[: k - 1])
+    values, vectors = np.append(1.0, rest[chosen]), np.column_stack([constant, inner[:, chosen]])
+    first: Parity = "even" if law.mirror_symmetric and "none" not in names else "none"
+    listed = (first, *(names[place] for place in chosen))
+    following = order[k - 1 : k - 1 + EXTRA]
+    if not following.size:
+        return values, vectors, listed, 0.0
+    after = residuals(law, basis, inner[:, following], rest[following], most_rows=0)
+    return values, vectors, listed, _reach(after)
+
+
+def _reach(after: Residuals) -> float:
+    """Up to what modulus the intervals of these functions reach."""
+    return float(np.max(np.abs(after.quotients) + after.norms))
+
+
+def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
+    if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
+        # a density may have a peak that no product rule sees; its rows have panels of their own
+        angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval)
+        image, _ = image_rule(law, basis, np.eye(basis.size))(angle, tolerance)
+        symmetric = basis.evaluate(angle).T @ (weight[:, None] * image)
+        return np.asarray(0.5 * (symmetric + symmetric.T))
+    matrix = discretise(law, basis, tolerance=tolerance)
+    check_reversible(matrix)
+    return np.asarray(0.5 * (matrix.symmetric + matrix.symmetric.T))
+
+
+def _enclosed(
+    found: Residuals,
+    known: tuple[int, Separation],
+    order: NDArray[np.intp],
+    place: int,
+    names: tuple[Parity, ...],
+    exact: bool,
+) -> Enclosure:
+    number, apart = known
+    own = names[place]
+    value, norm = float(found.quotients[place]), float(found.norms[place])
+    rank = int(np.flatnonzero(order == place)[0])
+    if rank == 0 and place == 0 and number:
+        return Enclosure(1.0, 1.0, 1.0, "indexed", 0, norm, apart.kind, f"P 1 = 1; {apart.reason}", own)
+    if rank < number:
+        # the law maps even functions to even ones and odd ones to odd ones: neighbours are those of the same parity
+        alike = np.array([other for other in order[:number] if names[other] == own], dtype=np.intp)
+        low, high = _temple(found, apart.radius, alike, place)
+        kind: ErrorKind = "bound" if exact and apart.kind == "bound" else "estimate"
+        reason = f"{apart.reason}: the rest is within {apart.radius:.6g}"
+        return Enclosure(value, low, high, "indexed", rank, norm, kind, reason, own)
+    radius = norm + float(found.quotient_errors[place]) + QUOTIENT_ROUNDING
+    reason = f"not indexed: the rest of the spectrum reaches {apart.radius:.6g} for all that is known ({apart.reason})"
+    kind = "bound" if exact else "estimate"
+    return Enclosure(
+        value, value - radius, min(value + radius, 1.0), "contains-spectrum", None, norm, kind, reason, own
+    )
+
+
+def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], place: int) -> tuple[float, float]:
+    """Kato-Temple on both sides, with the distances to the neighbouring enclosures or to the rest."""
+    doubt = found.quotient_errors + QUOTIENT_ROUNDING
+    radius = found.norms + doubt
+    value, norm = found.quotients[place], found.norms[place]
+    others = listed[listed != place]
+    near, spread = found.quotients[others], radius[others]
+    above = np.concatenate([(near - spread)[near > value], [-rest] if value < -rest else []])
+    below = np.concatenate([(near + spread)[near <= value], [rest] if value > rest else []])
+    room_above = float(above.min()) - value if above.size else np.inf
+    room_below = value - float(below.max()) if below.size else np.inf
+    up = min(norm**2 / room_below, radius[place]) if room_below > 0.0 else radius[place]
+    down = min(norm**2 / room_above, radius[place]) if room_above > 0.0 else radius[place]
+    return float(value - down - doubt[place]), float(min(value + up + doubt[place], 1.0))

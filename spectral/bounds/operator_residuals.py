@@ -1,0 +1,327 @@
+"""Residuals of trial functions, for the law itself and not for its matrix."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ...checks import Floats
+from ...errors import AccuracyError, InputError
+from ...kernels import Basis, Bins, CircularArcLaw, Composition, DensityLaw, Law, Legendre, Panels, PolygonLaw, WallLaw
+from ...kernels.bases.measure import SINE, gauss_on_intervals
+from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
+from ...kernels.discretisation.densities import GRAZING_EDGES
+from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
+from ...kernels.expectations.basis_means import BasisRows, function_rows, height_of, integrates_panels, weighted_rows
+from ...kernels.laws.density import GAUSS_NODES, split_rows
+from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.specular_frame import SpecularFrame
+from ...kernels.laws.structure import Rules, fold, holds_of_all
+from ...kernels.walls.circular_arc import MOST_HITS
+from ...kernels.walls.words import law_of, words_of
+from ...rounding import EPS
+
+# Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
+SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
+# Rows held at a time for few functions, and how many functions are few.
+CHUNK_ROWS, FEW_FUNCTIONS = 256, 16
+# Halves of (0, pi) overlap by no more.
+HALF_ROUNDING = 1e-12
+# Errors of rows of which nothing is asked.
+ROW_TOLERANCE = 1e-8
+# A Gauss rule with n nodes on a panel of width h follows cos(l theta) to rounding for l h up to about this times n.
+NODES_PER_DEGREE = 1.2
+# Nodes beyond those that the basis asks for, of the two rules that are compared.
+MORE_NODES = (0, 8)
+# Into how many parts the panels are cut for these two rules, and for the third where the two differ by more than this.
+PARTS, SETTLED = (1, 1, 4), 1e-12
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What quadrature over the incoming angle finds of orthonormal trial functions v_i and a self-adjoint law P.
+
+    Attributes
+    ----------
+    quotients : array of shape (k,)
+        <v_i, P v_i>.
+    quotient_errors : array of shape (k,)
+        Estimated errors of the quotients.
+    norms : array of shape (k,)
+        ||P v_i - rho_i v_i||, the quadrature's own error included.
+    rows : int
+        Angles at which the law was applied.
+    """
+
+    quotients: Floats
+    quotient_errors: Floats
+    norms: Floats
+    rows: int
+
+    def split(self, number: int) -> tuple[Residuals, Residuals]:
+        """Those of the first functions, and of the others."""
+        both = (
+            (self.quotients[part], self.quotient_errors[part], self.norms[part])
+            for part in (slice(None, number), slice(number, None))
+        )
+        first, others = (Residuals(*arrays, self.rows) for arrays in both)
+        return first, others
+
+
+def residuals(
+    law: Law,
+    basis: Basis,
+    vectors: Floats,
+    values: Floats,
+    most_rows: int = MOST_ROWS,
+    *,
+    mirrored: bool = False,
+    quotient_error: float = 0.0,
+    leading: int | None = None,
+) -> Residuals:
+    """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
+
+    ``values``, shape (k,), are the eigenvalues that they are thought to have. ||P v - rho v||^2 is integrated as it
+    stands: as <P v, P v> - rho^2 it would lose half of its digits. Panels in the incoming angle are halved where Gauss
+    and Kronrod differ most for the ``leading`` functions, by default all; their difference counts as error.
+    ``mirrored`` says that each function is even or odd, and the law mirror-symmetric; an error of a quotient below
+    ``quotient_error`` is good enough.
+    """
+    if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.breakpoints.size:
+        return _smooth_residuals(law, basis, vectors, values)
+    function = _TrialFunctions(law, basis, vectors, quotient_error)
+    low, high = _first_panels(law, basis)
+    if mirrored:
+        inside = low < 0.5 * np.pi - HALF_ROUNDING
+        low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
+    kept = np.zeros((2, 0))
+    # integrals, the differences of the two rules, and what the errors of the rows do
+    total, error, doubt = (np.zeros((0, 2, len(values))) for _ in range(3))
+    rows = 0
+    while low.size:
+        fresh = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
+        rows += low.size * len(NODES)
+        kept = np.concatenate([kept, [low, high]], axis=1)
+        total, error, doubt = (np.concatenate(both) for both in zip((total, error, doubt), fresh, strict=True))
+        square = total[:, 1].sum(axis=0)
+        # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
+        wanted = np.stack(
+            [
+                np.maximum(SHARE * square + 4.0 * EPS, quotient_error),
+                np.maximum(SHARE * square + (8.0 * EPS) ** 2, SHARE * quotient_error),
+            ]
+        )
+        share = (error / wanted)[..., :leading].max(axis=(1, 2))
+        affordable = max(most_rows - rows, 0) // (2 * len(NODES))
+        worst = np.argsort(-share)[:affordable]
+        worst = worst[(share[worst] * len(share) > 1.0) & (np.diff(kept[:, worst], axis=0)[0] > NARROWEST)]
+        if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
+            break
+        middle = kept[:, worst].mean(axis=0)
+        low, high = np.append(kept[0, worst], middle), np.append(middle, kept[1, worst])
+        rest = np.setdiff1d(np.arange(len(share)), worst)
+        kept, total, error, doubt = kept[:, rest], total[rest], error[rest], doubt[rest]
+    correction, square = total.sum(axis=0)
+    correction_error, square_error = (error + doubt).sum(axis=0)
+    return Residuals(values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), rows)
+
+
+def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -> Residuals:
+    """The same for polynomials and a density, whose images are smooth: two Gauss rules that follow them."""
+    found, rows, rule = [], 0, image_rule(law, basis, vectors)
+    for more in MORE_NODES:
+        angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval + more)
+        rows += angle.size
+        here = expansion(basis, vectors, angle)
+        image, errors = rule(angle, ROW_TOLERANCE)
+        rest = image - here * values
+        found.append((weight @ (here * rest), weight @ (rest * rest)))
+    (first, first_square), (second, second_square) = found
+    norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
+    # an error e of the images adds at most ||e|| to either, for the trial functions are unit vectors
+    doubt = float(np.sqrt(weight @ errors**2))
+    return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, rows)
+
+
+def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
+    """Between the edges of the basis and beside grazing; of densities also where their images of jumps vary."""
+    edges = [basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES]
+    for part in {part for word in words_of(law) or () for part in word}:
+        if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
+            # the law is symmetric: where p(theta, .) has kinks, p(., theta') has them
+            edges += [part.breakpoints, part.incoming_edges(basis.edges)]
+            edges += [np.pi - one for one in edges[-2:]] if law.frame == "specular" else []
+    joint = np.unique(np.clip(np.concatenate(edges), 0.0, np.pi))
+    return joint[:-1], joint[1:]
+
+
+class _TrialFunctions:
+    """Trial functions and what the law makes of them."""
+
+    def __init__(self, law: Law, basis: Basis, vectors: Floats, row_tolerance: float) -> None:
+        self.basis, self.vectors = basis, vectors
+        self.row_tolerance = row_tolerance or ROW_TOLERANCE
+        self.rule = image_rule(law, basis, vectors)
+
+    def __call__(self, theta: Floats) -> Floats:
+        """Their values, shape (angles, k)."""
+        return expansion(self.basis, self.vectors, theta)
+
+    def images(self, theta: Floats) -> tuple[Floats, Floats]:
+        """The values of P v, shape (angles, k), and their errors."""
+        found, errors = self.rule(theta, self.row_tolerance)
+        if np.isnan(errors).any():
+            raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
+        return found, errors
+
+
+def _integrals(
+    function: _TrialFunctions, values: Floats, low: Floats, high: Floats, copies: float
+) -> tuple[Floats, Floats, Floats]:
+    """Integrals of v (P v - rho v) and of its square over each panel, with the differences of the two rules and what
+    the errors of the rows do.
+
+    An error e of a row adds e v to the first and 2 e (P v - rho v) + e^2 to the second.
+    """
+    half = 0.5 * (high - low)
+    angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
+    flat = angle.ravel()
+    image, row_error = function.images(flat)
+    here = function(flat)
+    rest, doubt = image - here * values, row_error[:, None]
+    shape = (*angle.shape, len(values))
+    parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
+    doubts = np.stack([(np.abs(here) * doubt).reshape(shape), ((2.0 * np.abs(rest) + doubt) * doubt).reshape(shape)], 2)
+    density = copies * half[:, None] * SINE.density(angle)
+    return (
+        np.einsum("pq,pqjk->pjk", density * KRONROD, parts),
+        np.abs(np.einsum("pq,pqjk->pjk", density * (KRONROD - GAUSS), parts)),
+        np.einsum("pq,pqjk->pjk", density * KRONROD, doubts),
+    )
+
+
+def image_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+    """What gives P v for the functions with the coefficients ``vectors``, and an error of the worst at each angle.
+
+    Raises
+    ------
+    InputError
+        If nothing is known of the errors: `apply` of a law of unknown kind, which does not promise to be exact, of
+        walls of very many pieces, and of compositions with laws that are not exact.
+    """
+    words = words_of(law)
+    if words is None:
+        raise _refusal(law, "it is a sum of very many compositions")
+    return weighted_rows([(weight, _rule(law_of(word), basis, vectors)) for word, weight in words.items()])
+
+
+def _rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+    if isinstance(law, Composition) and not holds_of_all(law, _is_exact):
+        raise _refusal(law, "it is a composition with a law whose means are integrals by quadrature")
+    if isinstance(law, SpecularFrame):
+        fine, coefficients = mirror_refinement(basis)
+        return _rule(law.law, fine, reflection_matrix(fine) @ (coefficients.T @ vectors))
+    if isinstance(law, LambertianLaw):
+        mean = basis.constant @ vectors
+        return lambda theta, tolerance: (np.tile(mean, (theta.size, 1)), np.zeros(theta.size))
+    if isinstance(law, WallLaw) and law.exact_law is not None:
+        return _rule(law.exact_law, basis, vectors)
+    if holds_of_all(law, _is_exact):
+        return _exact_rule(law, basis, vectors)
+    if isinstance(law, DensityLaw):
+        return _of_rules(partial(_means_of_density, law, basis, vectors), vectors.shape[1])
+    if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
+        return _of_rules(partial(_means_of_arc, law, basis, vectors), vectors.shape[1])
+    if integrates_panels(law):
+        return function_rows(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)
+    raise _refusal(law, "its means come without errors, and it does not promise to be exact (exact_apply)")
+
+
+def _is_exact(law: Law) -> bool:
+    return law.exact_apply
+
+
+def _refusal(law: Law, reason: str) -> InputError:
+    return InputError(
+        f"law: the images of trial functions under {law!r} have no known error, for {reason}; spectrum(law) and "
+        "spectral_gap(law) take its matrix"
+    )
+
+
+def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+    """By `apply`; rays of a polygon whose way was not found, a share s, change P v by 2 s^(1/2) max|v| at most."""
+    unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda share: share))
+    doubt = 2.0 * math.sqrt(unknown) * height_of(basis, vectors) if unknown else 0.0
+
+    def means(theta: Floats) -> Floats:
+        return law.apply(lambda angle: expansion(basis, vectors, angle), theta)
+
+    return lambda theta, tolerance: (_in_chunks(means, theta, vectors.shape[1]), np.full(theta.size, doubt))
+
+
+def _unresolved(law: Law) -> float:
+    return float(law.unresolved) if isinstance(law, PolygonLaw) else 0.0
+
+
+def _of_rules(means: Callable[..., Floats], functions: int) -> BasisRows:
+    """Means by two Gauss rules, and by a far finer one where these differ: the error is what both are from that."""
+
+    def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))
+        error = _largest(second - first)
+        # two rules that hardly differ may both miss a kink: one whose error is much less tells
+        open_rows = np.flatnonzero(error > SETTLED)
+        if open_rows.size:
+            finest = _in_chunks(partial(means, level=2), theta[open_rows], functions)
+            error[open_rows] = _largest(finest - first[open_rows]) + _largest(finest - second[open_rows])
+            second[open_rows] = finest
+        return second, error
+
+    return rule
+
+
+def _largest(values: Floats) -> Floats:
+    return np.asarray(np.abs(values).reshape(len(values), -1).max(axis=1, initial=0.0))
+
+
+def _in_chunks(means: Callable[[Floats], Floats], theta: Floats, functions: int) -> Floats:
+    step = max(1, CHUNK_ROWS // (1 + functions // FEW_FUNCTIONS))
+    return np.concatenate([means(theta[start : start + step]) for start in range(0, theta.size, step)])
+
+
+def _means_of_density(law: DensityLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
+    """Rows of a density are cut at the edges of the basis, and as fine as its functions need."""
+    edges = law.panels(theta)
+    if isinstance(basis, Legendre):
+        # a panel's Gauss rule follows polynomials in cos(theta) of a degree below its nodes over its width
+        edges = split_rows(edges, 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES)))
+    else:
+        inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
+        edges = np.sort(np.concatenate([edges, inner], axis=1), axis=1)
+    edges = split_rows(edges, PARTS[level])
+    nodes = GAUSS_NODES + MORE_NODES[level % 2]
+    outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), nodes)
+    outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)
+    weight = weight * law.density(theta[:, None], outgoing)
+    weight /= weight.sum(axis=1, keepdims=True)
+    return np.asarray(np.einsum("ij,ij...->i...", weight, expansion(basis, vectors, outgoing)))
+
+
+def _means_of_arc(law: CircularArcLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
+    """A piece of a row may be as long as (0, pi); finer rules also follow more hits."""
+    nodes = GAUSS_NODES + int(np.ceil(0.5 * np.pi * basis.size / NODES_PER_DEGREE)) + MORE_NODES[level % 2]
+    hits = (level + 1) * MOST_HITS
+    return law.means(lambda angle: expansion(basis, vectors, angle), theta, nodes, hits)
+
+
+def expansion(basis: Basis, vectors: Floats, theta: Floats) -> Floats:
+    """Values of the functions with the coefficients ``vectors``, shape ``theta.shape + (k,)``."""
+    if not isinstance(basis, Panels):
+        return np.asarray(basis.evaluate(theta) @ vectors)
+    panel, values = basis.local(theta)
+    coefficients = vectors.reshape(-1, basis.degree + 1, vectors.shape[1])
+    return np.asarray(np.einsum("...d,...dk->...k", values, coefficients[panel]))

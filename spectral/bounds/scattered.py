@@ -1,0 +1,188 @@
+"""Enclosures for sums of words that begin and end with a Henyey-Greenstein scattering: of the whole spectrum at once.
+
+The scattering HG(g) leaves of polynomials of degree n and more at most the share |g|^n, so that such a word is its
+matrix in the first n Legendre polynomials but for an operator of norm 2 |g|^n and the matrix' own error. What else the
+sum may have, identity, specular and Lambertian reflection, is diagonal in these polynomials. By Weyl's theorem the
+eigenvalues off the essential spectrum are then those of the matrix within that distance, in order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...checks import Floats
+from ...errors import InputError
+from ...estimates import ErrorKind
+from ...kernels import KernelMatrix, Law, Legendre, discretise
+from ...kernels.discretisation.scattering import is_scattered
+from ...kernels.laws.ideal import LambertianLaw, specular
+from ...kernels.laws.phase_function import HenyeyGreensteinLaw
+from ...kernels.laws.structure import holds_of_all
+from ...kernels.walls.words import Sum, Word, words_of
+from ...rounding import EPS
+from ..eigenvalues.parity import Parity
+from ..eigenvalues.spectra import check_reversible
+
+# The largest matrices, where they are diagonal and where not, and the share of the tolerance that the tail may have.
+MOST_DIAGONAL, MOST_FUNCTIONS, TAIL_SHARE = 2048, 512, 0.1
+# Rounding of sums and powers of numbers below 1; of eigenvalues of a matrix with n rows n^(1/2) times as much.
+ROUNDING = 8.0 * EPS
+
+
+@dataclass(frozen=True)
+class ScatteredSpectrum:
+    """The eigenvalues of largest modulus of a matrix that is the law but for an operator of small norm.
+
+    Attributes
+    ----------
+    values : array of shape (k,)
+        The constants' 1 first, the others in order of their moduli.
+    parities : tuple of str
+    certain : tuple of bool
+        Whether so many eigenvalues of the law as there are listed values near it are there, in this order.
+    distance : float
+        A bound for the norm of what the matrix leaves out.
+    essential : float
+        Largest modulus in the essential spectrum, exact.
+    degrees : int
+    kind : {"bound", "estimate"}
+        ``"bound"`` where the matrix is diagonal.
+    """
+
+    values: Floats
+    parities: tuple[Parity, ...]
+    certain: tuple[bool, ...]
+    distance: float
+    essential: float
+    degrees: int
+    kind: ErrorKind
+
+
+def scattered_words(law: Law) -> Sum | None:
+    """The law as a sum of words with a scattering in them; None where this module has nothing to say."""
+    if holds_of_all(law, lambda part: not isinstance(part, HenyeyGreensteinLaw)):
+        return None
+    words = words_of(law)
+    if words is None:
+        return None
+    return words if all(_is_diagonal(word) or _is_enclosed(word) for word in words) else None
+
+
+def scattered_spectrum(law: Law, words: Sum, k: int, tolerance: float) -> ScatteredSpectrum:
+    """The spectrum of a law that is self-adjoint, from its words.
+
+    Raises
+    ------
+    InputError
+        If a scattering is too near to a mirror for the polynomials that can be held.
+    """
+    diagonal = all(map(_is_diagonal, words))
+    most = MOST_DIAGONAL if diagonal else MOST_FUNCTIONS
+    wanted = EPS if diagonal else TAIL_SHARE * tolerance
+    degrees = k + 1
+    while degrees < most and _tail(words, degrees) > wanted:
+        degrees = min(2 * degrees, most)
+    if not diagonal and _tail(words, degrees) > tolerance:
+        raise InputError(
+            f"law: {law!r} has a scattering that leaves {_tail(words, degrees):.2g} of degree {degrees}, "
+            "the highest that is followed in compositions; ask for a tolerance above that, or for spectrum(law)"
+        )
+    symmetric, error = (
+        _diagonal(words, degrees) if diagonal else _checked(discretise(law, Legendre(degrees), tolerance=wanted))
+    )
+    distance = error + 2.0 * _tail(words, degrees)
+    even, odd = (sum(w * _kept(word, sign) for word, w in words.items()) for sign in (1.0, -1.0))
+    essential = max(abs(even), abs(odd))
+    values, parities = _eigenvalues(symmetric, law.mirror_symmetric is True)
+    listed = values[: k - 1]
+    certain = [_is_certain(values, place, k - 1, distance, essential) for place in range(len(listed))]
+    first: Parity = "even" if law.mirror_symmetric is True else "none"
+    return ScatteredSpectrum(
+        np.append(1.0, listed), (first, *parities[: k - 1]), (True, *certain), float(distance), essential, degrees,
+        "bound" if diagonal else "estimate",
+    )  # fmt: skip
+
+
+def _is_diagonal(word: Word) -> bool:
+    return not word or (len(word) == 1 and (word[0] == specular() or _has_eigenvalues(word[0])))
+
+
+def _has_eigenvalues(law: Law) -> bool:
+    return isinstance(law, (LambertianLaw, HenyeyGreensteinLaw))
+
+
+def _is_enclosed(word: Word) -> bool:
+    ends = isinstance(word[0], HenyeyGreensteinLaw) and isinstance(word[-1], HenyeyGreensteinLaw)
+    return ends and is_scattered(word)
+
+
+def _factor(word: Word) -> float:
+    """The |g| of the end of a word that leaves more of high degrees; 0 where nothing or all is left."""
+    ends = [part for part in (*word[:1], *word[-1:]) if isinstance(part, HenyeyGreensteinLaw)]
+    return max((abs(part.g) for part in ends), default=0.0)
+
+
+def _tail(words: Sum, degrees: int) -> float:
+    return float(sum(weight * _factor(word) ** degrees for word, weight in words.items()))
+
+
+def _kept(word: Word, sign: float) -> float:
+    """What the word makes of polynomials of high degree that are even, or odd: only isometries keep them."""
+    if not word:
+        return 1.0
+    return sign if word == (specular(),) else 0.0
+
+
+def _diagonal(words: Sum, degrees: int) -> tuple[Floats, float]:
+    degree = np.arange(float(degrees))
+    total = np.zeros(degrees)
+    for word, weight in words.items():
+        if word and isinstance(word[0], HenyeyGreensteinLaw):
+            total += weight * word[0].g ** degree
+        elif word and isinstance(word[0], LambertianLaw):
+            total += weight * (degree == 0.0)
+        else:
+            total += weight * (np.where(degree % 2.0, -1.0, 1.0) if word else 1.0)
+    return np.diag(total), ROUNDING
+
+
+def _checked(matrix: KernelMatrix) -> tuple[Floats, float]:
+    check_reversible(matrix)
+    symmetric = np.asarray(0.5 * (matrix.symmetric + matrix.symmetric.T))
+    asymmetry = float(np.linalg.norm(matrix.symmetric - symmetric))
+    return symmetric, float(matrix.error) + asymmetry + ROUNDING * len(symmetric) ** 0.5
+
+
+def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parity, ...]]:
+    """Those off the constants by modulus, descending, with their parities."""
+    inner = symmetric[1:, 1:]
+    values: Floats
+    names: list[Parity] = ["none"] * len(inner)
+    if np.array_equal(inner, np.diag(np.diag(inner))):
+        values = np.diag(inner)
+        if mirrored:
+            names = ["odd" if place % 2 == 0 else "even" for place in range(len(values))]
+    elif mirrored:
+        # what the law has between polynomials of either parity is error
+        odd, even = (np.linalg.eigvalsh(inner[start::2, start::2]) for start in (0, 1))
+        values = np.asarray(np.append(odd, even), dtype=np.float64)
+        names[: len(odd)], names[len(odd) :] = ["odd"] * len(odd), ["even"] * len(even)
+    else:
+        values = np.asarray(np.linalg.eigvalsh(inner), dtype=np.float64)
+    order = np.argsort(-np.abs(values), kind="stable")
+    return values[order], tuple(names[place] for place in order)
+
+
+def _is_certain(values: Floats, place: int, number: int, distance: float, essential: float) -> bool:
+    """Whether a value's place is known: all that may have its modulus are near to it, and are listed."""
+    if abs(values[place]) - distance <= essential + distance:
+        return False
+    # neighbours by modulus as far as no gap tells them apart
+    modulus = np.abs(values)
+    apart = np.flatnonzero(modulus[:-1] - modulus[1:] > 2.0 * distance) + 1
+    first = int(apart[apart <= place].max(initial=0))
+    last = int(apart[apart > place].min(initial=len(values)))
+    same_sign = bool(np.all(np.sign(values[first:last]) == np.sign(values[place])))
+    return same_sign and last <= number and modulus[last - 1] - distance > essential + distance

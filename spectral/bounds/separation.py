@@ -1,0 +1,147 @@
+"""How far the rest of a spectrum stays from the eigenvalues that are enclosed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...checks import Floats
+from ...estimates import ErrorKind
+from ...kernels import DensityLaw, Law, MatrixLaw
+from ...kernels.bases.measure import SINE, gauss_rule
+from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.phase_function import HenyeyGreensteinLaw
+from ...kernels.laws.structure import Rules, fold
+from ...rounding import EPS
+from ..essential.edge import essential_edge
+from .oscillations import fast_top
+
+# The power P^p of a law with eigenvalues g^l is chosen so that g^p is about this: the sum of the squares that are left
+# out, x^(2 m)/(1 - x^2), is then below the last square that is kept, x^(2 m - 2), and rounding is not yet.
+POWER_TARGET = 0.6
+# Nodes of the quadrature of traces, and of the coarser one that tells its error.
+TRACE_PANELS, TRACE_NODES = 24, (12, 16)
+
+
+@dataclass(frozen=True)
+class Separation:
+    """All of the spectrum but m listed eigenvalues has a modulus of at most ``radius``.
+
+    Attributes
+    ----------
+    radius : float
+        ``inf`` where nothing is known.
+    kind : {"bound", "estimate"}
+    reason : str
+    """
+
+    radius: float
+    kind: ErrorKind
+    reason: str
+
+
+def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) -> Separation:
+    """What bounds the spectrum beyond the listed eigenvalues.
+
+    Parameters
+    ----------
+    law : Law
+    values : array of shape (m,)
+        The listed eigenvalues, the constants' included.
+    width : float
+        Each of them has an eigenvalue of its own this near.
+    next_value : float
+        Modulus, with its residual, of the next one in the basis, for laws of which nothing better is known.
+    """
+    if isinstance(law, MatrixLaw):
+        return _of_matrix(law, len(values))
+    found = _hilbert_schmidt(law, values, width)
+    if found is not None:
+        return found
+    share = lambertian_share(law)
+    if share > 0.0 and len(values) == 1:
+        return Separation(1.0 - share, "bound", f"a Lambertian share a = {share:.6g}: 1 - a beyond the constants")
+    edge = essential_edge(law)
+    if edge.high >= next_value:
+        reason = f"norm of the essential part, {edge.high:.6g}: " + "; ".join(edge.reasons)
+        return Separation(edge.high, edge.kind, reason)
+    # the next value of slow functions is not that of the law where a law nearly keeps fast oscillations
+    fast = fast_top(law)
+    if fast is not None and fast[0] > next_value:
+        return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
+    reason = f"next eigenvalue in the basis, with its residual; essential part at most {edge.high:.3g}"
+    return Separation(next_value, "estimate", reason)
+
+
+def _of_matrix(law: MatrixLaw, listed: int) -> Separation:
+    """A law that is constant on bins has the eigenvalues of its matrix, and 0."""
+    root = np.sqrt(SINE.mass(law.edges[:-1], law.edges[1:]))
+    symmetric = root[:, None] * law.array / root
+    moduli = np.sort(np.abs(np.linalg.eigvalsh(0.5 * (symmetric + symmetric.T))))[::-1]
+    rounding = len(moduli) * EPS + float(np.linalg.norm(symmetric - symmetric.T))
+    radius = float(moduli[listed]) + rounding if listed < len(moduli) else 0.0
+    return Separation(
+        radius, "bound", f"the next of the {len(moduli)} eigenvalues of its matrix; beyond its bins it is 0"
+    )
+
+
+def lambertian_share(law: Law) -> float:
+    r"""The a in P = a L + (1 - a) R with L Lambertian and R Markov: beyond the constants ||P|| <= 1 - a.
+
+    Of sums and products it is found from their parts: (1 - a)(1 - b) is what is left of a product.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> round(lambertian_share(ker.maxwell(0.25) ** 2), 12)
+    0.4375
+    """
+    rules: Rules[float] = Rules(
+        lambda leaf: 1.0 if isinstance(leaf, LambertianLaw) else 0.0,
+        lambda terms: sum(weight * share for weight, share in terms),
+        lambda shares: 1.0 - float(np.prod([1.0 - share for share in shares])),
+        lambda share: share,
+    )
+    return min(fold(law, rules), 1.0)
+
+
+def _hilbert_schmidt(law: Law, values: Floats, width: float) -> Separation | None:
+    """The sum of all lambda^(2 p), which is the trace of P^(2 p), less those that are listed."""
+    if not isinstance(law, DensityLaw):
+        return None
+    power = 1
+    if isinstance(law, HenyeyGreensteinLaw):
+        if law.g == 0.0:
+            return Separation(0.0, "bound", "the law is Lambertian: of rank 1")
+        power = max(1, round(np.log(POWER_TARGET) / np.log(abs(law.g))))
+        traces = [_trace(HenyeyGreensteinLaw(abs(law.g) ** (2 * power)), nodes) for nodes in TRACE_NODES]
+    else:
+        traces = [_squared_norm(law, nodes) for nodes in TRACE_NODES]
+    total, doubt = traces[-1], abs(traces[1] - traces[0])
+    listed = float(np.sum(np.maximum(np.abs(values) - width, 0.0) ** (2 * power)))
+    rest = max(total - listed, 0.0) + doubt + 16.0 * EPS * total
+    radius = float(rest ** (0.5 / power))
+    kind: ErrorKind = "bound" if isinstance(law, (HenyeyGreensteinLaw, LambertianLaw)) else "estimate"
+    what = "P" if power == 1 else f"P^{power}"
+    reason = (
+        f"Hilbert-Schmidt remainder of {what}: {total:.6g} less the squares of the {len(values)} listed eigenvalues"
+    )
+    return Separation(radius, kind, reason)
+
+
+def _trace(law: DensityLaw, nodes: int) -> float:
+    theta, weight = gauss_rule(_edges(), nodes)
+    return float(np.sum(weight * law.density(theta, theta)))
+
+
+def _squared_norm(law: DensityLaw, nodes: int) -> float:
+    """The integral of p(theta, theta') p(theta', theta), which for a reversible law is that of the squared kernel."""
+    edges = np.unique(np.concatenate((_edges(), np.asarray(getattr(law, "breakpoints", ())))))
+    theta, weight = gauss_rule(edges, nodes)
+    density = law.density(theta[:, None], theta)
+    return float(weight @ (density * density.T) @ weight)
+
+
+def _edges() -> Floats:
+    return np.linspace(0.0, np.pi, TRACE_PANELS + 1)

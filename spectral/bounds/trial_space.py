@@ -1,0 +1,240 @@
+"""Trial functions on panels that are divided where the residual is large."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...errors import InputError
+from ...kernels import Law, Legendre, Panels
+from ...kernels.bases.assembly import one_blas_thread
+from ...kernels.bases.measure import SINE
+from ...kernels.expectations.angle_panels import KRONROD, NODES
+from ...kernels.expectations.basis_means import BasisRows, basis_rows, traces_rows
+from ..eigenvalues.parity import Parity
+
+# Degree on each panel: Kronrod's rule is then still exact for products of two functions.
+DEGREE = 6
+# Kinks that the law knows become edges at once, the widest panel of the first level is this.
+FIRST_KINKS, WIDEST = 40, np.pi / 10
+# Nearest distance of two edges.
+NARROWEST = 1e-7
+# A level divides the worst panels, those that hold this share of the squared residuals.
+SHARE = 0.9
+# Levels at most; and panels beyond which none are divided, where rows are traced and where they are not.
+MOST_LEVELS, MOST_PANELS = 12, {True: 60, False: 200}
+# Trial functions that tell what comes next.
+EXTRA = 2
+# Trial functions of one parity that are iterated together, beyond those asked for.
+GUARD = 12
+MOST_ITERATIONS, SETTLED = 60, 0.02
+PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
+# Rows are as exact as this share of the residual that is wanted.
+ROW_SHARE = 0.03
+
+
+@dataclass(frozen=True)
+class Trials:
+    """Approximate eigenfunctions of a law, the constants first, then descending.
+
+    Attributes
+    ----------
+    basis : Panels
+    values : array of shape (k,)
+    vectors : array of shape (n, k)
+        Coefficients in ``basis``, of unit norm.
+    following : array of shape (n, 2)
+        Those that come next by modulus, ``following_values`` their values.
+    parities : tuple of {"even", "odd", "none"}
+        Of ``vectors``.
+    mirrored : bool
+        Whether every function is even or odd under theta -> pi - theta.
+    """
+
+    basis: Panels
+    values: Floats
+    vectors: Floats
+    following_values: Floats
+    following: Floats
+    parities: tuple[Parity, ...]
+    mirrored: bool
+    levels: tuple[tuple[int, float], ...]
+
+
+def adapted_trials(law: Law, k: int, tolerance: float, most_levels: int = MOST_LEVELS) -> Trials:
+    """Trial functions of the k eigenvalues of largest modulus, with Kato-Temple bounds of about the tolerance.
+
+    Notes
+    -----
+    On every level the functions P e_j are evaluated at Kronrod's nodes, and e_i is integrated against them: a matrix
+    that acts on smooth functions as exactly as P does, but is not symmetric, because single P e_j have kinks inside
+    panels. Its leading eigenvectors are found by iterating smooth functions. The same nodes show their residuals, and
+    panels with large ones are divided.
+    """
+    mirrored = bool(law.mirror_symmetric)
+    edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[traces_rows(law)]
+    history: list[tuple[int, float]] = []
+    goal = np.sqrt(tolerance)
+    while True:
+        level = _Level(law, edges, mirrored, ROW_SHARE * goal)
+        with one_blas_thread():
+            values, vectors, parity = level.leading(k + EXTRA, SETTLED * goal)
+        squares = level.squared_residuals(values, vectors, parity)
+        goal = np.sqrt(tolerance * _room(values, k))
+        joint = float(np.sqrt(squares[:, :k].sum()))
+        history.append((level.panels.size, joint))
+        if joint <= goal or len(history) == most_levels or len(edges) > most_panels:
+            break
+        edges = _divided(edges, squares[:, :k].sum(axis=1))
+    first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
+    chosen = np.append(0, first)
+    whole = level.extended(vectors, parity)
+    return Trials(
+        level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
+        tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, tuple(history),
+    )  # fmt: skip
+
+
+class _Level:
+    """The law at the Kronrod nodes of panels; of a mirror-symmetric law on (0, pi/2) only.
+
+    Coefficients are those on the panels that are kept; the others have them by parity.
+    """
+
+    def __init__(self, law: Law, edges: Floats, mirrored: bool, row_tolerance: float) -> None:
+        whole = np.concatenate([edges, np.pi - edges[-2::-1]]) if mirrored else edges.copy()
+        whole[-1] = np.pi
+        self.panels, self.mirrored = Panels(whole, DEGREE), mirrored
+        half = 0.5 * np.diff(edges)
+        angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
+        self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
+        rows: BasisRows = basis_rows(law, self.panels)
+        self._images, _ = rows(angle.ravel(), row_tolerance)
+        # values of each panel's own functions, shape (panels, nodes, degree + 1); of norm 1 on what is kept
+        self.norm = np.sqrt(0.5) if mirrored else 1.0
+        self.local = self.panels.local(angle)[1] * self.norm
+        self._signs = (-1.0) ** np.arange(DEGREE + 1)
+
+    def images(self, parity: int) -> Floats:
+        """The images of the functions of one parity, shape (rows, functions)."""
+        return self._even if parity > 0 else self._odd
+
+    @cached_property
+    def _even(self) -> Floats:
+        return self._folded(1)
+
+    @cached_property
+    def _odd(self) -> Floats:
+        return self._folded(-1)
+
+    def _folded(self, parity: int) -> Floats:
+        count = len(self.angle)
+        if not self.mirrored:
+            return self._images
+        blocks = self._images.reshape(self.angle.size, -1, DEGREE + 1)
+        folded = blocks[:, :count] + parity * self._signs * blocks[:, ::-1][:, :count]
+        return np.asarray(self.norm * folded.reshape(self.angle.size, -1))
+
+    def projected(self, values: Floats) -> Floats:
+        """Coefficients of functions known at the nodes, shape (rows, k)."""
+        shaped = values.reshape(*self.angle.shape, -1) * self.weight[..., None]
+        return np.asarray(np.einsum("pqd,pqk->pdk", self.local, shaped).reshape(-1, values.shape[1]))
+
+    def expanded(self, vectors: Floats) -> Floats:
+        """Values at the nodes, shape (rows, k)."""
+        blocks = vectors.reshape(len(self.angle), DEGREE + 1, -1)
+        return np.asarray(np.einsum("pqd,pdk->pqk", self.local, blocks).reshape(self.angle.size, -1))
+
+    def leading(self, k: int, algebraic: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
+        """Values of the largest moduli, constants first, with vectors and parities (0 where the law has none)."""
+        found = [self._leading_of(parity, k, algebraic) for parity in ((1, -1) if self.mirrored else (0,))]
+        values = np.concatenate([part[0] for part in found])
+        vectors = np.concatenate([part[1] for part in found], axis=1)
+        parity = np.concatenate([np.full(len(part[0]), sign) for part, sign in zip(found, (1, -1), strict=False)])
+        order = np.argsort(-np.abs(values), kind="stable")
+        # the constants are the first vector of the first part whatever rounding does to 1
+        order = np.append(0, order[order != 0])[:k]
+        return values[order], vectors[:, order], parity[order]
+
+    def _leading_of(self, parity: int, k: int, algebraic: float) -> tuple[Floats, Floats]:
+        images = self.images(parity or 1)
+        start = Legendre(2 * (k + GUARD) if self.mirrored else k + GUARD).evaluate(self.angle.ravel())
+        start = start[:, (0 if parity >= 0 else 1) :: 2] if self.mirrored else start
+        block = np.linalg.qr(self.projected(start))[0]
+        constant = block[:, :1].copy()
+        wanted = slice(0, k)
+        for _ in range(MOST_ITERATIONS):
+            image = self.projected(images @ block)
+            values, turn = _ritz(block.T @ image)
+            vectors = block @ turn
+            rest = (image @ turn - vectors * values)[:, wanted]
+            if float(np.abs(rest).max()) <= 0.1 * algebraic and float(np.linalg.norm(rest)) <= algebraic:
+                break
+            block = np.linalg.qr(image)[0]
+        vectors = vectors / np.linalg.norm(vectors, axis=0)
+        if parity >= 0:
+            nearest = int(np.argmax(np.abs(constant.T @ vectors)))
+            order = np.append(nearest, np.delete(np.arange(len(values)), nearest))
+            values, vectors = values[order], vectors[:, order]
+            values[0], vectors[:, 0] = 1.0, constant[:, 0]
+        return values[wanted], vectors[:, wanted]
+
+    def squared_residuals(self, values: Floats, vectors: Floats, parity: NDArray[np.intp]) -> Floats:
+        """The part of every panel in the squared residuals, shape (panels, k)."""
+        rest = np.empty((self.angle.size, len(values)))
+        for sign in np.unique(parity):
+            own = parity == sign
+            rest[:, own] = self.images(int(sign)) @ vectors[:, own] - self.expanded(vectors[:, own]) * values[own]
+        squares = (rest**2).reshape(*self.angle.shape, -1)
+        return np.asarray(np.einsum("pq,pqk->pk", self.weight, squares))
+
+    def extended(self, vectors: Floats, parity: NDArray[np.intp]) -> Floats:
+        """Coefficients in all panels."""
+        if not self.mirrored:
+            return vectors
+        blocks = self.norm * vectors.reshape(len(self.angle), DEGREE + 1, -1)
+        other = blocks[::-1] * self._signs[:, None] * parity
+        return np.concatenate([blocks, other]).reshape(-1, vectors.shape[1])
+
+
+def _ritz(projected: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues of largest modulus first and eigenvectors of a matrix that is nearly symmetric."""
+    values, vectors = np.linalg.eig(projected)
+    if np.iscomplexobj(values) and np.any(values.imag != 0.0):
+        values, vectors = np.linalg.eigh(0.5 * (projected + projected.T))
+    values, vectors = np.real(values), np.real(vectors)
+    order = np.argsort(-np.abs(values), kind="stable")
+    return values[order], vectors[:, order]
+
+
+def _room(values: Floats, k: int) -> float:
+    """How far the last value that is wanted stays from the next, at least a hundredth of itself."""
+    modulus = np.abs(values)
+    return float(max(modulus[k - 1] - modulus[k], 0.01 * modulus[k - 1])) if len(values) > k else 1.0
+
+
+def _first_edges(law: Law, mirrored: bool) -> Floats:
+    """Kinks that the law knows, and panels that are not too wide between them; from 0 to pi or pi/2."""
+    end = 0.5 * np.pi if mirrored else np.pi
+    try:
+        kinks = law.kinks(FIRST_KINKS)[0]
+    except InputError:
+        kinks = np.empty(0)
+    marks = np.append(kinks[(kinks > NARROWEST) & (kinks < end - NARROWEST)], [0.0, end])
+    marks = np.unique(marks)
+    marks = marks[np.append(np.diff(marks) > NARROWEST, True)]
+    parts = np.ceil(np.diff(marks) / WIDEST).astype(int)
+    pieces = [low + (high - low) * np.arange(n) / n for low, high, n in zip(marks, marks[1:], parts, strict=False)]
+    return np.append(np.concatenate(pieces), end)
+
+
+def _divided(edges: Floats, squares: Floats) -> Floats:
+    order = np.argsort(-squares)
+    enough = int(np.searchsorted(np.cumsum(squares[order]), SHARE * squares.sum())) + 1
+    chosen = order[:enough]
+    chosen = chosen[np.diff(edges)[chosen] > 2.0 * NARROWEST]
+    return np.union1d(edges, 0.5 * (edges[chosen] + edges[chosen + 1]))

@@ -1,0 +1,1 @@
+"""What follows from spectra: mixing, diffusion, channels, conductance, the billiard Laplacian."""

@@ -1,0 +1,119 @@
+"""Comparison with the billiard Laplacian, to which laws of shallow walls tend."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...checks import Floats, frozen, whole_number
+from ...errors import InputError
+from ...kernels import Law, Legendre, discretise
+
+# Chords of a wall's pieces and twice as many, whose difference tells the error of the mean squared slope.
+CHORDS = 4096
+# Towards a vertical tangent the steepest chord grows like the root of their number, elsewhere by one part in it.
+STEEPENING = 1.2
+
+
+@dataclass(frozen=True)
+class LaplacianComparison:
+    r"""The law in Feres' convention against 1 + 2 h d/dz (1 - z^2) d/dz, z = cos(theta).
+
+    Attributes
+    ----------
+    flatness : float
+        h, from the law: (1 - <e_1, P_F e_1>)/4 with e_1 = sqrt(3) cos(theta).
+    degrees : array of int, shape (n,)
+        1, ..., n.
+    deficits : array of shape (n,)
+        1 - <e_l, P_F e_l> of the normalised Legendre polynomials.
+    ratios : array of shape (n,)
+        deficits / (2 h l (l + 1)): 1 where the Laplacian describes the law.
+    leaks : array of shape (n,)
+        Norm of what P_F e_l has beyond e_l, over its deficit: small where Legendre polynomials are nearly
+        eigenfunctions.
+    error : float
+        Frobenius error of the matrix that was used.
+    """
+
+    flatness: float
+    degrees: Floats
+    deficits: Floats
+    ratios: Floats
+    leaks: Floats
+    error: float
+
+
+def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) -> LaplacianComparison:
+    """Moments of scattering and eigenvalues of a law, compared with those of the billiard Laplacian.
+
+    Parameters
+    ----------
+    law : Law
+        In either convention; it is compared in Feres'.
+    degrees : int
+        Number of Legendre polynomials.
+    tolerance : float
+        Wanted error of the matrix.
+
+    Notes
+    -----
+    Source: R. Feres and H.-K. Zhang, Commun. Math. Phys. 299 (2010): P_F - 1 is about 2 h times the Legendre operator
+    for walls of mean squared slope h, so 1 - lambda_l is about 2 h l (l + 1), and the gap 4 h.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = laplacian_comparison(ker.CircularArcLaw(0.1), 2)
+    >>> [round(float(ratio), 2) for ratio in found.ratios]
+    [1.0, 0.99]
+    """
+    whole_number("degrees", degrees, 1)
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    specular = law if law.frame == "specular" else law.in_specular_frame()
+    matrix = discretise(specular, Legendre(2 * degrees + 2), tolerance=tolerance)
+    order = np.arange(1, degrees + 1)
+    diagonal = np.diagonal(matrix.symmetric)[order]
+    deficits = 1.0 - diagonal
+    flatness = float(deficits[0]) / 4.0
+    columns = matrix.symmetric[:, order].copy()
+    columns[order, np.arange(degrees)] = 0.0
+    scale = np.where(deficits > 0.0, deficits, np.inf)
+    ratios = deficits / (2.0 * flatness * order * (order + 1)) if flatness > 0.0 else np.full(degrees, np.nan)
+    leaks = np.linalg.norm(columns, axis=0) / scale
+    return LaplacianComparison(
+        flatness, frozen(order), frozen(deficits), frozen(ratios), frozen(leaks), float(matrix.error)
+    )
+
+
+def mean_squared_slope(wall: Any) -> float:
+    """h of a wall: the mean over a period of the squared slope; ``inf`` where a piece is vertical or overhangs.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> round(mean_squared_slope(geo.triangular_teeth(np.pi / 2)), 12)
+    1.0
+    """
+    coarse, fine = (_slope_sum(wall, chords) for chords in (CHORDS, 2 * CHORDS))
+    if not np.isfinite(fine[0]) or fine[1] > STEEPENING * coarse[1]:
+        # halving the chords makes the steepest one steeper: a vertical tangent, where the integral diverges
+        return float("inf")
+    # chords have the error 1/chords^2
+    return float((fine[0] + (fine[0] - coarse[0]) / 3.0) / wall.period)
+
+
+def _slope_sum(wall: Any, chords: int) -> tuple[float, float]:
+    """The integral of the squared slope of the chords of a wall's pieces, and the steepest of them."""
+    total, steepest = 0.0, 0.0
+    for piece in wall.pieces:
+        points = np.array([piece.point(t) for t in np.linspace(0.0, 1.0, chords + 1)])
+        run, rise = np.diff(points, axis=0).T
+        if np.any(run <= 0.0):
+            return np.inf, np.inf
+        total += float(np.sum(rise**2 / run))
+        steepest = max(steepest, float(np.max(np.abs(rise / run))))
+    return total, steepest

@@ -1,0 +1,206 @@
+"""How long a chain of reflections takes to forget where it started."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...checks import Floats, finite_number, number_between
+from ...errors import AccuracyError, InputError
+from ...estimates import ErrorKind, Estimate
+from ...kernels import DensityLaw, KernelMatrix, Law
+from ...kernels.bases.measure import SINE
+from ...rounding import EPS
+from ..eigenvalues.spectra import Spectrum, matrix_spectrum
+from ..gap.gap import modulus_gap
+
+Distance = Literal["L2", "total variation", "chi-square"]
+DISTANCES: tuple[Distance, ...] = ("L2", "total variation", "chi-square")
+
+# Eigenvalues of a matrix among which the one of largest modulus is sought, and the error asked of a law's.
+SOUGHT, TOLERANCE = 6, 1e-4
+# Panels and nodes of the norm of a density.
+PANELS, NODES = 48, 16
+
+
+@dataclass(frozen=True)
+class MixingTime:
+    """The number of steps after which a chain is near its invariant distribution.
+
+    Attributes
+    ----------
+    steps : int
+        Enough for every initial density whose distance to 1 in L^2 is ``initial``.
+    earliest : int
+        For ``distance="L2"`` and ``"chi-square"`` fewer steps than this do not do for the worst such density; for
+        ``"total variation"`` 0, for nothing is claimed.
+    relaxation_time : Estimate
+        -1/ln(slem), in steps.
+    slem : Estimate
+        The largest modulus in the spectrum off the constants.
+    distance : {"L2", "total variation", "chi-square"}
+    initial : float
+        ||f - 1|| in L^2 of the invariant probability measure.
+    kind : {"bound", "estimate"}
+        Of ``steps``: that of ``slem``, whose upper end is used.
+    """
+
+    steps: int
+    earliest: int
+    relaxation_time: Estimate
+    slem: Estimate
+    distance: Distance
+    initial: float
+    kind: ErrorKind
+
+    def __float__(self) -> float:
+        return float(self.steps)
+
+
+def mixing_time(
+    kernel: Law | KernelMatrix | Spectrum,
+    within: float = 0.25,
+    distance: Distance = "total variation",
+    *,
+    density: Callable[[Floats], Floats] | None = None,
+    start: float | None = None,
+    initial: float = 1.0,
+) -> MixingTime:
+    r"""Steps until the distribution is ``within`` of the invariant one, from a density in L^2.
+
+    Parameters
+    ----------
+    kernel : Law, KernelMatrix or Spectrum
+        Reversible.
+    within : float
+        The distance that is allowed.
+    distance : {"L2", "total variation", "chi-square"}
+        ||f_n - 1||, half of the L^1 norm of f_n - 1, or the square of the first.
+    density : callable, optional
+        Initial density with respect to sin(theta)/2 d theta, a vectorised function of the angle.
+    start : float, optional
+        An initial angle. Only for laws with a density: after one step, which is counted, the distribution has one.
+    initial : float
+        ||f - 1|| itself, where neither of these is given.
+
+    Returns
+    -------
+    MixingTime
+
+    Raises
+    ------
+    AccuracyError
+        If the law has no gap, or its slem is not known to be less than 1.
+    InputError
+        If a start is given for a law without a density, or the density is no density.
+
+    Notes
+    -----
+    f_n = P^n f, so ||f_n - 1|| <= slem^n ||f - 1||, and for the worst f this is attained in the limit; the total
+    variation distance is at most half of it, the chi-square distance its square.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = mixing_time(ker.maxwell(0.5), 0.01, "L2")
+    >>> found.steps, found.earliest, round(float(found.relaxation_time), 4)
+    (7, 7, 1.4427)
+    """
+    within = number_between("within", within, 0.0, np.inf)
+    if distance not in DISTANCES:
+        raise InputError(f"distance: expected one of {', '.join(DISTANCES)}, got {distance!r}")
+    steps_before, size = 0, finite_number("initial", initial)
+    if size < 0.0:
+        raise InputError(f"initial: expected a norm, at least 0, got {initial!r}")
+    if density is not None:
+        size = _distance_of(density)
+    elif start is not None:
+        steps_before, size = 1, _distance_after_a_step(kernel, start)
+    gap = _modulus_gap(kernel)
+    slem = slem_from_gap(gap)
+    # as gaps: 1 - slem of a slem near 1 would lose its digits
+    least, most = gap.value - gap.error, min(gap.value + gap.error, 1.0)
+    if least <= 0.0:
+        raise AccuracyError(
+            f"the law is not known to have a gap: 1 - slem = {gap}, so no mixing time can be given", 1.0 - least
+        )
+    target = {"L2": within, "total variation": 2.0 * within, "chi-square": float(np.sqrt(within))}[distance]
+    steps = steps_before + _steps(least, target / size if size else np.inf)
+    earliest = 0 if distance == "total variation" else _steps(most, target / size if size else np.inf)
+    return MixingTime(steps, earliest, relaxation_time(gap), slem, distance, size, slem.kind)
+
+
+def slem_from_gap(gap: Estimate) -> Estimate:
+    """1 - gap, whose rounding is an error that the gap does not have."""
+    value = 1.0 - gap.value
+    return Estimate(value, gap.error + (EPS if 1.0 - value != gap.value else 0.0), gap.kind, gap.method)
+
+
+def relaxation_time(gap: Estimate) -> Estimate:
+    """-1/ln(1 - gap), with an infinite error where the gap may be 0.
+
+    Examples
+    --------
+    >>> f"{float(relaxation_time(Estimate(1e-18, 0.0, 'bound', ''))):.12g}"
+    '1e+18'
+    """
+    slower, value, faster = (_time_scale(one) for one in (gap.value - gap.error, gap.value, gap.value + gap.error))
+    if not np.isfinite(slower):
+        return Estimate(value if np.isfinite(value) else 0.0, np.inf, gap.kind, "-1/ln(slem)")
+    error = max(slower - value, value - faster) + 4.0 * EPS * value
+    return Estimate(value, error, gap.kind, "-1/ln(slem)")
+
+
+def _modulus_gap(kernel: Law | KernelMatrix | Spectrum) -> Estimate:
+    """1 - slem with its error."""
+    if isinstance(kernel, Law):
+        return modulus_gap(kernel, TOLERANCE)
+    listed = kernel if isinstance(kernel, Spectrum) else matrix_spectrum(kernel, SOUGHT)
+    modulus, width = np.abs(listed.values[1:]), listed.errors.total()[1:]
+    method = f"{listed.basis!r}, {listed.method}"
+    if not modulus.size:
+        return Estimate(1.0, np.inf, "estimate", method)
+    largest = int(np.argmax(modulus))
+    if listed.slem > modulus[largest]:
+        # the edge of a law's essential spectrum
+        return Estimate(1.0 - listed.slem, listed.gap_error, "estimate", f"{listed.verdict}: {listed.method}")
+    return Estimate(1.0 - float(modulus[largest]), float(width[largest]), "estimate", method)
+
+
+def _steps(gap: float, target: float) -> int:
+    """The least n with (1 - gap)^n <= target."""
+    if target >= 1.0:
+        return 0
+    if gap >= 1.0:
+        return 1
+    return int(np.ceil(np.log(target) / np.log1p(-gap) * (1.0 - 4.0 * EPS)))
+
+
+def _time_scale(gap: float) -> float:
+    return float(-1.0 / np.log1p(-gap)) if 0.0 < gap < 1.0 else (np.inf if gap <= 0.0 else 0.0)
+
+
+def _distance_of(density: Callable[[Floats], Floats]) -> float:
+    angle, weight = SINE.quadrature(np.linspace(0.0, np.pi, PANELS + 1), NODES)
+    values = np.asarray(density(angle), dtype=np.float64)
+    mass = float(weight @ values)
+    if np.min(values) < 0.0 or abs(mass - 1.0) > 1e-6:
+        raise InputError(
+            f"density: expected values of at least 0 and an integral of 1 under sin(theta)/2 d theta, got {mass:.8g}"
+        )
+    return float(np.sqrt(weight @ (values - 1.0) ** 2))
+
+
+def _distance_after_a_step(kernel: object, start: float) -> float:
+    if not isinstance(kernel, DensityLaw):
+        raise InputError(
+            "start: expected a law with a density, whose first step has one in L^2; give other laws an initial density"
+        )
+    theta = np.array([number_between("start", start, 0.0, np.pi)])
+    edges = np.unique(np.concatenate([kernel.panels(theta)[0], np.linspace(0.0, np.pi, PANELS + 1)]))
+    angle, weight = SINE.quadrature(edges, NODES)
+    values = kernel.density(theta[:, None], angle)[0] / SINE.density(angle)
+    return float(np.sqrt(weight @ (values - 1.0) ** 2))

@@ -1,0 +1,1 @@
+"""Eigenvalues of symmetric matrices: dense and sparse, complete by proof, with sampling errors."""

@@ -1,0 +1,103 @@
+"""Even and odd functions under theta -> pi - theta: the two halves of a mirror-symmetric law, and their eigenvalues."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...checks import Floats
+from ...kernels import Bins
+from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
+from .deflation import compressed, symmetric_half
+from .dense import Extremes, Which, counted_from_above, outermost, wanted
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from ...kernels import Basis, KernelMatrix, Law
+
+    Halves = tuple[csr_array[Any], csr_array[Any]]
+
+Parity = Literal["even", "odd", "none"]
+
+# Entries of the flip that are no rounding: it permutes the functions of a basis, up to signs.
+ENTRY = 0.5
+
+
+def halves(basis: Basis, law: Law | KernelMatrix) -> Halves | None:
+    """Orthonormal even and odd functions of a mirror-symmetric law's basis: sparse, shapes (n, even) and (n, odd).
+
+    None where the law is not known to be mirror-symmetric, or where the flip does not keep the basis.
+
+    Examples
+    --------
+    >>> from asperity.kernels import Legendre, lambertian
+    >>> [half.shape for half in halves(Legendre(5), lambertian())]
+    [(5, 3), (5, 2)]
+    """
+    if not law.mirror_symmetric or not is_mirror_symmetric(basis):
+        return None
+    here = np.arange(basis.size)
+    if isinstance(basis, Bins):
+        # a large matrix need not be made to see that bins change places
+        image, sign = here[::-1], np.ones(basis.size)
+    else:
+        flip = reflection_matrix(basis)
+        image = np.argmax(np.abs(flip), axis=1)
+        sign = flip[here, image]
+    if np.any(np.abs(sign) < ENTRY) or np.any(image[image] != here):
+        return None
+    from scipy.sparse import csr_array
+
+    def columns(alone: NDArray[np.bool_], factor: float) -> csr_array[Any]:
+        """The functions of one parity: each that is its own image, and the sums of each other one with its image."""
+        single, first = here[alone], here[image > here]
+        weight = np.full(len(first), np.sqrt(0.5))
+        rows = np.concatenate([single, first, image[first]])
+        pair = len(single) + np.arange(len(first))
+        entries = np.concatenate([np.ones(len(single)), weight, factor * weight * np.sign(sign[first])])
+        where = np.concatenate([np.arange(len(single)), pair, pair])
+        return csr_array((entries, (rows, where)), shape=(basis.size, len(single) + len(first)))
+
+    return columns((image == here) & (sign > 0.0), 1.0), columns((image == here) & (sign < 0.0), -1.0)
+
+
+def outermost_by_parity(
+    array: Floats, split: Halves | None, constant: Floats | None, k: int, which: Which = "moduli"
+) -> tuple[Extremes, tuple[Parity, ...]]:
+    """`outermost` of the symmetric half of a matrix, with the parities of the eigenvectors.
+
+    Of a mirror-symmetric law, even and odd functions do not mix: two matrices of half the size take a quarter of the
+    work, and what a sampled matrix mixes is left out as the noise that it is. ``split`` is what `halves` gives.
+    """
+    if split is None:
+        found = outermost(symmetric_half(array), constant, k, which)
+        nothing: Parity = "none"
+        return found, (nothing,) * len(found.values)
+    parts: list[tuple[Extremes, csr_array[Any], Parity]] = []
+    names: tuple[Parity, Parity] = ("even", "odd")
+    for half, name in zip(split, names, strict=True):
+        if half.shape[1]:
+            inside = None if constant is None or name == "odd" else np.asarray(half.T @ constant)
+            parts.append((outermost(compressed(array, half.T.tocsr()), inside, k, which), half, name))
+    return _merged(parts, k, which)
+
+
+def _merged(
+    parts: list[tuple[Extremes, csr_array[Any], Parity]], k: int, which: Which
+) -> tuple[Extremes, tuple[Parity, ...]]:
+    """The k wanted ones of both halves: each of these lists as many of its own."""
+    values = np.concatenate([part.values for part, _, _ in parts])
+    vectors = np.concatenate([half @ part.vectors for part, half, _ in parts], axis=1)
+    residuals = np.concatenate([part.residuals for part, _, _ in parts])
+    errors = np.concatenate([part.errors for part, _, _ in parts])
+    names = np.repeat([name for _, _, name in parts], [len(part.values) for part, _, _ in parts])
+    order = np.argsort(-values, kind="stable")
+    order = order[wanted(values[order], k, which)]
+    methods = dict.fromkeys(part.method for part, _, _ in parts)
+    values = values[order]
+    top = counted_from_above(values, which)
+    found = Extremes(values, vectors[:, order], top, residuals[order], errors[order], "; ".join(methods))
+    return found, tuple(names[order].tolist())

@@ -1,0 +1,121 @@
+"""Sampling errors of eigenvalues: standard errors by the delta method, intervals by the bootstrap."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...checks import Floats, number_between, whole_number
+from ...errors import InputError
+from ...estimates import NORMAL_95, student_95
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+    from ...kernels import KernelMatrix
+
+
+def sampling_quantile(matrix: KernelMatrix) -> float:
+    """How many standard errors of `sampling_errors` an interval of 95 % has on each side."""
+    return student_95(len(matrix.replicates)) if len(matrix.replicates) > 1 else NORMAL_95
+
+
+def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Floats:
+    """One standard error of each eigenvalue, shape (k,); zeros for matrices that were not sampled.
+
+    To first order an eigenvalue moves by v^T (S_hat - S) v. Where the matrix keeps the parts of its rays,
+    the spread of v^T S_r v over them is used; otherwise the multinomial variance of the counts in each row.
+    """
+    if len(matrix.replicates) > 1:
+        each = np.array([_quadratic_forms(replicate, vectors) for replicate in matrix.replicates])
+        return np.asarray(each.std(axis=0, ddof=1) / np.sqrt(len(each)))
+    if matrix.counts is not None:
+        return np.sqrt(_count_variances(matrix, vectors))
+    return np.zeros(len(values))
+
+
+def _quadratic_forms(symmetric: Floats | csr_array[Any], vectors: Floats) -> Floats:
+    return np.asarray(np.sum(vectors * (symmetric @ vectors), axis=0))
+
+
+def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
+    """Variance of the mean of phi(i) phi(j) over the counted pairs, phi = v / sqrt(w).
+
+    Where rows were normalised, i is fixed and each row an independent multinomial; else all pairs are one.
+    """
+    counts = np.asarray(matrix.counts, dtype=np.float64)
+    weights = np.asarray(matrix.weights)
+    phi = vectors / np.sqrt(weights)[:, None]
+    if matrix.symmetrised:
+        shares = counts / counts.sum()
+        mean = np.sum(phi * (shares @ phi), axis=0)
+        spread = np.sum(phi**2 * (shares @ phi**2), axis=0) - mean**2
+        return np.asarray(np.maximum(spread, 0.0) / counts.sum())
+    totals = np.maximum(counts.sum(axis=1), 1.0)
+    shares = counts / totals[:, None]
+    spread = np.maximum(shares @ phi**2 - (shares @ phi) ** 2, 0.0)
+    return np.asarray(((weights[:, None] * phi) ** 2 * spread / totals[:, None]).sum(axis=0))
+
+
+def bootstrap_intervals(
+    matrix: KernelMatrix, k: int, rng: np.random.Generator, resamples: int = 200, level: float = 0.95
+) -> Floats:
+    """Basic bootstrap intervals of the k largest eigenvalues off the constants, shape (k, 2), largest first.
+
+    Parameters
+    ----------
+    matrix : KernelMatrix
+        Sampled, in bins, with its raw counts; resampled as it was sampled, pair by pair.
+    k : int
+        Number of eigenvalues.
+    rng : numpy.random.Generator
+    resamples : int
+    level : float
+        Nominal coverage.
+
+    Raises
+    ------
+    InputError
+        If the matrix has no counts.
+
+    Notes
+    -----
+    An interval [2 x - q_high, 2 x - q_low] from the quantiles q of the resampled values; it needs no normality, which
+    makes it a check of the delta method. Where a bin has few pairs both are doubtful.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> rng = np.random.default_rng(0)
+    >>> P = ker.discretise(ker.maxwell(0.5), ker.Bins(4), method="monte-carlo", samples=4000, rng=rng)
+    >>> low, high = bootstrap_intervals(P, 1, rng)[0]
+    >>> bool(low < high)
+    True
+    """
+    if matrix.counts is None or not matrix.basis.is_partition:
+        raise InputError("matrix: expected a matrix sampled in bins, with counts; use sampling_errors for others")
+    whole_number("k", k, 1)
+    level = number_between("level", level, 0.0, 1.0)
+    counts = np.asarray(matrix.counts)
+    number = int(counts.sum())
+    drawn = rng.multinomial(number, (counts / number).ravel(), size=resamples).reshape(-1, *counts.shape)
+    everything = np.concatenate([counts[None], drawn])
+    values = _leading_values(everything, np.asarray(matrix.weights), k, symmetrised=matrix.symmetrised)
+    tail = 0.5 * (1.0 - level)
+    low, high = np.quantile(values[1:], [tail, 1.0 - tail], axis=0)
+    return np.stack([2.0 * values[0] - high, 2.0 * values[0] - low], axis=1)
+
+
+def _leading_values(counts: Floats, weights: Floats, k: int, *, symmetrised: bool) -> Floats:
+    """The largest eigenvalues off the constants of many matrices of counts at once, shape (matrices, k)."""
+    counts = counts.astype(np.float64)
+    if symmetrised:
+        flux = counts / counts.sum(axis=(1, 2), keepdims=True)
+    else:
+        flux = weights[:, None] * counts / np.maximum(counts.sum(axis=2, keepdims=True), 1.0)
+    root = np.sqrt(weights)
+    flux = 0.5 * (flux + np.swapaxes(flux, 1, 2)) / (root[:, None] * root)
+    # the constants are moved out of the way, below everything else
+    shifted = flux - 3.0 * np.outer(root, root)
+    return np.asarray(np.linalg.eigvalsh(shifted)[:, ::-1][:, :k])

@@ -1,0 +1,1 @@
+"""The essential spectrum: what grazing rays, ideal parts and straight pieces keep of it."""

@@ -1,0 +1,193 @@
+"""How far the essential spectrum of a law reaches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from ...checks import Floats
+from ...estimates import ErrorKind
+from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
+from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.phase_function import HenyeyGreensteinLaw
+from ...kernels.laws.structure import Rules, fold, made_of_isometries
+from .grazing import SWAP, GrazingLimit, grazing_limit
+from .straight_pieces import straight_part
+
+ROUNDING = 1e-15
+
+
+@dataclass(frozen=True)
+class EssentialEdge:
+    """An interval that holds the supremum of the essential spectrum.
+
+    Attributes
+    ----------
+    low, high : float
+        Between 0 and 1; equal where the structure of the law tells.
+    kind : {"bound", "estimate"}
+    reasons : tuple of str
+    """
+
+    low: float
+    high: float
+    kind: ErrorKind
+    reasons: tuple[str, ...]
+
+    @property
+    def value(self) -> float:
+        """The middle of the interval."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def error(self) -> float:
+        """Half its width."""
+        return 0.5 * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What a law does to functions that oscillate fast, and to functions of grazing angles."""
+
+    # an interval for the top of what its isometries make, and <1, Q 1> of these
+    kept: tuple[float, float]
+    grazing: Floats
+    error: float
+    entry_error: float
+    certain: bool
+    notes: tuple[str, ...] = ()
+    share: float = 0.0
+
+
+def essential_edge(law: Law) -> EssentialEdge:
+    r"""How far the essential spectrum of a reversible law reaches towards 1.
+
+    Parameters
+    ----------
+    law : Law
+
+    Returns
+    -------
+    EssentialEdge
+
+    Notes
+    -----
+    A law is taken apart into what is compact and two things that are not. *Isometries*, theta' = +-theta + c: for
+    suitable large n all n c are nearly multiples of 2 pi, so that cos(n theta) times a slow function goes to
+    cos(n theta) times another; the part of the law that consists of isometries, a sub-Markov operator Q, has all of
+    its spectrum in the essential spectrum: `straight_part`. *Grazing rays*: see
+    `grazing_limit`. Sums and products of laws have the sums and products of these symbols. That the remainder is
+    compact is a theorem for densities and matrices; for curved walls it presumes that outgoing angles depend on the
+    entry point by analytic pieces, so that the edge is an estimate.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> essential_edge(0.25 * ker.lambertian() + 0.75 * ker.TriangularTeethLaw(0.7)).value
+    0.75
+    """
+    part = _taken_apart(law)
+    matrix = part.grazing
+    root = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
+    low = min(max(part.kept[0], root - part.error), 1.0)
+    high = min(max(part.kept[1], root + part.error, low), 1.0)
+    notes = tuple(dict.fromkeys(part.notes))
+    if part.certain and part.kept[0] == part.kept[1] >= root - ROUNDING - part.error:
+        # fast oscillations reach as far as anything can: the norm of the part that is not compact
+        low = high = min(part.kept[0], 1.0)
+    return EssentialEdge(low, high, "bound" if part.certain and low == high else "estimate", notes)
+
+
+def grazing_symbol(law: Law) -> GrazingLimit:
+    """`grazing_limit` of a law, from its parts: sums and products of laws have sums and products of these matrices."""
+    part = _taken_apart(law)
+    return GrazingLimit(part.grazing, part.error, part.entry_error)
+
+
+def _taken_apart(law: Law) -> _Part:
+    return fold(law, Rules(_leaf, _mixture, _chain, _turned))
+
+
+def _leaf(law: Law) -> _Part:
+    if isinstance(law, (LambertianLaw, HenyeyGreensteinLaw, MatrixLaw)):
+        return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
+    if made_of_isometries(law):
+        limit = grazing_limit(law) if not hasattr(law, "retro") else None
+        grazing = limit.matrix if limit else (np.eye(2) if getattr(law, "retro", False) else SWAP)
+        # an isometric law cannot enlarge anything: what its grazing limit is matters in sums with other walls only
+        note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
+        errors = (limit.error, limit.entry_error) if limit else (0.0, 0.0)
+        return _Part((1.0, 1.0), grazing, *errors, True, (note,), 1.0)
+    limit = grazing_limit(law)
+    errors = (limit.error, limit.entry_error)
+    how = f"-> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
+    if not limit.resolved:
+        how = "has no limit that can be told in double precision, so the essential spectrum may reach 1"
+    elif limit.error == 0.0:
+        how += ", by the shape of the wall at y = 0"
+    note = f"{law!r}: grazing rays, E[sin(theta)/sin(theta')] {how}"
+    if isinstance(law, DensityLaw):
+        return _Part((0.0, 0.0), limit.matrix, *errors, False, (note, f"{law!r} has a density, taken as bounded"))
+    if isinstance(law, InvolutionLaw):
+        reason = f"{law!r} is an involution: f + f o T is kept for every f"
+        return _Part((0.0, 1.0), limit.matrix, *errors, True, (reason,))
+    kept, share = (0.0, 0.0), 0.0
+    notes = [note]
+    if isinstance(law, WallLaw):
+        straight = straight_part(law)
+        kept, share = (straight.low, straight.high), straight.share
+        if straight.high > 0.0:
+            reach = f"{kept[0]:.6g}" if kept[0] == kept[1] else f"{kept[0]:.6g} to {kept[1]:.6g}"
+            notes.append(
+                f"a share {share:.4g} of the rays meets straight pieces only: isometries, whose part of the law has a "
+                f"spectrum up to {reach}"
+            )
+    return _Part(kept, limit.matrix, *errors, False, tuple(notes), share)
+
+
+def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:
+    share = sum(w * part.share for w, part in terms)
+    return _Part(
+        # positive operators: the sum reaches as far as any term, and as its share
+        (max(share, *(w * part.kept[0] for w, part in terms)), sum(w * part.kept[1] for w, part in terms)),
+        sum((w * part.grazing for w, part in terms), np.zeros((2, 2))),
+        sum(w * part.error for w, part in terms),
+        sum(w * part.entry_error for w, part in terms),
+        all(part.certain for _, part in terms),
+        tuple(note for _, part in terms for note in part.notes),
+        share,
+    )
+
+
+def _chain(parts: Sequence[_Part]) -> _Part:
+    whole = reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, 0.0, True, share=1.0))
+    if parts and all(part is parts[0] for part in parts):
+        # a power
+        low, high = parts[0].kept
+        whole = replace(whole, kept=(low ** len(parts), high ** len(parts)))
+    return whole
+
+
+def _product(first: _Part, second: _Part) -> _Part:
+    share = first.share * second.share
+    # what keeps all rays changes no norm
+    low = {(True, True): 1.0, (True, False): second.kept[0], (False, True): first.kept[0]}.get(
+        (first.kept[0] == 1.0, second.kept[0] == 1.0), share
+    )
+    return _Part(
+        (low, first.kept[1] * second.kept[1]),
+        first.grazing @ second.grazing,
+        # sums of rows are at most 1 but for the errors
+        first.error + second.error + first.error * second.error,
+        2.0 * (first.entry_error + second.entry_error + first.entry_error * second.entry_error),
+        first.certain and second.certain,
+        first.notes + second.notes,
+        share,
+    )
+
+
+def _turned(part: _Part) -> _Part:
+    return replace(part, grazing=part.grazing @ SWAP)

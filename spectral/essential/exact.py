@@ -1,0 +1,107 @@
+"""What ideal laws in a law, specular and Lambertian reflection and retroreflection, say of its spectrum."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ...kernels import Combination, Law, SpecularFrame
+from ...kernels.laws.ideal import IsometryLaw, LambertianLaw
+from ...kernels.laws.structure import Rules, fold
+from ...rounding import EPS
+
+
+@dataclass(frozen=True)
+class IdealSpectrum:
+    """Off the constants such a law is ``even`` times the identity on even functions of cos(theta), ``odd`` on odd ones.
+
+    Attributes
+    ----------
+    even, odd : float
+    rounding : float
+        Bound for the rounding of both.
+    """
+
+    even: float
+    odd: float
+    rounding: float = 0.0
+
+    @property
+    def top(self) -> float:
+        """The larger of the two."""
+        return max(self.even, self.odd)
+
+
+def ideal_spectrum(law: Law) -> IdealSpectrum | None:
+    """The two eigenvalues off the constants of a law made of ideal ones in any way; None of other laws.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = ideal_spectrum(ker.maxwell(0.25))
+    >>> found.even, found.odd
+    (0.75, -0.75)
+    """
+    return fold(law, Rules(_leaf, _mixture, _chain, _turned))
+
+
+def _leaf(law: Law) -> IdealSpectrum | None:
+    if isinstance(law, LambertianLaw):
+        return IdealSpectrum(0.0, 0.0)
+    if isinstance(law, IsometryLaw):
+        return IdealSpectrum(1.0, 1.0 if law.retro else -1.0)
+    return None
+
+
+def _mixture(terms: Sequence[tuple[float, IdealSpectrum | None]]) -> IdealSpectrum | None:
+    even, odd, rounding = 0.0, 0.0, 0.0
+    for weight, part in terms:
+        if part is None:
+            return None
+        even, odd = even + weight * part.even, odd + weight * part.odd
+        rounding += weight * part.rounding + EPS
+    return IdealSpectrum(even, odd, rounding)
+
+
+def _chain(parts: Sequence[IdealSpectrum | None]) -> IdealSpectrum | None:
+    even, odd, rounding = 1.0, 1.0, 0.0
+    for part in parts:
+        if part is None:
+            return None
+        even, odd = even * part.even, odd * part.odd
+        rounding += part.rounding + EPS
+    return IdealSpectrum(even, odd, rounding)
+
+
+def _turned(part: IdealSpectrum | None) -> IdealSpectrum | None:
+    return None if part is None else IdealSpectrum(part.even, -part.odd, part.rounding)
+
+
+def without_identity(law: Law) -> tuple[float, Law]:
+    """1 - a and R of P = a 1 + (1 - a) R, where the structure of a law shows such an a > 0; else 1 and P itself.
+
+    The identity is retroreflection in the paper's convention, specular reflection in the other.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> without_identity(0.75 * ker.retroreflection() + 0.25 * ker.henyey_greenstein(0.5))
+    (0.25, henyey_greenstein(0.5))
+    """
+    turned = isinstance(law, SpecularFrame)
+    inner = law.law if isinstance(law, SpecularFrame) else law
+    inner = getattr(inner, "closed_form", None) or inner
+    if not isinstance(inner, Combination):
+        return 1.0, law
+    terms = [(weight, SpecularFrame.of(term) if turned else term) for weight, term in inner.terms_checked()]
+    rest = [(weight, term) for weight, term in terms if weight > 0.0 and not _keeps_angles(term)]
+    if not rest or len(rest) == sum(weight > 0.0 for weight, _ in terms):
+        return 1.0, law
+    share = math.fsum(weight for weight, _ in rest)
+    return share, rest[0][1] if len(rest) == 1 else Combination(tuple((weight / share, term) for weight, term in rest))
+
+
+def _keeps_angles(law: Law) -> bool:
+    inner = law.law if isinstance(law, SpecularFrame) else law
+    return isinstance(inner, IsometryLaw) and inner.retro == (law.frame == "paper")

@@ -1,0 +1,277 @@
+"""What a law does to grazing rays, on which its essential spectrum depends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...checks import Floats
+from ...kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
+from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
+from ...kernels.laws.random_map import entry_inside, responder
+from ...rounding import EPS
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+    from ...geometry.curves.curve import Curve
+
+# Grazing angles, down to where the outgoing angle, good to some 1e-15, still has seven digits; for the ends of hollows
+# that keep their direction only to a small depth, times the ratio of this depth to the opening.
+ANGLES = 10.0 ** -np.arange(3.0, 9.0)
+# A tangent is taken as vertical if its horizontal part is below this share: the angles of some ten operations.
+VERTICAL = 64.0 * EPS
+# The end of a hollow keeps its direction until its tangent has turned by this angle; halvings that find the place.
+TURNED, HALVINGS = 0.1, 60
+# Adaptive quadrature in the entry point: first panels, error asked for, and rays that it may take.
+FIRST_PANELS, QUADRATURE_TOLERANCE, MOST_RAYS, NARROWEST = 8, 1e-9, 20_000, 1e-13
+# Shifted lattices where there are too many changes of itinerary: their spread is the error.
+LATTICES, LATTICE_POINTS = 8, 2048
+# Three powers of ten between which the sums of rows change by less than this are enough, where the scale is known.
+SETTLED, FEWEST_ANGLES = 2e-8, 3
+# No limit has an eigenvalue above the norm of a law, 1: what exceeds it by more than its error has not settled, and
+# then nothing is known.
+NORM, UNKNOWN = 1.0, 1.0
+SWAP = np.array([[0.0, 1.0], [1.0, 0.0]])
+# Walls whose limits are kept.
+REMEMBERED = 32
+# Relative accuracy of an outgoing angle of the size of the incoming one.
+ANGLE_ROUNDING = 4e-15
+
+
+@dataclass(frozen=True)
+class GrazingLimit:
+    """The matrix lim E[sin(theta) / sin(Theta'); Theta' at end j] for theta at end i; ends are 0 and pi.
+
+    Attributes
+    ----------
+    matrix : array of shape (2, 2)
+    error : float
+        Estimated error of the sums of rows; 0 where the shape of the wall decides.
+    entry_error : float
+        Estimated error of the entries: in deep hollows the ends share a row in a way that never settles.
+    resolved : bool
+        False where the angles have not come near a limit: its error is then the norm of a law, 1.
+    """
+
+    matrix: Floats
+    error: float
+    entry_error: float
+    resolved: bool = True
+
+    @property
+    def root(self) -> float:
+        """The largest eigenvalue: how far the essential spectrum reaches on account of grazing rays."""
+        return float(np.max(np.abs(np.linalg.eigvals(self.matrix))))
+
+
+def grazing_limit(law: Law) -> GrazingLimit:
+    r"""The limit at grazing of the law's action on 1/sin(theta), end by end.
+
+    Notes
+    -----
+    Where grazing rays come back at an angle proportional to their own, theta' = c theta with c of a fixed
+    distribution, the law acts on functions of ln(theta) as a convolution, and the symbol of this convolution on
+    L^2(theta d theta) is E[c^(-1 + i omega)], whose modulus is largest at omega = 0. An outgoing angle that does not
+    graze contributes nothing in the limit. For the semicircle the sum of a row is (3/8) ln 9.
+
+    *Walls.* A ray that enters a hollow at a small angle theta meets the side of the hollow within O(theta) of its end
+    on y = 0. If the side leaves this end at an angle a to the horizontal, 0 < a < pi/2, the ray goes up from there
+    at the angle pi - 2 a, and out: it does not graze. If a = 0, the side falls off like -c w^m with the distance w from
+    its end, m > 1; the ray meets it at a depth of order theta, where w is of order theta^(1/m) and the slope of order
+    theta^(1 - 1/m), so that sin(theta)/sin(theta') is of order theta^(1/m). Either way the limit is 0, and by Schur's
+    test with the weight 1/sin(theta) the norm of the law on functions of angles below theta tends to 0: such sides add
+    nothing to the essential spectrum. Only flat tops, vertical sides and overhanging ones do.
+
+    *Other ends, other laws.* The angles run through powers of ten, from a thousandth of the angle under which the part
+    of the side that keeps its direction is seen from the opening; Aitken's extrapolation gives the limit, and how far
+    it moved the last value, with the errors of the quadratures, its error. A limit above the norm of a law is refused.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> grazing_limit(ker.specular()).matrix.round(6).tolist()
+    [[0.0, 1.0], [1.0, 0.0]]
+
+    The sides of shallow bumps are horizontal at their tops:
+
+    >>> from asperity import geometry as geo
+    >>> grazing_limit(ker.WallLaw(geo.dispersing_arcs(1e-9))).root
+    0.0
+    """
+    if isinstance(law, CircularArcLaw) and _is_plain(float(np.cos(law.half_angle))):
+        return GrazingLimit(np.zeros((2, 2)), 0.0, 0.0)
+    return _limit_of_wall(law) if isinstance(law, (CircularArcLaw, WallLaw)) else _limit(law, Grazed())
+
+
+@dataclass(frozen=True)
+class Grazed:
+    """Where grazing rays are to be looked at: parts of the period, for theta near 0 and near pi, and how near."""
+
+    parts: tuple[tuple[tuple[float, float], ...], ...] = (((0.0, 1.0),), ((0.0, 1.0),))
+    flat: float = 0.0
+    scale: float | None = None
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _limit_of_wall(law: CircularArcLaw | WallLaw) -> GrazingLimit:
+    """The gaps in both conventions and the diffusivity ask for the same limit."""
+    if isinstance(law, CircularArcLaw):
+        return _limit(law, Grazed(scale=1.0))
+    # the law of the cell is that of the wall, and its rays enter where its hollows are
+    cell = law.wall.cell
+    return _limit(law if cell is law.wall else WallLaw(cell), grazed(cell))
+
+
+def grazed(wall: Wall) -> Grazed:
+    """The hollows of a wall whose sides are vertical, or overhang, where grazing rays meet them."""
+    from ...geometry.cells.hollow import flat_tops, hollows_between
+
+    highest = max((float(piece.box[3]) for loop in wall.islands for piece in loop), default=-np.inf)
+    if wall.pieces[0].start[1] < 0.0 or highest >= 0.0:
+        return Grazed()
+    parts: tuple[list[tuple[float, float]], ...] = ([], [])
+    scales = [1.0]
+    for hollow in hollows_between(flat_tops(wall.pieces, wall.vertices), wall.vertices):
+        sides = (wall.pieces[hollow.first], wall.pieces[hollow.last - 1].reversed())
+        for part, side, forward in zip(parts, sides, (1.0, -1.0), strict=True):
+            # a straight curve on y = 0 is a flat top in all but name
+            if not (_is_plain(float(forward * _direction(side)[0])) and side.box[1] < 0.0):
+                part.append((hollow.left / wall.period, hollow.right / wall.period))
+                scales.append(_straight_depth(side) / hollow.width)
+    # islands below the openings are met by rays that are not grazing enough
+    scale = min(*scales, -highest / wall.period) if wall.islands else min(scales)
+    return Grazed((tuple(parts[0]), tuple(parts[1])), wall.flat_top / wall.period, scale)
+
+
+def _is_plain(run: float) -> bool:
+    """Whether a side with this horizontal part of its unit tangent is neither vertical nor overhanging."""
+    return run > VERTICAL
+
+
+def _direction(side: Curve) -> Floats:
+    """The unit tangent at the start; of a Bezier curve that stands still there its limit."""
+    points = np.array(getattr(side, "control_points", ()))
+    ahead = [point for point in points[1:] - points[:1] if np.any(point)] if points.size else []
+    return np.asarray(ahead[0] / np.hypot(*ahead[0]) if ahead else side.tangent(0.0))
+
+
+def _straight_depth(side: Curve) -> float:
+    """How far from its start a curve keeps its direction."""
+    start = _direction(side)
+
+    def turned(s: float) -> bool:
+        return bool(start @ side.tangent(s) < np.cos(TURNED))
+
+    low, high = 0.0, 1.0
+    if turned(high):
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if turned(middle) else (middle, high)
+    return float(np.hypot(*(side.point(high) - side.point(0.0))))
+
+
+def _limit(law: Law, where: Grazed) -> GrazingLimit:
+    if not any(where.parts):
+        return GrazingLimit(where.flat * SWAP, 0.0, 0.0)
+    rows: list[list[tuple[Floats, float]]] = []
+    for angle in (1.0 if where.scale is None else where.scale) * ANGLES:
+        rows.append([_row(law, angle, end, where.parts[end]) for end in (0, 1)])
+        settled = len(rows) >= FEWEST_ANGLES and where.scale is not None
+        if settled and all(np.ptp([row[end][0].sum() for row in rows[-FEWEST_ANGLES:]]) <= SETTLED for end in (0, 1)):
+            break
+    found = _extrapolated(rows)
+    matrix = found.matrix + where.flat * SWAP
+    limit = GrazingLimit(matrix, found.error, found.entry_error, found.error < UNKNOWN)
+    if limit.resolved and limit.root <= NORM + limit.error + EPS * NORM:
+        return limit
+    return GrazingLimit(np.minimum(matrix, NORM), UNKNOWN, UNKNOWN, False)
+
+
+def _extrapolated(rows: list[list[tuple[Floats, float]]]) -> GrazingLimit:
+    values = np.array([[pair[end][0] for end in (0, 1)] for pair in rows])
+    noise = np.array([max(pair[0][1], pair[1][1]) for pair in rows])
+    # of deep hollows only small angles are out of reach: the best-known angles decide
+    known = noise <= max(4.0 * float(noise.min()), 1e-6)
+    values, noise = values[known], noise[known]
+    matrix, sums = values[-1], values.sum(axis=2)
+    if len(values) < 3:
+        spread = float(noise[-1] + np.ptp(values, axis=0).max())
+        return GrazingLimit(matrix, float(noise[-1] + np.ptp(sums)), spread)
+    limit = _aitken(sums[-3], sums[-2], sums[-1], float(noise[-3:].max()))
+    scale = np.divide(limit, sums[-1], out=np.ones(2), where=sums[-1] > 0.0)
+    moved = np.abs(limit - sums[-1]) + np.minimum(np.abs(sums[-1] - sums[-2]), np.abs(limit - sums[-1]) + noise[-1])
+    error = float(np.max(moved) + noise[-3:].max())
+    # what shrinks from one power of ten to the next is settled; what does not, as rays that alternate, is not
+    steps = np.abs(np.diff(values[-3:], axis=0)).max(axis=(1, 2))
+    unsettled = float(steps[1]) if steps[1] < 0.5 * steps[0] else float(np.ptp(values, axis=0).max())
+    return GrazingLimit(matrix * scale[:, None], error, max(error, unsettled))
+
+
+def _aitken(first: Floats, second: Floats, third: Floats, noise: float) -> Floats:
+    """The limit of a geometric approach; the last value where the steps are noise or do not shrink."""
+    before, last = second - first, third - second
+    shrinks = (np.abs(last) > noise) & (np.abs(last) < 0.9 * np.abs(before)) & (before * last > 0.0)
+    step = np.divide(last * last, before - last, out=np.zeros_like(last), where=shrinks)
+    return np.maximum(third + step, 0.0)
+
+
+def _row(law: Law, angle: float, end: int, parts: tuple[tuple[float, float], ...]) -> tuple[Floats, float]:
+    """E[sin(theta)/sin(Theta'); x in parts] with Theta' nearer to 0 and to pi, and its error."""
+    if not parts:
+        return np.zeros(2), 0.0
+    theta = angle if end == 0 else np.pi - angle
+
+    def ratio(outgoing: Floats) -> Floats:
+        share = np.sin(angle) / np.sin(outgoing)
+        near = outgoing < 0.5 * np.pi
+        return np.stack([np.where(near, share, 0.0), np.where(near, 0.0, share)], axis=-1)
+
+    respond = responder(law) if isinstance(law, DrivenLaw) else None
+    if respond is not None:
+        found = [_entry_integral(lambda x: ratio(respond(x, np.full(x.shape, theta))[0]), *part) for part in parts]
+        value, error = sum((part[0] for part in found), np.zeros(2)), sum(part[1] for part in found)
+    else:
+        value, error = law.apply(ratio, np.array([theta]))[0], 0.0
+        if isinstance(law, DensityLaw):
+            error = float(angle)
+    return value, error + ANGLE_ROUNDING / angle
+
+
+def _entry_integral(function: Callable[[Floats], Floats], first: float, last: float) -> tuple[Floats, float]:
+    """The integral over entry points in (first, last) of a function that is analytic between jumps, and its error."""
+    edges = np.linspace(first, last, FIRST_PANELS + 1)
+    low, high = edges[:-1], edges[1:]
+    total, settled, rays = np.zeros(2), 0.0, 0
+    while low.size:
+        half = 0.5 * (high - low)
+        x = (0.5 * (low + high))[:, None] + half[:, None] * NODES
+        values = function(entry_inside(x.ravel())).reshape(*x.shape, 2)
+        rays += x.size
+        integral = half[:, None] * np.einsum("k,pkj->pj", KRONROD, values)
+        error = half * np.abs(np.einsum("k,pkj->pj", KRONROD - GAUSS, values)).sum(axis=1)
+        done = (error <= QUADRATURE_TOLERANCE * half) | (half <= NARROWEST)
+        if rays > MOST_RAYS:
+            done[:] = True
+        total = total + integral[done].sum(axis=0)
+        settled += float(error[done].sum())
+        middle = 0.5 * (low + high)
+        low, high = np.concatenate([low[~done], middle[~done]]), np.concatenate([middle[~done], high[~done]])
+    if settled <= 1e-6:
+        return total, settled
+    return _lattice_integral(function, first, last, total, settled)
+
+
+def _lattice_integral(
+    function: Callable[[Floats], Floats], first: float, last: float, total: Floats, settled: float
+) -> tuple[Floats, float]:
+    """Shifted lattices, if their spread is smaller than the error of what they replace."""
+    shift = (np.arange(LATTICES) + 0.5) / LATTICES * np.sqrt(2.0) % 1.0
+    points = (np.arange(LATTICE_POINTS) + shift[:, None]) / LATTICE_POINTS
+    values = function(entry_inside(first + (last - first) * points.ravel()))
+    means = (last - first) * values.reshape(LATTICES, LATTICE_POINTS, 2).mean(axis=1)
+    spread = 2.0 * float(means.sum(axis=1).std(ddof=1)) / np.sqrt(LATTICES)
+    return (means.mean(axis=0), spread) if spread < settled else (total, settled)

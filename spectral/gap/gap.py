@@ -1,0 +1,263 @@
+"""The spectral gap of a law: a number with its error, a verdict and the evidence."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...checks import positive_number
+from ...errors import InputError
+from ...kernels import CollisionLaw, KernelMatrix, Law
+from ...rounding import EPS
+from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
+from ..bounds.enclosure import as_power
+from ..bounds.oscillations import held_against_oscillations
+from ..bounds.separation import lambertian_share
+from ..eigenvalues.spectra import Spectrum, matrix_spectrum
+from ..essential.edge import EssentialEdge, essential_edge
+from ..essential.exact import ideal_spectrum, without_identity
+from .gap_routes import enclosed_gap, rough_gap
+from .methods import gap_of_power, law_eigenvalues
+from .refinement import EIGENVALUES, Refinement, SharedMatrices, refined
+from .shallow import shallow_gap
+from .theorems import gap_by_theorem
+from .verdict import SpectralGap, isolated, made_from
+
+# Eigenvalues among which the one of largest modulus is sought.
+MODULI = 3
+
+
+def spectral_gap(
+    law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: np.random.Generator | None = None
+) -> SpectralGap:
+    """The gap 1 - sup(spectrum off the constants) of a reversible law.
+
+    Parameters
+    ----------
+    law : Law, CollisionLaw or KernelMatrix
+        In the convention that it carries; a matrix is taken as it is, of a collision law its P~.
+    tolerance : float
+        The basis grows, and the number of rays with it, until the reported error is below this or the largest basis
+        and number of rays are reached; the error says which.
+    rng : numpy.random.Generator, optional
+        For laws that are traced; ``np.random.default_rng(0)`` by default, so that results repeat.
+
+    Returns
+    -------
+    SpectralGap
+
+    Raises
+    ------
+    AccuracyError
+        If the law is not reversible, or its sampled matrix speaks against it.
+
+    Notes
+    -----
+    A law P J in the convention in which it is not self-adjoint, as that of a wall without mirror symmetry in the
+    specular frame, need not have a real spectrum. There the value is 1 - the contraction factor of functions of mean
+    0, ||P J|| = slem of P, since J is unitary; method and evidence say so.
+
+    First the structure of the law is asked. Laws made of isometries (polygonal walls, specular reflection,
+    retroreflection) have no gap: 1 is in the essential spectrum, and whatever a grid shows is an artefact of the grid.
+    Else `essential_edge` says how far the essential spectrum reaches, and Galerkin matrices, whose eigenvalues above
+    it converge from below, say whether an eigenvalue lies beyond. If one does, the gap is *isolated*; if on all bases
+    all of them stay short of the edge, the gap ends at the *essential edge*.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker, spectral as spec
+    >>> gap = spec.spectral_gap(ker.henyey_greenstein(0.5), tolerance=1e-9)
+    >>> round(float(gap), 9), gap.verdict
+    (0.5, 'isolated')
+    >>> spec.spectral_gap(ker.specular()).verdict
+    'no gap'
+    >>> semicircle = spec.spectral_gap(ker.CircularArcLaw(np.pi / 2))
+    >>> round(float(semicircle), 6), semicircle.verdict
+    (0.176041, 'essential edge')
+    """
+    positive_number("tolerance", tolerance)
+    if isinstance(law, CollisionLaw):
+        law = law.law
+    if isinstance(law, KernelMatrix):
+        return _of_matrix(law)
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a Law, a CollisionLaw or a KernelMatrix, got {law!r}")
+    other = self_adjoint_elsewhere(law)
+    if other is not None:
+        return _contraction(law, other, tolerance, rng or np.random.default_rng(0))
+    refuse_unless_self_adjoint(law)
+    power = as_power(law)
+    if power is not None:
+        return _of_power(law, *power, tolerance, rng or np.random.default_rng(0))
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng or np.random.default_rng(0)))
+
+
+def gaps_in_both_conventions(
+    law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None
+) -> tuple[SpectralGap, SpectralGap]:
+    """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
+
+    Raises
+    ------
+    InputError
+        If the law is not known to be mirror-symmetric: in the other convention it need not be self-adjoint then.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> [float(gap) for gap in gaps_in_both_conventions(0.5 * ker.specular() + 0.5 * ker.lambertian())]
+    [0.5, 0.5]
+    """
+    positive_number("tolerance", tolerance)
+    if not law.reversible or not law.mirror_symmetric:
+        raise InputError(f"law: expected a reversible and mirror-symmetric one, got {law!r}")
+    matrices = SharedMatrices(rng or np.random.default_rng(0))
+    other = law.in_specular_frame()
+    first, second = (gap_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
+    return first, second
+
+
+def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
+    found = matrix_spectrum(matrix, EIGENVALUES)
+    method = made_from(found, "algebraic + two-grid + 1.96 x sampling error")
+    evidence = ("one matrix: its basis was not refined",)
+    return SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
+
+
+def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+    """The spectrum of P^n consists of the n-th powers of that of P: an even power turns its lower end up."""
+    ask = modulus_gap if exponent % 2 == 0 else spectral_gap
+    found = ask(base, tolerance / exponent, rng)
+    value, error = gap_of_power(found.value, found.error, exponent)
+    method = f"power {exponent} of the spectrum of P; {found.method}"
+    evidence = (f"P: {found}", *found.evidence)
+    return SpectralGap(value, error, found.kind, method, found.verdict, evidence, law.frame)
+
+
+def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None) -> SpectralGap:
+    """1 - slem, the distance from 1 of the largest modulus in the spectrum off the constants, as `spectral_gap` is.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> round(float(modulus_gap(ker.henyey_greenstein(-0.5))), 9)
+    0.5
+    """
+    ideal = ideal_spectrum(law)
+    if ideal is not None and ideal.top < 1.0:
+        found = spectral_gap(law, tolerance, rng)
+        return replace(found, value=1.0 - max(abs(ideal.even), abs(ideal.odd)))
+    small = _shallow_modulus(law, tolerance)
+    if small is not None:
+        return small
+    upper = spectral_gap(law, tolerance, rng)
+    if upper.verdict == "no gap" or lambertian_share(law) == upper.value:
+        # of modulus 1, or as large as the rest of a law with a Lambertian share can be
+        return upper
+    listed = law_eigenvalues(law, MODULI, tolerance, rng)
+    place = int(np.argmin(listed.values))
+    least, error = -float(listed.values[place]), float(listed.errors.total()[place])
+    top = 1.0 - upper.value
+    edge = essential_edge(law)
+    if least + error < top - upper.error or least <= edge.high:
+        # the essential spectrum reaches no farther below than above: the parts of the law are positive operators
+        return upper
+    evidence = (*upper.evidence, f"the least eigenvalue is {-least:.10g} +- {error:.2g}")
+    method = f"least eigenvalue, {listed.basis!r}, {listed.method}"
+    if least - error > max(top + upper.error, edge.high):
+        gap = SpectralGap(1.0 - least, error, "estimate", method, "isolated", evidence, law.frame, listed)
+        return gap.cut_at_zero()
+    low, high = max(top - upper.error, least - error), max(top + upper.error, least + error)
+    method = f"largest and least eigenvalue: {upper.method}; {method}"
+    return SpectralGap(
+        1.0 - 0.5 * (low + high), 0.5 * (high - low), "estimate", method, upper.verdict, evidence, law.frame, listed
+    ).cut_at_zero()  # fmt: skip
+
+
+def _shallow_modulus(law: Law, tolerance: float) -> SpectralGap | None:
+    """Of mirror-symmetric shallow walls: slow functions are kept or turned round, and in the two conventions the gap is
+    that of either; fast ones have moduli further from 1."""
+    if not law.mirror_symmetric:
+        return None
+    both = [shallow_gap(one, essential_edge(one)) for one in (law, law.in_specular_frame())]
+    known = [one for one in both if one is not None]
+    least = min(known, key=lambda one: one.value, default=None)
+    if least is None or len(known) < 2 or least.error > tolerance:
+        return None
+    return replace(least, convention=law.frame, method=f"the lesser of the gaps in both conventions; {least.method}")
+
+
+def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generator) -> SpectralGap:
+    """1 - ||P J|| on functions of mean 0, for P J that is not self-adjoint where P is."""
+    found = modulus_gap(other, tolerance, rng)
+    evidence = (why_not_self_adjoint(other), what_is_true(), *found.evidence)
+    method = f"norm of P J on functions of mean 0, the slem of P; {found.method}"
+    return replace(
+        found, method=method, evidence=evidence, convention=law.frame, spectrum=None, self_adjoint=False
+    )  # fmt: skip
+
+
+def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
+    """By what is known best: of shallow walls the form of 1 - P, else enclosures and matrices."""
+    share, rest = without_identity(law)
+    if share < 1.0:
+        own = SharedMatrices(matrices.rng)
+        return _scaled(gap_by_theorem(rest) or _by_refinement(rest, tolerance / share, own), share)
+    edge = essential_edge(law)
+    small = shallow_gap(law, edge)
+    if small is not None and small.error <= tolerance:
+        return small
+    found = _by_matrices(law, tolerance, matrices, edge).cut_at_zero()
+    if found.verdict == "isolated" and found.kind == "estimate":
+        found = held_against_oscillations(law, found)
+    return small if small is not None and small.error < found.error else found
+
+
+def _scaled(found: SpectralGap, share: float) -> SpectralGap:
+    """The gap of (1 - share) + share R from that of R."""
+    reason = f"a share {share:.6g} of the law is R, the rest keeps all angles: the gap is {share:.6g} times that of R"
+    value, error = share * found.value, share * found.error + 4.0 * EPS * share * found.value
+    return replace(found, value=value, error=error, evidence=(reason, *found.evidence), spectrum=None)
+
+
+def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap:
+    if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
+        # the edge cannot be told from 1, and no eigenvalue fits between that the tolerance could tell
+        return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
+    found_at_once = rough_gap(law, tolerance, matrices, edge) or enclosed_gap(law, tolerance, edge)
+    if found_at_once is not None:
+        return found_at_once
+    steps = refined(law, tolerance, matrices, edge)
+    found, error = steps.finest, steps.error
+    evidence = (*steps.evidence, *_lower_bound(law))
+    gap = isolated(found, error, steps.how, edge, law.frame, evidence) if steps.converges else None
+    if gap is not None:
+        return gap
+    reasons, top = (*edge.reasons, *evidence), 1.0 - found.gap
+    if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
+        short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
+        return _at_edge(law, edge, (*reasons, short), found, steps.overshoot(edge.high))
+    # two grids say nothing where refinement does not converge; the gap of a Galerkin matrix is never too small
+    method = made_from(found, "not converged: an upper bound but for its noise")
+    error = max(error, abs(found.gap))
+    return SpectralGap(found.gap, error, "estimate", method, "undecided", reasons, law.frame, found)
+
+
+def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:
+    """Whether the edge is known better than what refinement leaves open between its largest eigenvalue and the edge."""
+    top = 1.0 - steps.finest.gap
+    return edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
+
+
+def _at_edge(
+    law: Law, edge: EssentialEdge, evidence: tuple[str, ...], found: Spectrum | None = None, overshoot: float = 0.0
+) -> SpectralGap:
+    method = "edge of the essential spectrum, from the law's action on grazing rays and its isometries"
+    error = max(edge.error, overshoot)
+    return SpectralGap(1.0 - edge.value, error, "estimate", method, "essential edge", evidence, law.frame, found)
+
+
+def _lower_bound(law: Law) -> tuple[str, ...]:
+    share = lambertian_share(law)
+    return (f"the gap is at least {share:.6g}, the Lambertian share of the law",) if share > 0.0 else ()

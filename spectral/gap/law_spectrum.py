@@ -1,0 +1,152 @@
+"""The spectrum of a kernel, with the verdict on its gap."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...checks import frozen, positive_number, whole_number
+from ...errors import InputError
+from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
+from ..bounds.contraction import refuse_unless_self_adjoint
+from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
+from ..essential.edge import essential_edge
+from .gap import spectral_gap
+from .methods import DEGREES, discretisation_only, law_eigenvalues
+from .theorems import gap_by_theorem
+from .verdict import SpectralGap
+
+TOLERANCE = 1e-4
+
+
+def spectrum(
+    kernel: KernelMatrix | Law | CollisionLaw,
+    k: int = 10,
+    *,
+    tolerance: float | None = None,
+    rng: np.random.Generator | None = None,
+    **discretisation: Any,
+) -> Spectrum:
+    """Eigenvalues of a reversible kernel, largest moduli first chosen, then sorted descending.
+
+    Parameters
+    ----------
+    kernel : KernelMatrix, Law or CollisionLaw
+        A collision law has the eigenvalues of its P~ with both signs. A matrix is taken as it is.
+    k : int
+        Number of eigenvalues; a matrix of fewer rows has fewer.
+    tolerance : float, optional
+        Error wanted of every eigenvalue of a law, 1e-4 by default; ``errors`` says what was reached. Where a basis is
+        given it is the wanted error of the matrix.
+    rng : numpy.random.Generator, optional
+        For laws that are traced.
+    **discretisation
+        ``basis=`` and further keywords of `asperity.kernels.discretise`: the law is taken by its matrix in this basis
+        (Legendre polynomials of degree below 48 where only others are given), and not refined.
+
+    Returns
+    -------
+    Spectrum
+        Of a law with the verdict on its gap: where that is "no gap" or "essential edge" ``gap`` and ``slem`` are the
+        law's, and the eigenvalues listed beyond may belong to the basis alone.
+
+    Raises
+    ------
+    AccuracyError
+        If the kernel is not symmetric within its error: its spectrum need not be real. Of a law that is self-adjoint in
+        the other convention only, the message says what is true in this one.
+
+    Notes
+    -----
+    Walls, arcs, densities, Lambertian reflection and sums of these: trial functions on panels that adapt to the law,
+    and enclosures of the eigenvalues from their residuals (`enclosures`); ``errors`` are the half widths. Powers have
+    the powers of the eigenvalues. Other laws: Galerkin matrices.
+
+    Of a matrix the constant function is split off exactly, and even from odd functions where the law is
+    mirror-symmetric. Small ones are solved by LAPACK's complete symmetric solver; of large ones Lanczos finds what is
+    asked for, and Cholesky factorisations prove that nothing was missed (`asperity.spectral.eigenvalues.dense`).
+    Cost: O(n^3).
+
+    Examples
+    --------
+    Henyey-Greenstein scattering has the eigenvalues g^l:
+
+    >>> from asperity import kernels as ker, spectral as spec
+    >>> spec.spectrum(ker.henyey_greenstein(0.5), k=4).values.round(12).tolist()
+    [1.0, 0.5, 0.25, 0.125]
+    >>> spec.spectrum(ker.TriangularTeethLaw(0.7))
+    Spectrum(k=10, gap=0, slem=1, verdict='no gap', convention='paper')
+    """
+    whole_number("k", k, 1)
+    how = dict(discretisation)
+    if tolerance is not None:
+        how["tolerance"] = positive_number("tolerance", tolerance)
+    if rng is not None:
+        how["rng"] = rng
+    if isinstance(kernel, CollisionLaw):
+        return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), **how), k)
+    if isinstance(kernel, KernelMatrix):
+        if how:
+            raise InputError(f"{', '.join(how)}: only for laws; a KernelMatrix is discretised already")
+        return matrix_spectrum(kernel, k)
+    if not isinstance(kernel, Law):
+        raise InputError(f"kernel: expected a KernelMatrix, a Law or a CollisionLaw, got {kernel!r}")
+    refuse_unless_self_adjoint(kernel)
+    if discretisation:
+        basis = how.pop("basis", None) or Legendre(DEGREES[0])
+        return _judged(kernel, matrix_spectrum(discretise(kernel, basis, **how), k), tolerance or TOLERANCE, rng)
+    wanted = tolerance or TOLERANCE
+    return _judged(kernel, law_eigenvalues(kernel, k, wanted, rng), wanted, rng)
+
+
+def _judged(law: Law, found: Spectrum, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
+    """With the law's gap and its verdict: what a matrix shows short of the essential spectrum's edge is not the gap."""
+    known = gap_by_theorem(law)
+    if known is None:
+        edge = essential_edge(law)
+        inside = int(np.sum(np.abs(found.values[1:]) + found.errors.total()[1:] <= edge.high))
+        evidence = edge.reasons
+        if inside:
+            evidence += (
+                f"{inside} of the values are not beyond {edge.high:.6g}, which the essential spectrum may reach: they "
+                "may belong to the basis",
+            )
+        top = 1.0 - found.gap
+        if top - found.gap_error > edge.high and found.gap > found.gap_error:
+            outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
+            return replace(found, verdict="isolated", evidence=(*evidence, outside))
+        known = spectral_gap(law, tolerance, rng)
+    return with_gap(found, known)
+
+
+def with_gap(found: Spectrum, known: SpectralGap) -> Spectrum:
+    """The eigenvalues of a matrix of a law, with the law's own gap."""
+    return replace(
+        found, gap=known.value, gap_errors=discretisation_only(np.array([known.error])),
+        slem=max(1.0 - known.value, found.slem), verdict=known.verdict, evidence=known.evidence,
+    )  # fmt: skip
+
+
+def _both_signs(half: Spectrum, k: int) -> Spectrum:
+    """spectrum(K) = spectrum(P~) x {+1, -1}: the flip of psi has both eigenvalues. The gap stays that of P~."""
+    index = np.tile(np.arange(len(half.values)), 2)
+    values = np.concatenate([half.values, -half.values])
+    order = np.argsort(-np.abs(values), kind="stable")[:k]
+    order = order[np.argsort(-values[order], kind="stable")]
+    pick = index[order]
+    errors = half.errors
+    return replace(
+        half,
+        values=frozen(values[order]),
+        vectors=frozen(half.vectors[:, pick]),
+        residuals=frozen(half.residuals[pick]),
+        parity=tuple(half.parity[i] for i in pick),
+        errors=SpectrumErrors(
+            frozen(errors.algebraic[pick]),
+            frozen(errors.discretisation[pick]),
+            frozen(errors.sampling[pick]),
+            errors.quantile,
+        ),
+    )

@@ -1,0 +1,194 @@
+"""Eigenvalues of laws: by enclosures where rows are known well enough, else by matrices of growing size."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...checks import Floats, frozen
+from ...kernels import DensityLaw, Law, Legendre, MatrixLaw, discretise
+from ...kernels.expectations.basis_means import has_costly_rows, integrates_panels
+from ...kernels.laws.structure import made_of_isometries
+from ...rounding import EPS
+from ..bounds.enclosure import EnclosedTrials, as_power, enclosed_trials
+from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
+from ..essential.exact import ideal_spectrum
+
+# Legendre polynomials of laws that have no rows with known errors; the first is enough for ten eigenvalues of most.
+DEGREES = (48, 96)
+# Share of the tolerance that the entries of a matrix may spend.
+MATRIX_SHARE = 0.1
+# Enclosures are asked for to this share of the tolerance, for they come out somewhat wider; they are sought again, at
+# most so often and to no less than this share of what was asked, while that narrows them by this factor.
+FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 3, 1e-3, 0.5
+# Eigenvalues that are enclosed at most in the search of the largest off the constants.
+MOST_ENCLOSED = 24
+
+
+def law_eigenvalues(law: Law, k: int, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
+    """The k eigenvalues of largest modulus of a law, without a word on its gap: see `spectrum`."""
+    power = as_power(law)
+    if power is not None:
+        base, exponent = power
+        # the largest modulus is listed, so that an even power knows its top
+        found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng)
+        return _raised(found, exponent, k)
+    if not made_of_isometries(law) and ideal_spectrum(law) is None:
+        if isinstance(law, DensityLaw):
+            return _of_density(law, k, tolerance)
+        if isinstance(law, MatrixLaw) or (integrates_panels(law) and not has_costly_rows(law)):
+            return _enclosed(law, k, tolerance)
+    return _by_matrices(law, k, tolerance, rng)
+
+
+def _by_matrices(law: Law, k: int, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
+    best = None
+    for degree in DEGREES:
+        found = matrix_spectrum(discretise(law, Legendre(degree), tolerance=MATRIX_SHARE * tolerance, rng=rng), k)
+        if best is None or found.errors.total().max() < best.errors.total().max():
+            best = found
+        if made_of_isometries(law) or best.errors.total().max() <= tolerance:
+            break
+    assert best is not None  # there are degrees
+    return best
+
+
+def _enclosed(law: Law, k: int, tolerance: float) -> Spectrum:
+    """Enclosures to the tolerance, of as many eigenvalues as it takes to have the largest off the constants."""
+    number, asked = k, FIRST * tolerance
+    best = found = enclosed_trials(law, number, None, asked)
+    for _ in range(ATTEMPTS):
+        if not found.indexed:
+            break
+        if not _has_top(found) and number < MOST_ENCLOSED:
+            number = min(2 * number + 2, MOST_ENCLOSED)
+        elif found.worst > tolerance:
+            asked *= max(FIRST * tolerance / found.worst, SMALLEST_STEP)
+        else:
+            break
+        before, found = found, enclosed_trials(law, number, None, asked)
+        if len(found.enclosures) == len(before.enclosures) and found.worst > WORTHWHILE * before.worst:
+            # the means are spent
+            break
+        best = found
+    return _spectrum_of(best, k)
+
+
+def _of_density(law: DensityLaw, k: int, tolerance: float) -> Spectrum:
+    first, *others = [Legendre(factor * max(DEGREES[0], 2 * k)) for factor in (1, 2, 4)]
+    best = enclosed_trials(law, k, first)
+    for basis in others:
+        if best.worst <= tolerance:
+            break
+        best = min(best, enclosed_trials(law, k, basis), key=lambda found: found.worst)
+    return _spectrum_of(best, k)
+
+
+def _has_top(found: EnclosedTrials) -> bool:
+    """Whether the largest eigenvalue off the constants is known to be among those that are listed."""
+    tops = [item.low for item in found.enclosures if item.index != 0]
+    return bool(tops) and max(tops) > max(found.enclosures.separation.radius, 0.0)
+
+
+def _spectrum_of(found: EnclosedTrials, k: int) -> Spectrum:
+    """Enclosures as a spectrum: the errors are what the intervals reach beyond the values."""
+    items = found.enclosures.items
+    values = np.array([item.value for item in items])
+    errors = np.array([max(item.high - item.value, item.value - item.low) for item in items])
+    # the constants' is the first, then by modulus
+    order = np.append(0, 1 + np.argsort(-np.abs(values[1:]), kind="stable"))[:k]
+    chosen = np.append(0, np.sort(order[1:]))
+    radius = found.enclosures.separation.radius
+    gap, gap_error, slem = 1.0, np.inf, 0.0
+    if len(values) > 1:
+        top, gap_error, slem = (
+            float(values[1:].max()),
+            float(errors[1 + np.argmax(values[1:])]),
+            np.abs(values[1:]).max(),
+        )
+        gap = 1.0 - top
+        if not _has_top(found) and found.indexed:
+            # a larger one may lie between the listed ones and what the rest reaches
+            gap_error = max(gap_error, radius - top)
+    return Spectrum(
+        values=frozen(values[chosen]),
+        vectors=frozen(found.vectors[:, chosen]),
+        residuals=frozen(np.array([items[i].residual for i in chosen])),
+        errors=discretisation_only(errors[chosen]),
+        gap=gap,
+        gap_errors=discretisation_only(np.array([gap_error])),
+        slem=float(slem),
+        convention=found.enclosures.convention,
+        basis=found.basis,
+        method=found.enclosures.method,
+        parity=tuple(items[i].parity for i in chosen),
+        completeness=(
+            f"the rest of the spectrum is within {radius:.6g}: {found.enclosures.separation.reason}"
+            if found.indexed
+            else "not all are indexed: see enclosures(law, k)"
+        ),
+    )
+
+
+def discretisation_only(width: Floats) -> SpectrumErrors:
+    """Errors that are in no other part."""
+    nothing = np.zeros(len(width))
+    return SpectrumErrors(frozen(nothing), frozen(width), frozen(nothing))
+
+
+def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
+    """The spectrum of a power: an error grows by the largest slope on its interval."""
+    width = found.errors.total()
+    slope = exponent * np.minimum(np.abs(found.values) + width, 1.0) ** (exponent - 1)
+    values = found.values**exponent
+    order = 1 + np.argsort(-np.abs(values[1:]), kind="stable")[: k - 1]
+    order = np.append(0, order[np.argsort(-values[order], kind="stable")])
+    # the largest modulus is that of the top, or of the most negative value, which is listed then
+    base, error = 1.0 - found.gap, found.gap_error
+    if exponent % 2 == 0 and found.slem > base:
+        base, error = found.slem, float(width[np.argmin(found.values)])
+    gap, grown = gap_of_power(1.0 - base if base != 1.0 - found.gap else found.gap, error, exponent)
+    parts = found.errors
+    return replace(
+        found,
+        values=frozen(values[order]),
+        vectors=frozen(found.vectors[:, order]),
+        residuals=frozen((slope * found.residuals)[order]),
+        errors=SpectrumErrors(
+            frozen((slope * parts.algebraic)[order]),
+            frozen((slope * parts.discretisation)[order]),
+            frozen((slope * parts.sampling)[order]),
+            parts.quantile,
+        ),
+        gap=gap,
+        gap_errors=discretisation_only(np.array([grown])),
+        slem=found.slem**exponent,
+        method=f"{_ordinal(exponent)} powers of the eigenvalues; {found.method}",
+        matrix_error=exponent * found.matrix_error,
+        parity=tuple(found.parity[i] for i in order),
+    )
+
+
+def gap_of_power(gap: float, error: float, exponent: int) -> tuple[float, float]:
+    """1 - (1 - gap)^n with the largest change within the error: a gap of 1e-13 keeps its digits.
+
+    Of an even power the gap given is 1 - slem, at most 1.
+
+    Examples
+    --------
+    >>> f"{gap_of_power(1e-16, 0.0, 3)[0]:.12g}", gap_of_power(1.5, 0.0, 3)[0]
+    ('3e-16', 1.125)
+    """
+
+    def grown(one: float) -> float:
+        return float(-np.expm1(exponent * np.log1p(-one))) if one < 1.0 else 1.0 - (1.0 - one) ** exponent
+
+    least, most = max(gap - error, 0.0), min(gap + error, 2.0 if exponent % 2 else 1.0)
+    value = grown(gap)
+    return value, max(grown(most) - value, value - grown(least), 0.0) + 4.0 * EPS * abs(value)
+
+
+def _ordinal(number: int) -> str:
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th") if number % 100 not in (11, 12, 13) else "th"
+    return f"{number}{ending}"

@@ -1,0 +1,277 @@
+"""The gap of shallow walls, as 1 - lambda without cancellation: from the quadratic form of 1 - P."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...checks import Floats
+from ...kernels import CircularArcLaw, Law, WallLaw
+from ...kernels.bases.measure import gauss_on_intervals, gauss_rule
+from ...kernels.laws.ideal import IsometryLaw
+from ...kernels.laws.specular_frame import SpecularFrame
+from ...kernels.laws.weighted_sum import Combination
+from ..essential.edge import EssentialEdge
+from .verdict import SpectralGap
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+    from ...geometry.curves.curve import Curve
+
+# The steepest slope, in radians, and pieces at most.
+STEEPEST, MOST_PIECES = 0.1, 64
+# A ray steeper than three times the steepest slope meets the wall once: it leaves steeper than that slope. Rays less
+# steep leave within five times the steepest slope of grazing.
+ONCE, WITHIN = 3.0, 5.0
+# Panels and nodes on a curved piece, and degrees of Legendre polynomials.
+PANELS, NODES, DEGREES = 32, 12, 12
+# Panels in the incoming angle, with enough nodes for products of two polynomials.
+ANGLE_PANELS, ANGLE_NODES = 4, 24
+# The factor by which fast oscillations shrink is looked at in steps of this share of the fastest of them, up to so many
+# turns of the piece that turns least; pieces that turn more than this ratio less than the steepest slope are refused.
+STEP, TURNS, LEAST_TURN = 0.2, 30.0, 0.01
+# Fast oscillations must shrink by this multiple of the gap, and are those by so much faster than its eigenfunction.
+APART, FASTER = 1.25, 1.5
+# An error above this share of the gap is of no use.
+LARGEST_ERROR = 0.01
+# Relative rounding of sums of squares with weights of one sign, from slopes that have all but the last few digits.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """The slope of a shallow wall at a uniform point of its period.
+
+    Attributes
+    ----------
+    angle, weight : arrays of shape (k,)
+        Angles to the horizontal, and their probabilities: a quadrature.
+    steepest : float
+        The largest modulus of the angle.
+    least_turn : float
+        By how much the curved piece turns that turns least; infinite without curved pieces.
+    """
+
+    angle: Floats
+    weight: Floats
+    steepest: float
+    least_turn: float
+
+    @property
+    def mean_square(self) -> float:
+        """The mean of sin^2: 4 of it are the gap to leading order."""
+        return float(self.weight @ np.sin(self.angle) ** 2)
+
+    def shrinkage(self, frequency: Floats) -> Floats:
+        """1 - |E exp(2 i t angle)|: what a law leaves of cos(t theta + phase) of large t, without cancellation."""
+        centred = self.angle - float(self.weight @ self.angle) / float(self.weight.sum())
+        lost = np.array([self.weight @ (2.0 * np.sin(t * centred) ** 2) for t in frequency.tolist()])
+        turned = np.array([self.weight @ np.sin(2.0 * t * centred) for t in frequency.tolist()])
+        square = lost * (2.0 - lost) - turned**2
+        return np.asarray(square / (1.0 + np.sqrt(np.maximum(1.0 - square, 0.0))))
+
+
+def shallow_gap(law: Law, edge: EssentialEdge) -> SpectralGap | None:
+    r"""The gap of a law of shallow walls to a relative error; None for other laws and where nothing can be said.
+
+    Parameters
+    ----------
+    law : Law
+        Reversible; of walls that are graphs with slopes below 0.1, circular arcs, specular reflection and sums of
+        these, in the paper's convention or, if mirror-symmetric, in the specular one.
+    edge : EssentialEdge
+        Of the same law.
+
+    Notes
+    -----
+    A ray steeper than three times the steepest slope meets the wall once. If the slope is phi there, theta'_F =
+    pi - theta' = theta - 2 phi; the flux weighs slopes with 1 - tan(phi) cot(theta). So
+
+        <f, (1 - P_F) f> = 1/2 E (f(theta'_F) - f(theta))^2,  cos(theta'_F) - cos(theta) = 2 sin(theta - phi) sin(phi),
+
+    is a sum of squares of small numbers that are known to full relative accuracy: the difference of two values of a
+    polynomial is its divided difference times that of the cosines. Less steep rays, a share of 9 s^2/2 for the
+    steepest slope s, stay within 5 s of grazing, so that their part of the form is at most 1/2 |f'|^2 (25 s^2/2)^2
+    times this share. In the paper's convention P~ f = P_F f for even f, and the eigenvalues of odd functions are
+    near -1.
+
+    The smallest value of the form on Legendre polynomials is an upper bound of the gap. By how much the gap is less is
+    estimated from the residual R = (1 - P) f - mu f by <R, (1 - P - mu)^(-1) R>: its part among steep rays with the
+    distance to the next eigenvalue, its part among grazing rays, localised as it is, with what the law leaves of
+    oscillations of their scale. That nothing else is smaller rests on E exp(2 i t phi), by which a law multiplies
+    fast oscillations cos(t theta): an estimate, not a proof.
+
+    Where sin(phi) is uniform, as on arcs of circles, the gap is 4 E sin^2 + 2 E sin^4 to a relative error of the order
+    of s^4 ln s.
+
+    Source: R. Feres and H.-K. Zhang, *The spectrum of the billiard Laplacian of a family of random billiards* (2010),
+    for the leading order.
+    """
+    if not law.reversible:
+        return None
+    slopes = _slopes_of(law)
+    if slopes is None or not 0.0 < slopes.steepest <= STEEPEST or slopes.least_turn < LEAST_TURN * slopes.steepest:
+        return None
+    parities = (1, 0) if law.frame == "specular" else (0,)
+    found = min((_Form(slopes, parity, bool(law.mirror_symmetric)) for parity in parities), key=lambda form: form.value)
+    slowest = found.first_degree + FASTER
+    kept = float(slopes.shrinkage(_frequencies(slopes, slowest)).min())
+    error = found.error
+    beyond = 1.0 - edge.high > found.value + error
+    if error > LARGEST_ERROR * found.value or not beyond or kept < APART * found.value:
+        return None
+    evidence = (
+        *edge.reasons,
+        f"rays steeper than {ONCE * slopes.steepest:.3g} meet the wall once, its slopes have a mean square of "
+        f"{slopes.mean_square:.6g}; what the others can change: {found.grazing_error:.2g}",
+        f"polynomials of degree {DEGREES} may miss {found.missed:.2g}",
+        f"cos(t theta) with t above {slowest:g} shrinks by {kept:.3g} or more, {kept / found.value:.3g} times the gap",
+    )
+    method = f"1 - lambda from E (f(theta') - f(theta))^2, Legendre polynomials up to degree {DEGREES}"
+    return SpectralGap(found.value, error, "estimate", method, "isolated", evidence, law.frame)
+
+
+class _Form:
+    """The form on polynomials of one parity: its smallest value, and the error of this as an eigenvalue."""
+
+    def __init__(self, slopes: Slopes, parity: int, mirrored: bool) -> None:
+        from scipy.linalg import eigh
+
+        steep = slopes.steepest
+        degrees = np.arange(1, DEGREES + 1)
+        own = degrees % 2 == parity
+        self.first_degree = int(degrees[own][0])
+        theta, weight = gauss_rule(np.linspace(ONCE * steep, np.pi - ONCE * steep, ANGLE_PANELS + 1), ANGLE_NODES)
+        size = (theta.size, DEGREES)
+        form, drift = np.zeros((DEGREES, DEGREES)), np.zeros(size)
+        for place, angle in enumerate(theta.tolist()):
+            change = _changes(angle, slopes.angle)
+            # 1 - tan(phi) cot(theta), and with the measure sin(theta)/2
+            flux = slopes.weight * np.sin(angle - slopes.angle) / (np.cos(slopes.angle) * np.sin(angle))
+            form += 0.25 * weight[place] * np.sin(angle) * (change * flux[:, None]).T @ change
+            drift[place] = flux @ change
+        values, vectors = eigh(form[np.ix_(own, own)])
+        self.value = float(values[0])
+        vector = np.zeros(DEGREES)
+        vector[own] = vectors[:, 0]
+        here = _polynomials(theta) @ vector
+        residual = -(drift @ vector) - self.value * here
+        mass = 0.5 * weight * np.sin(theta)
+        alike = 0.5 * (residual + (-1.0) ** parity * residual[::-1])
+        other = residual - alike
+        norms = np.sqrt(2.0 * degrees + 1.0)
+        height, steepness = (
+            float(np.abs(vector) @ norms),
+            float(np.abs(vector) @ (norms * degrees * (degrees + 1) / 2.0)),
+        )
+        # grazing rays: their share of the flux, and how far they move in the cosine
+        share, moved = 2.0 * np.sin(0.5 * ONCE * steep) ** 2, 2.0 * np.sin(0.5 * WITHIN * steep) ** 2
+        self.grazing_error = 0.5 * share * (steepness * moved) ** 2
+        local = float(slopes.shrinkage(_frequencies(slopes, 1.0 / (ONCE * steep))).min())
+        # their residual, on oscillations of their scale and on slow functions
+        spread = 1.0 / local + 1.5 * share * np.log(1.0 / (ONCE * steep)) / slopes.mean_square
+        grazing = share * (steepness * moved + self.value * height) ** 2
+        steeper = float(mass @ alike**2) / float(values[1] - values[0]) + (0.0 if mirrored else float(mass @ other**2))
+        self.missed = 2.0 * (grazing * spread + steeper)
+
+    @property
+    def error(self) -> float:
+        """Of the value as the gap."""
+        return float(self.grazing_error + self.missed + ROUNDING * self.value)
+
+
+def _changes(angle: float, slope: Floats) -> Floats:
+    """e_l(theta'_F) - e_l(theta) for l = 1, ..., DEGREES, shape (slopes, degrees)."""
+    here, there = np.cos(angle), np.cos(angle - 2.0 * slope)
+    found = np.empty((slope.size, DEGREES))
+    before, value = 1.0, here
+    # divided differences of Legendre polynomials by the recurrence of these
+    previous, divided = np.zeros(slope.size), np.ones(slope.size)
+    for degree in range(1, DEGREES + 1):
+        found[:, degree - 1] = np.sqrt(2.0 * degree + 1.0) * divided
+        step = (2 * degree + 1) * (there * divided + value) - degree * previous
+        previous, divided = divided, step / (degree + 1)
+        before, value = value, ((2 * degree + 1) * here * value - degree * before) / (degree + 1)
+    return found * (2.0 * np.sin(angle - slope) * np.sin(slope))[:, None]
+
+
+def _polynomials(angle: Floats) -> Floats:
+    from numpy.polynomial.legendre import legvander
+
+    return np.asarray((legvander(np.cos(angle), DEGREES) * np.sqrt(2.0 * np.arange(DEGREES + 1) + 1.0))[:, 1:])
+
+
+def _frequencies(slopes: Slopes, slowest: float) -> Floats:
+    fastest = TURNS / min(slopes.least_turn, 2.0 * slopes.steepest)
+    if fastest <= slowest:
+        return np.array([slowest])
+    # slow ones in equal ratios, fast ones in equal steps
+    step = STEP / slopes.steepest
+    return np.concatenate([np.geomspace(slowest, fastest, 200), np.arange(slowest, fastest, step)])
+
+
+def _slopes_of(law: Law) -> Slopes | None:
+    if isinstance(law, SpecularFrame):
+        return _slopes_of(law.law)
+    if isinstance(law, Combination):
+        parts = [(weight, _slopes_of(term)) for weight, term in law.terms_checked()]
+        known = [(weight, part) for weight, part in parts if part is not None]
+        if len(known) < len(parts):
+            return None
+        return Slopes(
+            np.concatenate([part.angle for _, part in known]),
+            np.concatenate([weight * part.weight for weight, part in known]),
+            max(part.steepest for _, part in known),
+            min(part.least_turn for _, part in known),
+        )
+    if isinstance(law, IsometryLaw) and not law.retro:
+        return Slopes(np.zeros(1), np.ones(1), 0.0, np.inf)
+    if isinstance(law, CircularArcLaw) and law.half_angle <= STEEPEST:
+        from ...geometry import focusing_arcs
+
+        return _slopes_of_wall(focusing_arcs(law.half_angle))
+    return _slopes_of_wall(law.wall) if isinstance(law, WallLaw) else None
+
+
+def _slopes_of_wall(wall: Wall) -> Slopes | None:
+    """None unless the wall is a graph with small slopes."""
+    from ...geometry import Segment
+
+    if not wall.closes or len(wall.pieces) > MOST_PIECES:
+        return None
+    angles, weights, turns = [], [], [np.inf]
+    for piece in wall.cell.pieces:
+        if isinstance(piece, Segment):
+            angle, weight = _angles(piece, np.zeros(1)), np.array([piece.end[0] - piece.start[0]])
+        else:
+            angle, weight = _slopes_of_curve(piece)
+            turns.append(float(np.ptp(angle)))
+        if np.any(np.abs(angle) > STEEPEST) or np.any(weight < 0.0):
+            return None
+        angles.append(angle)
+        weights.append(weight / wall.period)
+    angle, weight = np.concatenate(angles), np.concatenate(weights)
+    return Slopes(angle, weight, float(np.abs(angle).max()), min(turns))
+
+
+def _slopes_of_curve(piece: Curve) -> tuple[Floats, Floats]:
+    """Slopes, with dx as weight, at the nodes of Gauss rules in the parameter, and at the ends with weights of 0."""
+    edges = np.linspace(0.0, 1.0, PANELS + 1)
+    place, width = gauss_on_intervals(edges[:-1], edges[1:], NODES)
+    x = piece.point(place)[:, 0].reshape(PANELS, NODES)
+    ends = piece.point(edges)[:, 0]
+    # dx/ds of the polynomials through the nodes of a panel
+    nodes = np.polynomial.legendre.leggauss(NODES)[0]
+    through = np.linalg.inv(np.polynomial.legendre.legvander(nodes, NODES - 1))
+    rise = np.polynomial.legendre.legvander(nodes, NODES - 2) @ np.polynomial.legendre.legder(through)
+    speed = (x - ends[:-1, None]) @ rise.T * (2.0 * PANELS)
+    weight = speed * width.reshape(PANELS, NODES)
+    weight *= (np.diff(ends) / weight.sum(axis=1))[:, None]
+    return np.append(_angles(piece, place), _angles(piece, edges)), np.append(weight.ravel(), np.zeros(edges.size))
+
+
+def _angles(piece: Curve, place: Floats) -> Floats:
+    tangent = piece.tangent(place)
+    return np.asarray(np.arctan2(tangent[..., 1], tangent[..., 0]))

@@ -1,0 +1,66 @@
+"""What the structure of a law tells of its gap without computing."""
+
+from __future__ import annotations
+
+from ...kernels import Bins, InvolutionLaw, Law, MatrixLaw, discretise
+from ...kernels.laws.structure import made_of_isometries
+from ...rounding import EPS
+from ..bounds.separation import lambertian_share
+from ..eigenvalues.spectra import Verdict, matrix_spectrum
+from ..essential.edge import essential_edge
+from ..essential.exact import ideal_spectrum
+from .refinement import EIGENVALUES
+from .verdict import SpectralGap, made_from
+
+
+def gap_by_theorem(law: Law) -> SpectralGap | None:
+    """The gap of a law made of isometries, an involution, of ideal laws or of finite rank; None where none is known.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> gap_by_theorem(ker.TriangularTeethLaw(0.7)).verdict, gap_by_theorem(ker.henyey_greenstein(0.5)) is None
+    ('no gap', True)
+    """
+    if made_of_isometries(law) and law.reversible:
+        reason = (
+            "the law is a mixture of isometries theta' = +-theta + const: 1 belongs to its essential spectrum, "
+            "so no L^2 gap exists, and a gap on a grid is an artefact of the grid"
+        )
+        return _stated(law, 0.0, 0.0, "no gap", reason)
+    if isinstance(law, InvolutionLaw):
+        reason = "the law is an involution T: f + f o T is kept for every f, so 1 has infinite multiplicity"
+        return _stated(law, 0.0, 0.0, "no gap", reason)
+    ideal = ideal_spectrum(law)
+    if ideal is not None:
+        reason = (
+            f"the spectrum off the constants consists of two isolated eigenvalues of infinite multiplicity, "
+            f"{ideal.even:.12g} on even functions of cos(theta) and {ideal.odd:.12g} on odd ones"
+        )
+        if lambertian_share(law) == 1.0:
+            reason = "the law is Lambertian: of rank 1, its spectrum off the constants is 0"
+        return _stated(law, 1.0 - ideal.top, ideal.rounding, "isolated", reason)
+    if isinstance(law, MatrixLaw):
+        return _of_finite_rank(law)
+    share = lambertian_share(law)
+    if share > 0.0:
+        edge = essential_edge(law)
+        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * EPS:
+            reason = (
+                f"a Lambertian share a = {share:.6g} makes the gap at least a, and the essential spectrum reaches 1 - a"
+            )
+            return _stated(law, share, 4.0 * EPS, "essential edge", reason, *edge.reasons)
+    return None
+
+
+def _stated(law: Law, value: float, error: float, verdict: Verdict, *evidence: str) -> SpectralGap:
+    return SpectralGap(value, error, "bound", "structure of the law", verdict, evidence, law.frame)
+
+
+def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
+    """A law that is constant on bins: its own bins hold every eigenvalue but 0, which has infinite multiplicity."""
+    found = matrix_spectrum(discretise(law, Bins(law.edges)), EIGENVALUES)
+    error = float(found.gap_errors.algebraic[0])
+    reason = f"the law is constant on {law.edges.size - 1} bins: beyond these its spectrum is 0"
+    method = made_from(found, "algebraic error; the basis is exact")
+    return SpectralGap(min(found.gap, 1.0), error, "bound", method, "isolated", (reason,), found.convention, found)

@@ -1,0 +1,127 @@
+"""The order of convergence that measurements show, with its confidence interval."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...checks import Floats, finite_array
+from ...errors import InputError
+
+# Fits need this many points to have a confidence interval.
+FEWEST_POINTS = 3
+CONFIDENCE = 0.95
+# Orders are told apart to this: the next ones worth a name are a quarter away.
+ALLOWANCE = 0.15
+
+OrderVerdict = Literal["agrees", "differs", "not resolved"]
+
+
+@dataclass(frozen=True)
+class FittedOrder:
+    """The slope p of error ~ size^-p in the logarithms.
+
+    Attributes
+    ----------
+    order : float
+    low, high : float
+        Ends of its 95 % confidence interval; see `fit_order`.
+    points : int
+        Number of measurements that the fit rests on.
+    """
+
+    order: float
+    low: float
+    high: float
+    points: int
+
+    def agrees_with(self, declared: float) -> bool:
+        """Whether the declared order is within 0.15 of the fitted one."""
+        return abs(self.order - declared) <= ALLOWANCE
+
+    def verdict(self, declared: float) -> OrderVerdict:
+        """Whether the declared order is within 0.15; if not, whether the interval excludes it.
+
+        Examples
+        --------
+        >>> FittedOrder(1.5, 1.2, 1.8, 4).verdict(1.75), FittedOrder(1.5, 1.4, 1.6, 4).verdict(1.75)
+        ('not resolved', 'differs')
+        """
+        if self.agrees_with(declared):
+            return "agrees"
+        return "not resolved" if self.low <= declared <= self.high else "differs"
+
+    def __str__(self) -> str:
+        return f"{self.order:.2f} [{self.low:.2f}, {self.high:.2f}]"
+
+
+def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = None) -> FittedOrder | None:
+    """Least squares of log(error) on log(size); None for fewer than three different sizes.
+
+    Parameters
+    ----------
+    size, error : array_like, shape (points,)
+        Positive.
+    repeats : array_like, shape (points,), optional
+        Of random methods: over how many independent repeats each error is a root mean square.
+
+    Returns
+    -------
+    FittedOrder or None
+        Without ``repeats`` the interval is Student's, from the scatter about the line: errors of a deterministic
+        method are exact, but do not lie on a line. With them every error has a spread of its own: n times its square
+        is as a chi-square with n degrees of freedom if the errors are Gaussian numbers, so that the variance of its
+        logarithm is trigamma(n/2)/4. The points are weighted by that, and the interval is Gaussian; where the scatter
+        about the line is larger than the spreads explain, it is widened by Birge's ratio. Errors of arrays scatter
+        less, so that their interval is too wide rather than too narrow.
+
+    Raises
+    ------
+    InputError
+        If the shapes differ, a size or an error is not above 0, or a number of repeats is below 1.
+
+    Examples
+    --------
+    >>> fit = fit_order([1, 2, 4, 8], [1, 1 / 4, 1 / 16, 1 / 64])
+    >>> round(fit.order, 12), fit.points
+    (2.0, 4)
+    >>> few = fit_order([1, 4, 16], [1, 0.5, 0.25], repeats=[5, 5, 5])
+    >>> round(few.order, 12), round(few.high - few.low, 2)
+    (0.5, 0.7)
+    """
+    sizes, errors = finite_array("size", size), finite_array("error", error)
+    if sizes.shape != errors.shape or np.any(sizes <= 0.0) or np.any(errors <= 0.0):
+        raise InputError(f"size, error: expected positive numbers of one shape, got {size!r}, {error!r}")
+    number = None if repeats is None else finite_array("repeats", repeats)
+    if number is not None and (number.shape != sizes.shape or np.any(number < 1.0)):
+        raise InputError(f"repeats: expected a number of at least 1 for each of {sizes.size} sizes, got {repeats!r}")
+    if len(np.unique(sizes)) < FEWEST_POINTS:
+        return None
+    slope, half = _by_scatter(sizes, errors) if number is None else _by_spread(sizes, errors, number)
+    return FittedOrder(-slope, -slope - half, -slope + half, len(sizes))
+
+
+def _by_scatter(sizes: Floats, errors: Floats) -> tuple[float, float]:
+    """Slope and half the width of its interval, by Student's t."""
+    from scipy.stats import linregress, t
+
+    fit = linregress(np.log(sizes), np.log(errors))
+    return float(fit.slope), float(t.ppf(0.5 + 0.5 * CONFIDENCE, len(sizes) - 2) * fit.stderr)
+
+
+def _by_spread(sizes: Floats, errors: Floats, repeats: Floats) -> tuple[float, float]:
+    """Slope and half the width of its interval, from the spreads of root mean squares over repeats."""
+    from scipy.special import polygamma
+    from scipy.stats import norm
+
+    weight = 4.0 / polygamma(1, 0.5 * repeats)
+    x, y = np.log(sizes), np.log(errors)
+    x = x - np.average(x, weights=weight)
+    precision = float(weight @ x**2)
+    slope = float(weight @ (x * y)) / precision
+    rest = y - np.average(y, weights=weight) - slope * x
+    birge = float(np.sqrt(weight @ rest**2 / (len(x) - 2)))
+    return slope, float(norm.ppf(0.5 + 0.5 * CONFIDENCE)) * max(birge, 1.0) / precision**0.5

@@ -1,0 +1,134 @@
+"""Measure error against run time: every method at every budget, with whatever goes wrong kept as a row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+
+from ...checks import positive_number, whole_number
+from ...errors import InputError
+from .machine import Machine, on_few_cores
+from .problem import WorkMethod, WorkProblem
+from .report import WorkReport
+from .stopwatch import measure
+from .work_row import WorkRow
+
+Budgets = Sequence[float] | Mapping[str, Sequence[float]]
+# What makes one row from problem, method, budget, repeats, seconds: in this process, or in one that can be ended.
+Runner = Callable[[WorkProblem, WorkMethod, float, int, float], WorkRow]
+
+
+def work_precision(
+    problem: WorkProblem,
+    methods: Sequence[WorkMethod],
+    budgets: Budgets,
+    *,
+    repeats: int = 5,
+    seconds: float = 60.0,
+    warm_up: bool = True,
+    threads: int = 1,
+    path: str | PathLike[str] | None = None,
+    runner: Runner = measure,
+) -> WorkReport:
+    """Error against run time of methods for one quantity.
+
+    Parameters
+    ----------
+    problem : WorkProblem
+        The quantity, its references and the norms of the error.
+    methods : sequence of WorkMethod
+    budgets : sequence of numbers, or mapping from a method's name to one
+        What every method is given; smaller ones come first.
+    repeats : int
+        Timed runs of each.
+    seconds : float
+        When the repeats of a row have taken so long, no further one is begun; when a single run has, larger budgets of
+        its method are left out. A run itself is ended only by a ``runner`` that can.
+    warm_up : bool
+        Whether one run more, at a method's smallest budget, goes before the others: it loads what is loaded once.
+    threads : int
+        Number of cores that the measurement is pinned to, and of threads of the linear algebra.
+    path : path-like, optional
+        A JSON file that is written after every row. If it exists, its rows are taken over and the rest is measured.
+    runner : callable
+        Makes a row from problem, method, budget, repeats and seconds; by default in this process.
+        Compiled code must not be interrupted inside a process: one with a hard limit works in another one.
+
+    Returns
+    -------
+    WorkReport
+
+    Raises
+    ------
+    InputError
+        If names repeat, a method has no budgets or no independent reference, or the file holds another problem or
+        times of another machine.
+
+    Examples
+    --------
+    >>> from asperity.spectral import ReferenceValue, WorkMethod, WorkProblem
+    >>> problem = WorkProblem("integral of x^2", ReferenceValue(1 / 3, 0.0, "closed form"))
+    >>> midpoint = WorkMethod("midpoint", lambda n: sum(((i + 0.5) / n) ** 2 for i in range(n)) / n, order=2.0)
+    >>> report = work_precision(problem, [midpoint], [8, 16, 32, 64], repeats=1)
+    >>> round(report.order("midpoint").order, 6)
+    2.0
+    """
+    whole_number("repeats", repeats, 1)
+    positive_number("seconds", seconds)
+    whole_number("threads", threads, 1)
+    ladders = _ladders(methods, budgets)
+    report = WorkReport.of(problem, methods, Machine.here(threads))
+    file = None if path is None else Path(path)
+    if file is not None and file.exists():
+        report = report.continued(WorkReport.of_json(file.read_text(encoding="utf-8")))
+    with on_few_cores(threads):
+        for method in methods:
+            earlier = [row for row in report.rows if row.method == method.name]
+            for row in _climb(problem, method, ladders[method.name], earlier, (repeats, seconds, warm_up, runner)):
+                report = report.with_row(row)
+                if file is not None:
+                    _write(file, report.to_json())
+    return report
+
+
+def _climb(
+    problem: WorkProblem, method: WorkMethod, ladder: list[float], earlier: list[WorkRow],
+    how: tuple[int, float, bool, Runner],
+) -> Iterator[WorkRow]:  # fmt: skip
+    """The rows of one method that are not there yet; once the time limit is met they are left out."""
+    repeats, seconds, warm_up, runner = how
+    missing = [budget for budget in ladder if budget not in {row.budget for row in earlier}]
+    exhausted = any(_met_the_limit(row, seconds) for row in earlier)
+    if warm_up and missing and not exhausted:
+        runner(problem, method, missing[0], 1, seconds)
+    for budget in missing:
+        if exhausted:
+            yield WorkRow(method.name, budget, "left out", note="a smaller budget met the time limit")
+            continue
+        row = runner(problem, method, budget, repeats, seconds)
+        exhausted = _met_the_limit(row, seconds)
+        yield row
+
+
+def _met_the_limit(row: WorkRow, seconds: float) -> bool:
+    """Whether a run was ended or took so long that the next budget would hardly be done in time."""
+    return row.status == "timed out" or (row.is_done and row.least > seconds)
+
+
+def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[float]]:
+    names = [method.name for method in methods]
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"methods: expected at least one, with different names, got {names}")
+    shared = {} if isinstance(budgets, Mapping) else dict.fromkeys(names, budgets)
+    given = budgets if isinstance(budgets, Mapping) else shared
+    if missing := [name for name in names if not len(given.get(name, ()))]:
+        raise InputError(f"budgets: expected at least one for every method, got none for {', '.join(missing)}")
+    return {name: sorted(positive_number("budgets", budget) for budget in given[name]) for name in names}
+
+
+def _write(file: Path, text: str) -> None:
+    """Replace the file in one step, so that a run that is stopped leaves a whole one."""
+    beside = file.with_name(file.name + ".part")
+    beside.write_text(text, encoding="utf-8")
+    beside.replace(file)
