@@ -31,7 +31,8 @@ from tests.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 import asperity
 from asperity import ledger
-from asperity.geometry.disk import kinetics, rolling
+from asperity.geometry.disk import disk as kinetics
+from asperity.geometry.disk import rolling
 from asperity.kernels.walls import circular_arc as circular
 from asperity.kernels.walls import triangular
 from asperity.verification import Entry

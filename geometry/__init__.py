@@ -24,7 +24,6 @@ from .scene.plan import TracePlan
 from .tables.container import Container
 from .tracing.tracing import Status, Trace, trace, trajectory
 from .walls.catalogue import WALLS, NamedWall, wall_from_text
-from .walls.koch_curve import koch
 from .walls.mushroom import mushrooms
 from .walls.named import (
     dispersing_arcs,
@@ -32,6 +31,7 @@ from .walls.named import (
     elliptical_arcs,
     flat,
     focusing_arcs,
+    koch,
     rectangular_teeth,
     triangular_teeth,
 )

@@ -26,10 +26,10 @@ from .gap.verdict import SpectralGap as SpectralGap
 from .work_diagrams.machine import Machine as Machine
 from .work_diagrams.order import FittedOrder as FittedOrder
 from .work_diagrams.order import fit_order as fit_order
+from .work_diagrams.problem import ReferenceValue as ReferenceValue
 from .work_diagrams.problem import WorkMethod as WorkMethod
 from .work_diagrams.problem import WorkProblem as WorkProblem
-from .work_diagrams.reference_value import ReferenceValue as ReferenceValue
 from .work_diagrams.report import MethodFacts as MethodFacts
 from .work_diagrams.report import WorkReport as WorkReport
+from .work_diagrams.report import WorkRow as WorkRow
 from .work_diagrams.runs import work_precision as work_precision
-from .work_diagrams.work_row import WorkRow as WorkRow

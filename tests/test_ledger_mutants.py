@@ -7,7 +7,8 @@ import pytest
 from benchmarks.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
 
 from asperity import ledger
-from asperity.geometry.disk import kinetics, rolling
+from asperity.geometry.disk import disk as kinetics
+from asperity.geometry.disk import rolling
 from asperity.verification import Formula, agreement, verified
 from equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 

@@ -15,7 +15,7 @@ from asperity import kernels as ker
 from asperity.errors import FileExistsRefusal, InputError
 from asperity.estimates import Estimate
 from asperity.kernels.matrices.defects import invariance_z_score, replicate_z_score, reversibility_z_score
-from asperity.kernels.matrices.matrix_algebra import frobenius_error
+from asperity.kernels.matrices.matrix import frobenius_error
 
 NO_ERROR = Estimate(0.0, 0.0, "bound", "given")
 ROUNDING = 1e-13

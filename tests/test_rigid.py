@@ -9,8 +9,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, next_root
-from asperity.geometry.collisions.compiled.flight_engine import flight
+from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, flight, next_root
 from asperity.geometry.disk.satellites import Satellites
 from plain_collision import collide_plainly
 

@@ -10,7 +10,7 @@ import pytest
 
 from asperity import spectral as spec
 from asperity.errors import AccuracyError, InputError
-from asperity.spectral.work_diagrams.stopwatch import measure
+from asperity.spectral.work_diagrams.runs import measure
 
 EXACT = np.e - 1.0
 BUDGETS = [8, 16, 32, 64]

@@ -11,8 +11,7 @@ from ...checks import Floats, finite_array, positive_number
 from ...errors import InputError
 from ..disk import rolling
 from ..disk.charts import RollingCharts
-from ..disk.disk import Disk
-from ..disk.kinetics import contact_normal
+from ..disk.disk import Disk, contact_normal
 from ..disk.satellites import Satellites
 from ..walls.interior import in_solid
 from ..walls.wall import Wall

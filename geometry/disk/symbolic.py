@@ -48,7 +48,7 @@ import sympy as sp
 from sympy import cos, sin
 
 from . import rolling
-from .kinetics import branch_block, contact_normal, direction, frame_rows
+from .disk import branch_block, contact_normal, direction, frame_rows
 
 __all__ = [
     "ANGLES", "G", "G_jacobian", "J", "alpha", "bend", "branch_matrix", "chi", "chi_perp", "contact", "e2", "e2_hat",

@@ -6,7 +6,7 @@ from typing import Any
 
 from ...verification import Formula, Verdict, convention, erratum, every, verified, verify
 from ...verification.entry import Code
-from ..disk.kinetics import direction, foreshortening, frame_rows
+from ..disk.disk import direction, foreshortening, frame_rows
 
 
 @verified(

@@ -20,7 +20,7 @@ from ...verification import (
     verify,
 )
 from ...verification.entry import Code
-from ..disk.kinetics import contact_normal
+from ..disk.disk import contact_normal
 from .trials import generator
 
 

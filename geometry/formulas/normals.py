@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...verification import Formula, Verdict, erratum, every, verified, verify
 from ...verification.entry import Code
 from ..disk import rolling
-from ..disk.kinetics import contact_normal
+from ..disk.disk import contact_normal
 
 
 @verified(

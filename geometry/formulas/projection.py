@@ -9,7 +9,7 @@ import numpy as np
 from ...verification import Formula, Verdict, by_reading, convention, erratum, every, holds, verified, verify
 from ...verification.entry import Code
 from ..disk import rolling
-from ..disk.kinetics import frame_rows
+from ..disk.disk import frame_rows
 from .trials import generator, masses
 
 

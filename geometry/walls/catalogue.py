@@ -13,7 +13,6 @@ from ...errors import InputError
 from ..cells.profile import Seam, read_profile
 from ..cells.toml import load_wall
 from ..disk.disk import Disk
-from .koch_curve import koch
 from .mushroom import mushrooms
 from .named import (
     dispersing_arcs,
@@ -21,6 +20,7 @@ from .named import (
     elliptical_arcs,
     flat,
     focusing_arcs,
+    koch,
     rectangular_teeth,
     triangular_teeth,
 )

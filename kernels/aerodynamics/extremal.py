@@ -17,8 +17,7 @@ from ..laws.interval_exchange import IntervalExchangeLaw
 from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.matrix_law import MatrixLaw
-from ..matrices.matrix import KernelMatrix
-from ..matrices.matrix_algebra import frobenius_error
+from ..matrices.matrix import KernelMatrix, frobenius_error
 from .drag import air_resistance
 from .dual_bounds import CostFunction, dual_bound, transport_plan
 

@@ -1,4 +1,4 @@
-"""Where many numbers or intervals lie among sorted edges, and what cuts leave of intervals."""
+"""Sorted edges and joined lists: where numbers and intervals lie among edges, and lists laid end to end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...checks import Floats
 from .measure import SINE
-from .ragged_lists import ragged
+
+
+def ragged(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The row that each entry belongs to, and its place there, of rows with so many entries.
+
+    Examples
+    --------
+    >>> [part.tolist() for part in ragged(np.array([2, 0, 3]))]
+    [[0, 0, 2, 2, 2], [0, 1, 0, 1, 2]]
+    """
+    owner = np.repeat(np.arange(number.size), number)
+    return owner, np.arange(owner.size) - np.repeat(np.cumsum(number) - number, number)
 
 
 def cell_among(edges: Floats, position: ArrayLike) -> NDArray[np.intp]:

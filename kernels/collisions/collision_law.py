@@ -14,8 +14,7 @@ from ...checks import Floats, angles, finite_array, generator
 from ...errors import InputError
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
-from ..laws.law import Law
-from ..laws.weighted_sum import Combination
+from ..laws.law import Combination, Law
 from ..walls.isometry_branches import isometries
 from .velocity_matrices import isometry_matrix
 

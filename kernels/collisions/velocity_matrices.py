@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...checks import Floats
-from ...geometry.disk.kinetics import branch_block
+from ...geometry.disk.disk import branch_block
 
 if TYPE_CHECKING:
     from ...geometry import Disk

@@ -12,11 +12,10 @@ from ...rounding import EPS
 from ..bases.angles import flipped, kept_inside
 from ..bases.assembly import add_blocks, add_masses, cell_index
 from ..bases.basis import Basis
-from ..bases.intervals import between_cuts, edges_inside
+from ..bases.intervals import between_cuts, edges_inside, ragged
 from ..bases.measure import gauss_on_intervals
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..bases.panels import Panels
-from ..bases.ragged_lists import ragged
 
 # Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
 # pi - xi, both within 2 xi / MOST_HITS, and are counted there.

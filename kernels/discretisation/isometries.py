@@ -12,9 +12,7 @@ from ..bases.assembly import add_products
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals, gauss_rule
 from ..laws.branches import preimages
-from ..laws.composition import Composition, Power
-from ..laws.specular_frame import SpecularFrame
-from ..laws.weighted_sum import Combination
+from ..laws.law import Combination, Composition, Power, SpecularFrame
 
 # A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
 # misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the

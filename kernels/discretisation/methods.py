@@ -19,16 +19,13 @@ from ..bases.mirror import mirror_refinement, reflection_matrix
 from ..bases.momentum import Directions
 from ..laws.density import DensityLaw
 from ..laws.involution import InvolutionLaw
-from ..laws.law import DrivenLaw, Law
+from ..laws.law import Combination, DrivenLaw, Law, SpecularFrame
 from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.random_map import responder
-from ..laws.specular_frame import SpecularFrame
 from ..laws.structure import holds_of_all, lists_branches
-from ..laws.weighted_sum import Combination
 from ..matrices.defects import SymmetryDefect
-from ..matrices.matrix import KernelMatrix
-from ..matrices.matrix_algebra import frobenius_error
+from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.counts import SampledArray
 from ..sampling.monte_carlo import independent_rays
 from ..sampling.sobol import PARTS, Net

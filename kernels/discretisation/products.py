@@ -16,10 +16,9 @@ from ..bases.legendre import Legendre
 from ..bases.measure import SINE
 from ..bases.panels import Panels
 from ..laws.involution import InvolutionLaw
-from ..laws.law import Law
+from ..laws.law import Combination, Law
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import lists_branches
-from ..laws.weighted_sum import Combination
 from ..matrices.matrix import KernelMatrix
 from .densities import jumps_of_map
 from .scattering import degrees_kept, local_values, split

@@ -11,10 +11,9 @@ from ...estimates import Estimate
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
-from .cell_rows import check_comparable
 from .joint import joint_law_distance, joint_matrix_distance
 from .pseudometric import moment_distance
-from .resampling import noise_floor
+from .resampling import check_comparable, noise_floor
 from .rowwise import law_distance, matrix_distance
 from .transport import wasserstein_order
 

@@ -13,14 +13,11 @@ from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import gauss_on_intervals, gauss_rule
 from ..discretisation.densities import row_intervals
-from ..laws.composition import Composition, Power
 from ..laws.density import DensityLaw
 from ..laws.interval_exchange import IntervalExchangeLaw
 from ..laws.involution import InvolutionLaw
-from ..laws.law import BranchLaw, DrivenLaw, Law
+from ..laws.law import BranchLaw, Combination, Composition, DrivenLaw, Law, Power, SpecularFrame
 from ..laws.least_resistance import LeastResistanceLaw
-from ..laws.specular_frame import SpecularFrame
-from ..laws.weighted_sum import Combination
 from ..walls.circular_arc import CircularArcLaw
 from ..walls.conditionals import WallRows, is_few
 from ..walls.wall_law import WallLaw

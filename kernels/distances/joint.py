@@ -14,10 +14,8 @@ from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
-from ..matrices.matrix import KernelMatrix
-from ..matrices.matrix_pair import joint_kind
-from .cell_rows import cell_middles, stochastic_rows
-from .resampling import matrices_error
+from ..matrices.matrix import KernelMatrix, joint_kind
+from .resampling import cell_middles, matrices_error, stochastic_rows
 from .rowwise import matrix_distance
 from .transport import Distributions, power_mean, wasserstein
 

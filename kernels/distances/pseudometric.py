@@ -12,8 +12,7 @@ from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
-from ..matrices.matrix import KernelMatrix
-from ..matrices.matrix_pair import joint_kind
+from ..matrices.matrix import KernelMatrix, joint_kind
 
 # Weights of 2^-60 and less are below the rounding of the sum.
 LARGEST_ORDER = 58

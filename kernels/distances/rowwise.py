@@ -13,14 +13,10 @@ from ..bases.measure import SINE, gauss_on_intervals
 from ..discretisation.densities import jumps_of_map
 from ..laws.density import DensityLaw
 from ..laws.involution import InvolutionLaw
-from ..laws.law import Law
-from ..laws.specular_frame import SpecularFrame
-from ..laws.weighted_sum import Combination
-from ..matrices.matrix import KernelMatrix
-from ..matrices.matrix_pair import joint_kind
-from .cell_rows import distance_of_rows, stochastic_rows
+from ..laws.law import Combination, Law, SpecularFrame
+from ..matrices.matrix import KernelMatrix, joint_kind
 from .distributions import ENTRY_POINTS, outgoing_distributions, parts_of
-from .resampling import matrices_error
+from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean, wasserstein
 
 # Gauss nodes on a panel in the incoming angle, panels without kinks, kinks and cells of the outgoing angle on the

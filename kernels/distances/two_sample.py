@@ -10,8 +10,15 @@ from ...checks import Floats, generator, number_between, whole_number
 from ...errors import InputError
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
-from .cell_rows import check_comparable, distance_of_rows, stochastic_rows
-from .resampling import CHUNK, null_distances, pooled_rows, rows_of_counts
+from .resampling import (
+    CHUNK,
+    check_comparable,
+    distance_of_rows,
+    null_distances,
+    pooled_rows,
+    rows_of_counts,
+    stochastic_rows,
+)
 from .transport import wasserstein_order
 
 

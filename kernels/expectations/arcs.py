@@ -1,4 +1,4 @@
-"""The outgoing angle on each piece of a row of circular arcs: linear in the angle delta of the chord."""
+"""Conditional expectations of piecewise polynomials under the law of circular arcs."""
 
 from __future__ import annotations
 
@@ -8,10 +8,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...checks import Floats
-from ..bases.measure import SINE
+from ..bases.intervals import cell_among, ragged
+from ..bases.legendre import legendre_moments
+from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
+from ..bases.panels import Panels
 
 if TYPE_CHECKING:
     from ..walls.circular_arc import CircularArcLaw
+
+# theta' moves by less than half a panel on pieces of this share of it or less: with half the nodes what Gauss's rule
+# misses of a polynomial falls by the share to the power of its degree.
+SHORT_SHARE = 0.1
+# sin(delta) on a piece, whose length is at most half of the widest panel, asks for this many nodes more than p/2 + 1.
+SINE_NODES = 2
+# Pieces held at a time.
+CHUNK = 2**17
+# exp(i theta' / 2 N) on a panel asks for this many Gauss nodes more than a polynomial of half the degree.
+MORE_NODES = 3
+# Angles at which the variation of functions is looked at.
+SPREAD_PROBES = 9
+# Ends of pieces held at a time.
+PIECES_AT_ONCE = 2**15
 
 
 class ArcLines(NamedTuple):
@@ -49,3 +66,141 @@ def outgoing_lines(law: CircularArcLaw, theta: Floats, most_hits: int) -> ArcLin
     end = np.where(pieces.mirrored, law.half_angle, np.pi - law.half_angle)
     angle = np.where(pieces.rest, end, offset + slope * lower)
     return ArcLines(pieces.ray, slope, offset, lower, upper, mass, angle, pieces.rest | alone, pieces.rest)
+
+
+def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
+    r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (rows, functions), and the rows' errors.
+
+    The outgoing angle is linear in the angle delta of the chord, of density sin(delta): on each piece between two
+    edges the functions are polynomials in delta, and a Gauss rule is exact but for the sine.
+    """
+    lines = outgoing_lines(law, theta, most_hits)
+    ray, slope, offset, lower, upper = lines[:5]
+    single = lines.single
+    ends = np.sort(np.stack([offset + slope * lower, offset + slope * upper]), axis=0)
+    first = cell_among(panels.edges, ends[0])
+    last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
+    gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
+    owner, place = ragged(np.where(single, 0, last - first + 1))
+    for start in range(0, owner.size, CHUNK):
+        own, panel = owner[start : start + CHUNK], (first[owner] + place)[start : start + CHUNK]
+        low, high = panels.edges[panel], panels.edges[panel + 1]
+        cuts = np.sort((np.stack([low, high]) - offset[own]) / slope[own], axis=0)
+        near, far = np.clip(cuts, lower[own], upper[own])
+        scale, shift = 2.0 * slope[own] / (high - low), (2.0 * offset[own] - low - high) / (high - low)
+        _add_moments(gathered, near, far, scale, shift, ray[own] * (len(panels.edges) - 1) + panel, panels.degree)
+    angle = lines.angle[single]
+    panel = cell_among(panels.edges, angle)
+    cell = ray[single] * (len(panels.edges) - 1) + panel
+    for column, values in zip(gathered, panels.legendre(angle, panel).T, strict=True):
+        column += np.bincount(cell, weights=lines.mass[single] * values, minlength=column.size)
+    total = lines.of_rows(lines.mass, theta.size)
+    moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
+    left = lines.of_rows(np.where(lines.rest, lines.mass, 0.0), theta.size)
+    # two angles of a function of sup norm 1
+    return panels.of_legendre(moments.transpose(1, 2, 0)), 2.0 * left / total
+
+
+def _add_moments(
+    gathered: Floats, near: Floats, far: Floats, scale: Floats, shift: Floats, cell: Floats, degree: int
+) -> None:
+    """Add the integrals of L_k(scale delta + shift) over (near, far), k = 0 ... degree, to the columns ``cell``."""
+    full = degree // 2 + 1 + SINE_NODES
+    short = np.abs(scale) * (far - near) <= 2.0 * SHORT_SHARE
+    for chosen, nodes in ((short, full // 2 + 1), (~short, full)):
+        if not chosen.any():
+            continue
+        delta, weight = (part.reshape(-1, nodes) for part in gauss_on_intervals(near[chosen], far[chosen], nodes))
+        weight = weight * SINE.density(delta)
+        local = scale[chosen, None] * delta + shift[chosen, None]
+        for column, moment in zip(gathered, legendre_moments(local, weight, degree), strict=True):
+            column += np.bincount(cell[chosen], weights=moment, minlength=column.size)
+
+
+class ArcMeans:
+    r"""E[v(Theta') | theta] for functions v with the coefficients ``vectors`` on panels.
+
+    On a piece with N hits theta' = o + s delta with s = -+2 N, so that the integral of v(theta') sin(delta) is the
+    imaginary part of exp(-i o/s)/s times the difference of two values of F_N(t), the integral of v(theta')
+    exp(i theta'/s) from 0 to t: a table at the edges, and one Gauss rule from the edge to t.
+
+    Parameters
+    ----------
+    law : CircularArcLaw
+    panels : Panels
+    vectors : array of shape (n, k)
+    """
+
+    def __init__(self, law: CircularArcLaw, panels: Panels, vectors: Floats) -> None:
+        self.law, self.edges = law, panels.edges
+        self._polynomials = panels.legendre_series(vectors)
+        self._orders = self._polynomials.shape[1] // 2 + 1 + MORE_NODES
+        self._angle, weight = (part.reshape(-1, self._orders) for part in gauss_rule(self.edges, self._orders))
+        local = 2.0 * (self._angle - self.edges[:-1, None]) / np.diff(self.edges)[:, None] - 1.0
+        basis = np.polynomial.legendre.legvander(local, self._polynomials.shape[1] - 1)
+        self._weighted = weight[..., None] * np.matmul(basis, self._polynomials)
+        self._tables: dict[int, NDArray[np.complex128]] = {}
+
+    def __call__(self, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
+        """The means, shape (rows, k), and how much the rays with more hits can be off in the worst of the functions."""
+        lines = outgoing_lines(self.law, theta, most_hits)
+        single, share = lines.single, lines.mass
+        whole = lines.of_rows(share, theta.size)
+        found = np.empty((len(single), self._polynomials.shape[2]))
+        long = np.flatnonzero(~single)
+        for start in range(0, long.size, PIECES_AT_ONCE):
+            part = long[start : start + PIECES_AT_ONCE]
+            found[part] = self._integrals(lines.offset[part], lines.slope[part], lines.lower[part], lines.upper[part])
+        known = np.flatnonzero(single)
+        angle = lines.angle[known]
+        here = self._moments(angle[:, None], cell_among(self.edges, angle), share[known, None])
+        found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[cell_among(self.edges, angle)])
+        total = np.stack([lines.of_rows(column, theta.size) for column in found.T], axis=1)
+        left = lines.of_rows(np.where(lines.rest, share, 0.0), theta.size)
+        return total / whole[:, None], left / whole * self._spread(most_hits)
+
+    def _spread(self, most_hits: int) -> float:
+        """How much the functions vary where rays with more hits leave: within 2 xi/N of xi and of pi - xi."""
+        xi = self.law.half_angle
+        near = xi + 2.0 * xi / most_hits * np.linspace(-1.0, 1.0, SPREAD_PROBES)
+        values = []
+        for angle in (near, np.pi - near):
+            cell = cell_among(self.edges, angle)
+            moments = self._moments(angle[:, None], cell, np.ones((angle.size, 1)))
+            values.append(np.einsum("pd,pdk->pk", moments, self._polynomials[cell]))
+        return float(max(np.abs(value - value[SPREAD_PROBES // 2]).max() for value in values))
+
+    def _integrals(self, offset: Floats, slope: Floats, lower: Floats, upper: Floats) -> Floats:
+        """The integrals of v(offset + slope delta) sin(delta)/2 over (lower, upper), shape (pieces, k)."""
+        ends = np.clip(np.stack([offset + slope * lower, offset + slope * upper]), 0.0, np.pi)
+        cell = cell_among(self.edges, ends)
+        hits = np.abs(0.5 * slope).astype(np.intp)
+        table = self._up_to(int(hits.max(initial=1)))[hits - 1, cell]
+        angle, weight = gauss_on_intervals(self.edges[cell].ravel(), ends.ravel(), self._orders)
+        angle, weight = angle.reshape(-1, self._orders), weight.reshape(-1, self._orders)
+        phase = angle / np.tile(2.0 * hits, 2)[:, None]
+        each = self._polynomials[cell.ravel()]
+        parts = [
+            np.einsum("pd,pdk->pk", self._moments(angle, cell.ravel(), weight * wave(phase)), each)
+            for wave in (np.cos, np.sin)
+        ]
+        primitive = table + (parts[0] + 1j * parts[1]).reshape(table.shape)
+        difference = primitive[1] - primitive[0]
+        difference = np.where(slope[:, None] > 0.0, difference, difference.conj())
+        return np.asarray(0.5 * (np.exp(-1j * offset / slope)[:, None] * difference).imag / slope[:, None])
+
+    def _up_to(self, most: int) -> NDArray[np.complex128]:
+        """F_N at the edges for N = 1 ... most, shape (most, edges, k)."""
+        if most not in self._tables:
+            # for many N at once: products of small matrices, one a panel
+            phase = self._angle[:, None] / (2.0 * np.arange(1, most + 1)[:, None])
+            whole = np.matmul(np.exp(1j * phase), self._weighted).transpose(1, 0, 2)
+            empty = np.zeros((most, 1, whole.shape[2]))
+            self._tables[most] = np.concatenate([empty, np.cumsum(whole, axis=1)], axis=1)
+        return self._tables[most]
+
+    def _moments(self, angle: Floats, cell: NDArray[np.intp], weight: Floats) -> Floats:
+        """Of nodes of shape (cells, nodes) with their weights: of these cells' polynomials, (cells, degree + 1)."""
+        low, high = self.edges[cell, None], self.edges[cell + 1, None]
+        local = (2.0 * angle - low - high) / (high - low)
+        return legendre_moments(local, weight, self._polynomials.shape[1] - 1).T

@@ -16,14 +16,11 @@ from ..bases.measure import gauss_rule
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..bases.panels import Panels
 from ..laws.ideal import LambertianLaw
-from ..laws.law import Law
-from ..laws.specular_frame import SpecularFrame
-from ..laws.weighted_sum import Combination
+from ..laws.law import Combination, Law, SpecularFrame
 from ..walls.circular_arc import CircularArcLaw, followed_hits
 from ..walls.conditionals import WallRows, is_few
 from ..walls.wall_law import WallLaw
-from .arc_means import ArcMeans
-from .arc_rows import arc_images
+from .arcs import ArcMeans, arc_images
 
 # Values of functions held at a time.
 VALUES_AT_ONCE = 2_000_000

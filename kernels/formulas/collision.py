@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry import Disk, Wall, rectangular_teeth, trace, triangular_teeth
-from ...geometry.disk.kinetics import contact_normal, foreshortening
+from ...geometry.disk.disk import contact_normal, foreshortening
 from ...verification import Formula, Verdict, agreement, erratum, every, verified, verify
 from ...verification.entry import Code
 

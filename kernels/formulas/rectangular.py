@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry import rectangular_teeth, trace
-from ...geometry.disk.kinetics import foreshortening
+from ...geometry.disk.disk import foreshortening
 from ...verification import Formula, Verdict, agreement, erratum, verify
 from ...verification.entry import Code
 from ..walls.rectangular import RectangularTeethLaw, crevice_retro

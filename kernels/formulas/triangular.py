@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry import focusing_arcs, rectangular_teeth, trace, triangular_teeth
-from ...geometry.disk.kinetics import foreshortening
+from ...geometry.disk.disk import foreshortening
 from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
 from ...verification.entry import Code
 from ..walls.triangular import TriangularTeethLaw

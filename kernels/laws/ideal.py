@@ -11,8 +11,7 @@ from ...checks import Floats, angles, number_between
 from ..bases.angles import flipped
 from ..bases.measure import SINE
 from .density import DensityLaw
-from .law import BranchLaw
-from .weighted_sum import Combination
+from .law import BranchLaw, Combination
 
 
 @dataclass(frozen=True, repr=False)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from ...checks import Floats
 from ..bases.angles import flipped
 from .involution import InvolutionLaw
-from .law import BranchLaw, DrivenLaw, Law
-from .specular_frame import SpecularFrame
+from .law import BranchLaw, DrivenLaw, Law, SpecularFrame
 
 # Outgoing angles and, for traced rays, which of them escaped.
 Response: TypeAlias = tuple[Floats, "NDArray[np.bool_] | None"]

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from ...errors import InputError
-from .composition import Composition, Power
-from .law import BranchLaw, Law
-from .specular_frame import SpecularFrame
-from .weighted_sum import Combination
+from .law import BranchLaw, Combination, Composition, Law, Power, SpecularFrame
 
 Fact = TypeVar("Fact")
 # Asked of a law to see whether it lists isometries.

@@ -11,8 +11,7 @@ from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
-from ..matrices.matrix import KernelMatrix
-from ..matrices.matrix_algebra import frobenius_error
+from ..matrices.matrix import KernelMatrix, frobenius_error
 from .counts import BATCHES, array_from_counts, array_from_sums, count_pairs, sum_products
 
 # Incoming angles whose bin totals lie this many standard deviations from the invariant measure were not drawn from it.

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...checks import Floats, angles, number_between
 from ..bases.angles import flipped, kept_inside, mixed_arccos
+from ..bases.intervals import ragged
 from ..bases.measure import SINE, gauss_on_intervals
-from ..bases.ragged_lists import ragged
 from ..laws.law import AngleFunction, DrivenLaw, entry_points
 
 # Rows jump where the number of hits N changes. Each of the first intervals gets its own Gauss rule; beyond MOST_HITS

@@ -203,7 +203,7 @@ class HollowRows:
         return cuts
 
     def _located(self, label: int, present: float, absent: float, k: int) -> float:
-        from ...geometry.itineraries.compiled.critical_angles import find_critical
+        from ...geometry.itineraries.compiled.neighbours import find_critical
 
         key = (label, min(present, absent), max(present, absent))
         for (name, low, high), angle in self._critical.items():

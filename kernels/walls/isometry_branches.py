@@ -7,9 +7,7 @@ from numpy.typing import ArrayLike
 
 from ...checks import Floats, angles
 from ..laws.ideal import IsometryLaw
-from ..laws.law import Law
-from ..laws.specular_frame import SpecularFrame
-from ..laws.weighted_sum import Combination
+from ..laws.law import Combination, Law, SpecularFrame
 from .isometry_table import IsometryTable
 
 # Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.

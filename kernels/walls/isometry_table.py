@@ -13,8 +13,7 @@ from ...checks import Floats, angles, frozen
 from ...errors import InputError
 from ...rounding import EPS
 from ..bases.angles import kept_inside
-from ..bases.intervals import without_outermost
-from ..bases.ragged_lists import ragged
+from ..bases.intervals import ragged, without_outermost
 
 Whole = NDArray[np.int64]
 

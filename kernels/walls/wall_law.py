@@ -14,8 +14,7 @@ from ...checks import Floats, angles
 from ...errors import AccuracyError, InputError
 from ...rounding import EPS
 from ..laws.ideal import specular
-from ..laws.law import AngleFunction, DrivenLaw, Law, entry_points
-from ..laws.weighted_sum import Combination
+from ..laws.law import AngleFunction, Combination, DrivenLaw, Law, entry_points
 from .circular_arc import CircularArcLaw
 from .conditionals import AdaptiveRows, adaptive_rows, is_few
 from .isometry_branches import table_of

@@ -11,12 +11,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from ..laws.composition import Composition, Power
 from ..laws.ideal import IsometryLaw, LambertianLaw, lambertian, retroreflection, specular
 from ..laws.involution import InvolutionLaw
-from ..laws.law import Law
+from ..laws.law import Composition, Law, Power, SpecularFrame
 from ..laws.phase_function import HenyeyGreensteinLaw
-from ..laws.specular_frame import SpecularFrame
 from ..laws.structure import Rules, fold
 from .rectangular import RectangularTeethLaw
 from .repeated_teeth import MOST_TIMES, RepeatedTeethLaw

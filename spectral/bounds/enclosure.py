@@ -12,18 +12,7 @@ from numpy.typing import NDArray
 from ...checks import Floats, whole_number
 from ...errors import InputError
 from ...estimates import ErrorKind
-from ...kernels import (  # fmt: skip
-    Basis,
-    Bins,
-    CollisionLaw,
-    Composition,
-    DensityLaw,
-    Law,
-    Legendre,
-    MatrixLaw,
-    Power,
-    discretise,
-)
+from ...kernels import Basis, Bins, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.expectations.basis_means import integrates_panels, traces_rows
 from ...kernels.laws.ideal import LambertianLaw

@@ -19,7 +19,7 @@ from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import BasisRows, function_rows, height_of, integrates_panels, weighted_rows
 from ...kernels.laws.density import GAUSS_NODES, split_rows
 from ...kernels.laws.ideal import LambertianLaw
-from ...kernels.laws.specular_frame import SpecularFrame
+from ...kernels.laws.law import SpecularFrame
 from ...kernels.laws.structure import Rules, fold, holds_of_all
 from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.words import law_of, words_of

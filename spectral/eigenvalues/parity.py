@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from ...checks import Floats
 from ...kernels import Bins
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
-from .deflation import compressed, symmetric_half
-from .dense import Extremes, Which, counted_from_above, outermost, wanted
+from .dense import Extremes, Which, compressed, counted_from_above, outermost, symmetric_half, wanted
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -12,8 +12,7 @@ from ...checks import Floats, finite_array, frozen, whole_number
 from ...errors import AccuracyError, InputError
 from ...kernels import KernelMatrix
 from ...rounding import EPS
-from .deflation import symmetric_half
-from .dense import Extremes, outermost
+from .dense import Extremes, outermost, symmetric_half
 from .parity import Parity, halves, outermost_by_parity
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ from ...checks import Floats
 from ...kernels import CircularArcLaw, Law, WallLaw
 from ...kernels.bases.measure import gauss_on_intervals, gauss_rule
 from ...kernels.laws.ideal import IsometryLaw
-from ...kernels.laws.specular_frame import SpecularFrame
-from ...kernels.laws.weighted_sum import Combination
+from ...kernels.laws.law import Combination, SpecularFrame
 from ..essential.edge import EssentialEdge
 from .verdict import SpectralGap
 

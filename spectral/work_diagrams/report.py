@@ -1,29 +1,132 @@
-"""Error against run time of several methods: rows, orders, the front, and how well the library chose."""
+"""A report on error against run time: its rows, its Markdown table and its picture."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from math import sqrt
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from ...errors import InputError
 from .machine import Machine
 from .order import FittedOrder, fit_order
-from .problem import WorkMethod, WorkProblem
-from .reference_value import ROUNDED
-from .work_row import WorkRow
-from .work_table import table_of
+from .problem import ROUNDED, WorkMethod, WorkProblem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+RowStatus = Literal["done", "failed", "timed out", "left out"]
 FORMAT = 1
 # An error within so many errors of its reference measures the reference.
 ABOVE_REFERENCE = 3.0
+MARKERS = "osv^D<>Ph*X"
+# An axis covers a power of ten at least, so that one is labelled.
+DECADE = 10.0
+
+
+@dataclass(frozen=True)
+class WorkRow:
+    """One row of a report on error against run time.
+
+    Attributes
+    ----------
+    method : str
+    budget : float
+    status : {"done", "failed", "timed out", "left out"}
+        ``"left out"``: a smaller budget had used up the time.
+    errors : mapping of str to float
+        By norm. Of a random method the root mean squares over the repeats.
+    seconds : tuple of float
+        Wall time of every repeat.
+    reported : float or None
+        The error that the method itself reports, where it reports one.
+    note : str
+        How the value was made, in the method's words; or the reason why there is none.
+
+    Examples
+    --------
+    >>> row = WorkRow("midpoint", 8, "done", {"absolute": 1e-3}, (0.2, 0.1, 0.4))
+    >>> row.least, round(row.spread, 12)
+    (0.1, 3.0)
+    """
+
+    method: str
+    budget: float
+    status: RowStatus
+    errors: Mapping[str, float] = field(default_factory=dict)
+    seconds: tuple[float, ...] = ()
+    reported: float | None = None
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if self.status not in get_args(RowStatus):
+            raise InputError(f"status: expected one of {', '.join(get_args(RowStatus))}, got {self.status!r}")
+        object.__setattr__(self, "budget", float(self.budget))
+        object.__setattr__(self, "errors", MappingProxyType(dict(self.errors)))
+        object.__setattr__(self, "seconds", tuple(map(float, self.seconds)))
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there is a value."""
+        return self.status == "done"
+
+    @property
+    def least(self) -> float:
+        """Least time of the repeats; infinite without one."""
+        return min(self.seconds, default=float("inf"))
+
+    @property
+    def spread(self) -> float:
+        """Greatest minus least time of the repeats as a share of the least."""
+        return (max(self.seconds) - self.least) / self.least if self.seconds else 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """What JSON holds."""
+        plain = {name: getattr(self, name) for name in ("method", "budget", "status", "reported", "note")}
+        return {**plain, "errors": dict(self.errors), "seconds": list(self.seconds)}
+
+    @classmethod
+    def of_dict(cls, data: Mapping[str, Any]) -> WorkRow:
+        """The row that `as_dict` gave."""
+        return cls(**{**data, "seconds": tuple(data["seconds"])})
+
+
+def table_of(report: WorkReport) -> str:
+    """The table of `WorkReport.table`."""
+    front = set(map(id, report.front()))
+    heads = ["method", "budget", *(f"{norm} error" for norm in report.norms), "reported", "seconds", "spread", ""]
+    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
+    lines += [f"| {' | '.join(_cells(report, row, id(row) in front))} |" for row in report.rows]
+    lines.append("")
+    for name, facts in report.methods.items():
+        words = f"- {name}: against {facts.reference} (known to {facts.floor:.1e})"
+        fitted = report.order(name)
+        if fitted is not None:
+            words += f"; fitted order {fitted}"
+        if facts.declared_order is not None:
+            words += f", declared {facts.declared_order:g}"
+            if fitted is not None:
+                words += f": {fitted.verdict(facts.declared_order)}"
+        lines.append(words)
+    choice = report.choice()
+    if choice is not None:
+        lines.append(f"- {report.auto} takes {choice:.2g} times as long as the best other method at equal error")
+    lines.append(f"- {report.machine}")
+    return "\n".join(lines)
+
+
+def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
+    name = f"**{row.method}**" if row.method == report.auto else row.method
+    if not row.is_done:
+        return [name, f"{row.budget:g}", *["-"] * (len(report.norms) + 3), f"{row.status}: {row.note}"]
+    errors = [f"{row.errors[norm]:.1e}" for norm in report.norms]
+    reported = "-" if row.reported is None else f"{row.reported:.1e}"
+    marks = [mark for mark, holds in (("front", in_front), (row.note, bool(row.note))) if holds]
+    return [name, f"{row.budget:g}", *errors, reported, f"{row.least:.2g}", f"{row.spread:.0%}", ", ".join(marks)]
 
 
 @dataclass(frozen=True)
@@ -166,8 +269,6 @@ class WorkReport:
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw errors against least times, both logarithmic."""
-        from .work_picture import draw_work
-
         return draw_work(self, ax)
 
     def to_json(self) -> str:
@@ -213,3 +314,36 @@ class WorkReport:
             return best[0][0]
         times, errors = np.log(np.array(best)).T
         return float(np.exp(np.interp(-np.log(error), -errors, times)))
+
+
+def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
+    """Draw the errors (see `WorkReport.level`) over the least times, the front in grey and the chosen one in black."""
+    if ax is None:
+        from matplotlib.figure import Figure
+
+        ax = Figure(figsize=(6.0, 4.5), layout="constrained").add_subplot()
+    front = [(row.least, report.level(row)) for row in report.front()]
+    if len(front) > 1:
+        ax.plot(*zip(*front, strict=True), color="0.8", linewidth=6.0, solid_capstyle="round", zorder=0)
+    floors = {facts.floor for facts in report.methods.values()}
+    for number, name in enumerate(report.methods):
+        rows = sorted((row for row in report.rows if row.is_done and row.method == name), key=lambda row: row.least)
+        if not rows:
+            continue
+        chosen = name == report.auto
+        ax.plot(
+            [row.least for row in rows], [report.level(row) for row in rows],
+            marker=MARKERS[number % len(MARKERS)], markersize=8.0 if chosen else 5.0, linewidth=1.2,
+            color="black" if chosen else f"C{number}", fillstyle="none" if chosen else "full", label=name,
+        )  # fmt: skip
+    ax.axhline(max(floors), color="0.5", linestyle=":", linewidth=1.0, label="reference known to")
+    ax.set(xscale="log", yscale="log", xlabel="seconds", ylabel=f"{report.norms[0]} error", title=report.problem)
+    from matplotlib.ticker import NullFormatter
+
+    for axis, (low, high), limit in ((ax.xaxis, ax.get_xlim(), ax.set_xlim), (ax.yaxis, ax.get_ylim(), ax.set_ylim)):
+        middle, reach = sqrt(low * high), sqrt(max(high / low, DECADE))
+        limit(middle / reach, middle * reach)
+        # matplotlib labels minor ticks of a few decades, too, and they overlap
+        axis.set_minor_formatter(NullFormatter())
+    ax.legend(fontsize="x-small", framealpha=0.6)
+    return ax

@@ -1,22 +1,67 @@
-"""Measure error against run time: every method at every budget, with whatever goes wrong kept as a row."""
+"""Measure error against run time: each method at each budget, with its errors, its times, or why there are none."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
-from ...checks import positive_number, whole_number
-from ...errors import InputError
+import numpy as np
+
+from ...checks import Floats, positive_number, whole_number
+from ...errors import AsperityError, InputError
+from ...estimates import Estimate
+from ...kernels import KernelMatrix
 from .machine import Machine, on_few_cores
 from .problem import WorkMethod, WorkProblem
-from .report import WorkReport
-from .stopwatch import measure
-from .work_row import WorkRow
+from .report import WorkReport, WorkRow
 
+# Independent generators of the repeats come from this and the repeat's number.
+SEED = 20220
 Budgets = Sequence[float] | Mapping[str, Sequence[float]]
 # What makes one row from problem, method, budget, repeats, seconds: in this process, or in one that can be ended.
 Runner = Callable[[WorkProblem, WorkMethod, float, int, float], WorkRow]
+
+
+def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
+    """One row; repeats end early, but not before the first, when together they take longer than ``seconds``.
+
+    Errors of ours, of arithmetic, of linear algebra and of memory become a row with their message.
+    """
+    times: list[float] = []
+    errors: list[dict[str, float]] = []
+    try:
+        while len(times) < repeats and sum(times) <= seconds:
+            start = time.perf_counter()
+            result = _solve(method, budget, len(times))
+            times.append(time.perf_counter() - start)
+            value, reported, note = _parts(result)
+            errors.append(problem.errors(value, method.name))
+    except (AsperityError, ArithmeticError, MemoryError, np.linalg.LinAlgError) as reason:
+        words = " ".join(f"{type(reason).__name__}: {reason}".split())
+        return WorkRow(method.name, budget, "failed", seconds=tuple(times), note=words)
+    norms = {name: float(np.sqrt(np.mean([one[name] ** 2 for one in errors]))) for name in problem.norms}
+    return WorkRow(method.name, budget, "done", norms, tuple(times), reported, note)
+
+
+def _solve(method: WorkMethod, budget: float, repeat: int) -> Any:
+    size = int(budget) if float(budget).is_integer() else budget
+    return method.solve(size, np.random.default_rng([SEED, repeat])) if method.is_random else method.solve(size)
+
+
+def _parts(result: Any) -> tuple[Floats, float | None, str]:
+    """Value, reported error and method of whatever a method returns."""
+    if isinstance(result, KernelMatrix):
+        return result.symmetric, _number(result.error.value), result.method
+    if isinstance(result, Estimate):
+        return np.asarray(result.value), _number(result.error), result.method
+    return np.asarray(result, dtype=np.float64), None, ""
+
+
+def _number(error: float) -> float | None:
+    return float(error) if np.isfinite(error) else None
 
 
 def work_precision(

@@ -12,10 +12,22 @@ import numpy as np
 
 from ...tracing.compiled.interruption import is_raised
 from ...tracing.compiled.nearby import LINE, NO_PIECE, SIDE
-from ...tracing.compiled.opening_engine import last_hollow
-from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
-from .contact import CLEAR, NO, NOTHING, WIDEST_SLACK, ZERO, first_in_hollow, next_root
-from .flight_engine import compiled, flight, inlined, satellite_after, towards_line, turning
+from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
+from .contact import (
+    CLEAR,
+    NO,
+    NOTHING,
+    WIDEST_SLACK,
+    ZERO,
+    compiled,
+    first_in_hollow,
+    flight,
+    inlined,
+    next_root,
+    satellite_after,
+    towards_line,
+    turning,
+)
 
 TOP = 7
 # Cells that one satellite may pass, and satellites that may pass the lowest point, in one flight.

@@ -1,13 +1,22 @@
-"""Compiled comparison of the pieces of neighbouring rows. Imported inside functions only."""
+"""Compiled comparison of the pieces of two neighbouring angles, and the angle between them at which one appears."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from .changes import probe
+from ....rounding import EPS
+from .changes import inner, probe
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
+# Near its end a piece is as wide as the distance to it or its square root; so many places, at most its last width away
+# from where its middle is expected, meet it in either case.
+PLACES_TRIED = 17
+# The ends of a piece are found to this share of its width, so that its middle can be followed.
+EDGE_STEPS = 5
+MOST_STEPS = 80
+# Angles closer than this are the same cut: what a square root leaves of it is below rounding.
+SAME_ANGLE = 1e-11
 
 
 @_compile
@@ -41,3 +50,57 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree)
                         rows.append(there)
                         places.append(x)
     return np.array(rows, dtype=np.int64), np.array(places), rays, np.int64(code[1])
+
+
+@inner
+def edge_from(x, step, label, task):
+    """An end of the piece around x, seen in the direction of ``step``: to a small share of its distance."""
+    left, right = task[1][0], task[1][1]
+    inside, outside = x, x + step
+    while left < outside < right and probe(outside, task)[1] == label:
+        inside = outside
+        step *= 2.0
+        outside = inside + step
+    outside = min(max(outside, left), right)
+    for _ in range(EDGE_STEPS):
+        middle = 0.5 * (inside + outside)
+        if probe(middle, task)[1] == label:
+            inside = middle
+        else:
+            outside = middle
+    return inside
+
+
+@_compile
+def find_critical(label, present, absent, low, high, drift, scene, degree):
+    """The angle between ``present`` and ``absent`` where the piece ends that is [low, high] at the former.
+
+    ``drift`` is how fast its middle moves, as far as known.
+    """
+    hollow, tables, period, limits, edges = scene
+    left, right = hollow[0], hollow[1]
+    code = np.zeros(2, np.uint64)
+    for _ in range(MOST_STEPS):
+        if abs(present - absent) <= SAME_ANGLE:
+            break
+        angle = 0.5 * (present + absent)
+        task = (angle, hollow, tables, period, limits, edges, degree, code)
+        width, before = high - low, 0.5 * (low + high)
+        centre = before + drift * (angle - present)
+        found = np.nan
+        for n in range(PLACES_TRIED):
+            # from the middle outwards, to either side in turn
+            x = centre + width * (1.0 - 2.0 * (n % 2)) * ((n + 1) // 2) / (PLACES_TRIED // 2)
+            if left < x < right and probe(x, task)[1] == label:
+                found = x
+                break
+        if np.isnan(found):
+            absent = angle
+            continue
+        step = max(0.25 * width, 4.0 * EPS * abs(found))
+        low, high = edge_from(found, -step, label, task), edge_from(found, step, label, task)
+        if high <= low:
+            break
+        drift = (0.5 * (low + high) - before) / (angle - present)
+        present = angle
+    return 0.5 * (present + absent)

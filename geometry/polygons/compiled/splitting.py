@@ -1,4 +1,4 @@
-"""The compiled loop that splits beams. Only `beams` imports this file, because it loads numba.
+"""The compiled loop that splits beams at the vertices of a triangulated hollow.
 
 A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0, and an
 unfolded vertex (X, Y) is the functional f = X s - Y c - p, positive where it lies right of the line. A beam is a convex
@@ -15,7 +15,7 @@ from numba import njit
 
 from ....rounding import EPS
 from ...tracing.compiled.growing import larger, longer, taller
-from ...tracing.compiled.trigonometry import PI
+from ...tracing.compiled.trigonometry import PI, PI_REST
 from ...tracing.double_double.arithmetic import add
 from ..triangulation import FIRST_WALL, OPENING
 from .columns import (
@@ -38,8 +38,8 @@ from .columns import (
     push,
     put,
 )
-from .unfolding_engine import offset_of, reduced, wall_lines
 
+_compile = njit(cache=True, nogil=True, error_model="numpy")
 # f is a sum of five products of numbers with one to three rounding errors each; every term is counted in `f`'s size.
 FUNCTIONAL_ULPS = 8.0
 # T gains 2 d R n at a reflection: d, n, R and the two products have one rounding error each.
@@ -50,7 +50,34 @@ RECOUNT = 4096
 # A beam may pass this many triangles for every beam that the budget allows.
 STEPS_A_BEAM = 64
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+@_compile
+def reduced(high, low):
+    """An angle in two doubles, modulo 2 pi, in [-pi, pi] within rounding."""
+    turns = np.rint(high / (2.0 * PI))
+    if turns != 0.0:
+        # turns is 1 or 2 at most, so its products are exact
+        high, low = add((high, low), (-2.0 * turns * PI, -2.0 * turns * PI_REST))
+    return high, low
+
+
+@_compile
+def offset_of(sign, turn, turn_low, middle):
+    """The offset of theta' = sign (theta + pi - turn), modulo 2 pi, for which the angle ``middle`` leaves upwards."""
+    offset = add((sign * PI, sign * PI_REST), (-sign * turn, -sign * turn_low))
+    turns = np.rint((sign * middle + offset[0] - 0.5 * PI) / (2.0 * PI))
+    return add(offset, (-2.0 * turns * PI, -2.0 * turns * PI_REST))[0]
+
+
+@_compile
+def wall_lines(x, y, turn_high):
+    """The lines of a hollow's walls, one a row: unit normal and distance from the origin, from the nearer end."""
+    lines = np.empty((turn_high.shape[0], 3))
+    for e in range(turn_high.shape[0]):
+        lines[e, 0], lines[e, 1] = -math.sin(turn_high[e]), math.cos(turn_high[e])
+        k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
+        lines[e, 2] = lines[e, 0] * x[k] + lines[e, 1] * y[k]
+    return lines
 
 
 @_compile

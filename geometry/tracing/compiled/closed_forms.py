@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from ...scene.closed_forms import CHAIN_COLUMNS, FAN, FAN_COLUMN, NONE
-from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
+from .rays import FLAT_TOP, TOP_CORNER, opening_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 
 # Status of a ray that is left to the loop.

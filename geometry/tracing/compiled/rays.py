@@ -1,4 +1,4 @@
-"""The compiled loop of the planar tracer. Loads numba: imported inside functions, and by other compiled loops.
+"""The compiled loop of the planar tracer: the hollow that a ray enters, and its flights to the exit.
 
 Every optional table is an array or ``None``; numba compiles one version for each combination that occurs, and the
 branches of absent primitives are pruned from it. Layout of the tables: `scene`.
@@ -26,12 +26,13 @@ from .arcs import arc_incidence, arc_reflect, arc_time, on_arc
 from .beziers import bend_number, bezier_hit, bezier_value
 from .interruption import is_raised
 from .nearby import BEZIER, CIRCLE, DOUBTFUL, ELLIPSE, LEAST_SHARE, LID, LINE, NO_PIECE, SIDE, hit_nearby, line_time
-from .opening_engine import FLAT_TOP, TOP_CORNER, opening_at
 from .runs import skip_crossings, skip_hops
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
+# In place of a hollow's number: a flat top, and an end of one that is a corner.
+FLAT_TOP, TOP_CORNER = -1, -2
+_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
-
 # Flights followed one by one before a ray is given up: 20 to 100 ms. Hits in a run cost one flight together.
 MOST_STEPS = 1_000_000
 # An odd number without pattern, so that itineraries of the same pieces in another order differ.
@@ -39,9 +40,31 @@ HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
 # Far beyond the numbers of the pieces.
 BEND_SHIFT = 40
 
-# The loop over rays takes in the loop over flights: passing some ten tables from one to the other would cost as much as
-# a bounce or two. Other callers go through a function of their own that calls `trace_ray` at one place.
-_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+@_compile
+def last_hollow(place, hollows):
+    """Number of the last hollow whose left end is not beyond a place of the cell, -1 where there is none."""
+    low, high = 0, hollows.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if hollows[middle, 0] <= place:
+            low = middle + 1
+        else:
+            high = middle
+    return low - 1
+
+
+@_compile
+def opening_at(place, hollows):
+    """Number of the hollow that opens at a place of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
+    h = last_hollow(place, hollows)
+    if h < 0 or place >= hollows[h, 1] or (place == hollows[h, 0] and hollows[h, 11] > 0.0):
+        # a flat top, or an edge of it; the edges between two hollows are corners
+        edge = h >= 0 and (
+            (place == hollows[h, 0] and hollows[h, 11] > 1.0) or (place == hollows[h, 1] and hollows[h, 12] > 1.0)
+        )
+        return TOP_CORNER if edge else FLAT_TOP
+    return h
 
 
 @_compile

@@ -10,7 +10,7 @@ import numpy as np
 from .. import geometry as geo
 from ..checks import Floats
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Legendre, TriangularTeethLaw, discretise, maxwell
-from ..kernels.matrices.matrix_algebra import frobenius_error
+from ..kernels.matrices.matrix import frobenius_error
 from ..rounding import EPS
 from ..spectral import spectrum
 from .extreme_row import ExtremeRow

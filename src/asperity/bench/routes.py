@@ -10,7 +10,7 @@ import numpy as np
 
 from ..kernels import KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
 from ..kernels.discretisation.traced import row_matrix
-from ..kernels.matrices.matrix_algebra import frobenius_error
+from ..kernels.matrices.matrix import frobenius_error
 from .quantity import QUICK_RAYS, RAYS
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
 from ..spectral.work_diagrams.machine import on_few_cores
-from ..spectral.work_diagrams.stopwatch import measure
+from ..spectral.work_diagrams.runs import measure
 from .child_process import ChildCrashed, ChildProcess, OutOfTime
 from .collision_quantities import by_true_disks
 from .known_references import known_reference
