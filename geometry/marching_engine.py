@@ -13,8 +13,8 @@ import math
 import numpy as np
 from numba import njit
 
+from .polygons.compiled.codes import FIRST_WALL, OPENING
 from .polygons.compiled.splitting import offset_of, reduced, wall_lines
-from .polygons.triangulation import FIRST_WALL, OPENING
 from .tracing.compiled.growing import longer, taller
 from .tracing.double_double.arithmetic import add
 

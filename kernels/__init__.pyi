@@ -36,8 +36,6 @@ from .inverse.two_mirror_hollow import two_mirrors as two_mirrors
 from .laws.density import DensityLaw as DensityLaw
 from .laws.ideal import lambertian as lambertian
 from .laws.ideal import maxwell as maxwell
-from .laws.ideal import retroreflection as retroreflection
-from .laws.ideal import specular as specular
 from .laws.interval_exchange import IntervalExchangeLaw as IntervalExchangeLaw
 from .laws.involution import InvolutionLaw as InvolutionLaw
 from .laws.law import BranchLaw as BranchLaw
@@ -48,6 +46,8 @@ from .laws.law import Law as Law
 from .laws.law import Power as Power
 from .laws.law import SpecularFrame as SpecularFrame
 from .laws.law import mixture as mixture
+from .laws.law import retroreflection as retroreflection
+from .laws.law import specular as specular
 from .laws.least_resistance import LeastResistanceLaw as LeastResistanceLaw
 from .laws.matrix_law import MatrixLaw as MatrixLaw
 from .laws.phase_function import henyey_greenstein as henyey_greenstein

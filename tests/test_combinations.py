@@ -13,8 +13,8 @@ from asperity.errors import InputError
 from asperity.kernels import Combination, Composition, mixture
 from asperity.kernels.bases.measure import SINE
 from asperity.kernels.laws.density import DensityLaw
-from asperity.kernels.laws.ideal import lambertian, maxwell, retroreflection, specular
-from asperity.kernels.laws.law import Law
+from asperity.kernels.laws.ideal import lambertian, maxwell
+from asperity.kernels.laws.law import Law, retroreflection, specular
 from asperity.kernels.laws.matrix_law import MatrixLaw
 from asperity.kernels.laws.phase_function import henyey_greenstein
 from asperity.kernels.walls.circular_arc import CircularArcLaw

@@ -17,8 +17,9 @@ from asperity.kernels.bases.bins import Bins
 from asperity.kernels.bases.legendre import Legendre
 from asperity.kernels.bases.measure import SINE
 from asperity.kernels.laws.density import DensityLaw
-from asperity.kernels.laws.ideal import lambertian, maxwell, retroreflection, specular
+from asperity.kernels.laws.ideal import lambertian, maxwell
 from asperity.kernels.laws.involution import InvolutionLaw
+from asperity.kernels.laws.law import retroreflection, specular
 from asperity.kernels.laws.matrix_law import MatrixLaw
 from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw, henyey_greenstein
 

@@ -11,9 +11,9 @@ from scipy.linalg import eigh
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.spectral.bounds.oscillations import held_against_oscillations
 from asperity.spectral.essential.edge import essential_edge, grazing_symbol
 from asperity.spectral.essential.grazing import grazed, grazing_limit
+from asperity.spectral.gap.gap import held_against_oscillations
 from asperity.spectral.gap.shallow import shallow_gap
 from asperity.spectral.gap.verdict import SpectralGap, isolated
 from textbook_tracer import follow, table_of

@@ -5,7 +5,8 @@ import pytest
 
 from asperity.geometry.marching import exact_row
 from asperity.geometry.polygons.beams import beams_of
-from asperity.geometry.polygons.triangulation import FIRST_WALL, OPENING, triangulated
+from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING
+from asperity.geometry.polygons.triangulation import triangulated
 from random_hollows import graph_hollow, random_hollow
 
 AWKWARD = {

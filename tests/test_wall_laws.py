@@ -11,8 +11,7 @@ from asperity import geometry as geo
 from asperity.errors import AccuracyError, InputError
 from asperity.kernels import Combination
 from asperity.kernels.bases.measure import SINE
-from asperity.kernels.laws.ideal import specular
-from asperity.kernels.laws.law import Law
+from asperity.kernels.laws.law import Law, specular
 from asperity.kernels.walls.circular_arc import CircularArcLaw
 from asperity.kernels.walls.rectangular import RectangularTeethLaw
 from asperity.kernels.walls.triangular import TriangularTeethLaw

@@ -23,6 +23,7 @@ from ..curves.segment import Segment
 if TYPE_CHECKING:
     from ..walls.wall import Wall
 
+
 # Two pieces are parts of one if that passes their joint, and points of either, at this distance relative to the wall's
 # size: the joint comes out of a few dozen operations, and the shift of the cell rounds once more.
 SAME_PIECE = 64.0 * EPS
@@ -31,7 +32,7 @@ INNER = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True)
-class Cell:
+class HighestPoint:
     """The pieces of a wall from one of its highest points on, over one period, with that point as the origin.
 
     Parameters
@@ -49,7 +50,7 @@ class Cell:
     numbers: tuple[int, ...]
 
 
-def cell_of(wall: Wall) -> Cell | None:
+def highest_point_of(wall: Wall) -> HighestPoint | None:
     """The cell of a wall without islands; None if it has some, or if the shift would make pieces vanish by rounding."""
     if wall.islands:
         return None
@@ -59,7 +60,7 @@ def cell_of(wall: Wall) -> Cell | None:
     x, y = (float(c) for c in wall.vertices[first])
     count = len(wall.pieces)
     if first == 0 and y == 0.0:
-        return Cell(wall.pieces, (0.0, 0.0), tuple(range(count)))
+        return HighestPoint(wall.pieces, (0.0, 0.0), tuple(range(count)))
     order = [*range(first, count), *range(first)]
     shifts = np.where(np.array(order) >= first, -x, wall.period - x)
     starts = wall.vertices[order] + np.column_stack([shifts, np.full(count, -y)])
@@ -80,7 +81,7 @@ def cell_of(wall: Wall) -> Cell | None:
         if whole is not None:
             pieces[seam - 1 : seam + 1] = [whole]
             del order[seam]
-    return Cell(tuple(pieces), (x, y), tuple(order))
+    return HighestPoint(tuple(pieces), (x, y), tuple(order))
 
 
 def first_top(vertices: Floats, period: float) -> int | None:

@@ -12,13 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from ...checks import Floats, finite_array, frozen
 from ...errors import InputError, WallError
 from ...rounding import UNIT_ROUNDOFF
+from .compiled.codes import FIRST_WALL, OPENING
 from .predicates import ExactPoints
 
 Integers = NDArray[np.int64]
-
-# Codes in `Triangulation.beyond`: at least 0 another triangle's edge; else the opening, or `FIRST_WALL - edge`.
-OPENING = -1
-FIRST_WALL = -2
 # Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 2^-51.
 PARALLEL = 32.0 * UNIT_ROUNDOFF
 

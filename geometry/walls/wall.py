@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ...checks import Floats, frozen, positive_number
 from ...errors import InputError, WallError
 from ..cells.hollow import Hollow, flat_tops, hollows_between
-from ..cells.origin import Cell, cell_of
+from ..cells.origin import HighestPoint, highest_point_of
 from ..cells.profile import Seam, vertices_of_profile
 from ..cells.validity import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
 from ..curves.curve import Curve, Point
@@ -200,8 +200,8 @@ class Wall:
         return all(isinstance(p, Segment) for path in (self.pieces, *self.islands) for p in path)
 
     @cached_property
-    def _cell(self) -> Cell | None:
-        return cell_of(self)
+    def _cell(self) -> HighestPoint | None:
+        return highest_point_of(self)
 
     @cached_property
     def closes(self) -> bool:

@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 from ...checks import Floats, finite_array, positive_number
 from ...errors import InputError
 from ...estimates import Estimate, student_95
-from ..bases.basis import Basis
+from ..bases.basis import AngleFunction, Basis
 from ..bases.measure import SINE, gauss_rule
 from ..bases.momentum import Directions
 from ..bases.panels import Panels
 from ..discretisation.discretisation import SEED_WITHOUT_RNG
 from ..discretisation.isometries import has_chain
 from ..discretisation.methods import MatrixMaker
-from ..laws.law import AngleFunction, Law
+from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import half_width
 from ..sampling.monte_carlo import DEFAULT_SAMPLES

@@ -12,9 +12,8 @@ from ...errors import InputError
 from ...estimates import Estimate
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
-from ..laws.ideal import retroreflection
 from ..laws.interval_exchange import IntervalExchangeLaw
-from ..laws.law import Law
+from ..laws.law import Law, retroreflection
 from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.matrix_law import MatrixLaw
 from ..matrices.matrix import KernelMatrix, frobenius_error

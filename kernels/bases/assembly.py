@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ...checks import Floats
 from .basis import Basis
 from .intervals import cell_among
+from .measure import gauss_rule
 from .panels import Panels
 
 # Values of basis functions held at a time.
@@ -82,3 +83,12 @@ def add_blocks(
         for column in range(width):
             sums = np.bincount(cell, weights=values[:, row] * images[:, column], minlength=panels * panels)
             blocks[:, row, :, column] += sums.reshape(panels, panels)
+
+
+def largest_square_sum(basis: Basis) -> float:
+    """sup over theta of the sum of e_i(theta)^2, from the nodes of the basis and points next to its edges."""
+    if basis.is_partition:
+        return float(np.max(basis.heights**2))
+    inside = np.clip(np.concatenate((basis.edges, basis.edges - 1e-12)), 0.0, np.pi)
+    angle, _ = gauss_rule(basis.edges, basis.nodes_per_interval)
+    return max(float(np.max(np.sum(basis.evaluate(part) ** 2, axis=-1))) for part in (inside, angle))

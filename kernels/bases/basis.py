@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...checks import Floats
 from .measure import AngularMeasure
+
+Frame = Literal["paper", "specular"]
+AngleFunction = Callable[[Floats], Floats]
 
 
 class Basis(ABC):

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...checks import Floats
-from ..bases.assembly import add_products
+from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
-from ..bases.measure import gauss_on_intervals, gauss_rule
+from ..bases.measure import gauss_on_intervals
 from ..laws.branches import preimages
 from ..laws.law import Combination, Composition, Power, SpecularFrame
 
@@ -91,12 +91,3 @@ def _add_nodes(law: Branching, basis: Basis, angle: Floats, weight: Floats, tota
         used = probability[:, slot] > 0.0
         share = (mass * probability[:, slot])[used]
         add_products(total, basis, angle[used], outgoing[used, slot], share)
-
-
-def largest_square_sum(basis: Basis) -> float:
-    """sup over theta of the sum of e_i(theta)^2, from the nodes of the basis and points next to its edges."""
-    if basis.is_partition:
-        return float(np.max(basis.heights**2))
-    inside = np.clip(np.concatenate((basis.edges, basis.edges - 1e-12)), 0.0, np.pi)
-    angle, _ = gauss_rule(basis.edges, basis.nodes_per_interval)
-    return max(float(np.max(np.sum(basis.evaluate(part) ** 2, axis=-1))) for part in (inside, angle))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ...checks import Floats
 from ..bases.angles import kept_inside
-from ..bases.assembly import add_products
+from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.intervals import between_cuts, edges_inside
 from ..bases.legendre import Legendre
@@ -16,7 +16,6 @@ from ..bases.panels import Panels
 from ..walls.crevice_tail import crevice_nodes, first_crossing
 from ..walls.isometry_table import IsometryTable
 from ..walls.rectangular import crevice_pieces
-from .isometries import largest_square_sum
 
 # Products of two functions of a basis times a sinusoid, on a piece of width w, vary like exp(n w) with n the
 # stiffness below. Gauss with m nodes misses (n w / 2)^(2m) / (2m)! of them: 3e-15 and less for these pairs of (n w, m),

@@ -10,7 +10,8 @@ from ...geometry import rectangular_teeth, trace
 from ...geometry.disk.disk import foreshortening
 from ...verification import Formula, Verdict, agreement, erratum, verify
 from ...verification.entry import Code
-from ..walls.rectangular import RectangularTeethLaw, crevice_retro
+from ..walls.crevice import crevice_retro
+from ..walls.rectangular import RectangularTeethLaw
 from .shares import SHARE_ERROR, share
 
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)

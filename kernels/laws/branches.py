@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import Protocol
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from ...errors import InputError
 from ...rounding import EPS
 from ..bases.angles import kept_inside
 from ..bases.intervals import edges_inside
-from .law import Law
 
 # Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
 SAME_ANGLE = 16.0 * EPS
@@ -21,6 +21,16 @@ MOST_BRANCHES = 64
 
 # Probabilities and outgoing angles, shape theta.shape + (branches,).
 Branches = Callable[[Floats], tuple[Floats, Floats]]
+
+
+class Branching(Protocol):
+    """What a chain asks of its laws."""
+
+    def branches(self, theta: Floats, /) -> tuple[Floats, Floats]:
+        """Probabilities and outgoing angles at incoming angles."""
+
+    def kinks(self, limit: int, /) -> tuple[Floats, float]:
+        """Where the branches change, at most about ``limit`` of them, and the measure of those left out."""
 
 
 def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
@@ -40,7 +50,7 @@ def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
     return probability, np.where(probability > 0.0, outgoing, first)
 
 
-def chained(laws: Sequence[Law], theta: Floats) -> tuple[Floats, Floats]:
+def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats]:
     """The branches of laws applied one after the other, merged after each."""
     probability, outgoing = np.ones((*theta.shape, 1)), theta[..., None]
     for law in laws:
@@ -57,7 +67,7 @@ def chained(laws: Sequence[Law], theta: Floats) -> tuple[Floats, Floats]:
     return probability, outgoing
 
 
-def chained_kinks(laws: Sequence[Law], limit: int) -> tuple[Floats, float]:
+def chained_kinks(laws: Sequence[Branching], limit: int) -> tuple[Floats, float]:
     """Kinks of a chain, and the probability of those left out.
 
     They are those of the first law, and where its branches meet kinks of the rest.

@@ -12,8 +12,9 @@ from ...checks import Floats, finite_array, frozen
 from ...errors import AccuracyError, InputError
 from ...rounding import EPS
 from ..bases.angles import kept_inside
+from ..bases.basis import AngleFunction
 from ..bases.measure import SINE, gauss_on_intervals
-from .law import AngleFunction, Law, set_facts
+from .law import Law, set_facts
 
 DensityFunction = Callable[[Floats, Floats], Floats]
 

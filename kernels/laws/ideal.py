@@ -7,34 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles, number_between
-from ..bases.angles import flipped
+from ...checks import Floats, number_between
 from ..bases.measure import SINE
 from .density import DensityLaw
-from .law import BranchLaw, Combination
-
-
-@dataclass(frozen=True, repr=False)
-class IsometryLaw(BranchLaw):
-    """The deterministic law theta' = theta (``retro``) or theta' = pi - theta."""
-
-    retro: bool
-
-    mirror_symmetric = True
-    fan_out = 1
-
-    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        """One branch, of probability 1."""
-        theta = angles("theta", theta)
-        outgoing = theta.copy() if self.retro else flipped(theta)
-        return np.ones((*theta.shape, 1)), outgoing[..., None]
-
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        """None at all."""
-        return np.empty(0), 0.0
-
-    def __repr__(self) -> str:
-        return "retroreflection()" if self.retro else "specular()"
+from .law import Combination, specular
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -57,28 +33,6 @@ class LambertianLaw(DensityLaw):
 
     def __repr__(self) -> str:
         return "lambertian()"
-
-
-def specular() -> IsometryLaw:
-    """Specular reflection, theta' = pi - theta in the paper's convention: the law of a flat wall.
-
-    Examples
-    --------
-    >>> float(specular().sample(np.pi / 4, np.random.default_rng(0))) == np.pi * 3 / 4
-    True
-    """
-    return IsometryLaw(retro=False)
-
-
-def retroreflection() -> IsometryLaw:
-    """Retroreflection, theta' = theta: the particle goes back where it came from.
-
-    Examples
-    --------
-    >>> float(retroreflection().sample(0.5, np.random.default_rng(0)))
-    0.5
-    """
-    return IsometryLaw(retro=True)
 
 
 def lambertian() -> LambertianLaw:

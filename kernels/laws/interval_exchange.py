@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from ...checks import Floats, frozen
 from ...errors import InputError
 from ..bases.angles import kept_inside
+from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..matrices.matrix import KernelMatrix
-from .law import AngleFunction, Law
+from .law import Law
 
 # Fluxes that differ by less, relative to a cell, are equal; smaller masses are rounding and are left where they are.
 FLUX_TOLERANCE = 1e-9

@@ -10,8 +10,9 @@ import numpy as np
 from ...checks import Floats, finite_array
 from ...errors import InputError
 from ..bases.angles import kept_inside
+from ..bases.basis import AngleFunction
 from ..bases.measure import SINE
-from .law import AngleFunction, Law
+from .law import Law
 
 PROBES = 4096
 # Width of a probe pair in probability. Rounding of the map (1e-16 or so) then shows as 1e-10 in the slope.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,10 +13,9 @@ from numpy.typing import ArrayLike
 from ...checks import Floats, angles, finite_array, generator, whole_number
 from ...errors import InputError
 from ..bases.angles import flipped
+from ..bases.basis import AngleFunction, Frame
 from .branches import chained, chained_kinks, merged
 
-Frame = Literal["paper", "specular"]
-AngleFunction = Callable[[Floats], Floats]
 # Half the spacing of rng.random(): draws of exactly 0, an entry through a tip of the wall, become this instead.
 SMALLEST_DRAW = 2.0**-54
 # Weights such as 0.1, ..., 0.4 typed in decimals sum to 1 within a few roundings; a forgotten term does not.
@@ -583,6 +581,49 @@ def _other_frame(frame: Frame) -> Frame:
 
 def _flip(frame: Frame) -> Law:
     """The operator J as a law of the given frame."""
-    from .ideal import retroreflection, specular
-
     return specular() if frame == "paper" else SpecularFrame(retroreflection())
+
+
+@dataclass(frozen=True, repr=False)
+class IsometryLaw(BranchLaw):
+    """The deterministic law theta' = theta (``retro``) or theta' = pi - theta."""
+
+    retro: bool
+
+    mirror_symmetric = True
+    fan_out = 1
+
+    def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
+        """One branch, of probability 1."""
+        theta = angles("theta", theta)
+        outgoing = theta.copy() if self.retro else flipped(theta)
+        return np.ones((*theta.shape, 1)), outgoing[..., None]
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """None at all."""
+        return np.empty(0), 0.0
+
+    def __repr__(self) -> str:
+        return "retroreflection()" if self.retro else "specular()"
+
+
+def specular() -> IsometryLaw:
+    """Specular reflection, theta' = pi - theta in the paper's convention: the law of a flat wall.
+
+    Examples
+    --------
+    >>> float(specular().sample(np.pi / 4, np.random.default_rng(0))) == np.pi * 3 / 4
+    True
+    """
+    return IsometryLaw(retro=False)
+
+
+def retroreflection() -> IsometryLaw:
+    """Retroreflection, theta' = theta: the particle goes back where it came from.
+
+    Examples
+    --------
+    >>> float(retroreflection().sample(0.5, np.random.default_rng(0)))
+    0.5
+    """
+    return IsometryLaw(retro=True)

@@ -9,9 +9,10 @@ import numpy as np
 
 from ...checks import Floats
 from ..bases.angles import kept_inside
+from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
-from .law import AngleFunction, Law
+from .law import Law
 
 # From here on rays are split, in x = theta - pi/2: where the partner 3 x - pi of x would be grazing.
 SPLIT_BEGINS = np.pi / 6.0

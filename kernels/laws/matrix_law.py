@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 from ...checks import Floats, finite_array, frozen
 from ...errors import InputError
 from ..bases.angles import kept_inside
+from ..bases.basis import AngleFunction, Frame
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw
-from .law import AngleFunction, Frame, set_facts
+from .law import set_facts
 
 # Rows that were divided by their sum add up to 1 within a few roundings; rows of a matrix whose flux was symmetrised
 # instead do not, and are no law.

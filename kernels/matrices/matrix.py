@@ -18,10 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 from ...checks import Floats, finite_array, finite_number, frozen, whole_number
 from ...errors import InputError
 from ...estimates import ErrorKind, Estimate
-from ..bases.basis import Basis
+from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..bases.tensor import TensorBasis
-from ..laws.law import AngleFunction, Frame
 from .defects import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry
 
 

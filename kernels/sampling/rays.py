@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ...checks import Floats
 from ...errors import AccuracyError
+from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.mirror import reflection_matrix
-from ..discretisation.isometries import largest_square_sum
 from ..laws.law import Law
 from ..walls.wall_law import LOST_TOLERANCE
 from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products

@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...checks import Floats, angles, number_between
 from ..bases.angles import flipped, kept_inside, mixed_arccos
+from ..bases.basis import AngleFunction
 from ..bases.intervals import ragged
 from ..bases.measure import SINE, gauss_on_intervals
-from ..laws.law import AngleFunction, DrivenLaw, entry_points
+from ..laws.law import DrivenLaw, entry_points
 
 # Rows jump where the number of hits N changes. Each of the first intervals gets its own Gauss rule; beyond MOST_HITS
 # hits, a share of rays of about 1/(4 N^2) and only for theta within xi/N of xi, the outgoing angle stays within xi/N of

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...checks import Floats, angles, finite_number
 from ...errors import InputError
-from ..laws.law import AngleFunction
+from ..bases.basis import AngleFunction
 from .hollow_conditionals import NO_LIMIT, HollowRows
 
 if TYPE_CHECKING:

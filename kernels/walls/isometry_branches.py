@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...checks import Floats, angles
-from ..laws.ideal import IsometryLaw
-from ..laws.law import Combination, Law, SpecularFrame
+from ..laws.law import Combination, IsometryLaw, Law, SpecularFrame
 from .isometry_table import IsometryTable
 
 # Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.

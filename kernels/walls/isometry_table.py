@@ -256,7 +256,7 @@ class IsometryTable:
             found.append((query, number[piece], self.density(at, piece) / np.sin(at)))
         everyone = np.arange(theta.size)
         for crevice in self.crevices:
-            from .rectangular import crevice_retro
+            from .crevice import crevice_retro
 
             retro = crevice.share * crevice_retro(crevice.height_to_width, theta)
             outcomes = (1, 0) if crevice.exchanged else (0, 1)
@@ -283,7 +283,7 @@ class IsometryTable:
 
     def kinks(self, limit: int) -> tuple[Floats, float]:
         """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of those left out."""
-        from .rectangular import crevice_kinks
+        from .crevice import crevice_kinks
 
         lists, left_out = [self.ends], 0.0
         for crevice in self.crevices:

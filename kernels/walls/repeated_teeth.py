@@ -9,16 +9,17 @@ from numpy.typing import ArrayLike
 
 from ...checks import Floats, angles
 from ..bases.angles import flipped, kept_inside
-from ..bases.assembly import add_products
+from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals
-from ..discretisation.isometries import NODES_WIDE, largest_square_sum
 from ..laws.law import BranchLaw
+from .crevice import crevice_kinks, crevice_retro
 from .crevice_tail import crevice_nodes, first_crossing
-from .rectangular import crevice_kinks, crevice_retro
 
 # A polynomial of this degree in the triangle wave is still cheap to integrate.
 MOST_TIMES = 64
+# As many nodes as an isometry has on a wide interval.
+LEAST_NODES = 20
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def repeated_teeth_matrix(law: RepeatedTeethLaw, basis: Basis, exchanged: bool) 
     steep = np.arctan2(2.0 * r, np.arange(begin, -1.0, -1.0))
     edges = np.unique(np.concatenate((steep, basis.edges, kept_inside(np.pi - basis.edges))))
     edges = edges[(edges >= steep[0]) & (edges <= steep[-1])]
-    nodes = max(NODES_WIDE, basis.nodes_per_interval) + law.times
+    nodes = max(LEAST_NODES, basis.nodes_per_interval) + law.times
     near, mass = gauss_on_intervals(edges[:-1], edges[1:], nodes)
     mass = mass * basis.measure.density(near)
     back = law.retro(crevice_retro(r, near))

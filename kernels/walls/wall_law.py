@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...checks import Floats, angles
 from ...errors import AccuracyError, InputError
 from ...rounding import EPS
-from ..laws.ideal import specular
-from ..laws.law import AngleFunction, Combination, DrivenLaw, Law, entry_points
+from ..bases.basis import AngleFunction
+from ..laws.law import Combination, DrivenLaw, Law, entry_points, specular
 from .circular_arc import CircularArcLaw
 from .conditionals import AdaptiveRows, adaptive_rows, is_few
 from .isometry_branches import table_of

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from ..laws.ideal import IsometryLaw, LambertianLaw, lambertian, retroreflection, specular
+from ..laws.ideal import LambertianLaw, lambertian
 from ..laws.involution import InvolutionLaw
-from ..laws.law import Composition, Law, Power, SpecularFrame
+from ..laws.law import Composition, IsometryLaw, Law, Power, SpecularFrame, retroreflection, specular
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import Rules, fold
 from .rectangular import RectangularTeethLaw

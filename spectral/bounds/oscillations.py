@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +11,6 @@ from ...checks import Floats
 from ...errors import AccuracyError
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
-from ..gap.verdict import SpectralGap
 
 # Rays, and parts of them for the spread.
 RAYS, PARTS = 2**12, 8
@@ -29,34 +27,6 @@ FASTEST_SLOW, SLOW_SHARE = 40.0, 0.01
 LEAST_MOVE = 1e-6
 
 
-def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:
-    r"""A gap found in slow functions, unless cos(t theta + phase) of some large t has a smaller quotient.
-
-    Notes
-    -----
-    The quotient 1/2 E (f(theta') - f(theta))^2 / Var f is at least the gap, whatever f. Straight pieces move angles by
-    a few constants c_k, and if all t c_k are nearly multiples of 2 pi, cos(t theta) is nearly kept. Where pieces are
-    slightly bent this still holds for such t as are not too large, while the essential spectrum is gone: a matrix in
-    slow functions knows nothing of it. A few thousand rays show such t; that they show none is no proof.
-    """
-    try:
-        frequency, quotient, spread = _least_quotient(law)
-    except AccuracyError as lost:
-        return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {lost}"))
-    most = quotient + SIGMAS * spread
-    if most >= found.value - found.error:
-        return found
-    reason = (
-        f"by {RAYS} rays cos(t theta + phase), t = {frequency:.6g}, has the quotient {quotient:.3g} +- {spread:.2g}: "
-        f"the gap is not {found.value:.6g}, that of slow functions, but {most:.3g} or less"
-    )
-    evidence = (*found.evidence, reason)
-    return replace(
-        found, value=0.5 * most, error=0.5 * most, method="quotients of fast oscillations, from rays",
-        verdict="undecided", evidence=evidence, spectrum=None,
-    )  # fmt: skip
-
-
 @lru_cache(maxsize=8)
 def fast_top(law: Law) -> tuple[float, str] | None:
     """A value that the spectrum beyond slow functions reaches, with what shows it; None where that cannot be told.
@@ -65,14 +35,14 @@ def fast_top(law: Law) -> tuple[float, str] | None:
     f is in the slow functions.
     """
     try:
-        frequency, quotient, spread = _least_quotient(law, FASTEST_SLOW)
+        frequency, quotient, spread = least_quotient(law, FASTEST_SLOW)
     except AccuracyError:
         return None
     top = 1.0 - quotient - SIGMAS * spread - SLOW_SHARE
     return top, f"by {RAYS} rays cos(t theta + phase), t = {frequency:.6g}, has a mean of {top:.6g} at least"
 
 
-def _least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
+def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
     """The frequency of the least quotient, this quotient, and its standard error; of frequencies beyond the least."""
     rng = np.random.default_rng(0)
     theta = SINE.quantile((np.arange(RAYS) + rng.random(RAYS)) / RAYS)

@@ -17,7 +17,8 @@ from ...errors import InputError
 from ...estimates import ErrorKind
 from ...kernels import KernelMatrix, Law, Legendre, discretise
 from ...kernels.discretisation.scattering import is_scattered
-from ...kernels.laws.ideal import LambertianLaw, specular
+from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.law import specular
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.words import Sum, Word, words_of

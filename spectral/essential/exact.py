@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...kernels import Combination, Law, SpecularFrame
-from ...kernels.laws.ideal import IsometryLaw, LambertianLaw
+from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.structure import Rules, fold
 from ...rounding import EPS
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from ...checks import positive_number
-from ...errors import InputError
+from ...errors import AccuracyError, InputError
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
 from ...kernels.expectations.basis_means import has_costly_rows, integrates_panels, traces_rows
 from ...rounding import EPS
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
-from ..bounds.oscillations import held_against_oscillations
+from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_share
 from ..bounds.trial_space import adapted_trials
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
@@ -326,3 +326,31 @@ def _at_edge(
 def _lower_bound(law: Law) -> tuple[str, ...]:
     share = lambertian_share(law)
     return (f"the gap is at least {share:.6g}, the Lambertian share of the law",) if share > 0.0 else ()
+
+
+def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:
+    r"""A gap found in slow functions, unless cos(t theta + phase) of some large t has a smaller quotient.
+
+    Notes
+    -----
+    The quotient 1/2 E (f(theta') - f(theta))^2 / Var f is at least the gap, whatever f. Straight pieces move angles by
+    a few constants c_k, and if all t c_k are nearly multiples of 2 pi, cos(t theta) is nearly kept. Where pieces are
+    slightly bent this still holds for such t as are not too large, while the essential spectrum is gone: a matrix in
+    slow functions knows nothing of it. A few thousand rays show such t; that they show none is no proof.
+    """
+    try:
+        frequency, quotient, spread = least_quotient(law)
+    except AccuracyError as lost:
+        return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {lost}"))
+    most = quotient + SIGMAS * spread
+    if most >= found.value - found.error:
+        return found
+    reason = (
+        f"by {RAYS} rays cos(t theta + phase), t = {frequency:.6g}, has the quotient {quotient:.3g} +- {spread:.2g}: "
+        f"the gap is not {found.value:.6g}, that of slow functions, but {most:.3g} or less"
+    )
+    evidence = (*found.evidence, reason)
+    return replace(
+        found, value=0.5 * most, error=0.5 * most, method="quotients of fast oscillations, from rays",
+        verdict="undecided", evidence=evidence, spectrum=None,
+    )  # fmt: skip

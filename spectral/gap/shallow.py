@@ -10,8 +10,7 @@ import numpy as np
 from ...checks import Floats
 from ...kernels import CircularArcLaw, Law, WallLaw
 from ...kernels.bases.measure import gauss_on_intervals, gauss_rule
-from ...kernels.laws.ideal import IsometryLaw
-from ...kernels.laws.law import Combination, SpecularFrame
+from ...kernels.laws.law import Combination, IsometryLaw, SpecularFrame
 from ..essential.edge import EssentialEdge
 from .verdict import SpectralGap
 

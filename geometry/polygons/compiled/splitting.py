@@ -17,7 +17,7 @@ from ....rounding import EPS
 from ...tracing.compiled.growing import larger, longer, taller
 from ...tracing.compiled.trigonometry import PI, PI_REST
 from ...tracing.double_double.arithmetic import add
-from ..triangulation import FIRST_WALL, OPENING
+from .codes import FIRST_WALL, OPENING
 from .columns import (
     BOUNCES,
     COUNT,

@@ -13,6 +13,7 @@ from numba import njit
 
 from ....rounding import EPS
 from ...scene.tolerances import JOINT_ULPS, NEARBY, TANGENT_ULPS
+from ..double_double.beziers import curve_size
 
 ROOT_STEPS = 80
 
@@ -44,12 +45,6 @@ def falling_root(a0, a1, a2, a3, low, high):
             return step
         s = step
     return s
-
-
-@_compile
-def curve_size(curve):
-    """A bound of a Bezier piece's extent: the sum of its coefficients but the constant ones."""
-    return abs(curve[2]) + abs(curve[3]) + abs(curve[4]) + abs(curve[5]) + abs(curve[6]) + abs(curve[7])
 
 
 @_compile

@@ -8,7 +8,6 @@ import numpy as np
 from numba import njit
 
 from ...scene.tolerances import NEARBY
-from ..compiled.beziers import curve_size
 from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, square_root, subtract, wide
 
 # Bisections: more than a double has digits and exponents before the point.
@@ -156,3 +155,9 @@ def bezier_place(curve, s):
     bent = (tx[0] * by - ty[0] * bx) / size[0] ** 3
     nx, ny = negate(divide(ty, size)), divide(tx, size)
     return cubic(ax0, ax1, ax2, ax3, s), cubic(ay0, ay1, ay2, ay3, s), nx, ny, bent
+
+
+@_compile
+def curve_size(curve):
+    """A bound of a Bezier piece's extent: the sum of its coefficients but the constant ones."""
+    return abs(curve[2]) + abs(curve[3]) + abs(curve[4]) + abs(curve[5]) + abs(curve[6]) + abs(curve[7])

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
@@ -23,7 +24,10 @@ from .verdict import Verdict
 START_SECONDS = 120.0
 # So long after the limit the process ends itself, should nobody have ended it.
 GRACE = 5.0
-_COMMAND = "import sys; sys.path[:] = {path!r}; from asperity.verification.worker import serve; serve({handle})"
+_COMMAND = (
+    "import sys; sys.path[:] = {path!r}; from asperity.verification.identity import decide; "
+    "from asperity.verification.worker import serve; serve({handle}, decide)"
+)
 
 
 class _Worker:
@@ -93,10 +97,8 @@ def _end() -> None:
         _worker.end()
 
 
-def serve(handle: int) -> None:
+def serve(handle: int, decide: Callable[[list[Any], list[Any]], Verdict]) -> None:
     """Answer one question after the other, until nobody asks."""
-    from .identity import decide
-
     connection: Connection[Any, Any] = Connection(handle)
     import flint  # noqa: F401
     import sympy  # noqa: F401

@@ -1,0 +1,7 @@
+"""What lies beyond the edge of a triangle of a hollow, in place of the number of an edge."""
+
+from __future__ import annotations
+
+# Codes in `Triangulation.beyond`: at least 0 another triangle's edge; else the opening, or `FIRST_WALL - edge`.
+OPENING = -1
+FIRST_WALL = -2
