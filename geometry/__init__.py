@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 from ..verification.identity import verify
 from .cells.hollow import Hollow
 from .cells.profile import read_profile
-from .cells.toml import load_wall
 from .collisions.configuration_space import ConfigurationSpace
 from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
 from .collisions.rigid import RigidCollision, collide
@@ -35,7 +34,7 @@ from .walls.named import (
     rectangular_teeth,
     triangular_teeth,
 )
-from .walls.wall import Wall
+from .walls.wall import Wall, load_wall
 
 if TYPE_CHECKING:
     from .disk import symbolic

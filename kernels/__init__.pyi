@@ -51,10 +51,10 @@ from .laws.law import specular as specular
 from .laws.least_resistance import LeastResistanceLaw as LeastResistanceLaw
 from .laws.matrix_law import MatrixLaw as MatrixLaw
 from .laws.phase_function import henyey_greenstein as henyey_greenstein
-from .matrices.archive import load_matrix as load_matrix
 from .matrices.defects import Defect as Defect
 from .matrices.defects import SymmetryDefect as SymmetryDefect
 from .matrices.matrix import KernelMatrix as KernelMatrix
+from .matrices.matrix import load_matrix as load_matrix
 from .sampling.estimation import estimate as estimate
 from .walls.circular_arc import CircularArcLaw as CircularArcLaw
 from .walls.polygon import PolygonLaw as PolygonLaw

@@ -10,7 +10,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.geometry.plotting.walls import vertical_stretch
-from asperity.spectral.plotting import draw_spectrum
+from asperity.spectral.gap.verdict import draw_spectrum
 from asperity.study import study_wall
 from asperity.study_picture import MOST_BOUNCES, chosen_rays, draw_outgoing_velocities, draw_study_wall, gallery
 
@@ -100,7 +100,7 @@ def test_rays_chosen_for_a_picture_leave_soon(name):
 
 def test_a_gap_is_shaded_and_named_with_its_verdict():
     law = ker.henyey_greenstein(0.5)
-    ax = draw_spectrum(spec.spectrum(law, k=6), new_axes(), spec.spectral_gap(law))
+    ax = draw_spectrum(spec.spectrum(law, k=6), spec.spectral_gap(law), new_axes())
     labels = ax.get_legend_handles_labels()[1]
     assert any(label.startswith("gap 0.50000") and "isolated" in label for label in labels)
     assert "paper convention" in ax.get_title() and ax.get_ylabel() == "eigenvalue"
@@ -111,7 +111,7 @@ def test_a_gap_is_shaded_and_named_with_its_verdict():
 def test_no_gap_is_suggested_where_there_is_none():
     law = ker.TriangularTeethLaw(0.7)
     found = spec.spectrum(ker.discretise(law, ker.Bins(32)), k=6)
-    ax = draw_spectrum(found, new_axes(), spec.spectral_gap(law))
+    ax = draw_spectrum(found, spec.spectral_gap(law), new_axes())
     labels = ax.get_legend_handles_labels()[1]
     assert not ax.patches and not any(label.startswith("gap") for label in labels)
     assert any("no gap" in label for label in labels) and any("matrix in Bins(32)" in label for label in labels)

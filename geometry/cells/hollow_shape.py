@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...checks import Floats, frozen
 from ...rounding import EPS
 from ..curves.segment import Segment
+from .cell import Cell
 from .hollow import Hollow
-
-if TYPE_CHECKING:
-    from ..walls.wall import Wall
 
 # Shapes are equal, and sides level or vertical, to this share of the size of the numbers: places are rounded once
 # each, and named walls compute them by some ten operations.
@@ -45,7 +42,7 @@ class HollowShape:
     rounding: float
 
     @classmethod
-    def of(cls, wall: Wall, hollow: Hollow) -> HollowShape:
+    def of(cls, wall: Cell, hollow: Hollow) -> HollowShape:
         """The shape of one hollow of a wall that is its own ``cell``."""
         pieces = wall.pieces[hollow.first : hollow.last]
         corner = np.array([hollow.left, 0.0])
@@ -88,7 +85,7 @@ class HollowShape:
         return -depth if level and max(abs(left), abs(right - 1.0)) <= SHAPE_TOLERANCE else None
 
 
-def distinct_hollows(wall: Wall) -> list[tuple[HollowShape, list[Hollow]]]:
+def distinct_hollows(wall: Cell) -> list[tuple[HollowShape, list[Hollow]]]:
     """The different shapes of a closed wall's hollows, each with the hollows of ``wall.cell`` that have it, in order.
 
     Examples

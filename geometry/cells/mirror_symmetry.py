@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +11,8 @@ from ...rounding import EPS
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment
+from .cell import Cell
 from .origin import joined
-
-if TYPE_CHECKING:
-    from ..walls.wall import Wall
 
 # Mirror images agree to rounding if their points differ by this much, relative to the wall's size: a mirrored point
 # rounds once, but the two halves of a wall may have been computed by formulas of some fifty operations.
@@ -24,7 +21,7 @@ MIRROR_TOLERANCE = 256.0 * EPS
 PARAMETERS = np.array([0.25, 0.5, 0.75, 1.0])
 
 
-def has_mirror_axis(wall: Wall) -> bool:
+def has_mirror_axis(wall: Cell) -> bool:
     """Whether the periodic wall has a mirror axis x = const; with islands only x = period/2 is tried.
 
     A wall without islands is compared with its mirror image as a cycle of pieces, from every place at which the first

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,10 +18,6 @@ from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
-
-if TYPE_CHECKING:
-    from ..walls.wall import Wall
-
 
 # Two pieces are parts of one if that passes their joint, and points of either, at this distance relative to the wall's
 # size: the joint comes out of a few dozen operations, and the shift of the cell rounds once more.
@@ -50,29 +45,25 @@ class HighestPoint:
     numbers: tuple[int, ...]
 
 
-def highest_point_of(wall: Wall) -> HighestPoint | None:
-    """The cell of a wall without islands; None if it has some, or if the shift would make pieces vanish by rounding."""
-    if wall.islands:
-        return None
-    first = first_top(wall.vertices, wall.period)
+def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> HighestPoint | None:
+    """The cell of a wall without islands; None if the shift would make pieces vanish by rounding."""
+    first = first_top(joints, period)
     if first is None:
         return None
-    x, y = (float(c) for c in wall.vertices[first])
-    count = len(wall.pieces)
+    x, y = (float(c) for c in joints[first])
+    count = len(path)
     if first == 0 and y == 0.0:
-        return HighestPoint(wall.pieces, (0.0, 0.0), tuple(range(count)))
+        return HighestPoint(path, (0.0, 0.0), tuple(range(count)))
     order = [*range(first, count), *range(first)]
-    shifts = np.where(np.array(order) >= first, -x, wall.period - x)
-    starts = wall.vertices[order] + np.column_stack([shifts, np.full(count, -y)])
-    vertices = np.concatenate([starts, [(wall.period, 0.0)]])
-    given = wall.vertices[1:][order] - wall.vertices[:-1][order]
+    shifts = np.where(np.array(order) >= first, -x, period - x)
+    starts = joints[order] + np.column_stack([shifts, np.full(count, -y)])
+    vertices = np.concatenate([starts, [(period, 0.0)]])
+    given = joints[1:][order] - joints[:-1][order]
     if np.any(np.all(vertices[1:] == vertices[:-1], axis=1) & np.any(given != 0.0, axis=1)):
         return None
     places = [(px, py) for px, py in vertices.tolist()]
     pieces = [
-        Segment(start, end)
-        if isinstance(wall.pieces[k], Segment)
-        else wall.pieces[k].moved(float(shift), -y).pinned(start, end)
+        Segment(start, end) if isinstance(path[k], Segment) else path[k].moved(float(shift), -y).pinned(start, end)
         for k, shift, (start, end) in zip(order, shifts, pairwise(places), strict=True)
     ]
     seam = count - first

@@ -13,14 +13,14 @@ from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
-from ..walls.wall import Wall
+from .cell import Cell
 
 FORMAT = "asperity wall 1"
 
 Table = dict[str, Any]
 
 
-def save_wall(wall: Wall, path: str | PathLike[str], overwrite: bool = False) -> None:
+def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) -> None:
     """Write a wall as TOML; see ``Wall.save``."""
     import tomli_w
 
@@ -45,38 +45,8 @@ def save_wall(wall: Wall, path: str | PathLike[str], overwrite: bool = False) ->
         ) from reason
 
 
-def load_wall(path: str | PathLike[str]) -> Wall:
-    """Read a wall from a TOML file.
-
-    Parameters
-    ----------
-    path : path
-        A file that ``Wall.save`` wrote, or one written by hand: ``period``, then either ``vertices`` (a list of
-        points) or ``[[pieces]]`` tables of ``kind`` "segment" (``start``, ``end``), "arc" (``center``,
-        ``semi_axes``, ``angles`` and, where known exactly, ``start`` and ``end``) or "bezier" (``control_points``);
-        islands are ``[[islands]]`` tables with ``pieces``.
-
-    Returns
-    -------
-    Wall
-        Equal to the saved one, to the bit.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is not TOML, or has a missing, unknown or unsuitable key.
-    WallError
-        If the wall breaks a condition.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     file = Path(folder) / "wall.toml"
-    ...     _ = file.write_text("period = 1.0\\nvertices = [[0, 0], [0.2, -0.4], [1, 0]]")
-    ...     load_wall(file) == Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
-    True
-    """
+def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[Curve]]]:
+    """Pieces, period and islands of a wall file, not yet validated as a wall; see ``load_wall``."""
     file = Path(path)
     try:
         document = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -85,7 +55,7 @@ def load_wall(path: str | PathLike[str]) -> Wall:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
         raise InputError(f"{file}: not a TOML file ({reason})") from reason
     try:
-        return _wall(document)
+        return _parts(document)
     except InputError as reason:
         raise type(reason)(f"{file}: {reason}") from reason
 
@@ -107,7 +77,7 @@ def _table(piece: Curve) -> Table:
     raise InputError(f"save: expected a Segment, an Arc or a Bezier, got {piece!r}")
 
 
-def _wall(document: Table) -> Wall:
+def _parts(document: Table) -> tuple[list[Curve], float, list[list[Curve]]]:
     _check_keys(document, {"period"}, {"format", "vertices", "pieces", "islands"})
     if document.get("format", FORMAT) != FORMAT:
         raise InputError(f"key 'format': expected {FORMAT!r}, got {document['format']!r}")
@@ -126,7 +96,7 @@ def _wall(document: Table) -> Wall:
             islands.append(_pieces("pieces", table["pieces"]))
         except InputError as reason:
             raise type(reason)(f"islands[{k}]: {reason}") from reason
-    return Wall(pieces, _number("period", document["period"]), islands)
+    return pieces, _number("period", document["period"]), islands
 
 
 def _pieces(name: str, value: Any) -> list[Curve]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from ..cells.cell import Cell
 from ..cells.hollow_shape import distinct_hollows
 from .closed_forms import NONE
-
-if TYPE_CHECKING:
-    from ..walls.wall import Wall
+from .scene import Scene
 
 
 @dataclass(frozen=True)
@@ -73,10 +71,8 @@ class TracePlan:
     mirror_symmetric: bool
 
 
-def plan_of(wall: Wall) -> TracePlan:
-    """Read the plan off the tables that the tracer uses."""
-    wall = wall.cell
-    scene = wall.scene
+def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
+    """Read the plan of a wall that is its own cell off the tables that the tracer uses."""
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     traced = sum(h.last - h.first for h in wall.hollows) if wall.closes else pieces
     runs = 0 if scene.circles is None else int((scene.circles[:, 10] > 0.0).sum())
@@ -95,5 +91,5 @@ def plan_of(wall: Wall) -> TracePlan:
         closed_forms=0 if scene.closed is None else int((scene.closed[:, 0] != NONE).sum()),
         hollows_with_grid=int((scene.hollows[:, 17] > 0.0).sum()),
         distinct_hollows=len(distinct_hollows(wall)) if wall.closes else 1,
-        mirror_symmetric=wall.is_mirror_symmetric,
+        mirror_symmetric=is_mirror_symmetric,
     )

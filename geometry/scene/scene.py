@@ -21,21 +21,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import asin, cos, hypot, pi, sin
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...checks import Floats
+from ..cells.cell import Cell
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
+from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
 from .closed_forms import NONE, closed_row, closed_table
 from .facing import facing_pairs
-
-if TYPE_CHECKING:
-    from ..curves.curve import Curve, Point
-    from ..walls.wall import Wall
 
 # Tangents that agree to this angle make a smooth joint: a ray at the joint is then reflected alike by both pieces, up
 # to this angle. Joints of arcs and splines that are meant to be smooth agree to a few rounding errors.
@@ -141,7 +138,7 @@ class Scene:
         return tuple(name for name in ("lines", "circles", "ellipses", "beziers") if getattr(self, name) is not None)
 
 
-def scene_of(wall: Wall) -> Scene:
+def scene_of(wall: Cell) -> Scene:
     """Build the tables of a wall."""
     tables = _Tables()
     places = [(float(x), float(y)) for x, y in wall.vertices]
@@ -163,7 +160,7 @@ def scene_of(wall: Wall) -> Scene:
     return tables.scene(wall.period, not wall.closes)
 
 
-def scene_in_one(wall: Wall) -> Scene:
+def scene_in_one(wall: Cell) -> Scene:
     """The tables of a wall that closes as if its cell were one hollow: one list of all pieces, the flat tops too."""
     tables = _Tables()
     places = [(float(x), float(y)) for x, y in wall.vertices]

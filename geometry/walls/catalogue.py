@@ -11,7 +11,6 @@ from typing import cast
 
 from ...errors import InputError
 from ..cells.profile import Seam, read_profile
-from ..cells.toml import load_wall
 from ..disk.disk import Disk
 from .mushroom import mushrooms
 from .named import (
@@ -24,7 +23,7 @@ from .named import (
     rectangular_teeth,
     triangular_teeth,
 )
-from .wall import Wall
+from .wall import Wall, load_wall
 
 
 @dataclass(frozen=True)

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Self
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, frozen, positive_number
+from ...checks import Floats, positive_number
 from ...errors import InputError, WallError
-from ..cells.hollow import Hollow, flat_tops, hollows_between
-from ..cells.origin import HighestPoint, highest_point_of
+from ..cells.cell import Cell
+from ..cells.mirror_symmetry import has_mirror_axis
 from ..cells.profile import Seam, vertices_of_profile
+from ..cells.toml import read_wall, save_wall
 from ..cells.validity import canonical_island, canonical_path, check_crossings, check_open_wall, wall_size
-from ..curves.curve import Curve, Point
+from ..curves.curve import Curve
 from ..curves.segment import Segment
 from ..disk.disk import Disk
-
-if TYPE_CHECKING:
-    from ..scene.plan import TracePlan
-    from ..scene.scene import Scene
+from ..scene.plan import TracePlan, plan_of
+from ..scene.scene import Scene, scene_of
 
 
-@dataclass(frozen=True, repr=False)
-class Wall:
+@dataclass(frozen=True, repr=False, init=False)
+class Wall(Cell):
     """One period of a wall, in y <= 0, whose free side is above (on the left of the direction of travel).
 
     Parameters
@@ -73,10 +72,6 @@ class Wall:
     (Hollow(left=0.0, right=1.0, first=0, last=2),)
     """
 
-    pieces: tuple[Curve, ...]
-    period: float = 1.0
-    islands: tuple[tuple[Curve, ...], ...] = ()
-
     def __init__(self, pieces: Sequence[Curve], period: float = 1.0, islands: Sequence[Sequence[Curve]] = ()) -> None:
         width = positive_number("period", period)
         path = canonical_path(pieces, width)
@@ -85,22 +80,10 @@ class Wall:
         self._fill(path, width, loops)
         if loops:
             check_open_wall(path, loops, width, size)
-        numbers = range(len(path)) if self._cell is None else self._cell.numbers
+        numbers = range(len(path)) if self._highest is None else self._highest.numbers
         check_crossings(self.cell.pieces, loops, width, self.cell.depth, self.origin, numbers)
         if not self.closes:
             check_open_wall(path, loops, width, size)
-
-    def _fill(self, pieces: tuple[Curve, ...], period: float, islands: tuple[tuple[Curve, ...], ...]) -> None:
-        object.__setattr__(self, "pieces", pieces)
-        object.__setattr__(self, "period", period)
-        object.__setattr__(self, "islands", islands)
-
-    def _image(self, x_factor: float, y_factor: float, period: float) -> Self:
-        """Return an upright affine image: it needs no new validation."""
-        image = object.__new__(type(self))
-        paths = [tuple(p.stretched(x_factor, y_factor) for p in path) for path in (self.pieces, *self.islands)]
-        image._fill(paths[0], period, tuple(paths[1:]))
-        return image
 
     @classmethod
     def from_vertices(cls, vertices: ArrayLike) -> Self:
@@ -173,95 +156,13 @@ class Wall:
         return cls.from_vertices(vertices_of_profile(x, height, seam))
 
     @cached_property
-    def vertices(self) -> Floats:
-        """The joints, shape (n + 1, 2), read-only: piece i goes from ``vertices[i]`` to ``vertices[i + 1]``."""
-        return _vertices(self.pieces)
-
-    @cached_property
-    def island_vertices(self) -> tuple[Floats, ...]:
-        """The joints of every island, each (n + 1, 2) and read-only; the last equals the first."""
-        return tuple(_vertices(loop) for loop in self.islands)
-
-    @cached_property
-    def depth(self) -> float:
-        """How far the wall reaches below y = 0."""
-        lowest = [float(self.vertices[:, 1].min())]
-        lowest += [p.box[1] for path in (self.pieces, *self.islands) for p in path if not isinstance(p, Segment)]
-        return max(0.0, -min(lowest + [float(v[:, 1].min()) for v in self.island_vertices]))
-
-    @cached_property
-    def arc_length(self) -> float:
-        """The total length of all pieces, islands included."""
-        return math.fsum(p.length for path in (self.pieces, *self.islands) for p in path)
-
-    @cached_property
-    def is_polygonal(self) -> bool:
-        """Whether every piece is a Segment."""
-        return all(isinstance(p, Segment) for path in (self.pieces, *self.islands) for p in path)
-
-    @cached_property
-    def _cell(self) -> HighestPoint | None:
-        return highest_point_of(self)
-
-    @cached_property
-    def closes(self) -> bool:
-        """Conditions B5, B5': no ray passes from cell to cell below the level of the wall's highest points.
-
-        It holds if there are no islands; it is not made use of where pieces would vanish by rounding in ``cell``.
-
-        Examples
-        --------
-        >>> Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).closes
-        True
-        """
-        return self._cell is not None
-
-    @cached_property
-    def cell(self) -> Wall:
-        """The same wall begun at one of its highest points and raised to y = 0; itself if it does not close.
-
-        Two pieces that are parts of one, which the given period cuts, are one piece here.
-
-        Examples
-        --------
-        >>> Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).cell.vertices.tolist()
-        [[0.0, 0.0], [0.5, -1.0], [1.0, 0.0]]
-        """
-        if self._cell is None or self._cell.pieces is self.pieces:
-            return self
-        wall = object.__new__(Wall)
-        wall._fill(self._cell.pieces, self.period, ())
-        return wall
-
-    @property
-    def origin(self) -> Point:
-        """Where the origin of ``cell`` lies in the coordinates of this wall.
-
-        Examples
-        --------
-        >>> Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).origin
-        (0.5, -0.2)
-        """
-        return (0.0, 0.0) if self._cell is None else self._cell.origin
-
-    @cached_property
     def is_mirror_symmetric(self) -> bool:
         """Whether the periodic wall has a mirror axis, to rounding; with islands only x = period/2 is tried."""
-        from ..cells.mirror_symmetry import has_mirror_axis
-
         return has_mirror_axis(self.cell)
-
-    @cached_property
-    def flat_top(self) -> float:
-        """The total length of the pieces that run rightward along the level of the highest points."""
-        cell = self.cell
-        return math.fsum(cell.pieces[i].length for i in flat_tops(cell.pieces, cell.vertices))
 
     @cached_property
     def scene(self) -> Scene:
         """The tables that the tracer reads, of the ``cell`` and in its coordinates, made on first use."""
-        from ..scene.scene import scene_of
-
         return scene_of(self.cell)
 
     def plan(self) -> TracePlan:
@@ -272,25 +173,7 @@ class Wall:
         >>> Wall.from_vertices([(0, 0), (0.5, 0), (0.5, -1), (1, -1), (1, 0)]).plan()  # doctest: +ELLIPSIS
         TracePlan(primitives=('lines',), hollows=1, pieces_traced=3, pieces_left_out=1, flat_share=0.5, ...)
         """
-        from ..scene.plan import plan_of
-
-        return plan_of(self)
-
-    @cached_property
-    def hollows(self) -> tuple[Hollow, ...]:
-        """The openings on the level of the highest points with the pieces of ``cell`` below each, from there on.
-
-        Left and right are in the coordinates of this wall, unfolded. Empty for a wall that does not close.
-
-        Examples
-        --------
-        >>> Wall.from_vertices([(0, -1), (0.5, 0), (1, -1)]).hollows
-        (Hollow(left=0.5, right=1.5, first=0, last=2),)
-        """
-        if self.cell is not self:
-            x = self.origin[0]
-            return tuple(replace(h, left=h.left + x, right=h.right + x) for h in self.cell.hollows)
-        return hollows_between(flat_tops(self.pieces, self.vertices), self.vertices) if self.closes else ()
+        return plan_of(self.cell, self.cell.scene, self.is_mirror_symmetric)
 
     def foreshorten(self, disk: Disk) -> Self:
         """Return the wall that the disk feels: y divided by ``disk.foreshortening``, same period.
@@ -308,21 +191,6 @@ class Wall:
         """Return the wall whose foreshortened wall this is: y multiplied by ``disk.foreshortening``."""
         return self._image(1.0, _checked(disk).foreshortening, self.period)
 
-    def scaled(self, factor: float) -> Self:
-        """Return the wall enlarged by ``factor`` > 0, its period included."""
-        c = positive_number("factor", factor)
-        return self._image(c, c, c * self.period)
-
-    def mirrored(self) -> Self:
-        """Return the mirror image of the cell in x = period/2."""
-        image = self._image(-1.0, 1.0, self.period)
-        paths = [
-            tuple(p.moved(self.period, 0.0).reversed() for p in reversed(path))
-            for path in (image.pieces, *image.islands)
-        ]
-        image._fill(paths[0], self.period, tuple(paths[1:]))
-        return image
-
     def outline(self, tolerance: float) -> Floats:
         """Return the path of one period as a polyline within ``tolerance``, shape (n, 2); islands left out."""
         chunks = [p.flattened(tolerance)[:-1] for p in self.pieces]
@@ -338,28 +206,50 @@ class Wall:
         InputError
             If the file cannot be written.
         """
-        from ..cells.toml import save_wall
-
         save_wall(self, path, overwrite=overwrite)
-
-    def __repr__(self) -> str:
-        names = [type(p).__name__.lower() for path in (self.pieces, *self.islands) for p in path]
-        counts = [f"{names.count(n)} {n}{'s' * (names.count(n) > 1)}" for n in dict.fromkeys(names)]
-        if self.islands:
-            counts.append(f"{len(self.islands)} island{'s' * (len(self.islands) > 1)}")
-        state = "closes" if self.closes else "open"
-        return f"Wall({', '.join(counts)}, period {self.period:g}, depth {self.depth:.6g}, {state})"
-
-    def __getstate__(self) -> dict[str, Any]:
-        # cached arrays stay behind: an unpickled array would be writable
-        return {"pieces": self.pieces, "period": self.period, "islands": self.islands}
-
-
-def _vertices(path: Sequence[Curve]) -> Floats:
-    return frozen([*(p.start for p in path), path[-1].end])
 
 
 def _checked(disk: Disk) -> Disk:
     if not isinstance(disk, Disk):
         raise InputError(f"disk: expected a Disk such as geo.Disk(mass=1.0, inertia=0.5), got {disk!r}")
     return disk
+
+
+def load_wall(path: str | PathLike[str]) -> Wall:
+    """Read a wall from a TOML file.
+
+    Parameters
+    ----------
+    path : path
+        A file that ``Wall.save`` wrote, or one written by hand: ``period``, then either ``vertices`` (a list of
+        points) or ``[[pieces]]`` tables of ``kind`` "segment" (``start``, ``end``), "arc" (``center``,
+        ``semi_axes``, ``angles`` and, where known exactly, ``start`` and ``end``) or "bezier" (``control_points``);
+        islands are ``[[islands]]`` tables with ``pieces``.
+
+    Returns
+    -------
+    Wall
+        Equal to the saved one, to the bit.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not TOML, or has a missing, unknown or unsuitable key.
+    WallError
+        If the wall breaks a condition.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "wall.toml"
+    ...     _ = file.write_text("period = 1.0\\nvertices = [[0, 0], [0.2, -0.4], [1, 0]]")
+    ...     load_wall(file) == Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
+    True
+    """
+    pieces, period, islands = read_wall(path)
+    try:
+        return Wall(pieces, period, islands)
+    except InputError as reason:
+        raise type(reason)(f"{Path(path)}: {reason}") from reason

@@ -6,60 +6,40 @@ import json
 import os
 import tempfile
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ...errors import FileExistsRefusal, InputError
-from ...estimates import Estimate
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.panels import Panels
 from ..bases.tensor import TensorBasis
-from .defects import SymmetryDefect
-from .matrix import KernelMatrix
 
 FORMAT, VERSION = "asperity kernel matrix", 1
-PLAIN_FIELDS = (
-    "symmetrised",
-    "samples",
-    "method",
-    "law",
-    "reversible",
-    "mirror_symmetric",
-    "frame",
-    "requested_tolerance",
-    "unresolved",
-    "norm_bound",
-)
+
+Record = dict[str, Any]
+Arrays = dict[str, np.ndarray[Any, Any]]
+T = TypeVar("T")
 
 
-def write_matrix(matrix: KernelMatrix, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Write a matrix to exactly ``path``; the file appears when it is complete.
+def write(path: str | Path, record: Record, arrays: Arrays, basis: Basis, *, overwrite: bool = False) -> Path:
+    """Write a record of plain values, named arrays and a basis to exactly ``path``; the file appears when complete.
 
     Raises
     ------
     FileExistsRefusal
         If the file exists and ``overwrite`` is not given.
     InputError
-        If the file cannot be written, the basis is of an unknown kind, or the metadata are not plain JSON values.
+        If the file cannot be written, the basis is of an unknown kind, or the record is not of plain JSON values.
     """
     target = Path(path)
     if target.exists() and not overwrite:
         raise FileExistsRefusal(f"{target} exists; pass overwrite=True to replace it")
-    arrays: dict[str, np.ndarray[Any, Any]] = {"symmetric": matrix.symmetric}
-    if matrix.counts is not None:
-        arrays["counts"] = matrix.counts
-    record: dict[str, Any] = {"format": FORMAT, "version": VERSION}
-    record |= {name: getattr(matrix, name) for name in PLAIN_FIELDS}
-    error, defect = matrix.error, matrix.raw_defect
-    record["error"] = [error.value, error.error, error.kind, error.method]
-    record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
-    record["metadata"] = dict(matrix.metadata)
-    record["basis"] = _described(matrix.basis, arrays, "basis")
-    record["replicates"] = [_stored(part, arrays, f"replicate{k}") for k, part in enumerate(matrix.replicates)]
+    record = {"format": FORMAT, "version": VERSION, **record, "basis": _described(basis, arrays, "basis")}
     try:
         arrays["record"] = np.array(json.dumps(record))
     except TypeError as reason:
@@ -71,19 +51,13 @@ def write_matrix(matrix: KernelMatrix, path: str | Path, *, overwrite: bool = Fa
     return target
 
 
-def load_matrix(path: str | Path) -> KernelMatrix:
-    """Read a matrix that `KernelMatrix.save` wrote: every field, to the last bit.
+def read(path: str | Path, restored: Callable[[Record, Arrays, Basis], T]) -> T:
+    """What ``restored`` makes of the record, the arrays and the basis in a file that `write` wrote.
 
     Raises
     ------
     InputError
         If there is no such file, or it is not such a file.
-
-    Examples
-    --------
-    >>> load_matrix("no/such/file.npz")
-    Traceback (most recent call last):
-    asperity.errors.InputError: cannot read no/such/file.npz: No such file or directory
     """
     source = Path(path)
     try:
@@ -97,7 +71,7 @@ def load_matrix(path: str | Path) -> KernelMatrix:
             raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
         if record["version"] != VERSION:
             raise InputError(f"{source} has version {record['version']}, this asperity reads version {VERSION}")
-        return _restored(record, arrays)
+        return restored(record, arrays, _basis_from(record["basis"], arrays))
     except InputError:
         raise
     except FileNotFoundError as reason:
@@ -108,21 +82,7 @@ def load_matrix(path: str | Path) -> KernelMatrix:
         ) from reason
 
 
-def _restored(record: dict[str, Any], arrays: dict[str, np.ndarray[Any, Any]]) -> KernelMatrix:
-    defect = record["raw_defect"]
-    return KernelMatrix(
-        arrays["symmetric"],
-        _basis_from(record["basis"], arrays),
-        Estimate(*record["error"]),
-        counts=arrays.get("counts"),
-        replicates=tuple(_loaded(kind, arrays, f"replicate{k}") for k, kind in enumerate(record["replicates"])),
-        raw_defect=None if defect is None else SymmetryDefect(*defect),
-        metadata=record["metadata"],
-        **{name: record[name] for name in PLAIN_FIELDS},
-    )
-
-
-def _described(basis: Basis, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> dict[str, Any]:
+def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
     if isinstance(basis, TensorBasis):
         factors = [_described(factor, arrays, f"{name}.{k}") for k, factor in enumerate(basis.factors)]
         return {"kind": "TensorBasis", "factors": factors}
@@ -137,7 +97,7 @@ def _described(basis: Basis, arrays: dict[str, np.ndarray[Any, Any]], name: str)
     raise InputError(f"basis: expected Bins, Legendre, Panels or a TensorBasis of these, got {basis!r}")
 
 
-def _basis_from(described: dict[str, Any], arrays: dict[str, np.ndarray[Any, Any]]) -> Basis:
+def _basis_from(described: dict[str, Any], arrays: Arrays) -> Basis:
     kind = described["kind"]
     if kind == "TensorBasis":
         return TensorBasis(tuple(_basis_from(factor, arrays) for factor in described["factors"]))
@@ -151,7 +111,8 @@ def _basis_from(described: dict[str, Any], arrays: dict[str, np.ndarray[Any, Any
     return equal if np.array_equal(equal.edges, edges) else Bins(edges, described["weight"])
 
 
-def _stored(part: Any, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> str:
+def store_array(part: Any, arrays: Arrays, name: str) -> str:
+    """Put a dense or sparse array among named arrays; returns its kind."""
     if isinstance(part, np.ndarray):
         arrays[name] = part
         return "dense"
@@ -160,7 +121,8 @@ def _stored(part: Any, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> st
     return "sparse"
 
 
-def _loaded(kind: str, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> Any:
+def load_array(kind: str, arrays: Arrays, name: str) -> Any:
+    """The array of a kind that `store_array` put there."""
     if kind == "dense":
         return arrays[name]
     from scipy.sparse import csr_array
@@ -169,7 +131,7 @@ def _loaded(kind: str, arrays: dict[str, np.ndarray[Any, Any]], name: str) -> An
     return csr_array(parts, shape=tuple(arrays[f"{name}.shape"]))
 
 
-def _write_whole(target: Path, arrays: dict[str, np.ndarray[Any, Any]]) -> None:
+def _write_whole(target: Path, arrays: Arrays) -> None:
     """Write beside the target and rename, so that a crash leaves no half of a file."""
     handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
     try:

@@ -19,9 +19,21 @@ from ...checks import Floats, finite_array, finite_number, frozen, whole_number
 from ...errors import InputError
 from ...estimates import ErrorKind, Estimate
 from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..bases.tensor import TensorBasis
+from . import archive
+from .archive import Arrays, Record, load_array, store_array
 from .defects import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry
+from .plot import draw_kernel
+
+# Cells a side when a kernel in polynomials is drawn.
+GRID = 240
+# What a file holds as it is.
+PLAIN_FIELDS = (
+    "symmetrised", "samples", "method", "law", "reversible", "mirror_symmetric", "frame", "requested_tolerance",
+    "unresolved", "norm_bound",
+)  # fmt: skip
 
 
 def check_same_basis(first: KernelMatrix, second: KernelMatrix) -> None:
@@ -389,15 +401,33 @@ class KernelMatrix:
     # ---- files and pictures ----------------------------------------------------------------------------------
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``."""
-        from .archive import write_matrix
-
-        return write_matrix(self, path, overwrite=overwrite)
+        arrays: Arrays = {"symmetric": self.symmetric}
+        if self.counts is not None:
+            arrays["counts"] = self.counts
+        record = {name: getattr(self, name) for name in PLAIN_FIELDS}  # names of fields of this class, in one list
+        error, defect = self.error, self.raw_defect
+        record["error"] = [error.value, error.error, error.kind, error.method]
+        record["raw_defect"] = None if defect is None else [float(defect), defect.norm, defect.z_score]
+        record["metadata"] = dict(self.metadata)
+        record["replicates"] = [store_array(part, arrays, f"replicate{k}") for k, part in enumerate(self.replicates)]
+        return archive.write(path, record, arrays, self.basis, overwrite=overwrite)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the density with respect to the invariant measure; returns the axes."""
-        from .plot import draw_matrix
+        return draw_kernel(*self._density(), self.frame, ax)
 
-        return draw_matrix(self, ax)
+    def _density(self) -> tuple[Floats, Floats]:
+        """Edges of cells, and the density with respect to the invariant measure on pairs of them."""
+        basis = self.basis
+        try:
+            edges = basis.edges
+        except InputError as reason:
+            raise InputError(f"plot: expected a kernel of one angle, got one in {basis!r}") from reason
+        if isinstance(basis, Bins):
+            return edges, self.array / basis.weights
+        edges = np.linspace(0.0, np.pi, GRID + 1)
+        values = basis.evaluate(0.5 * (edges[1:] + edges[:-1]))
+        return edges, values @ self.symmetric @ values.T
 
     def __repr__(self) -> str:
         error = f"error {float(self.error):.2g} ({self.error.kind})"
@@ -418,3 +448,34 @@ class KernelMatrix:
         if values.ndim == 0 or values.shape[axis] != self.size:
             raise InputError(f"{name}: expected {self.size} entries for {self.basis!r}, got shape {values.shape}")
         return values
+
+
+def load_matrix(path: str | Path) -> KernelMatrix:
+    """Read a matrix that `KernelMatrix.save` wrote: every field, to the last bit.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is not such a file.
+
+    Examples
+    --------
+    >>> load_matrix("no/such/file.npz")
+    Traceback (most recent call last):
+    asperity.errors.InputError: cannot read no/such/file.npz: No such file or directory
+    """
+    return archive.read(path, _restored)
+
+
+def _restored(record: Record, arrays: Arrays, basis: Basis) -> KernelMatrix:
+    defect = record["raw_defect"]
+    return KernelMatrix(
+        arrays["symmetric"],
+        basis,
+        Estimate(*record["error"]),
+        counts=arrays.get("counts"),
+        replicates=tuple(load_array(kind, arrays, f"replicate{k}") for k, kind in enumerate(record["replicates"])),
+        raw_defect=None if defect is None else SymmetryDefect(*defect),
+        metadata=record["metadata"],
+        **{name: record[name] for name in PLAIN_FIELDS},
+    )

@@ -14,7 +14,7 @@ from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.mirror import reflection_matrix
 from ..laws.law import Law
-from ..walls.wall_law import LOST_TOLERANCE
+from ..walls.traced_map import LOST_TOLERANCE
 from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
 
 # Rays at a time; more where adding up the matrices of counts would take longer than the rays.

@@ -15,6 +15,7 @@ from ...errors import InputError
 from ...estimates import Estimate
 from ..laws.law import BranchLaw
 from .isometry_table import IsometryTable
+from .traced_map import traced_angles
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
@@ -148,9 +149,7 @@ class PolygonLaw(BranchLaw):
 
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
-        from .wall_law import WallLaw
-
-        return WallLaw(self.wall).respond(x, theta)
+        return traced_angles(self.wall, x, theta)
 
 
 def table_of_beams(beams: Beams) -> IsometryTable:

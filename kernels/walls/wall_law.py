@@ -14,13 +14,14 @@ from ...checks import Floats, angles
 from ...errors import AccuracyError, InputError
 from ...rounding import EPS
 from ..bases.basis import AngleFunction
-from ..laws.law import Combination, DrivenLaw, Law, entry_points, specular
+from ..laws.law import Combination, DrivenLaw, Law, specular
 from .circular_arc import CircularArcLaw
 from .conditionals import AdaptiveRows, adaptive_rows, is_few
 from .isometry_branches import table_of
 from .isometry_table import IsometryTable
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
+from .traced_map import LOST_TOLERANCE, traced_angles, traced_outcomes
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
@@ -32,9 +33,6 @@ if TYPE_CHECKING:
 ROUNDED = 64.0 * EPS
 # The hollows with closed forms have at most this many pieces.
 MOST_PIECES_KNOWN = 3
-# Rays that end in a corner, at a tangency or at the bounce limit are sent back (see WallLaw). Their share bounds the
-# error in total variation; above this it would show in a kernel estimated from a million rays.
-LOST_TOLERANCE = 1e-4
 # Polygonal walls are resolved into beams where that takes about a second (a few microseconds a beam, the table and the
 # triangles included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
 MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
@@ -136,24 +134,11 @@ class WallLaw(DrivenLaw):
 
         ``x`` in (0, 1) is the entry point as a share of the period. Never raises an AccuracyError.
         """
-        from ...geometry.tracing.tracing import trace
-
-        x, theta = np.broadcast_arrays(entry_points(x), angles("theta", theta))
-        traced = trace(self.wall, x * self.wall.period, theta)
-        escaped = np.asarray(traced.escaped)
-        return np.where(escaped, traced.theta, theta), escaped
+        return traced_outcomes(self.wall, x, theta)
 
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
-        outgoing, escaped = self.outcomes(x, theta)
-        lost = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
-        if lost > LOST_TOLERANCE:
-            raise AccuracyError(
-                f"{self!r}: {lost:.2g} of {escaped.size} rays did not escape, more than {LOST_TOLERANCE:g}; "
-                "geometry.trace(wall, x, theta).counts() says how they ended, outcomes() which they were",
-                lost,
-            )
-        return outgoing
+        return traced_angles(self.wall, x, theta)
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         return super().branches(theta) if self.exact_law is None else self.exact_law.branches(theta)

@@ -13,6 +13,7 @@ from ...errors import AccuracyError
 from ...estimates import NORMAL_95, Estimate
 from ...kernels import Basis, KernelMatrix
 from ...rounding import EPS
+from ..plotting import draw_eigenfunctions, draw_eigenvalues
 from .dense import Extremes, compressed, end_values
 from .parity import Parity, halves, outermost_by_parity
 from .standard_errors import sampling_errors, sampling_quantile
@@ -29,6 +30,10 @@ REVERSIBLE_Z = 5.0
 # An unsampled matrix is called reversible below this relative antisymmetry, a thousand times the rounding errors of
 # its entries; otherwise its own reported error decides.
 REVERSIBLE_ROUNDING = 1e-12
+# Angles of a curve, and curves that can be told apart.
+ANGLES, SHOWN_FUNCTIONS = 400, 5
+# The label of eigenvalues in pictures.
+EIGENVALUE = "eigenvalue with its total error"
 
 
 def two_grid_changes(matrix: KernelMatrix, found: Extremes) -> Floats:
@@ -190,15 +195,18 @@ class Spectrum:
 
     def plot_eigenfunctions(self, ax: Axes | None = None) -> Axes:
         """Draw the eigenfunctions off the constants against the incoming angle."""
-        from ..plotting import draw_eigenfunctions
-
-        return draw_eigenfunctions(self, ax)
+        theta = np.linspace(0.0, np.pi, ANGLES + 2)[1:-1]
+        labels, functions = [], []
+        for index in range(1, min(len(self.values), 1 + SHOWN_FUNCTIONS)):
+            parity = self.parity[index] if self.parity else "none"
+            labels.append(f"{self.values[index]:.6g}" + (f" ({parity})" if parity != "none" else ""))
+            functions.append(self.eigenfunction(index, theta))
+        return draw_eigenfunctions(theta, np.array(functions), labels, self.convention, ax)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the eigenvalues with their intervals."""
-        from ..plotting import draw_spectrum
-
-        return draw_spectrum(self, ax)
+        gap = self.gap, f"1 - second eigenvalue of this matrix: {self.gap:.4g}"
+        return draw_eigenvalues(self.values, self.errors.total(), self.convention, EIGENVALUE, gap, ax)
 
     def __repr__(self) -> str:
         numbers = f"k={len(self.values)}, gap={self.gap:.10g}, slem={self.slem:.10g}"

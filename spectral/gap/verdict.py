@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...estimates import Estimate
-from ..eigenvalues.spectra import Spectrum, Verdict
+from ...estimates import Estimate, rounded
+from ..eigenvalues.spectra import EIGENVALUE, Spectrum, Verdict
 from ..essential.edge import EssentialEdge
+from ..plotting import draw_eigenvalues
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -65,3 +70,14 @@ def isolated(
     outside = f"largest eigenvalue {top:.10g} beyond the essential spectrum, which reaches {edge.high:.6g}"
     reasons = (*edge.reasons, *evidence, outside)
     return SpectralGap(found.gap, error, "estimate", made_from(found, how), "isolated", reasons, convention, found)
+
+
+def draw_spectrum(found: Spectrum, gap: SpectralGap, ax: Axes | None = None) -> Axes:
+    """Draw eigenvalues of a matrix with what is known of the gap of the law behind it.
+
+    The gap is shaded and named with its verdict; where the law has no gap nothing is shaded.
+    """
+    gapless = gap.verdict == "no gap"
+    label = f"eigenvalue of the matrix in {found.basis!r}" if gapless else EIGENVALUE
+    shaded = None if gapless else (gap.value, f"gap {rounded(gap).replace('+-', '±')} ({gap.verdict})")
+    return draw_eigenvalues(found.values, found.errors.total(), found.convention, label, shaded, ax)

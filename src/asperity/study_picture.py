@@ -83,14 +83,17 @@ def _draw_kernel(study: Study, ax: Axes) -> None:
 
 
 def _draw_spectrum(study: Study, ax: Axes) -> None:
-    from .spectral.plotting import draw_spectrum
+    from .spectral.gap.verdict import draw_spectrum
 
     if study.spectrum is None:
         ax.set_axis_off()
         reason = textwrap.fill(study.refusals["spectrum"], TITLE_WIDTH)
         ax.text(0.5, 0.5, f"No spectrum:\n{reason}", ha="center", va="center", transform=ax.transAxes)
         return
-    draw_spectrum(study.spectrum, ax, study.gap)
+    if study.gap is None:
+        study.spectrum.plot(ax)
+    else:
+        draw_spectrum(study.spectrum, study.gap, ax)
 
 
 def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:

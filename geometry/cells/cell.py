@@ -1,0 +1,173 @@
+"""What a wall is: its pieces over one period, its islands, and what follows from them without tracing a ray."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+from ...checks import Floats, frozen, positive_number
+from ..curves.curve import Curve, Point
+from ..curves.segment import Segment
+from .hollow import Hollow, flat_tops, hollows_between
+from .origin import HighestPoint, highest_point_of
+
+
+@dataclass(frozen=True, repr=False)
+class Cell:
+    """The pieces of a wall over one period, its islands, and its cell; `Wall` adds validation, files and rays.
+
+    Attributes
+    ----------
+    pieces : tuple of Curve
+        With exact joints: each piece starts to the bit where the one before ends.
+    period : float
+    islands : tuple of tuples of Curve
+    """
+
+    pieces: tuple[Curve, ...]
+    period: float = 1.0
+    islands: tuple[tuple[Curve, ...], ...] = ()
+
+    def _fill(self, pieces: tuple[Curve, ...], period: float, islands: tuple[tuple[Curve, ...], ...]) -> None:
+        object.__setattr__(self, "pieces", pieces)
+        object.__setattr__(self, "period", period)
+        object.__setattr__(self, "islands", islands)
+
+    def _image(self, x_factor: float, y_factor: float, period: float) -> Self:
+        """Return an upright affine image: it needs no new validation."""
+        image = object.__new__(type(self))
+        paths = [tuple(p.stretched(x_factor, y_factor) for p in path) for path in (self.pieces, *self.islands)]
+        image._fill(paths[0], period, tuple(paths[1:]))
+        return image
+
+    @cached_property
+    def vertices(self) -> Floats:
+        """The joints, shape (n + 1, 2), read-only: piece i goes from ``vertices[i]`` to ``vertices[i + 1]``."""
+        return _vertices(self.pieces)
+
+    @cached_property
+    def island_vertices(self) -> tuple[Floats, ...]:
+        """The joints of every island, each (n + 1, 2) and read-only; the last equals the first."""
+        return tuple(_vertices(loop) for loop in self.islands)
+
+    @cached_property
+    def depth(self) -> float:
+        """How far the wall reaches below y = 0."""
+        lowest = [float(self.vertices[:, 1].min())]
+        lowest += [p.box[1] for path in (self.pieces, *self.islands) for p in path if not isinstance(p, Segment)]
+        return max(0.0, -min(lowest + [float(v[:, 1].min()) for v in self.island_vertices]))
+
+    @cached_property
+    def arc_length(self) -> float:
+        """The total length of all pieces, islands included."""
+        return math.fsum(p.length for path in (self.pieces, *self.islands) for p in path)
+
+    @cached_property
+    def is_polygonal(self) -> bool:
+        """Whether every piece is a Segment."""
+        return all(isinstance(p, Segment) for path in (self.pieces, *self.islands) for p in path)
+
+    @cached_property
+    def _highest(self) -> HighestPoint | None:
+        return None if self.islands else highest_point_of(self.pieces, self.vertices, self.period)
+
+    @cached_property
+    def closes(self) -> bool:
+        """Conditions B5, B5': no ray passes from cell to cell below the level of the wall's highest points.
+
+        It holds if there are no islands; it is not made use of where pieces would vanish by rounding in ``cell``.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).closes
+        True
+        """
+        return self._highest is not None
+
+    @cached_property
+    def cell(self) -> Self:
+        """The same wall begun at one of its highest points and raised to y = 0; itself if it does not close.
+
+        Two pieces that are parts of one, which the given period cuts, are one piece here.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).cell.vertices.tolist()
+        [[0.0, 0.0], [0.5, -1.0], [1.0, 0.0]]
+        """
+        if self._highest is None or self._highest.pieces is self.pieces:
+            return self
+        cell = object.__new__(type(self))
+        cell._fill(self._highest.pieces, self.period, ())
+        return cell
+
+    @property
+    def origin(self) -> Point:
+        """Where the origin of ``cell`` lies in the coordinates of this wall.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.Wall.from_vertices([(0, -1.2), (0.5, -0.2), (1, -1.2)]).origin
+        (0.5, -0.2)
+        """
+        return (0.0, 0.0) if self._highest is None else self._highest.origin
+
+    @cached_property
+    def flat_top(self) -> float:
+        """The total length of the pieces that run rightward along the level of the highest points."""
+        cell = self.cell
+        return math.fsum(cell.pieces[i].length for i in flat_tops(cell.pieces, cell.vertices))
+
+    @cached_property
+    def hollows(self) -> tuple[Hollow, ...]:
+        """The openings on the level of the highest points with the pieces of ``cell`` below each, from there on.
+
+        Left and right are in the coordinates of this wall, unfolded. Empty for a wall that does not close.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.Wall.from_vertices([(0, -1), (0.5, 0), (1, -1)]).hollows
+        (Hollow(left=0.5, right=1.5, first=0, last=2),)
+        """
+        if self.cell is not self:
+            x = self.origin[0]
+            return tuple(replace(h, left=h.left + x, right=h.right + x) for h in self.cell.hollows)
+        return hollows_between(flat_tops(self.pieces, self.vertices), self.vertices) if self.closes else ()
+
+    def scaled(self, factor: float) -> Self:
+        """Return the wall enlarged by ``factor`` > 0, its period included."""
+        c = positive_number("factor", factor)
+        return self._image(c, c, c * self.period)
+
+    def mirrored(self) -> Self:
+        """Return the mirror image of the cell in x = period/2."""
+        image = self._image(-1.0, 1.0, self.period)
+        paths = [
+            tuple(p.moved(self.period, 0.0).reversed() for p in reversed(path))
+            for path in (image.pieces, *image.islands)
+        ]
+        image._fill(paths[0], self.period, tuple(paths[1:]))
+        return image
+
+    def __repr__(self) -> str:
+        names = [type(p).__name__.lower() for path in (self.pieces, *self.islands) for p in path]
+        counts = [f"{names.count(n)} {n}{'s' * (names.count(n) > 1)}" for n in dict.fromkeys(names)]
+        if self.islands:
+            counts.append(f"{len(self.islands)} island{'s' * (len(self.islands) > 1)}")
+        state = "closes" if self.closes else "open"
+        return f"{type(self).__name__}({', '.join(counts)}, period {self.period:g}, depth {self.depth:.6g}, {state})"
+
+    def __getstate__(self) -> dict[str, Any]:
+        # cached arrays stay behind: an unpickled array would be writable
+        return {"pieces": self.pieces, "period": self.period, "islands": self.islands}
+
+
+def _vertices(path: Sequence[Curve]) -> Floats:
+    return frozen([*(p.start for p in path), path[-1].end])
