@@ -12,7 +12,7 @@ import json
 from pathlib import Path
 
 from asperity import __version__
-from asperity.bench.bench_run import DATA, BenchRun
+from asperity.bench.run import DATA, BenchRun
 
 from .pages import BENCHMARKS, STABILITY, pictures, write_between_marks
 from .sections import SECTIONS, section_text, write_section

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.checks import Floats
+from asperity.core.checks import Floats
 
 # Runs along an arc of more hits than this carry less than 1e-11 of the flux; theirs are counted with the last ones.
 MOST_HITS = 20_000

@@ -12,7 +12,7 @@ from scipy.linalg import eigvalsh
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.timing import least_time
+from asperity.bench.running.timing import least_time
 
 from .laws import LawTime
 from .memory import MemoryUse
@@ -145,7 +145,7 @@ def _large_matrix(name: str, matrix: ker.KernelMatrix) -> Goal:
 
 
 def _true_disk() -> Goal:
-    from asperity.bench.uniform_disk import DISK, sampled_velocities
+    from asperity.bench.quantities.collision import DISK, sampled_velocities
 
     rng = np.random.default_rng(0)
     wall, scale = geo.triangular_teeth(0.7), 1e-3

@@ -10,7 +10,7 @@ from tests import precise_triangular
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.bench.timing import least_time
+from asperity.bench.running.timing import least_time
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometry_tables import table_matrix
 from asperity.kernels.discretisation.traced import row_matrix

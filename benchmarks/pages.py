@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from asperity.bench.bench_run import BenchRun
+from asperity.bench.run import BenchRun
 
 DOCS = Path(__file__).parents[1] / "docs"
 BENCHMARKS, STABILITY, PICTURES = DOCS / "benchmarks.md", DOCS / "stability.md", DOCS / "benchmark-pictures"

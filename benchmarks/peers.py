@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.timing import least_time
+from asperity.bench.running.timing import least_time
 
 from .metastable import WELLS, Solution, metastable_table
 

@@ -23,8 +23,8 @@ import asperity
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench.timing import least_time
-from asperity.checks import angles, finite_array
+from asperity.bench.running.timing import least_time
+from asperity.core.checks import angles, finite_array
 from asperity.geometry.tracing.compiled.trigonometry import direction_angle, sine_cosine
 
 from .rigid import DISK, random_states

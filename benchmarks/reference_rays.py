@@ -10,7 +10,7 @@ from scipy.stats.qmc import Sobol
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.checks import Floats
+from asperity.core.checks import Floats
 from asperity.kernels.sampling.counts import count_pairs, sum_products
 
 NETS, CHUNK, SEED = 16, 2**18, 20261121

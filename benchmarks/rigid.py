@@ -9,7 +9,7 @@ import numpy as np
 from tests.plain_collision import collide_plainly
 
 from asperity import geometry as geo
-from asperity.bench.timing import least_time
+from asperity.bench.running.timing import least_time
 from asperity.geometry.disk.satellites import Satellites
 
 COLLISIONS, REPEATS = 2**18, 5

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity import geometry as geo
-from asperity.bench.timing import least_time
+from asperity.bench.running.timing import least_time
 
 RAYS, REPEATS = 2**14, 5
 LIMIT = 2**62

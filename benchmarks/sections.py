@@ -10,10 +10,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from asperity.bench.bench_run import BenchRun
-from asperity.bench.extreme_report import run_extremes
-from asperity.bench.scene_savings import savings_table
-from asperity.bench.scenes import RANDOM_WALLS
+from asperity.bench.extremes.report import run_extremes
+from asperity.bench.quantities.walls import RANDOM_WALLS
+from asperity.bench.run import BenchRun
+from asperity.bench.savings import savings_table
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
 from asperity.spectral import Machine
 

@@ -29,7 +29,7 @@ from tests.textbook_tracer import compiled, follow, table_of
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.checks import Floats
+from asperity.core.checks import Floats
 from asperity.spectral.essential.edge import essential_edge
 
 DIGITS = 50

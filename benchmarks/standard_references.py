@@ -1,4 +1,4 @@
-"""Make src/asperity/bench/standard_references.json: ``python -m benchmarks.standard_references [PROBLEM...]``.
+"""Make src/asperity/bench/running/standard_references.json: ``python -m benchmarks.standard_references [PROBLEM...]``.
 
 The benchmark's references come from here and not from its own runs. Polygons that resolve into beams are exact, and
 confirmed by a second way; the arcs' numbers come from `exact_rows`; grazing limits are in closed form; all other walls
@@ -20,12 +20,12 @@ import numpy as np
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.bench.known_references import FILE
-from asperity.bench.matrix_quantities import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
-from asperity.bench.scenes import RANDOM_WALLS, wall_of
+from asperity.bench.quantities.collision import DISK, correlation_of
+from asperity.bench.quantities.matrix import LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS, resistance_of
+from asperity.bench.quantities.walls import RANDOM_WALLS, wall_of
+from asperity.bench.running.references import FILE
 from asperity.bench.standard_set import problem_names
-from asperity.bench.uniform_disk import DISK, correlation_of
-from asperity.checks import Floats
+from asperity.core.checks import Floats
 from asperity.kernels.discretisation.traced import row_matrix
 
 from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row

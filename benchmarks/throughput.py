@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from asperity import geometry as geo
-from asperity.bench.timing import least_time
+from asperity.bench.running.timing import least_time
 
 RAYS = 2**20
 REPEATS = 5

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity import kernels as ker
-from asperity.bench.timing import least_time
+from asperity.bench.running.timing import least_time
 from asperity.kernels.distances.transport import grid_wasserstein
 
 REPEATS = 5

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import asperity
 from asperity.ledger import entries
-from asperity.ledger_text import page_of
+from asperity.ledger.text import page_of
 
 # docs/ledger.md includes the rows
 generated = Path(__file__).parent / "generated"

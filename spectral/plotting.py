@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..checks import Floats
+from ..core.checks import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -56,6 +56,6 @@ EQUIVALENT_IN_THE_LIBRARY = {
     "triangular.TriangularTeethLaw._most_hits: return np.maximum(np.ceil(2.0 * theta / self.angle), -1.0)": _GUARD,
     "triangular.TriangularTeethLaw._turned: return np.where(np.mod(count, -2.0) == 0.0, np.pi + theta - turn, "
     "turn - theta)": _EVEN_MODULUS,
-    "circular.CircularArcLaw._rotation: return (right, base, chord, np.maximum(np.ceil((self.half_angle + base "
+    "circular_arc.CircularArcLaw._rotation: return (right, base, chord, np.maximum(np.ceil((self.half_angle + base "
     "- chord) / (2.0 * chord)), -1.0))": _GUARD,
 }

@@ -1,8 +1,9 @@
 """The collision of the disk with satellites in 50 digits, one disk at a time: python tests/precise_collision.py
 
-Writes ``src/asperity/bench/extreme_disks.json``, which the stability report reads. As in `plain_collision`, nothing is
-known of a flight but that no satellite moves faster than some speed: it advances by the least time in which one could
-reach the wall, until one is near; then a secant finds the contact. The wall is polygonal, its corners are doubles.
+Writes ``src/asperity/bench/running/extreme_disks.json``, which the stability report reads. As in `plain_collision`,
+nothing is known of a flight but that no satellite moves faster than some speed: it advances by the least time in which
+one could reach the wall, until one is near; then a secant finds the contact. The wall is polygonal, its corners are
+doubles.
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 
-from asperity.bench.extreme_disks import DATA, DISK, SCALES, WALL
+from asperity.bench.extremes.disks import DATA, DISK, SCALES, WALL
 from asperity.geometry.disk.satellites import Satellites
 
-FILE = Path(__file__).parents[1] / "src/asperity/bench" / DATA
+FILE = Path(__file__).parents[1] / "src/asperity/bench/running" / DATA
 DIGITS, GUARD = 50, 15
 DISKS = 12
 # A satellite so near the wall, in units of the wall, is brought to it by secants; it is there at the second distance.

@@ -1,6 +1,6 @@
 """Rays on the extreme walls, and where they go in 50 digits: python tests/precise_extremes.py [CASE] writes the data.
 
-The stability report reads ``src/asperity/bench/extreme_rays.json``. Walls with a closed form are judged by it
+The stability report reads ``src/asperity/bench/running/extreme_rays.json``. Walls with a closed form are judged by it
 (`precise_rays`), the others by the tracer in 50 digits (`precise_tracer`); neither shares code with the library.
 
 Of each ray the file has the place, the angle, the outgoing angle rounded once, the number of hits, the condition (1 +
@@ -18,12 +18,12 @@ from pathlib import Path
 import mpmath as mp
 import numpy as np
 
-from asperity.bench import extreme_walls as walls
-from asperity.bench.extreme_rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
+from asperity.bench.extremes import walls as walls
+from asperity.bench.extremes.rays import CLEAR, DATA, IN_ANGLE, IN_WALL, TOO_FAR
 from precise_rays import arc, cap, cap_clearance, crevice, tooth
 from precise_tracer import DIGITS, trace_precisely
 
-FILE = Path(__file__).parents[1] / "src/asperity/bench" / DATA
+FILE = Path(__file__).parents[1] / "src/asperity/bench/running" / DATA
 RAYS, FEW, FEWEST = 64, 24, 4
 # Stems so narrow that none of the rays misses them after its first hit, the one that the closed form is about.
 SMALL_STEMS = walls.STEMS[:2]

@@ -18,19 +18,22 @@ from scipy.stats import norm, t
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.bench import collision_quantities, quantities, routes, scene_savings, uniform_disk
-from asperity.bench.bench_run import BenchRun
-from asperity.bench.child_process import ChildCrashed, ChildProcess, OutOfTime
+from asperity.bench import savings as scene_savings
 from asperity.bench.comparison import compare_runs
-from asperity.bench.extreme_report import run_extremes
-from asperity.bench.extreme_row import ExtremeRow
-from asperity.bench.known_references import known_reference
-from asperity.bench.matrix_quantities import LAW_BASIS, resistance_of
-from asperity.bench.scenes import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
-from asperity.bench.spectral_quantities import eta_at
+from asperity.bench.extremes.report import run_extremes
+from asperity.bench.extremes.row import ExtremeRow
+from asperity.bench.quantities import collision as collision_quantities
+from asperity.bench.quantities import collision as uniform_disk
+from asperity.bench.quantities import methods as routes
+from asperity.bench.quantities import standard as quantities
+from asperity.bench.quantities.matrix import LAW_BASIS, resistance_of
+from asperity.bench.quantities.spectral import eta_at
+from asperity.bench.quantities.walls import RANDOM_WALLS, random_wall, scenes, standard_names, wall_of
+from asperity.bench.run import BenchRun
+from asperity.bench.running.processes import ChildCrashed, ChildProcess, OutOfTime, TimePlan
+from asperity.bench.running.references import known_reference
+from asperity.bench.running.timing import side_by_side
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
-from asperity.bench.time_plan import TimePlan
-from asperity.bench.timing import side_by_side
 from asperity.cli import main
 from asperity.errors import InputError
 from asperity.estimates import student_95
@@ -211,7 +214,7 @@ def test_what_has_no_independent_reference_says_so(monkeypatch):
 
 def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr("asperity.bench.time_plan.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("asperity.bench.running.processes.time.monotonic", lambda: now[0])
     for greedy in (lambda number: True, lambda number: number % 2, lambda number: number > 6):
         start, plan = now[0], TimePlan(100.0, 10)
         for number in range(10):

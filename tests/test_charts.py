@@ -6,10 +6,10 @@ import pytest
 import sympy
 
 from asperity import geometry as geo
-from asperity import ledger
 from asperity.errors import InputError
 from asperity.geometry.disk import rolling
 from asperity.geometry.disk.rolling import SERIES_ANGLE
+from asperity.ledger import index as ledger
 from differentiation import complex_steps
 
 CHARTS = [geo.RollingCharts(2 * np.pi / 40), geo.RollingCharts(2 * np.pi / 9000, scale=1e-8)]

@@ -12,7 +12,7 @@ from asperity import spectral as spec
 from asperity.geometry.plotting.walls import vertical_stretch
 from asperity.spectral.gap.verdict import draw_spectrum
 from asperity.study import study_wall
-from asperity.study_picture import MOST_BOUNCES, chosen_rays, draw_outgoing_velocities, draw_study_wall, gallery
+from asperity.study.pictures import MOST_BOUNCES, chosen_rays, draw_outgoing_velocities, draw_study_wall, gallery
 
 
 def new_axes():

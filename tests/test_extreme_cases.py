@@ -8,9 +8,10 @@ import pytest
 
 import precise_collision
 from asperity import geometry as geo
-from asperity.bench import extreme_disks, extreme_rays
-from asperity.bench.extreme_report import case_names, run_case
-from asperity.bench.extreme_walls import extreme_walls
+from asperity.bench.extremes import disks as extreme_disks
+from asperity.bench.extremes import rays as extreme_rays
+from asperity.bench.extremes.report import case_names, run_case
+from asperity.bench.extremes.walls import extreme_walls
 from precise_extremes import FILE, judge_of, judged
 
 SLOW_CASES = ("Koch 8", "matrix of")

@@ -10,9 +10,10 @@ from dataclasses import replace
 import pytest
 from click.testing import CliRunner
 
-from asperity import InputError, ledger
+from asperity import InputError
 from asperity.cli import main
-from asperity.ledger_text import latex_of, page_of, table_of
+from asperity.ledger import index as ledger
+from asperity.ledger.text import latex_of, page_of, table_of
 from asperity.verification import Formula, Verdict, agreement, by_reading, erratum, verified
 
 ROWS = ledger.entries()
@@ -127,7 +128,7 @@ def double(printed, corrected):
 )
 def test_a_row_is_as_stated_only_if_both_verdicts_are(entry, as_stated, monkeypatch):
     assert entry.run().as_stated is as_stated
-    monkeypatch.setattr("asperity.ledger.entries", lambda: (entry,))
+    monkeypatch.setattr("asperity.ledger.index.entries", lambda: (entry,))
     result = CliRunner().invoke(main, ["verify"])
     assert result.exit_code == (0 if as_stated else 1)
     assert ("NOT AS STATED" in result.stdout) is not as_stated

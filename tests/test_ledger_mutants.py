@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from benchmarks.ledger_mutants import Mutant, changes, judged, library, mutants_of, noticed
 
-from asperity import ledger
-from asperity.geometry.disk import disk as kinetics
-from asperity.geometry.disk import rolling
+from asperity.geometry.disk import disk, rolling
+from asperity.ledger import index as ledger
 from asperity.verification import Formula, agreement, verified
 from equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
@@ -66,23 +65,23 @@ def test_what_is_listed_as_equivalent_is_accepted(row):
 
 
 def test_a_function_is_changed_in_one_place_at_a_time():
-    labels = {change.label for change in changes(kinetics.foreshortening)}
+    labels = {change.label for change in changes(disk.foreshortening)}
     assert labels == {
-        "kinetics.foreshortening: return 2 / xp.sqrt(1 + mass / inertia)",
-        "kinetics.foreshortening: return -1 / xp.sqrt(1 + mass / inertia)",
-        "kinetics.foreshortening: return 1 * xp.sqrt(1 + mass / inertia)",
-        "kinetics.foreshortening: return 1 / xp.sqrt(2 + mass / inertia)",
-        "kinetics.foreshortening: return 1 / xp.sqrt(-1 + mass / inertia)",
-        "kinetics.foreshortening: return 1 / xp.sqrt(1 - mass / inertia)",
-        "kinetics.foreshortening: return 1 / xp.sqrt(1 + mass * inertia)",
+        "disk.foreshortening: return 2 / xp.sqrt(1 + mass / inertia)",
+        "disk.foreshortening: return -1 / xp.sqrt(1 + mass / inertia)",
+        "disk.foreshortening: return 1 * xp.sqrt(1 + mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(2 + mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(-1 + mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(1 - mass / inertia)",
+        "disk.foreshortening: return 1 / xp.sqrt(1 + mass * inertia)",
     }
 
 
 def test_a_change_is_undone():
-    change = changes(kinetics.foreshortening)[0]
+    change = changes(disk.foreshortening)[0]
     with change.in_place():
-        assert kinetics.foreshortening(3.0, 1.0) == 1.0
-    assert kinetics.foreshortening(3.0, 1.0) == 0.5
+        assert disk.foreshortening(3.0, 1.0) == 1.0
+    assert disk.foreshortening(3.0, 1.0) == 0.5
 
 
 def test_a_check_that_looks_at_nothing_accepts_what_is_wrong():
@@ -98,7 +97,7 @@ def test_a_check_that_looks_at_nothing_accepts_what_is_wrong():
     assert judged(entry, Mutant("", lambda x: float("nan"))).answer == "undecided"
 
 
-@pytest.mark.parametrize(("function", "rows"), [(kinetics.branch_block, ["S1.23"]), (rolling.slip, ["S4.15"])])
+@pytest.mark.parametrize(("function", "rows"), [(disk.branch_block, ["S1.23"]), (rolling.slip, ["S4.15"])])
 def test_the_rows_see_the_librarys_formulas(function, rows):
     seen = {found.function: found for found in library([ROWS[row] for row in rows])}[function]
     assert [entry.id for entry in seen.rows] == rows

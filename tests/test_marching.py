@@ -6,8 +6,8 @@ import pytest
 from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.marching import exact_row, exact_rows
 from asperity.geometry.polygons.beams import beams_of
+from interval_marching import exact_row, exact_rows
 from random_hollows import random_hollow, wall_with
 
 # Shares of a row that two methods may see differently: rounding of a vertex's place over sin(theta), for a hundred

@@ -8,8 +8,8 @@ import pytest
 from click.testing import CliRunner
 
 from asperity import spectral as spec
-from asperity.bench.bench_run import BenchRun
 from asperity.bench.comparison import DRIFT, SIGNIFICANT, compare_runs
+from asperity.bench.run import BenchRun
 from asperity.cli import main
 
 TIMES = (1.0, 1.1, 1.2, 1.3)

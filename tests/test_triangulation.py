@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from asperity.geometry.marching import exact_row
 from asperity.geometry.polygons.beams import beams_of
 from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING
 from asperity.geometry.polygons.triangulation import triangulated
+from interval_marching import exact_row
 from random_hollows import graph_hollow, random_hollow
 
 AWKWARD = {

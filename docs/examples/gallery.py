@@ -10,7 +10,7 @@ import measured_profile
 
 from asperity import geometry as geo
 from asperity.study import PICTURES, Study, study_wall
-from asperity.study_picture import draw_gallery
+from asperity.study.pictures import draw_gallery
 
 
 def main(folder: Path, tolerance: float = 1e-3) -> dict[str, Study]:

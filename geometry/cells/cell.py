@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
 
-from ...checks import Floats, frozen, positive_number
+from ...core.checks import Floats, frozen, positive_number
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Floats, frozen
-from ...rounding import EPS
+from ...core.checks import Floats, frozen
+from ...core.rounding import EPS
 from ..curves.segment import Segment
 from .cell import Cell
 from .hollow import Hollow

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...checks import Floats
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...checks import Floats
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point

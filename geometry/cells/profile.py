@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array
-from ...errors import InputError
+from ...core.checks import Floats, finite_array
+from ...core.errors import InputError
 
 Seam = Literal["mirror", "step"]
 

@@ -8,7 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ...errors import FileExistsRefusal, InputError
+from ...core.errors import FileExistsRefusal, InputError
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point

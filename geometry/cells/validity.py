@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...errors import WallError
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import WallError
+from ...core.rounding import EPS
 from ..curves.crossings import find_crossing
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment

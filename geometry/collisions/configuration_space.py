@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, finite_array, positive_number
-from ...errors import InputError
+from ...core.checks import Floats, finite_array, positive_number
+from ...core.errors import InputError
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, positive_number, whole_number
+from ...core.checks import Floats, positive_number, whole_number
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk

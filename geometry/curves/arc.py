@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
-from ...errors import WallError
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import WallError
+from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
 # Up to this span (radians) an arc is placed by its chord and its semi-axes: the difference of two angles near pi/2

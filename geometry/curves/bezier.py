@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
-from ...errors import WallError
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import WallError
+from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
 # Beyond this distance (in the parameter) between the speed's minimum and [0, 1] the closed formula of a quadratic's

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.rounding import EPS
 from .curve import Curve
 from .segment import Segment
 

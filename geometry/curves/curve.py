@@ -9,8 +9,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
-from ...errors import WallError
+from ...core.checks import Floats
+from ...core.errors import WallError
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
-from ...errors import WallError
+from ...core.checks import Floats
+from ...core.errors import WallError
 from .curve import Box, Curve, Point, as_point, stretch_factors
 
 

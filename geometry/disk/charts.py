@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, finite_array, positive_number
-from ...errors import InputError
+from ...core.checks import Floats, finite_array, positive_number
+from ...core.errors import InputError
 from . import rolling
 from .rolling import Matrix, Vector
 from .satellites import Satellites

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles, finite_array, frozen, positive_number
-from ...errors import InputError
+from ...core.checks import Floats, angles, finite_array, frozen, positive_number
+from ...core.errors import InputError
 
 
 def frame_rows(mass: Any, inertia: Any, xp: Any = np) -> list[list[Any]]:

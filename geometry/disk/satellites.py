@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from ...checks import positive_number
-from ...errors import InputError
+from ...core.checks import positive_number
+from ...core.errors import InputError
 from . import rolling
 
 # The theorem asks for spacings that tend to 0 while scale/spacing^2 tends to 0; two fifths is in the middle.

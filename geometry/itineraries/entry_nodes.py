@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 
 # Samples that a row starts from, at irregular places so that no symmetry of the wall hides a piece from all of them.
 FIRST_SAMPLES = 32

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, number_between, positive_number
-from ...errors import InputError
+from ...core.checks import Floats, number_between, positive_number
+from ...core.errors import InputError
 from ..collisions.configuration_space import ConfigurationSpace
 from ..collisions.rigid import collide
 from ..disk.disk import Disk

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles, finite_array
+from ...core.checks import Floats, angles, finite_array
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

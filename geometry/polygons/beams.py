@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, frozen, number_between, whole_number
+from ...core.checks import Floats, frozen, number_between, whole_number
 from ..tracing.threads import interruptibly
 from .triangulation import triangulated
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...rounding import EPS, UNIT_ROUNDOFF
+from ...core.checks import Floats
+from ...core.rounding import EPS, UNIT_ROUNDOFF
 
 # Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ULPS = 3.0 + 16.0 * EPS

@@ -9,9 +9,9 @@ from math import frexp, ldexp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, finite_array, frozen
-from ...errors import InputError, WallError
-from ...rounding import UNIT_ROUNDOFF
+from ...core.checks import Floats, finite_array, frozen
+from ...core.errors import InputError, WallError
+from ...core.rounding import UNIT_ROUNDOFF
 from .compiled.codes import FIRST_WALL, OPENING
 from .predicates import ExactPoints
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TypeVar
 
-from ...checks import Floats
+from ...core.checks import Floats
 from .scene import Scene
 
 Table = TypeVar("Table", Floats, Floats | None)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..curves.arc import Arc
 from ..curves.segment import Segment
 from .facing import WIDEST_WEDGE

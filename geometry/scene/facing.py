@@ -8,8 +8,8 @@ from math import atan2, cos, hypot, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.rounding import EPS
 
 # In a wedge wider than this a ray makes ten hits at most; a run is not worth its arctangents there.
 WIDEST_WEDGE = 0.3

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 
 # Cells a piece: a choice that keeps a cell about as large as a piece; it has not been tuned.
 CELLS_PER_PIECE = 2.0

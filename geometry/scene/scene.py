@@ -25,7 +25,7 @@ from math import asin, cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..cells.cell import Cell
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, finite_array, frozen, number_between, positive_number
-from ...errors import InputError
+from ...core.checks import Floats, finite_array, frozen, number_between, positive_number
+from ...core.errors import InputError
 
 # Normals have length 1 to a few rounding errors.
 UNIT_TOLERANCE = 1e-12

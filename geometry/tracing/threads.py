@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import whole_number
+from ...core.checks import whole_number
 
 # Rays in one block: handing a block to a thread costs some 30 us, as much as a thousand of the cheapest rays, and one
 # thread at a time does so. So blocks are large, but small enough to share them evenly, some to every thread.

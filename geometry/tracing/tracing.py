@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles, finite_array, finite_number, number_between, whole_number
-from ...errors import InputError
+from ...core.checks import Floats, angles, finite_array, finite_number, number_between, whole_number
+from ...core.errors import InputError
 from .threads import in_blocks, interruptibly, new_flag
 
 if TYPE_CHECKING:

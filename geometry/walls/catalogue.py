@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import cast
 
-from ...errors import InputError
+from ...core.errors import InputError
 from ..cells.profile import Seam, read_profile
 from ..disk.disk import Disk
 from .mushroom import mushrooms

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..curves.curve import Curve
 from ..curves.segment import Segment
 from .wall import Wall

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
-from ...checks import finite_number, number_between, whole_number
-from ...errors import InputError
-from ...rounding import EPS
+from ...core.checks import finite_number, number_between, whole_number
+from ...core.errors import InputError
+from ...core.rounding import EPS
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment

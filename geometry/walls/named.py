@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import number_between, positive_number, whole_number
-from ...errors import InputError
+from ...core.checks import number_between, positive_number, whole_number
+from ...core.errors import InputError
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.segment import Segment

@@ -13,8 +13,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, positive_number
-from ...errors import InputError, WallError
+from ...core.checks import Floats, positive_number
+from ...core.errors import InputError, WallError
 from ..cells.cell import Cell
 from ..cells.mirror_symmetry import has_mirror_axis
 from ..cells.profile import Seam, vertices_of_profile

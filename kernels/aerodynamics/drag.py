@@ -9,9 +9,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, positive_number
-from ...errors import InputError
-from ...estimates import Estimate, student_95
+from ...core.checks import Floats, finite_array, positive_number
+from ...core.errors import InputError
+from ...core.estimates import Estimate, student_95
 from ..bases.basis import AngleFunction, Basis
 from ..bases.measure import SINE, gauss_rule
 from ..bases.momentum import Directions

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import AccuracyError
+from ...core.checks import Floats
+from ...core.errors import AccuracyError
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
 

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from ...checks import Floats, positive_number, whole_number
-from ...errors import InputError
-from ...estimates import Estimate
+from ...core.checks import Floats, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import Estimate
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.interval_exchange import IntervalExchangeLaw

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, finite_number, frozen, generator, positive_number, whole_number
-from ...errors import InputError
-from ...estimates import Estimate
+from ...core.checks import Floats, finite_array, finite_number, frozen, generator, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import Estimate
 from ..bases.measure import SINE
 from ..laws.law import Law
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score

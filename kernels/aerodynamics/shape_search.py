@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ...checks import Floats, finite_array, frozen, positive_number, whole_number
-from ...errors import InputError
-from ...estimates import Estimate
+from ...core.checks import Floats, finite_array, frozen, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import Estimate
 from ..laws.law import Law
 from ..walls.wall_law import WallLaw
 from .drag import resistance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from .measure import LARGEST_ANGLE, SMALLEST_ANGLE
 
 

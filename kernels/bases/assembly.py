@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from .basis import Basis
 from .intervals import cell_among
 from .measure import gauss_rule

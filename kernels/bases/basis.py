@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
+from ...core.checks import Floats
 from .measure import AngularMeasure
 
 Frame = Literal["paper", "specular"]

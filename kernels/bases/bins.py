@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, finite_array, frozen, whole_number
-from ...errors import InputError
+from ...core.checks import Floats, finite_array, frozen, whole_number
+from ...core.errors import InputError
 from .basis import Basis
 from .intervals import cell_among
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name

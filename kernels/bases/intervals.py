@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from .measure import SINE
 
 

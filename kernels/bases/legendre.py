@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, whole_number
+from ...core.checks import Floats, whole_number
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 

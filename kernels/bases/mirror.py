@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from .assembly import overlaps
 from .basis import Basis
 from .bins import Bins

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
+from ...core.checks import Floats
 from .basis import Basis
 from .measure import SINE, AngularMeasure
 

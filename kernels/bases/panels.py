@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, frozen, number_between, whole_number
+from ...core.checks import Floats, frozen, number_between, whole_number
 from .basis import Basis
 from .bins import Bins
 from .measure import SINE, AngularMeasure, WeightName

@@ -9,8 +9,8 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from .basis import Basis
 from .measure import AngularMeasure
 

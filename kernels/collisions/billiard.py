@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, finite_array, generator, whole_number
-from ...errors import InputError
+from ...core.checks import Floats, finite_array, generator, whole_number
+from ...core.errors import InputError
 
 if TYPE_CHECKING:
     from ...geometry import Container, Disk

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles, finite_array, generator
-from ...errors import InputError
+from ...core.checks import Floats, angles, finite_array, generator
+from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..laws.law import Combination, Law

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import finite_array, generator, whole_number
-from ...errors import InputError
+from ...core.checks import finite_array, generator, whole_number
+from ...core.errors import InputError
 from .satellite_law import SatelliteLaw
 
 if TYPE_CHECKING:

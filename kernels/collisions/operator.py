@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.sparse.linalg import LinearOperator
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.mirror import reflection_matrix
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, generator
-from ...errors import AccuracyError
+from ...core.checks import Floats, finite_array, generator
+from ...core.errors import AccuracyError
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall

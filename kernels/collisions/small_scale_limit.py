@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, frozen, generator, number_between, whole_number
-from ...errors import InputError
-from ...estimates import NORMAL_95, Estimate, student_95
-from ...rounding import EPS
+from ...core.checks import Floats, finite_array, frozen, generator, number_between, whole_number
+from ...core.errors import InputError
+from ...core.estimates import NORMAL_95, Estimate, student_95
+from ...core.rounding import EPS
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ...geometry.disk.disk import branch_block
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.rounding import EPS
 from ..bases.angles import flipped, kept_inside
 from ..bases.assembly import add_blocks, add_masses, cell_index
 from ..bases.basis import Basis

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...errors import AccuracyError
+from ...core.errors import AccuracyError
 from ..sampling.sobol import Net
 from ..walls.wall_law import FEW_PIECES
 from .traced import is_affordable

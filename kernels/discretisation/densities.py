@@ -8,9 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats
-from ...errors import InputError
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import InputError
+from ...core.rounding import EPS
 from ..bases.assembly import add_products, cell_index
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre

@@ -7,8 +7,8 @@ from typing import get_args
 
 import numpy as np
 
-from ...checks import finite_number, generator, whole_number
-from ...errors import InputError
+from ...core.checks import finite_number, generator, whole_number
+from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import Law

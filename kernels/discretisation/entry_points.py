@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.assembly import cell_index
 from ..bases.basis import Basis
 from ..bases.measure import SINE

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals

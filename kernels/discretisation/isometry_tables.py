@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.angles import kept_inside
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis

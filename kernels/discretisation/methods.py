@@ -8,10 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
-from ...estimates import ErrorKind
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import InputError
+from ...core.estimates import ErrorKind
+from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from ..bases.assembly import one_blas_thread
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.assembly import cell_index, one_blas_thread
 from ..bases.basis import Basis
 from ..bases.legendre import DEGREES_PER_PANEL, DIGITS, Legendre

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix

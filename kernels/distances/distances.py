@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from ...checks import positive_number
-from ...errors import InputError
-from ...estimates import Estimate
+from ...core.checks import positive_number
+from ...core.errors import InputError
+from ...core.estimates import Estimate
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix

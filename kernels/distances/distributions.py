@@ -6,8 +6,8 @@ from functools import singledispatch
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from ..bases.angles import kept_inside
 from ..bases.bins import Bins
 from ..bases.intervals import cell_among

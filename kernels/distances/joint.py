@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import AccuracyError
-from ...estimates import Estimate
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import AccuracyError
+from ...core.estimates import Estimate
+from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise

@@ -6,8 +6,8 @@ from math import ceil, log2
 
 import numpy as np
 
-from ...checks import Floats
-from ...estimates import Estimate
+from ...core.checks import Floats
+from ...core.estimates import Estimate
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..discretisation.discretisation import discretise

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from ..matrices.matrix import KernelMatrix, check_same_basis
 from ..sampling.counts import Counts
 from .transport import grid_wasserstein, power_mean

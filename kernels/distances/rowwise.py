@@ -6,9 +6,9 @@ from itertools import count
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
-from ...estimates import Estimate
+from ...core.checks import Floats
+from ...core.errors import InputError
+from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
 from ..discretisation.densities import jumps_of_map
 from ..laws.density import DensityLaw

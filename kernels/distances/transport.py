@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Floats, finite_number
-from ...errors import InputError
-from ...rounding import EPS
+from ...core.checks import Floats, finite_number
+from ...core.errors import InputError
+from ...core.rounding import EPS
 from ..bases.intervals import cell_among
 
 # Ends of a piece that agree to this share, over the order to the power 4/5, are integrated by two terms about the

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Floats, generator, number_between, whole_number
-from ...errors import InputError
+from ...core.checks import Floats, generator, number_between, whole_number
+from ...core.errors import InputError
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
 from .resampling import (

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.intervals import cell_among, ragged
 from ..bases.legendre import legendre_moments
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule

@@ -8,7 +8,7 @@ from functools import singledispatch
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.assembly import cell_index
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre

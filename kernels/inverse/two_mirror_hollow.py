@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Floats, generator, number_between, positive_number, whole_number
-from ...errors import InputError
-from ...estimates import LEVEL, Estimate
+from ...core.checks import Floats, generator, number_between, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import LEVEL, Estimate
 from ..bases.measure import SINE
 
 if TYPE_CHECKING:

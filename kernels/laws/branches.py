@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import InputError
+from ...core.rounding import EPS
 from ..bases.angles import kept_inside
 from ..bases.intervals import edges_inside
 

@@ -8,9 +8,9 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, frozen
-from ...errors import AccuracyError, InputError
-from ...rounding import EPS
+from ...core.checks import Floats, finite_array, frozen
+from ...core.errors import AccuracyError, InputError
+from ...core.rounding import EPS
 from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
 from ..bases.measure import SINE, gauss_on_intervals

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, number_between
+from ...core.checks import Floats, number_between
 from ..bases.measure import SINE
 from .density import DensityLaw
 from .law import Combination, specular

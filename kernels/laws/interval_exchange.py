@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats, frozen
-from ...errors import InputError
+from ...core.checks import Floats, frozen
+from ...core.errors import InputError
 from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
 from ..bases.bins import Bins

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Floats, finite_array
-from ...errors import InputError
+from ...core.checks import Floats, finite_array
+from ...core.errors import InputError
 from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
 from ..bases.measure import SINE

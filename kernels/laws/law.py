@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles, finite_array, generator, whole_number
-from ...errors import InputError
+from ...core.checks import Floats, angles, finite_array, generator, whole_number
+from ...core.errors import InputError
 from ..bases.angles import flipped
 from ..bases.basis import AngleFunction, Frame
 from .branches import chained, chained_kinks, merged

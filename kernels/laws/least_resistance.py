@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
 from ..bases.bins import Bins

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, frozen
-from ...errors import InputError
+from ...core.checks import Floats, finite_array, frozen
+from ...core.errors import InputError
 from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction, Frame
 from ..bases.intervals import cell_among

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, number_between, whole_number
+from ...core.checks import Floats, number_between, whole_number
 from ..bases.angles import flipped, kept_inside
 from ..bases.measure import SINE
 from .density import GAUSS_NODES, DensityLaw

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.angles import flipped
 from .involution import InvolutionLaw
 from .law import BranchLaw, DrivenLaw, Law, SpecularFrame

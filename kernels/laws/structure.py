@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from ...errors import InputError
+from ...core.errors import InputError
 from .law import BranchLaw, Combination, Composition, Law, Power, SpecularFrame
 
 Fact = TypeVar("Fact")

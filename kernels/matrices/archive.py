@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ...errors import FileExistsRefusal, InputError
+from ...core.errors import FileExistsRefusal, InputError
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre

@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 
 # Statistics with fewer degrees of freedom than this carry no information.
 LEAST_FREEDOM = 1e-9

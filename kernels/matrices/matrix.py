@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, finite_array, finite_number, frozen, whole_number
-from ...errors import InputError
-from ...estimates import ErrorKind, Estimate
+from ...core.checks import Floats, finite_array, finite_number, frozen, whole_number
+from ...core.errors import InputError
+from ...core.estimates import ErrorKind, Estimate
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix

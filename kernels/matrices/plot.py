@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.basis import Frame
 
 if TYPE_CHECKING:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...errors import AccuracyError
-from ...estimates import LEVEL
-from ...rounding import EPS
+from ...core.checks import Floats
+from ...core.errors import AccuracyError
+from ...core.estimates import LEVEL
+from ...core.rounding import EPS
 from ..bases.assembly import add_products, cell_index
 from ..bases.basis import Basis
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, replicate_z_score, reversibility_z_score

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles
-from ...errors import InputError
+from ...core.checks import Floats, angles
+from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...errors import AccuracyError
+from ...core.checks import Floats
+from ...core.errors import AccuracyError
 from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.mirror import reflection_matrix

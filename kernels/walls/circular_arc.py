@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles, number_between
+from ...core.checks import Floats, angles, number_between
 from ..bases.angles import flipped, kept_inside, mixed_arccos
 from ..bases.basis import AngleFunction
 from ..bases.intervals import ragged

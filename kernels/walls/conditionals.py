@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles, finite_number
-from ...errors import InputError
+from ...core.checks import Floats, angles, finite_number
+from ...core.errors import InputError
 from ..bases.basis import AngleFunction
 from .hollow_conditionals import NO_LIMIT, HollowRows
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.measure import SINE
 
 # d = 2 r |cot theta| carries a relative error of about 2 eps. Above the first number that is too much for the rest of a

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 
 if TYPE_CHECKING:
     from ...geometry.scene.scene import Scene

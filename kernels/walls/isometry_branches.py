@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles
+from ...core.checks import Floats, angles
 from ..laws.law import Combination, IsometryLaw, Law, SpecularFrame
 from .isometry_table import IsometryTable
 

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles, frozen
-from ...errors import InputError
-from ...rounding import EPS
+from ...core.checks import Floats, angles, frozen
+from ...core.errors import InputError
+from ...core.rounding import EPS
 from ..bases.angles import kept_inside
 from ..bases.intervals import ragged, without_outermost
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, positive_number, whole_number
-from ...errors import InputError
-from ...estimates import Estimate
+from ...core.checks import Floats, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import Estimate
 from ..laws.law import BranchLaw
 from .isometry_table import IsometryTable
 from .traced_map import traced_angles

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles, positive_number
+from ...core.checks import Floats, angles, positive_number
 from ..bases.angles import flipped
 from ..laws.law import BranchLaw, entry_points
 from .crevice import crevice_kinks, crevice_retro, crossings_modulo_two

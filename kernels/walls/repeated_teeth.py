@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, angles
+from ...core.checks import Floats, angles
 from ..bases.angles import flipped, kept_inside
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles
-from ...errors import AccuracyError
+from ...core.checks import Floats, angles
+from ...core.errors import AccuracyError
 from ..laws.law import entry_points
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles, number_between
-from ...rounding import EPS
+from ...core.checks import Floats, angles, number_between
+from ...core.rounding import EPS
 from ..bases.angles import flipped, kept_inside, mixed_arccos
 from ..bases.intervals import without_outermost
 from ..laws.branches import merged

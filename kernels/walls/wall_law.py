@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...checks import Floats, angles
-from ...errors import AccuracyError, InputError
-from ...rounding import EPS
+from ...core.checks import Floats, angles
+from ...core.errors import AccuracyError, InputError
+from ...core.rounding import EPS
 from ..bases.basis import AngleFunction
 from ..laws.law import Combination, DrivenLaw, Law, specular
 from .circular_arc import CircularArcLaw

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import AccuracyError, InputError
+from ...core.errors import AccuracyError, InputError
 from ...kernels import Law
 from ...kernels.expectations.basis_means import integrates_panels
 from ...kernels.laws.structure import lists_branches

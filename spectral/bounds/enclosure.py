@@ -9,16 +9,16 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats, whole_number
-from ...errors import InputError
-from ...estimates import ErrorKind
+from ...core.checks import Floats, whole_number
+from ...core.errors import InputError
+from ...core.estimates import ErrorKind
+from ...core.rounding import EPS
 from ...kernels import Basis, Bins, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
 from ...kernels.bases.measure import SINE
 from ...kernels.expectations.basis_means import integrates_panels, traces_rows
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import made_of_isometries
-from ...rounding import EPS
 from ..eigenvalues.parity import Parity, halves, outermost_by_parity
 from ..eigenvalues.spectra import check_reversible
 from .contraction import refuse_unless_self_adjoint

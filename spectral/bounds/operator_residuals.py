@@ -9,8 +9,9 @@ from functools import partial
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import AccuracyError, InputError
+from ...core.checks import Floats
+from ...core.errors import AccuracyError, InputError
+from ...core.rounding import EPS
 from ...kernels import Basis, Bins, CircularArcLaw, Composition, DensityLaw, Law, Legendre, Panels, PolygonLaw, WallLaw
 from ...kernels.bases.measure import SINE, gauss_on_intervals
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
@@ -23,7 +24,6 @@ from ...kernels.laws.law import SpecularFrame
 from ...kernels.laws.structure import Rules, fold, holds_of_all
 from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.words import law_of, words_of
-from ...rounding import EPS
 
 # Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
 SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9

@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...errors import AccuracyError
+from ...core.checks import Floats
+from ...core.errors import AccuracyError
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Floats
-from ...errors import InputError
-from ...estimates import ErrorKind
+from ...core.checks import Floats
+from ...core.errors import InputError
+from ...core.estimates import ErrorKind
+from ...core.rounding import EPS
 from ...kernels import KernelMatrix, Law, Legendre, discretise
 from ...kernels.discretisation.scattering import is_scattered
 from ...kernels.laws.ideal import LambertianLaw
@@ -22,7 +23,6 @@ from ...kernels.laws.law import specular
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import holds_of_all
 from ...kernels.walls.words import Sum, Word, words_of
-from ...rounding import EPS
 from ..eigenvalues.parity import Parity
 from ..eigenvalues.spectra import check_reversible
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...checks import Floats
-from ...estimates import ErrorKind
+from ...core.checks import Floats
+from ...core.estimates import ErrorKind
+from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, MatrixLaw
 from ...kernels.bases.measure import SINE, gauss_rule
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold
-from ...rounding import EPS
 from ..essential.edge import essential_edge
 from .oscillations import fast_top
 

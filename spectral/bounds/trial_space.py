@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
-from ...errors import InputError
+from ...core.checks import Floats
+from ...core.errors import InputError
 from ...kernels import Law, Legendre, Panels
 from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, frozen, generator, positive_number, whole_number
-from ...errors import InputError
-from ...estimates import NORMAL_95, Estimate
+from ...core.checks import Floats, finite_array, frozen, generator, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import NORMAL_95, Estimate
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .diffusion import Arrangement, check_arrangement

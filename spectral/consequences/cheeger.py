@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Floats, frozen
-from ...errors import InputError
+from ...core.checks import Floats, frozen
+from ...core.errors import InputError
 from ..eigenvalues.spectra import matrix_spectrum
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from ...checks import Floats, positive_number
-from ...errors import InputError
-from ...estimates import ErrorKind, Estimate
+from ...core.checks import Floats, positive_number
+from ...core.errors import InputError
+from ...core.estimates import ErrorKind, Estimate
+from ...core.rounding import EPS
 from ...kernels import Law
-from ...rounding import EPS
 from ..essential.edge import grazing_symbol
 from ..essential.exact import ideal_spectrum
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Floats, frozen, whole_number
-from ...errors import InputError
+from ...core.checks import Floats, frozen, whole_number
+from ...core.errors import InputError
 from ...kernels import Law, Legendre, discretise
 
 # Chords of a wall's pieces and twice as many, whose difference tells the error of the mean squared slope.

@@ -8,12 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from ...checks import Floats, finite_number, number_between
-from ...errors import AccuracyError, InputError
-from ...estimates import ErrorKind, Estimate
+from ...core.checks import Floats, finite_number, number_between
+from ...core.errors import AccuracyError, InputError
+from ...core.estimates import ErrorKind, Estimate
+from ...core.rounding import EPS
 from ...kernels import DensityLaw, KernelMatrix, Law
 from ...kernels.bases.measure import SINE
-from ...rounding import EPS
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..gap.gap import modulus_gap
 

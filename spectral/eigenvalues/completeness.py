@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Floats
-from ...rounding import UNIT_ROUNDOFF
+from ...core.checks import Floats
+from ...core.rounding import UNIT_ROUNDOFF
 
 # Roundings of an entry of the shifted matrix, beside one for each vector that is moved: its product with the sign, the
 # shift, and two products and sums of the deflation.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ...kernels import Bins
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
 from .dense import Extremes, Which, compressed, counted_from_above, outermost, symmetric_half, wanted

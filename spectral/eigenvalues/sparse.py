@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...checks import Floats, finite_array, frozen, whole_number
-from ...errors import AccuracyError, InputError
+from ...core.checks import Floats, finite_array, frozen, whole_number
+from ...core.errors import AccuracyError, InputError
+from ...core.rounding import EPS
 from ...kernels import KernelMatrix
-from ...rounding import EPS
 from .dense import Extremes, outermost, symmetric_half
 from .parity import Parity, halves, outermost_by_parity
 

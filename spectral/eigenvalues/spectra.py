@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...checks import Floats, frozen
-from ...errors import AccuracyError
-from ...estimates import NORMAL_95, Estimate
+from ...core.checks import Floats, frozen
+from ...core.errors import AccuracyError
+from ...core.estimates import NORMAL_95, Estimate
+from ...core.rounding import EPS
 from ...kernels import Basis, KernelMatrix
-from ...rounding import EPS
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
 from .dense import Extremes, compressed, end_values
 from .parity import Parity, halves, outermost_by_parity

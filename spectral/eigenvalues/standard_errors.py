@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...checks import Floats, number_between, whole_number
-from ...errors import InputError
-from ...estimates import NORMAL_95, student_95
+from ...core.checks import Floats, number_between, whole_number
+from ...core.errors import InputError
+from ...core.estimates import NORMAL_95, student_95
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

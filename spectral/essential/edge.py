@@ -8,8 +8,8 @@ from functools import reduce
 
 import numpy as np
 
-from ...checks import Floats
-from ...estimates import ErrorKind
+from ...core.checks import Floats
+from ...core.estimates import ErrorKind
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw

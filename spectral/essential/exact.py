@@ -6,11 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ...core.rounding import EPS
 from ...kernels import Combination, Law, SpecularFrame
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.structure import Rules, fold
-from ...rounding import EPS
 
 
 @dataclass(frozen=True)

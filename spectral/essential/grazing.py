@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
+from ...core.rounding import EPS
 from ...kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.laws.random_map import entry_inside, responder
-from ...rounding import EPS
 
 if TYPE_CHECKING:
     from ...geometry import Wall

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...checks import positive_number
-from ...errors import AccuracyError, InputError
+from ...core.checks import positive_number
+from ...core.errors import AccuracyError, InputError
+from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
 from ...kernels.expectations.basis_means import has_costly_rows, integrates_panels, traces_rows
-from ...rounding import EPS
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient

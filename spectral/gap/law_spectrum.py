@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import frozen, positive_number, whole_number
-from ...errors import InputError
+from ...core.checks import frozen, positive_number, whole_number
+from ...core.errors import InputError
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ..bounds.contraction import refuse_unless_self_adjoint
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum

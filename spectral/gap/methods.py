@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...checks import Floats, frozen
+from ...core.checks import Floats, frozen
+from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, MatrixLaw, discretise
 from ...kernels.expectations.basis_means import has_costly_rows, integrates_panels
 from ...kernels.laws.structure import made_of_isometries
-from ...rounding import EPS
 from ..bounds.enclosure import EnclosedTrials, as_power, enclosed_trials
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 from ..essential.exact import ideal_spectrum

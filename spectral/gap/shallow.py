@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...checks import Floats
+from ...core.checks import Floats
 from ...kernels import CircularArcLaw, Law, WallLaw
 from ...kernels.bases.measure import gauss_on_intervals, gauss_rule
 from ...kernels.laws.law import Combination, IsometryLaw, SpecularFrame

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from ...core.rounding import EPS
 from ...kernels import Bins, InvolutionLaw, Law, MatrixLaw, discretise
 from ...kernels.laws.structure import made_of_isometries
-from ...rounding import EPS
 from ..bounds.separation import lambertian_share
 from ..eigenvalues.spectra import Verdict, matrix_spectrum
 from ..essential.edge import essential_edge

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...estimates import Estimate, rounded
+from ...core.estimates import Estimate, rounded
 from ..eigenvalues.spectra import EIGENVALUE, Spectrum, Verdict
 from ..essential.edge import EssentialEdge
 from ..plotting import draw_eigenvalues

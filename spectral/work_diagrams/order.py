@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array
-from ...errors import InputError
+from ...core.checks import Floats, finite_array
+from ...core.errors import InputError
 
 # Fits need this many points to have a confidence interval.
 FEWEST_POINTS = 3

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...checks import Floats, finite_array, finite_number, frozen
-from ...errors import InputError
-from ...rounding import EPS
+from ...core.checks import Floats, finite_array, finite_number, frozen
+from ...core.errors import InputError
+from ...core.rounding import EPS
 
 # A value that is exact in the text may carry the rounding of a few thousand operations.
 ROUNDED = 4096.0 * EPS

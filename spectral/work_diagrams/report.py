@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from ...errors import InputError
+from ...core.errors import InputError
 from .machine import Machine
 from .order import FittedOrder, fit_order
 from .problem import ROUNDED, WorkMethod, WorkProblem

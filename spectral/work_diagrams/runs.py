@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ...checks import Floats, positive_number, whole_number
-from ...errors import AsperityError, InputError
-from ...estimates import Estimate
+from ...core.checks import Floats, positive_number, whole_number
+from ...core.errors import AsperityError, InputError
+from ...core.estimates import Estimate
 from ...kernels import KernelMatrix
 from .machine import Machine, on_few_cores
 from .problem import WorkMethod, WorkProblem

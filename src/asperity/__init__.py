@@ -15,14 +15,12 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .errors import AccuracyError, AsperityError, FileExistsRefusal, InputError, WallError
-from .estimates import Estimate
+from .core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError, WallError
+from .core.estimates import Estimate
+from .core.version import __version__
 
 if TYPE_CHECKING:
-    pass
     from .verification import Verdict, verify
-
-__version__ = "0.1.0"
 
 __all__ = [
     "AccuracyError",

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from . import __version__
-from .errors import AccuracyError, AsperityError, InputError
+from .core.errors import AccuracyError, AsperityError, InputError
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile (mirrored to make it periodic, or profile.txt:seam=step)."""
@@ -109,7 +109,7 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
     from .geometry import wall_from_text
     from .kernels import WallLaw
     from .spectral import enclosures, spectral_gap
-    from .study_text import enclosures_as_list, enclosures_as_text, gap_as_dict, quotation
+    from .study.report import enclosures_as_list, enclosures_as_text, gap_as_dict, quotation
 
     law = WallLaw(wall_from_text(wall))
     chosen = law.in_specular_frame() if specular else law
@@ -139,7 +139,7 @@ def gap(wall: str, specular: bool, tolerance: float, enclose: int, as_json: bool
 def walls(out: Path | None, force: bool) -> None:
     """List the named walls with their parameters and defaults, and draw them."""
     from .geometry import WALLS
-    from .study_picture import draw_gallery
+    from .study.pictures import draw_gallery
 
     if out is not None:
         # refused before anything is printed
@@ -172,7 +172,7 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
     from tqdm import tqdm
 
     from .ledger import findings, selected
-    from .ledger_text import finding_as_dict, latex_of, table_of
+    from .ledger.text import finding_as_dict, latex_of, table_of
 
     chosen = selected(ids)
     if as_latex:

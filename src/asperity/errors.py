@@ -1,31 +1,5 @@
 """The exceptions of asperity: each message says what was expected, what came, and what to do."""
 
+from .core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError, WallError
 
-class AsperityError(Exception):
-    """Base class of every exception that asperity raises on purpose."""
-
-
-class InputError(AsperityError, ValueError):
-    """An argument is not what the function accepts."""
-
-
-class WallError(InputError):
-    """A wall breaks one of the conditions on its geometry; the message names the pieces and the place."""
-
-
-class FileExistsRefusal(AsperityError, FileExistsError):
-    """An existing file would have been overwritten; pass ``overwrite=True`` (or ``--force``) to allow it."""
-
-
-class AccuracyError(AsperityError, ArithmeticError):
-    """A computation could not reach the accuracy that its result needs.
-
-    Attributes
-    ----------
-    defect : float
-        The measured defect, in the norm that the message names.
-    """
-
-    def __init__(self, message: str, defect: float) -> None:
-        super().__init__(message)
-        self.defect = defect
+__all__ = ["AccuracyError", "AsperityError", "FileExistsRefusal", "InputError", "WallError"]

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, trace_ray
 
 # Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers

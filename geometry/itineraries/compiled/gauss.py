@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from .changes import FIRST_LABEL, inner, is_spent, probe
 
 ORDERS = (4, 7, 12, 20, 32)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from ...tracing.compiled.growing import longer
 from .changes import FIRST_LABEL, MOST_SAMPLES, add_change, empty_chain, inner, is_spent, sample_row, spread, undecided
 from .gauss import MOST_NODES, SPARE, integrate_piece

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from .changes import inner, probe
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from ...tracing.compiled.growing import larger, longer, taller
 from ...tracing.compiled.trigonometry import PI, PI_REST
 from ...tracing.double_double.arithmetic import add

@@ -13,7 +13,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from ...scene.tolerances import TANGENT_ULPS
 
 _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from ...scene.tolerances import JOINT_ULPS, NEARBY, TANGENT_ULPS
 from ..double_double.beziers import curve_size
 

@@ -20,7 +20,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from ...scene.tolerances import JOINT_ULPS, NEARBY
 from .arcs import arc_incidence, arc_reflect, arc_time, on_arc
 from .beziers import bend_number, bezier_hit, bezier_value

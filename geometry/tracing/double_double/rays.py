@@ -27,7 +27,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS
+from ....core.rounding import EPS
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_place
 from .arithmetic import (

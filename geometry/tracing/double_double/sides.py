@@ -22,7 +22,7 @@ import math
 import numpy as np
 from numba import njit
 
-from ....rounding import EPS, UNIT_ROUNDOFF
+from ....core.rounding import EPS, UNIT_ROUNDOFF
 from .arcs import arc_height
 from .arithmetic import add, divide, dot, multiply, negate, square_root, subtract, two_product, two_sum, wide
 from .beziers import bezier_coefficients, bezier_place, cubic, cubic_slope

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from .bench_run import BenchRun, fresh_folder
 from .comparison import compare_runs
+from .run import BenchRun, fresh_folder
 from .standard_set import FULL, QUICK, problem_names, run_problems
 
 
@@ -20,11 +20,11 @@ def run_bench(
     earlier = None if compare is None else BenchRun.of_json(compare.read_text(encoding="utf-8"))
     fresh_folder(out, force)
     if extremes:
-        from .extreme_report import run_extremes
+        from .extremes.report import run_extremes
 
         return _show(out / "extremes.md", run_extremes(quick).table())
     if savings:
-        from .scene_savings import savings_table
+        from .savings import savings_table
 
         return _show(out / "savings.md", savings_table(quick))
     effort = QUICK if quick else FULL

@@ -7,9 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..errors import InputError
+from ..core.errors import InputError
 from ..spectral import WorkReport, WorkRow
-from .bench_run import BenchRun
+from .run import BenchRun
 
 # A row is slower only if chance would show it in less than this share of the rows, and by more than machines drift in a
 # day. Four repeats that are all slower than four others, the fewest that are run, have the p-value 1/70.

@@ -11,17 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..core.errors import InputError
 from ..spectral import WorkMethod, WorkProblem, WorkReport, WorkRow, work_precision
 from ..spectral.work_diagrams.machine import on_few_cores
 from ..spectral.work_diagrams.runs import measure
-from .child_process import ChildCrashed, ChildProcess, OutOfTime
-from .collision_quantities import by_true_disks
-from .known_references import known_reference
-from .quantities import QUANTITIES
-from .scenes import scenes, standard_names, wall_of
-from .time_plan import TimePlan
-from .uniform_disk import DISK
+from .quantities.collision import DISK, by_true_disks
+from .quantities.standard import QUANTITIES
+from .quantities.walls import scenes, standard_names, wall_of
+from .running.processes import ChildCrashed, ChildProcess, OutOfTime, TimePlan
+from .running.references import known_reference
 
 Say = Callable[[str], None]
 

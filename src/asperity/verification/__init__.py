@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from .entry import Entry, Finding, Formula, by_reading, convention, erratum, verified
 from .identity import verify
-from .measurement import agreement, holds, no_excess
-from .verdict import Verdict, every
+from .verdict import Verdict, agreement, every, holds, no_excess
 
 __all__ = [
     "Entry",

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .balls import Unclear, Undefined, is_true
 from .polyhedron import BITS, Inequality, Polyhedron, sign_of
 

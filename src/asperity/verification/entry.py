@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import Any, Literal
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .verdict import Verdict
 
 Status = Literal["verified", "erratum", "convention"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .verdict import Verdict, every
 
 TIME_LIMIT = 10.0

@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy as sp
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .derivation import derive_equality
 from .domain import Domain
 from .polyhedron import Inequality

@@ -17,7 +17,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ..errors import InputError
+from ..core.errors import InputError
 from .verdict import Verdict
 
 # A start takes about a second; beyond this it has failed.

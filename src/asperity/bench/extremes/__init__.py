@@ -1,0 +1,1 @@
+"""The extreme cases of the stability report."""

@@ -1,0 +1,62 @@
+"""The true disk at scales from a tenth of its radius to 10^-8, against 50 digits and its own way back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from ... import geometry as geo
+from ...core.rounding import EPS
+from ..quantities.collision import DISK, sampled_velocities
+from ..running.references import kept
+from .row import ExtremeRow
+
+# Written by tests/precise_collision.py
+DATA = "extreme_disks.json"
+# Measured below 0.4; the margin is that of single rays.
+UNITS = 32.0
+# Rounding errors of a handful of contacts, each of which may magnify them some tens of times; measured below 600.
+ROUNDED = 2.0**14 * EPS
+SCALES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
+WALL = geo.triangular_teeth(0.7)
+
+
+def disk_cases(disks: int) -> dict[str, Callable[[], ExtremeRow]]:
+    """The cases by name."""
+    return {f"true disk, scale {scale:g}": partial(_case, scale, disks) for scale in SCALES}
+
+
+def _case(scale: float, disks: int) -> ExtremeRow:
+    """The known disks, then as many random ones sent there and back."""
+    rows = kept(DATA)[f"{scale:g}"]
+    start = np.array([[float.fromhex(number) for number in row[0]] for row in rows])
+    exact = np.array([[float.fromhex(number) for number in row[1]] for row in rows])
+    contacts, condition = (np.array([row[k] for row in rows]) for k in (2, 3))
+    found = geo.collide(DISK, WALL, scale, start[:, :2], start[:, 2:])
+    error = np.abs(found.velocity - exact).max(axis=1) / (EPS * (1.0 + contacts) * condition)
+    error[found.contacts != contacts] = np.inf
+    back, energy, others, counts = _there_and_back(scale, disks)
+    worst = max(float(error[found.escaped].max(initial=0.0)), UNITS * max(back, energy) / ROUNDED)
+    note = f"{disks} more come back to {back:.1g}, energy to {energy:.1g}; {others} came back by other contacts"
+    for status, number in found.counts().items():
+        counts[status] += number
+    return ExtremeRow(
+        f"true disk, scale {scale:g}", "50 digits, and its own way back", worst, UNITS, "eps x condition",
+        counts=counts, note=note,
+    )  # fmt: skip
+
+
+def _there_and_back(scale: float, disks: int) -> tuple[float, float, int, dict[str, int]]:
+    """Errors of the involution and of the energy, how many came back otherwise, and the statuses."""
+    rng = np.random.default_rng(6)
+    velocity = -sampled_velocities(disks, rng)
+    position = np.column_stack([scale * rng.random(disks), 2.0 * np.pi * rng.random(disks)])
+    there = geo.collide(DISK, WALL, scale, position, velocity)
+    gone = there.escaped
+    back = geo.collide(DISK, WALL, scale, there.position[gone], -there.velocity[gone])
+    same = back.escaped & (back.contacts == there.contacts[gone])
+    involution = np.abs(back.velocity + velocity[gone])[same].max(initial=0.0)
+    energy = np.abs(DISK.inner(there.velocity, there.velocity) - 1.0)[gone].max(initial=0.0)
+    return float(involution), float(energy), int((~same).sum()), there.counts()

@@ -1,0 +1,116 @@
+"""Extreme rays and walls: single rays against what 50 digits say of them.
+
+The rays and their references lie in ``extreme_rays.json``, which ``tests/precise_extremes.py`` writes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ... import geometry as geo
+from ...core.rounding import EPS
+from ..running.references import kept
+from .row import ExtremeRow
+from .walls import extreme_walls
+
+DATA = "extreme_rays.json"
+UNIT = "eps x condition"
+# The tracer's error in these units is below 5 wherever it was measured; a margin of six.
+UNITS = 32.0
+# What is known of a ray: it passes every corner at a distance that double precision resolves; it meets a corner if its
+# angle is moved by at most half an ulp; or if the wall is moved by its rounding; or its first hit is more flights away
+# than the tracer follows.
+CLEAR, IN_ANGLE, IN_WALL, TOO_FAR = range(4)
+REASONS = {
+    CLEAR: "no corner is within half an ulp of the angle, but double-double arithmetic does not settle it either",
+    IN_WALL: "the opening, seen along the ray, is thinner than the rounding of the wall's coordinates",
+    TOO_FAR: "the first hit is more than 10^6 cells away",
+}
+
+
+@dataclass(frozen=True)
+class KnownRay:
+    """One ray and where it goes.
+
+    Attributes
+    ----------
+    x, theta : float
+    out : float
+        The exact outgoing angle, rounded once; not a number where nobody followed the ray.
+    hits : int
+    condition : float
+        1 + the sum of the moduli of the derivatives of the outgoing state.
+    clearance : int
+        ``CLEAR``, ``IN_ANGLE``, ``IN_WALL`` or ``TOO_FAR``.
+    others : mapping of float to int
+        Angles and hits of rays some ulps beside it that go another way, and of this ray where the wall's rounded
+        coordinates send it another way than the ideal ones.
+    """
+
+    x: float
+    theta: float
+    out: float
+    hits: int
+    condition: float
+    clearance: int
+    others: Mapping[float, int]
+
+    @property
+    def is_open(self) -> bool:
+        """Whether an ulp of the ray decides everything about its way out."""
+        return EPS * self.condition >= 1.0
+
+    def error(self, theta: float, hits: int) -> tuple[float, bool]:
+        """Error of what the tracer found, in ``UNIT``, and whether the ray had to be moved by a few ulps for it."""
+        scale = EPS * (1.0 + self.hits) * self.condition
+        here = abs(theta - self.out) / scale if hits == self.hits or self.is_open else np.inf
+        beside = min((abs(theta - out) / scale for out in self.others), default=np.inf)
+        return (here, False) if here <= UNITS or here <= beside else (beside, True)
+
+
+def ray_cases() -> dict[str, Callable[[], ExtremeRow]]:
+    """The cases by name."""
+    return {name: partial(_case, name, build) for name, build in extreme_walls().items()}
+
+
+def _case(name: str, build: Callable[[], geo.Wall]) -> ExtremeRow:
+    return compare_rays(name, build())
+
+
+def known_rays(name: str) -> tuple[str, tuple[KnownRay, ...]]:
+    """What a case is measured against, and its rays."""
+    case = kept(DATA)[name]
+    return case["reference"], tuple(
+        KnownRay(
+            float.fromhex(x), float.fromhex(theta), float("nan") if out is None else float.fromhex(out), hits or 0,
+            condition, clearance, {float.fromhex(other): number for other, number in others},
+        )
+        for x, theta, out, hits, condition, clearance, others in case["rays"]
+    )  # fmt: skip
+
+
+def compare_rays(name: str, wall: geo.Wall) -> ExtremeRow:
+    """Trace the rays of a case and compare each with what is known of it."""
+    reference, rays = known_rays(name)
+    traced = geo.trace(wall, [ray.x for ray in rays], [ray.theta for ray in rays])
+    errors = [
+        ray.error(float(theta), int(hits))
+        for ray, theta, hits, gone in zip(rays, traced.theta, traced.collisions, traced.escaped, strict=True)
+        if gone
+    ]
+    worst = max((error for error, _ in errors), default=0.0)
+    flags = [ray.clearance for ray, gone in zip(rays, traced.escaped, strict=True) if not gone]
+    right = flags.count(IN_ANGLE)
+    notes = [f"{sum(moved for _, moved in errors)} beside a jump"] if any(moved for _, moved in errors) else []
+    undecided = sum(ray.is_open for ray in rays)
+    notes += [f"{undecided} whose way out is decided by less than an ulp of them"] if undecided else []
+    notes += [f"{right} flagged rightly: half an ulp of the angle meets a corner"] if right else []
+    notes += [f"{flags.count(flag)} flagged: {reason}" for flag, reason in REASONS.items() if flag in flags]
+    return ExtremeRow(
+        name, reference, float(worst), UNITS, UNIT, counts=traced.counts(), flagged_rightly=right,
+        note="; ".join(notes),
+    )  # fmt: skip

@@ -1,0 +1,116 @@
+"""The stability report: every extreme case in a process that can be ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+from ...core.errors import AsperityError, InputError
+from ..running.processes import ChildCrashed, ChildProcess, OutOfTime
+from .row import ExtremeRow
+
+# Disks and collisions a case, bins of the largest matrix, and the limit of a case.
+QUICK_SIZE, QUICK_BINS, QUICK_SECONDS = 100, 2_000, 40.0
+SIZE, MOST_BINS, SECONDS = 1_000, 10_000, 180.0
+
+
+@dataclass(frozen=True)
+class ExtremeReport:
+    """The rows of the stability report.
+
+    Attributes
+    ----------
+    rows : tuple of ExtremeRow
+    """
+
+    rows: tuple[ExtremeRow, ...]
+
+    def table(self) -> str:
+        """A Markdown table and the number of cases by verdict."""
+        heads = ["case", "reference", "error", "may be", "unit", "share that escaped", "seconds", "verdict", ""]
+        lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
+        for row in self.rows:
+            total = sum(row.counts.values())
+            flagged = ", ".join(
+                f"{number} {status}" for status, number in row.counts.items() if status != "escaped" and number
+            )
+            escaped = (
+                "-" if not total else f"{row.counts['escaped'] / total:.4g}" + (f" ({flagged})" if flagged else "")
+            )
+            error, allowed = (f"{row.error:.2g}", f"{row.allowed:.2g}") if not row.ended else ("-", "-")
+            lines.append(
+                f"| {row.case} | {row.reference} | {error} | {allowed} | {row.unit} | {escaped} | {row.seconds:.2g} "
+                f"| {row.verdict} | {row.note} |"
+            )
+        verdicts = [row.verdict for row in self.rows]
+        numbers = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in dict.fromkeys(verdicts))
+        return "\n".join([*lines, "", f"{len(self.rows)} cases: {numbers}."])
+
+
+def case_names(quick: bool) -> tuple[str, ...]:
+    """Names of all cases."""
+    return tuple(_cases(quick))
+
+
+def run_case(name: str, quick: bool) -> ExtremeRow:
+    """One case in this process, without a limit; a refusal is a row."""
+    if name not in _cases(quick):
+        raise InputError(f"case: expected one of {', '.join(_cases(quick))}, got {name!r}")
+    start = time.perf_counter()
+    try:
+        row = _cases(quick)[name]()
+    except (AsperityError, MemoryError) as reason:
+        row = ExtremeRow(name, "-", ended="refused", note=" ".join(f"{type(reason).__name__}: {reason}".split()))
+    return replace(row, seconds=time.perf_counter() - start, counts=dict(row.counts))
+
+
+def run_extremes(
+    quick: bool = False, names: Sequence[str] | None = None, seconds: float | None = None
+) -> ExtremeReport:
+    """Every case, or those named, each within its limit."""
+    limit = seconds if seconds is not None else QUICK_SECONDS if quick else SECONDS
+    rows = []
+    with ChildProcess(_load) as child:
+        for name in case_names(quick) if names is None else names:
+            try:
+                rows.append(child.call(run_case, name, quick, seconds=limit))
+            except OutOfTime:
+                note = f"ended after {limit:g} s"
+                rows.append(ExtremeRow(name, "-", ended="timed out", note=note, seconds=limit))
+            except ChildCrashed as reason:
+                rows.append(ExtremeRow(name, "-", ended="failed", note=str(reason)))
+    return ExtremeReport(tuple(rows))
+
+
+@cache
+def _cases(quick: bool) -> dict[str, Callable[[], ExtremeRow]]:
+    from .disks import disk_cases
+    from .laws import law_cases
+    from .rays import ray_cases
+
+    size = QUICK_SIZE if quick else SIZE
+    return {**ray_cases(), **disk_cases(size), **law_cases(size, QUICK_BINS if quick else MOST_BINS)}
+
+
+def _load() -> None:
+    """What is loaded, and on a new machine compiled, before the first case: the loops for every kind of wall."""
+    import numpy as np
+
+    from ... import geometry as geo
+    from ...geometry.tracing.refinement import refined_trace
+    from ..quantities.collision import DISK
+    from .disks import WALL
+    from .walls import extreme_walls
+
+    seen = set()
+    for name, build in extreme_walls().items():
+        # of the Koch curves the one in small has the same kinds of tables
+        wall = geo.koch(4) if "Koch" in name else build()
+        kind = (*wall.scene.primitives, wall.scene.is_open, wall.scene.pairs is None, wall.scene.grid is None)
+        if kind not in seen:
+            seen.add(kind)
+            geo.trace(wall, [0.45, 0.55], [1.0, 2.0])
+            refined_trace(wall.scene, np.array([0.5]), np.array([1.0]))
+    geo.collide(DISK, WALL, 0.1, [[0.0, 0.0]], [[0.1, -1.0, 0.1]])

@@ -1,0 +1,1 @@
+"""The quantities and walls of the standard set."""

@@ -1,0 +1,126 @@
+"""The collision of a disk: <v1, K v1>/<v1, v1> in the limit of small scale, and of the true disk."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ... import geometry as geo
+from ...core.checks import Floats
+from ...core.estimates import Estimate
+from ...kernels import CollisionLaw, Legendre
+from ...spectral import WorkMethod
+from .methods import RANDOM_ORDER
+from .quantity import QUICK_RAYS, RAYS, Methods, Quantity
+from .walls import standard_names
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+
+DISK = geo.Disk(1.0, 0.5)
+# Means over Lambda^2 of sin(psi)^2 and cos(psi)^2.
+SINE_MEAN, COSINE_MEAN = 0.75, 0.25
+# True disks at every scale: their noise is about 0.002.
+TRUE_DISKS = 2**18
+# The rigid tracer has no Bezier curves.
+DISK_SCENES = tuple(name for name in standard_names() if name != "mixed")
+
+
+def velocity_share() -> tuple[float, float]:
+    """Factors a, b of v1 = a cos(theta) sin(psi) + b cos(psi) at speed 1."""
+    frame = np.asarray(DISK.frame)
+    return float(frame[0, 0]), float(frame[2, 0])
+
+
+def square_of_v1() -> float:
+    """<v1, v1> in Lambda^2."""
+    along, roll = velocity_share()
+    return along**2 * SINE_MEAN / 3.0 + roll**2 * COSINE_MEAN
+
+
+def correlation_of(moment: float) -> float:
+    r"""<v1, K v1>/<v1, v1> in Lambda^2 from <u, P~ u>/<u, u>.
+
+    v1 = a cos theta sin psi + b cos psi, and K keeps sin psi and turns the sign of cos psi.
+    """
+    along, roll = (share**2 for share in velocity_share())
+    return (along * SINE_MEAN / 3.0 * moment - roll * COSINE_MEAN) / square_of_v1()
+
+
+def sampled_velocities(number: int, rng: np.random.Generator) -> Floats:
+    """Outgoing velocities of speed 1 from Lambda^2, shape (number, 3)."""
+    cos_theta = 1.0 - 2.0 * rng.random(number)
+    # sin(psi)^2 d psi is the law of the polar angle of a uniform point on the three-dimensional sphere
+    gauss = rng.standard_normal((number, 4))
+    psi = np.arccos(gauss[:, 0] / np.linalg.norm(gauss, axis=1))
+    return np.asarray(DISK.from_angles(np.arccos(cos_theta), psi))
+
+
+def _collision_methods(wall: Wall) -> Methods:
+    by_tolerance = WorkMethod("auto", lambda n, rng: by_operator(wall, tolerance=1.0 / n, rng=rng), True)
+    by_nets = WorkMethod("QMC operator", lambda n, rng: by_operator(wall, method="qmc", samples=n, rng=rng), True)
+    by_sampling = WorkMethod("sampled velocities", lambda n, rng: by_velocities(wall, n, rng), True, RANDOM_ORDER)
+    by_means = WorkMethod("means over outgoing angles", lambda n: by_action(wall, n))
+    return [
+        (by_tolerance, (1e2, 1e6), (1e2, 1e4, 1e6, 1e8)),
+        (by_nets, QUICK_RAYS, RAYS),
+        (by_sampling, QUICK_RAYS, RAYS),
+        (by_means, (8, 16), (8, 16, 32, 64, 128)),
+    ]
+
+
+def by_operator(wall: Wall, **how: Any) -> Estimate:
+    """From the matrix of K on polynomials of degree below 2 in either angle, which hold v1."""
+    operator = CollisionLaw.from_wall(wall, DISK).operator(Legendre(2), Legendre(2, weight="sin2"), **how)
+    along, roll = velocity_share()
+    # v1 in the orthonormal product basis: only the mean over psi of sin(psi) is not a polynomial, so split by hand
+    moment = operator.theta_matrix.symmetric[1, 1]
+    psi = operator.flip[1, 1]
+    plane, turn = along**2 * SINE_MEAN / 3.0, roll**2 * COSINE_MEAN
+    error = plane / (plane + turn) * operator.theta_matrix.error.value
+    value = (plane * moment + turn * psi) / (plane + turn)
+    return Estimate(value, error, operator.theta_matrix.error.kind, operator.theta_matrix.method)
+
+
+def by_velocities(wall: Wall, number: int, rng: np.random.Generator) -> float:
+    """Sampled in the original coordinates: incoming velocities from Lambda^2, one collision each."""
+    incoming = -sampled_velocities(number, rng)
+    outgoing = CollisionLaw.from_wall(wall, DISK).sample(incoming, rng)
+    return float(np.mean(-incoming[:, 0] * outgoing[:, 0]) / square_of_v1())
+
+
+def by_action(wall: Wall, nodes: int) -> float:
+    """From K v1 at Gauss nodes in cos(theta) and Gauss-Chebyshev nodes in psi."""
+    along, roll = velocity_share()
+    cosines, weights = np.polynomial.legendre.leggauss(nodes)
+    theta = np.arccos(cosines)[:, None]
+    psi = np.pi * np.arange(1, 5) / 5.0
+    psi_weights = np.sin(psi) ** 2 / np.sum(np.sin(psi) ** 2)
+
+    def v1(angle: Any, roll_angle: Any) -> Floats:
+        return np.asarray(along * np.cos(angle) * np.sin(roll_angle) + roll * np.cos(roll_angle))
+
+    image = CollisionLaw.from_wall(wall, DISK).apply(v1, theta, psi)
+    total = np.sum(0.5 * weights[:, None] * psi_weights * v1(theta, psi) * image)
+    return float(total) / square_of_v1()
+
+
+def _disk_methods(wall: Wall) -> Methods:
+    scales = (10.0, 100.0, 1000.0)
+    method = WorkMethod("true disk, budget 1/eps", lambda inverse, rng: by_true_disks(wall, 1.0 / inverse, rng), True)
+    return [(method, scales, (*scales, 1e4, 1e5))]
+
+
+def by_true_disks(wall: Wall, scale: float, rng: np.random.Generator, number: int = TRUE_DISKS) -> float:
+    """<v1, K v1>/<v1, v1> of the disk with satellites above a wall whose period is this scale."""
+    incoming = -sampled_velocities(number, rng)
+    position = np.column_stack([scale * rng.random(number), 2.0 * np.pi * rng.random(number)])
+    # the incoming velocities follow sin(theta), as the flux through x2 = 0 does
+    hit = geo.collide(DISK, wall, scale / wall.period, position, incoming)
+    found = float(np.mean((-incoming[:, 0] * hit.velocity[:, 0])[hit.escaped]))
+    return found / square_of_v1()
+
+
+COLLISION = Quantity("collision", "<v1, K v1>/<v1, v1> of a uniform disk", _collision_methods, standard_names())
+TRUE_DISK = Quantity("disk", "that of the true disk at scale eps, against the limit", _disk_methods, DISK_SCENES)

@@ -1,0 +1,64 @@
+"""Quantities that can be read off the matrix of a law: the matrix itself, the first moment, the resistance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.checks import Floats
+from ...core.estimates import Estimate
+from ...kernels import Bins, KernelMatrix, Legendre
+from ...kernels.bases.momentum import MEAN_SINE, SINE_NORM, Directions
+from ...spectral import WorkMethod
+from .methods import RANDOM_ORDER, Route, declared_order, routes_for
+from .quantity import Methods, Quantity
+from .walls import standard_names
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+    from ...kernels import Basis
+
+LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS = Bins(32), Legendre(2), Directions()
+
+
+def _by_routes(basis: Basis, read: Callable[[KernelMatrix], Any], in_bins: bool = False) -> Callable[[Wall], Methods]:
+    """Methods for what can be read off a matrix."""
+
+    def method(wall: Wall, route: Route) -> WorkMethod:
+        # strata and nets do better than 3/4 where the integrand does not jump: declared for bins alone
+        order = declared_order(route, wall) if in_bins or route.order == RANDOM_ORDER else None
+        return WorkMethod(
+            route.name, lambda budget, *rng: read(route.matrix(wall, basis, budget, *rng)), route.is_random, order
+        )
+
+    return lambda wall: [(method(wall, route), route.quick, route.full) for route in routes_for(wall)]
+
+
+def moment_of(matrix: KernelMatrix) -> Estimate:
+    """<u, P u>/<u, u>, from the matrix in Legendre polynomials."""
+    return Estimate(float(matrix.symmetric[1, 1]), matrix.error.value, matrix.error.kind, matrix.method)
+
+
+def resistance_of(symmetric: Floats) -> float:
+    """(3/4) E[1 + cos(theta' - theta)] from the matrix in 1, cos and sin made orthonormal."""
+    sine = np.array([MEAN_SINE, 0.0, SINE_NORM])
+    return float(0.75 * (1.0 + symmetric[1, 1] / 3.0 + sine @ symmetric @ sine))
+
+
+def _resistance(matrix: KernelMatrix) -> Estimate:
+    # the coefficients of the matrix have this norm
+    size = 0.75 * float(np.hypot(1.0 / 3.0, MEAN_SINE**2 + SINE_NORM**2))
+    return Estimate(resistance_of(matrix.symmetric), size * matrix.error.value, matrix.error.kind, matrix.method)
+
+
+LAW = Quantity(
+    "law", "the matrix of the law in 32 bins", _by_routes(LAW_BASIS, lambda matrix: matrix, in_bins=True),
+    standard_names(),
+)  # fmt: skip
+MOMENT = Quantity("moment", "<u, P u>/<u, u>", _by_routes(MOMENT_BASIS, moment_of), standard_names())
+RESISTANCE = Quantity(
+    "resistance", "the mean resistance of a body with this wall", _by_routes(RESISTANCE_BASIS, _resistance),
+    ("triangular-teeth", "focusing-arc", "mixed"),
+)  # fmt: skip

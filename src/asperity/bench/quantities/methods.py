@@ -1,0 +1,128 @@
+"""The ways from a wall to the matrix of its law, each on its own and as the library chooses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...kernels import KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
+from ...kernels.discretisation.traced import row_matrix
+from ...kernels.matrices.matrix import frobenius_error
+from .quantity import QUICK_RAYS, RAYS
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+    from ...kernels import Basis
+
+MakeMatrix = Callable[..., KernelMatrix]
+# Sampled rays converge like the root of their number. Strata and scrambled nets in two dimensions gain the root of
+# their own side where the integrand jumps along curves, as indicators of bins and the laws of most walls do: 3/4.
+RANDOM_ORDER, JUMPING_ORDER = 0.5, 0.75
+# Where each piece of a wall is smaller than a stratum, rays of one stratum are as good as independent ones. A million
+# strata have a side of 1/1024: walls of more pieces than half of that do not see it made small.
+MANY_PIECES = 512
+
+
+@dataclass(frozen=True)
+class Route:
+    """One way to a matrix.
+
+    Attributes
+    ----------
+    name : str
+    matrix : callable
+        ``matrix(wall, basis, budget)`` or ``matrix(wall, basis, budget, rng)``.
+    budget : str
+        What the budget is.
+    quick, full : tuple of float
+        Budgets of the two sets.
+    is_random : bool
+    order : float or None
+        Declared order of the error for matrices in bins.
+    """
+
+    name: str
+    matrix: MakeMatrix
+    budget: str
+    quick: tuple[float, ...]
+    full: tuple[float, ...]
+    is_random: bool = False
+    order: float | None = None
+
+
+def routes_for(wall: Wall) -> tuple[Route, ...]:
+    """The routes that a wall allows, the library's own choice first."""
+    found = [AUTO]
+    if WallLaw(wall).closed_form is not None:
+        found.append(CLOSED_FORM)
+    if wall.is_polygonal and wall.closes:
+        found.append(BEAMS)
+    found += [ROWS, QMC, STRATIFIED, MONTE_CARLO]
+    return tuple(found)
+
+
+def declared_order(route: Route, wall: Wall) -> float | None:
+    """The order of a route for matrices in bins, at the numbers of rays of the ladders.
+
+    >>> from asperity.bench.quantities.walls import wall_of
+    >>> [declared_order(STRATIFIED, wall_of(name)) for name in ("cusps", "profile")]
+    [0.75, 0.5]
+    """
+    return RANDOM_ORDER if route.order == JUMPING_ORDER and len(wall.pieces) > MANY_PIECES else route.order
+
+
+def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelMatrix:
+    """From the formula for the wall's hollows."""
+    law = WallLaw(wall).closed_form
+    assert law is not None  # `routes_for` offers this route to no other wall
+    return discretise(law, basis)
+
+
+def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
+    """From at most so many beams a hollow, with a bound for the others."""
+    return discretise(PolygonLaw(wall, max_beams=int(budget)), basis, "exact")
+
+
+def adaptive_row_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
+    """By adaptive rows to the tolerance 1/budget, whatever the wall."""
+    symmetric, error, rays = row_matrix(wall, basis, 1.0 / budget)
+    how = frobenius_error(error, "estimate", f"adaptive rows, {rays} rays")
+    return KernelMatrix(symmetric, basis, how, method="adaptive rows")
+
+
+def qmc_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
+    """From so many rays of scrambled Sobol sequences."""
+    return discretise(WallLaw(wall), basis, "qmc", samples=int(budget), rng=rng)
+
+
+def stratified_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
+    """From one ray in every cell of a square grid over entry point and u."""
+    side = round(budget**0.5)
+    cell = np.arange(side)
+    x = (cell[:, None] + rng.random((side, side))) / side
+    u = -1.0 + 2.0 * (cell + rng.random((side, side))) / side
+    theta = np.arccos(-u).ravel()
+    return estimate(theta, WallLaw(wall).respond(x.ravel(), theta), basis)
+
+
+def monte_carlo_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
+    """From so many independent rays, traced even where a closed form could be sampled."""
+    theta = np.arccos(1.0 - 2.0 * rng.random(int(budget)))
+    return estimate(theta, WallLaw(wall).respond(rng.random(int(budget)), theta), basis)
+
+
+def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
+    """As the library chooses, to the tolerance 1/budget; it may sample, so every repeat has its own generator."""
+    return discretise(WallLaw(wall), basis, tolerance=1.0 / budget, rng=rng)
+
+
+AUTO = Route("auto", auto_matrix, "1/tolerance", (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
+CLOSED_FORM = Route("closed form", closed_form_matrix, "-", (1.0,), (1.0,))
+BEAMS = Route("beams", beam_matrix, "beams a hollow", (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
+ROWS = Route("adaptive rows", adaptive_row_matrix, "1/tolerance", (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
+QMC = Route("randomised QMC", qmc_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+STRATIFIED = Route("stratified", stratified_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+MONTE_CARLO = Route("Monte Carlo", monte_carlo_matrix, "rays", QUICK_RAYS, RAYS, True, RANDOM_ORDER)

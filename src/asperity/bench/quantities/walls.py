@@ -1,0 +1,161 @@
+"""The walls of the standard set, and random walls that are not in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from math import pi
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...core.checks import Floats
+from ...core.errors import InputError
+
+if TYPE_CHECKING:
+    from ...geometry import Curve, Wall
+
+Point = tuple[float, float]
+
+METRES_PER_DEGREE = 111_200.0
+TRANSECT_ROW, EXAGGERATION = 170, 3.0
+RANDOM_WALLS = 20
+# A wall is its generator's first attempt that is a wall; more than a few are never needed.
+ATTEMPTS = 1000
+
+
+@dataclass(frozen=True)
+class BenchScene:
+    """A wall with its name; ``build`` makes the wall."""
+
+    name: str
+    summary: str
+    build: Callable[[], Wall]
+
+
+def terrain_profile() -> tuple[Floats, Floats]:
+    """Distance along one row of the elevation model that matplotlib ships, and height there, both in metres.
+
+    The model is of the Jacksboro fault, from the U.S. Geological Survey's National Elevation Dataset.
+    """
+    from matplotlib import cbook
+
+    with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as model:
+        height = np.asarray(model["elevation"], dtype=np.float64)[TRANSECT_ROW]
+        spacing = METRES_PER_DEGREE * float(model["dx"]) * np.cos(np.radians(float(model["ymin"])))
+    return spacing * np.arange(len(height)), height
+
+
+def _measured() -> Wall:
+    from ...geometry import Wall
+
+    x, height = terrain_profile()
+    return Wall.from_profile(x, EXAGGERATION * height, seam="mirror")
+
+
+def _mixed() -> Wall:
+    from ...geometry import Arc, Bezier, Segment, Wall
+
+    teeth = [Segment((0.0, 0.0), (0.2, -0.3)), Segment((0.2, -0.3), (0.35, 0.0)), Segment((0.35, 0.0), (0.45, 0.0))]
+    curves = [
+        Arc((0.6, 0.0), 0.15, pi, 2.0 * pi),
+        Bezier([(0.75, 0.0), (0.8, -0.4), (0.95, -0.4), (1.0, 0.0)]),
+    ]
+    return Wall([*teeth, *curves], period=1.0)
+
+
+def _named(name: str, *parameters: float) -> Callable[[], Wall]:
+    def build() -> Wall:
+        from ... import geometry
+
+        wall: Wall = getattr(geometry, name)(*parameters)
+        return wall
+
+    return build
+
+
+_STANDARD = (
+    BenchScene("triangular-teeth", "isosceles teeth of apex angle 0.7", _named("triangular_teeth", 0.7)),
+    BenchScene("rectangular-teeth", "crevices twice as deep as wide", _named("rectangular_teeth", 2.0)),
+    BenchScene("focusing-arc", "circular arcs of half angle 1.2", _named("focusing_arcs", 1.2)),
+    BenchScene("cusps", "dispersing bumps that meet in a cusp", _named("dispersing_arcs", 2.0)),
+    BenchScene("mushroom", "mushrooms with a stem of 0.3 of the cap", _named("mushrooms", 0.3, 0.5)),
+    BenchScene("koch", "the Koch curve after four steps, 256 lines", _named("koch", 4)),
+    BenchScene("profile", "a terrain transect of 403 heights, mirrored, heights times 3", _measured),
+    BenchScene("mixed", "a tooth, a flat top, a semicircle and a cubic in one period", _mixed),
+)
+
+
+def _random(number: int) -> Callable[[], Wall]:
+    return lambda: random_wall(number)
+
+
+def random_wall(number: int) -> Wall:
+    """Random wall ``number``: the first attempt of its own generator that is a wall.
+
+    The generator is ``numpy.random.default_rng([8, number])``. One to four joints have places uniform in (0.1, 0.9) and
+    depths uniform in (0.05, 0.8). Walls of even number are polygons; in the others every piece is, with equal
+    probability, a segment, a circular arc whose height over its chord is 0.05 to 0.3 chords, to either side, or a cubic
+    whose inner control points are off the chord by up to 0.35 chords. Every third has a flat top of a quarter.
+    """
+    from ...geometry import Segment, Wall
+
+    rng = np.random.default_rng([8, number])
+    for _ in range(ATTEMPTS):
+        inner = np.sort(rng.uniform(0.1, 0.9, int(rng.integers(1, 5))))
+        joints = [(0.0, 0.0), *((float(x), -float(rng.uniform(0.05, 0.8))) for x in inner), (1.0, 0.0)]
+        try:
+            pieces = [_piece(start, end, number % 2 == 1, rng) for start, end in pairwise(joints)]
+            if number % 3 == 0:
+                pieces.append(Segment((1.0, 0.0), (1.25, 0.0)))
+            return Wall(pieces, period=1.25 if number % 3 == 0 else 1.0)
+        except InputError:
+            continue
+    raise InputError(f"number: no wall after {ATTEMPTS} attempts for {number!r}; choose another")
+
+
+def _piece(start: Point, end: Point, curved: bool, rng: np.random.Generator) -> Curve:
+    from ...geometry import Arc, Bezier, Segment
+
+    kind = int(rng.integers(0, 3)) if curved else 0
+    if kind == 0:
+        return Segment(start, end)
+    first, last = np.array(start), np.array(end)
+    along = last - first
+    chord = float(np.hypot(*along))
+    normal = np.array([along[1], -along[0]])
+    if kind == 1:
+        side = float(rng.choice([-1.0, 1.0]))
+        height = float(rng.uniform(0.05, 0.3)) * chord
+        radius = (0.25 * chord**2 + height**2) / (2.0 * height)
+        center = 0.5 * (first + last) + side * (height - radius) / chord * normal
+        begin, finish = (float(np.arctan2(*(point - center)[::-1])) for point in (first, last))
+        if side * (finish - begin) < 0.0:
+            finish += side * 2.0 * pi
+        return Arc(tuple(center), radius, begin, finish).pinned(start, end)
+    bends = rng.uniform(-0.35, 0.35, 2)
+    control = [tuple(first + (k + 1) / 3 * along + bends[k] * normal) for k in range(2)]
+    return Bezier([start, *control, end])
+
+
+@cache
+def scenes() -> Mapping[str, BenchScene]:
+    """The standard set and the random walls, by name."""
+    random = (BenchScene(f"random-{k}", "a random wall", _random(k)) for k in range(RANDOM_WALLS))
+    return MappingProxyType({scene.name: scene for scene in (*_STANDARD, *random)})
+
+
+def standard_names() -> tuple[str, ...]:
+    """Names of the scenes of the standard set."""
+    return tuple(scene.name for scene in _STANDARD)
+
+
+@cache
+def wall_of(name: str) -> Wall:
+    """The wall of a scene, made once a process."""
+    if name not in scenes():
+        raise InputError(f"scene: expected one of {', '.join(scenes())}, got {name!r}")
+    return scenes()[name].build()

@@ -1,0 +1,175 @@
+"""One run of the benchmark: reports of problems, extreme cases and savings, their files and pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..core.errors import FileExistsRefusal, InputError
+from ..spectral import WorkReport, WorkRow
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMAT = 1
+SUMMARY, TABLES, DATA = "summary.md", "tables.md", "bench.json"
+# The library's choice is called good within this factor of the best method's time at equal error.
+GOOD_CHOICE = 2.0
+COLUMNS, WIDTH, HEIGHT = 3, 4.6, 3.8
+
+
+@dataclass(frozen=True)
+class BenchRun:
+    """Reports on problems, in the order in which they were run.
+
+    Attributes
+    ----------
+    reports : tuple of WorkReport
+    """
+
+    reports: tuple[WorkReport, ...]
+
+    def summary(self) -> str:
+        """One line a problem: what the library chose, how far it got, how far its time is from the best."""
+        lines = [
+            "| problem | chosen | error | reported | seconds | times the best at equal error | at equal known error "
+            "| front |",
+            "|---|---|---|---|---|---|---|---|",
+        ]
+        lines += [_line(report) for report in self.reports]
+        lines += ["", *self._choices(), ""]
+        agree, differ, unsure = self.orders()
+        lines.append(
+            f"Declared orders: {len(agree)} agree within 0.15, {len(differ)} differ, {len(unsure)} are not resolved "
+            "(their 95 % interval holds the declared one, but is wide)."
+        )
+        lines += ["", *(f"- differs: {line}" for line in differ), ""] if differ else [""]
+        if self.reports:
+            lines.append(f"Machine: {self.reports[0].machine}.")
+        return "\n".join(lines)
+
+    def _choices(self) -> list[str]:
+        """How good the library's choices are, in words, and which are not."""
+        choosing = [report for report in self.reports if report.auto in report.methods]
+        done = [report for report in choosing if any(row.is_done for row in _chosen(report))]
+        choices = [(report.problem, choice) for report in done if (choice := report.choice()) is not None]
+        good = sum(choice <= GOOD_CHOICE for _, choice in choices)
+        known = [choice for report in done if (choice := report.choice(known=True)) is not None]
+        lines = [
+            f"The library chooses in {len(choosing)} problems. It is within a factor {GOOD_CHOICE:g} of the best on "
+            f"{good} of the {len(choices)} where another method gets as far; on {len(done) - len(choices)} none does; "
+            f"on {len(choosing) - len(done)} it was not done in time. Where errors count as far as they are known, it "
+            f"is within that factor on {sum(choice <= GOOD_CHOICE for choice in known)} of {len(known)}."
+        ]
+        slow = [f"- {problem}: {choice:.2g} times the best" for problem, choice in choices if choice > GOOD_CHOICE]
+        return [*lines, "", *slow] if slow else lines
+
+    def references(self) -> str:
+        """What every problem is measured against, and how well that is known, as a table."""
+        lines = ["| problem | reference | known to |", "|---|---|---|"]
+        for report in self.reports:
+            for source, floor in dict.fromkeys((facts.reference, facts.floor) for facts in report.methods.values()):
+                lines.append(f"| {report.problem} | {source} | {floor:.1e} |")
+        return "\n".join(lines)
+
+    def orders(self) -> tuple[list[str], list[str], list[str]]:
+        """Declared orders that the fits agree with, that they contradict, and that they do not resolve."""
+        groups: tuple[list[str], list[str], list[str]] = ([], [], [])
+        for report in self.reports:
+            for name, facts in report.methods.items():
+                fitted = report.order(name)
+                if facts.declared_order is None or fitted is None:
+                    continue
+                verdict = fitted.verdict(facts.declared_order)
+                line = f"{report.problem}, {name}: {fitted}, declared {facts.declared_order:g}"
+                groups[("agrees", "differs", "not resolved").index(verdict)].append(line)
+        return groups
+
+    def tables(self) -> str:
+        """All rows of all problems."""
+        return "\n\n".join(f"## {report.problem}\n\n{report.table()}" for report in self.reports)
+
+    def save(self, folder: Path) -> list[Path]:
+        """Write summary, tables, data, and a picture a scene; returns what was written."""
+        written = [folder / SUMMARY, folder / TABLES, folder / DATA]
+        for path, text in zip(written, (self.summary(), self.tables(), self.to_json()), strict=True):
+            path.write_text(text + "\n", encoding="utf-8")
+        for scene, reports in self.by_scene().items():
+            drawn = [report for report in reports if any(row.is_done for row in report.rows)]
+            if drawn:
+                written.append(folder / f"{scene}.png")
+                draw_scene(drawn).savefig(written[-1], dpi=100)
+        return written
+
+    def by_scene(self) -> dict[str, list[WorkReport]]:
+        """The reports of every scene."""
+        found: dict[str, list[WorkReport]] = {}
+        for report in self.reports:
+            found.setdefault(report.problem.split("/")[0], []).append(report)
+        return found
+
+    def to_json(self) -> str:
+        """All reports."""
+        data = {"format": FORMAT, "reports": [json.loads(report.to_json()) for report in self.reports]}
+        return json.dumps(data, indent=1, allow_nan=False)
+
+    @classmethod
+    def of_json(cls, text: str) -> BenchRun:
+        """The run that `to_json` gave; an InputError for any other text."""
+        try:
+            data = json.loads(text)
+            return cls(tuple(WorkReport.of_json(json.dumps(report)) for report in data["reports"]))
+        except (ValueError, KeyError, TypeError) as reason:
+            raise InputError(f"JSON: expected what BenchRun.to_json() gives: {reason!r}") from reason
+
+
+def fresh_folder(folder: Path, force: bool) -> None:
+    """Make the folder; with ``force`` remove the rows of an earlier run, so that all are measured again."""
+    if folder.exists() and not folder.is_dir():
+        raise FileExistsRefusal(f"--out: {folder} is a file; name a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    if force:
+        for path in folder.glob("*.json"):
+            path.unlink()
+
+
+def _chosen(report: WorkReport) -> list[WorkRow]:
+    """The rows of the method in which the library chooses."""
+    return [row for row in report.rows if row.method == report.auto]
+
+
+def _line(report: WorkReport) -> str:
+    rows = [row for row in _chosen(report) if row.is_done]
+    front = ", ".join(dict.fromkeys(row.method for row in report.front()))
+    if not rows:
+        states = ", ".join(dict.fromkeys(row.status for row in _chosen(report)))
+        words = states or ("not run" if report.auto in report.methods else "nothing to choose")
+        return f"| {report.problem} | {words} | - | - | - | - | - | {front} |"
+    best = min(rows, key=report.error)
+    reported = "-" if best.reported is None else f"{best.reported:.1e}"
+    ratios = [report.choice(), report.choice(known=True)]
+    true, known = ("-" if ratio is None else f"{ratio:.2g}" for ratio in ratios)
+    return (
+        f"| {report.problem} | {best.note} | {report.error(best):.1e} | {reported} | {best.least:.2g} "
+        f"| {true} | {known} | {front} |"
+    )
+
+
+def draw_scene(reports: Sequence[WorkReport]) -> Figure:
+    """One panel a report, in rows of three."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    columns = min(COLUMNS, len(reports))
+    rows = -(-len(reports) // columns)
+    figure = Figure(figsize=(WIDTH * columns, HEIGHT * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel, report in zip(panels, reports, strict=False):
+        report.plot(panel)
+    for panel in panels[len(reports) :]:
+        panel.remove()
+    return figure

@@ -1,0 +1,1 @@
+"""How measurements run: processes that can be ended, timing, stored references."""

@@ -1,0 +1,275 @@
+"""What each scene of the standard set leaves out, and what that saves: timed with it, and with it switched off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..core.checks import Floats
+from ..geometry import Trace, trace
+from ..geometry.scene.ablations import without_formulas, without_grid, without_pairs, without_runs
+from ..geometry.scene.scene import Scene, scene_in_one
+from ..kernels import KernelMatrix, Legendre, PolygonLaw, WallLaw, discretise
+from ..kernels.discretisation.traced import row_matrix
+from .quantities.walls import standard_names, wall_of
+from .running.timing import SideBySide, side_by_side
+
+if TYPE_CHECKING:
+    from ..geometry import Wall
+
+# Rays enough that a tenth of their time is well above the noise, and turns for the spread.
+RAYS, REPEATS, QUICK_REPEATS = 2**18, 7, 3
+SEED = 9
+# Rays differ by rounding where a run of hits is taken in one step.
+ROUNDED = 1e-9
+# Adaptive rows are compared on walls of so few pieces, to these tolerances.
+ROW_PIECES, ROW_TOLERANCES = 3, (1e-2, 3e-3, 1e-3)
+BASIS = Legendre(2)
+# Beams a hollow, where the hollows of one shape are resolved once.
+BEAMS = 1000
+
+
+@dataclass(frozen=True)
+class Saving:
+    """One thing that a scene leaves out.
+
+    Attributes
+    ----------
+    scene, what : str
+    seconds, seconds_without : float
+        Least times with it left out and with it computed.
+    low, high : float
+        Least and greatest ratio of the two in one turn; for rows of half of the angles, at one tolerance.
+    difference : float
+        Largest difference of the results, or that in units of their errors where they have some.
+    is_same : bool
+        Whether the results are the same: to rounding, or within their errors, five of those from samples.
+    unit : str
+        Of the times: seconds, or rays, which have no noise.
+    """
+
+    scene: str
+    what: str
+    seconds: float
+    seconds_without: float
+    low: float
+    high: float
+    difference: float
+    is_same: bool
+    unit: str = "s"
+
+    @property
+    def factor(self) -> float:
+        """How many times as long it takes without."""
+        return self.seconds_without / self.seconds
+
+    def row(self) -> str:
+        """A line of the table; a factor that is not beyond its noise says so."""
+        same = f"{'yes' if self.is_same else 'NO'} ({self.difference:.1g})"
+        times = f"{self.factor:.2g} ({self.low:.2g} to {self.high:.2g})"
+        if self.low <= 1.0 <= self.high:
+            times += ", noise"
+        with_it, without = (f"{time:.2g} {self.unit}" for time in (self.seconds, self.seconds_without))
+        return f"| {self.scene} | {self.what} | {with_it} | {without} | {times} | {same} |"
+
+
+class WithoutMirror:
+    """A wall that does not know of its mirror axis."""
+
+    is_mirror_symmetric = False
+
+    def __init__(self, wall: Wall) -> None:
+        self._wall = wall
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._wall, name)
+
+
+class SceneWithout:
+    """A wall whose rays are traced with other tables; it has what `trace` asks of a wall."""
+
+    def __init__(self, wall: Wall, scene: Scene) -> None:
+        self.period, self.origin, self.scene = wall.period, wall.origin, scene
+
+
+def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Saving]:
+    """Everything that one scene leaves out and that can be switched off."""
+    wall = wall_of(name)
+    plan, scene = wall.plan(), wall.scene
+    followed = without_formulas(scene)
+    found = []
+
+    def traced(what: str, with_it: Scene, without: Scene) -> None:
+        found.append(_traced(name, what, wall, (with_it, without), rays, repeats))
+
+    if plan.closed_forms:
+        traced(f"flights in {plan.closed_forms} hollows of two lines or one arc", scene, followed)
+    if plan.channels or plan.wedges:
+        traced(f"runs between {plan.channels} channels and {plan.wedges} wedges", followed, without_pairs(followed))
+    if plan.arcs_with_runs:
+        traced(f"runs on {plan.arcs_with_runs} arcs", followed, without_runs(followed))
+    if plan.hollows_with_grid:
+        what = f"pieces off the way, by a grid in {plan.hollows_with_grid} hollows"
+        traced(what, followed, without_grid(followed))
+    if plan.pieces_left_out or plan.hollows > 1:
+        what = f"{plan.pieces_left_out} flat tops and {plan.hollows - 1} other hollows"
+        traced(what, followed, without_formulas(scene_in_one(wall)))
+    if plan.distinct_hollows < plan.hollows and wall.is_polygonal:
+        found.append(_alike(name, wall, repeats))
+    if WallLaw(wall).exact_law is not None or WallLaw(wall).closed_form is not None:
+        found.append(_tracing(name, wall, rays, repeats))
+    if plan.mirror_symmetric and len(wall.pieces) <= ROW_PIECES:
+        found.append(_half(name, wall))
+    return found
+
+
+def _traced(name: str, what: str, wall: Wall, scenes: tuple[Scene, Scene], rays: int, repeats: int) -> Saving:
+    rng = np.random.default_rng(SEED)
+    # rays that enter a hollow: those on flat tops are never traced
+    hollow = scene_hollows(wall)[rng.integers(len(wall.hollows), size=rays)]
+    x = hollow[:, 0] + (hollow[:, 1] - hollow[:, 0]) * rng.random(rays)
+    theta = np.arccos(1.0 - 2.0 * rng.random(rays))
+
+    def job(scene: Scene) -> Callable[[], Trace]:
+        other = SceneWithout(wall, scene)
+        return lambda: trace(other, x, theta, threads=1)  # type: ignore[arg-type]
+
+    times = side_by_side(job(scenes[0]), job(scenes[1]), repeats)
+    difference = largest_difference(times.first, times.second)
+    return _saving(name, what, times, difference, difference <= ROUNDED)
+
+
+def _saving(name: str, what: str, times: SideBySide[Any, Any], difference: float, is_same: bool) -> Saving:
+    seconds = times.first_seconds, times.second_seconds
+    return Saving(name, what, *seconds, times.low, times.high, difference, is_same)
+
+
+def scene_hollows(wall: Wall) -> Floats:
+    """Ends of the openings, shape (hollows, 2)."""
+    return np.array([(hollow.left, hollow.right) for hollow in wall.hollows])
+
+
+def largest_difference(first: Trace, second: Trace) -> float:
+    """Of the outgoing angles of the rays that escaped with the same number of hits in both, but for one in a thousand.
+
+    Infinite where more rays than that part ways: at a corner rounding decides.
+    """
+    gone = first.escaped & second.escaped
+    error = np.sort(np.abs(first.theta - second.theta)[gone])
+    most = len(error) - 1 - len(error) // 1000
+    return float(error[most]) if gone.mean() > 0.999 else float("inf")
+
+
+def _alike(name: str, wall: Wall, repeats: int) -> Saving:
+    """Beams of every hollow, against those of the different ones alone."""
+    plan = wall.plan()
+    parts = [_alone(wall, number) for number in range(len(wall.hollows))]
+
+    def together() -> tuple[Floats, float]:
+        matrix = _by_beams(wall)
+        return matrix.symmetric, matrix.error.value
+
+    def one_by_one() -> tuple[Floats, float]:
+        shares = [part.period / wall.period for part in parts]
+        laws = [_by_beams(part) for part in parts]
+        level = (1.0 - sum(shares)) * np.diag([1.0, -1.0])
+        total = sum((share * law.symmetric for share, law in zip(shares, laws, strict=True)), level)
+        return total, sum(share * law.error.value for share, law in zip(shares, laws, strict=True))
+
+    times = side_by_side(together, one_by_one, repeats)
+    distance = float(np.linalg.norm(times.first[0] - times.second[0]))
+    score = distance / (times.first[1] + times.second[1])
+    what = f"{plan.hollows - plan.distinct_hollows} hollows that are like others ({BEAMS} beams each)"
+    return _saving(name, what, times, score, score <= 1.0)
+
+
+def _by_beams(wall: Wall) -> KernelMatrix:
+    return discretise(PolygonLaw(wall, max_beams=BEAMS), BASIS, "exact")
+
+
+def _alone(wall: Wall, number: int) -> Wall:
+    """One hollow of a polygonal wall as a wall whose period is its opening."""
+    from ..geometry import Wall
+
+    hollow = wall.hollows[number]
+    corners = wall.vertices[hollow.first : hollow.last + 1] - [hollow.left, 0.0]
+    corners[[0, -1]] = (0.0, 0.0), (hollow.width, 0.0)
+    return Wall.from_vertices(corners)
+
+
+def _tracing(name: str, wall: Wall, rays: int, repeats: int) -> Saving:
+    """The law's matrix from rays, and the same without tracing to the error that these rays leave."""
+    sampled = _by_rays(wall, rays)
+    tolerance = sampled.error.value
+    # a law remembers what it has computed, so each run has its own
+    times = side_by_side(
+        lambda: discretise(WallLaw(wall), BASIS, tolerance=tolerance), lambda: _by_rays(wall, rays), repeats
+    )
+    distance = float(np.linalg.norm(times.first.symmetric - times.second.symmetric))
+    score = distance / (times.first.error.value + times.second.error.value)
+    what = f"tracing altogether, for an error of {tolerance:.0e} ({rays} rays)"
+    return _saving(name, what, times, score, score <= 5.0)
+
+
+def _by_rays(wall: Wall, rays: int) -> KernelMatrix:
+    return discretise(WallLaw(wall), BASIS, "qmc", samples=rays, rng=np.random.default_rng(SEED))
+
+
+def _half(name: str, wall: Wall) -> Saving:
+    """Adaptive rows of half of the angles, against those of all, at equal error.
+
+    Both stop at errors of their own below the tolerance. So times are compared at the errors of the halved rows, those
+    of the others interpolated between their tolerances in the logarithms.
+    """
+    halved, whole = ([_rows(one, tolerance) for tolerance in ROW_TOLERANCES] for one in (wall, WithoutMirror(wall)))
+    errors, rays = (np.array([row[k] for row in whole], dtype=np.float64) for k in (1, 2))
+    log_error, log_time = (np.log(part) for part in (errors, rays))
+    slope, shift = np.polyfit(log_error, log_time, 1)
+    others = [float(np.exp(slope * np.log(row[1]) + shift)) for row in halved]
+    ratios = [other / row[2] for other, row in zip(others, halved, strict=True)]
+    scores = [
+        float(np.linalg.norm(row[0] - other[0])) / (row[1] + other[1]) for row, other in zip(halved, whole, strict=True)
+    ]
+    seconds = halved[-1][2], others[-1]
+    what = "half of the angles, by symmetry (rows, at equal error)"
+    return Saving(name, what, *seconds, min(ratios), max(ratios), max(scores), max(scores) <= 1.0, "rays")
+
+
+def _rows(wall: Wall | WithoutMirror, tolerance: float) -> tuple[Floats, float, float]:
+    """Matrix, error and rays of adaptive rows: their time is that of their rays, without its noise."""
+    symmetric, error, rays = row_matrix(wall, BASIS, tolerance)  # type: ignore[arg-type]
+    return symmetric, error, float(rays)
+
+
+def savings_table(quick: bool = False) -> str:
+    """All scenes: their plans in words, and a line for everything that can be switched off."""
+    lines = ["| scene | leaves out | time | without that | times | same result |", "|---|---|---|---|---|---|"]
+    for name in standard_names():
+        lines += [one.row() for one in savings_of(name, repeats=QUICK_REPEATS if quick else REPEATS)]
+    lines += ["", "| scene | what the tracer does |", "|---|---|"]
+    return "\n".join([*lines, *(f"| {name} | {plan_words(wall_of(name))} |" for name in standard_names())])
+
+
+def plan_words(wall: Wall) -> str:
+    """The plan of a wall in words, without what it has none of."""
+    plan = wall.plan()
+    words = [
+        f"{plan.pieces_traced} pieces ({', '.join(plan.primitives)}) in {plan.hollows} hollow{'s' * (plan.hollows > 1)}"
+    ]
+    if plan.hollows > plan.distinct_hollows:
+        words[0] += f", {plan.distinct_hollows} of them different"
+    if plan.pieces_left_out:
+        words.append(f"{plan.pieces_left_out} flat tops of {plan.flat_share:.0%} of the period left out")
+    if plan.closed_forms:
+        words.append(f"{plan.closed_forms} of two lines or one arc, in closed form")
+    runs = {"arcs": plan.arcs_with_runs, "channels": plan.channels, "wedges": plan.wedges}
+    if any(runs.values()):
+        words.append("runs of hits on " + ", ".join(f"{number} {what}" for what, number in runs.items() if number))
+    if plan.hollows_with_grid:
+        words.append(f"{plan.hollows_with_grid} grids")
+    if plan.mirror_symmetric:
+        words.append("mirror-symmetric: half of the angles give the other half")
+    return "; ".join(words)

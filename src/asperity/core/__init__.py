@@ -1,0 +1,1 @@
+"""The ground floor: checks, errors, estimates, rounding and the version."""

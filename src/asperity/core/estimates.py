@@ -1,0 +1,111 @@
+"""A number together with its error: where the error comes from and how big it is."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+ErrorKind = Literal["bound", "estimate"]
+
+# The share of intervals of estimated width that hold the true value.
+LEVEL = 0.95
+# Of how many standard deviations such an interval of a normal variable has on each side.
+NORMAL_95 = 1.959963984540054
+# A number without error is printed to this many decimals.
+DECIMALS = 12
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A quantity that carries its error.
+
+    Parameters
+    ----------
+    value : float
+        The quantity.
+    error : float
+        Half width of the interval around ``value``; ``inf`` where nothing is known.
+    kind : {"bound", "estimate"}
+        ``"bound"``: the true value is within ``error``, to rounding. ``"estimate"``: ``error`` is the half width of an
+        interval that holds the true value in 95 of 100 cases. Where sampling is the only error it does so in 95 % of
+        repetitions; where it comes from two resolutions, in at least 95 % of problems.
+    method : str
+        How value and error were found, in words.
+
+    Notes
+    -----
+    Where a quantity has errors from several sources their half widths are added as they are. That is right if they are
+    not independent, and on the safe side if they are: the sum of a bound and a half width of 95 % is one of 95 %, that
+    of two half widths one of 95 % or more for errors of normal distribution.
+
+    Examples
+    --------
+    >>> gap = Estimate(0.25, 0.0, "bound", "closed form")
+    >>> float(gap)
+    0.25
+    >>> print(gap)
+    0.25 +- 0 (bound: closed form)
+    """
+
+    value: float
+    error: float
+    kind: ErrorKind
+    method: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "value", float(self.value))
+        object.__setattr__(self, "error", float(self.error))
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def __str__(self) -> str:
+        return f"{self.value:.10g} +- {self.error:.2g} ({self.kind}: {self.method})"
+
+
+def rounded(number: Estimate) -> str:
+    """Value and error to the digits that the error leaves.
+
+    Examples
+    --------
+    >>> from asperity.estimates import Estimate
+    >>> rounded(Estimate(0.63297743, 0.00022, "estimate", "")), rounded(Estimate(0.25, 0.0, "bound", ""))
+    ('0.63298 +- 0.00022', '0.25 +- 0')
+    """
+    if number.error == 0.0 or not math.isfinite(number.error):
+        return f"{number.value:.{DECIMALS}g} +- {number.error:g}"
+    decimals = min(max(1 - math.floor(math.log10(number.error)), 0), DECIMALS)
+    if decimals >= DECIMALS:
+        return f"{number.value:.{DECIMALS}f} +- {number.error:.2g}"
+    return f"{number.value:.{decimals}f} +- {number.error:.{decimals}f}"
+
+
+def student_95(parts: int) -> float:
+    """Of how many standard errors, from the spread of so many parts, an interval of 95 % has on each side.
+
+    Examples
+    --------
+    >>> round(student_95(8), 3), round(student_95(10**6), 3)
+    (2.365, 1.96)
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(parts - 1, 0.5 * (1.0 + LEVEL)))
+
+
+def estimate_as_dict(number: Estimate) -> dict[str, Any]:
+    """A number with its error as plain values; an unknown error is None."""
+    return {"value": number.value, "error": finite(number.error), "kind": number.kind, "method": number.method}
+
+
+def finite(value: Any) -> Any:
+    """JSON has no infinity: an unknown number is None."""
+    # not at the head: ``import asperity`` does without
+    import numpy as np
+
+    if value is None:
+        return None
+    if np.ndim(value):
+        return [finite(entry) for entry in value]
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,1 @@
+"""Entries of the ledger on the disk: model, frame, impact and collision."""

@@ -1,0 +1,117 @@
+"""Sections 2.2.1 and 2.3.1: the law of rectangular teeth, and of the foreshortened ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...geometry import rectangular_teeth, trace
+from ...geometry.disk.disk import foreshortening
+from ...kernels.walls.crevice import crevice_retro
+from ...kernels.walls.rectangular import RectangularTeethLaw
+from ...verification import Formula, Verdict, agreement, erratum, verify
+from ...verification.entry import Code
+from ..entry_probability import SHARE_ERROR, share
+
+HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
+
+
+def share_of_specular(height_to_width: float, theta: Any, low: float) -> Any:
+    """How many of the rays that enter between ``low`` and 1 leave specularly, by tracing."""
+
+    def is_specular(x: Any, theta: Any) -> Any:
+        out = trace(rectangular_teeth(height_to_width), x, theta).theta
+        return np.abs(out + theta - np.pi) < np.abs(out - theta)
+
+    return share(is_specular, theta, low)
+
+
+def compared_with_tracing(probability: Code, low: float) -> Verdict:
+    """The probability of specular reflection against its frequency, for several teeth."""
+    theta = np.linspace(0.15, 3.0, 40)
+    ratios = np.array(HEIGHTS_TO_WIDTHS)
+    found = [probability(ratio, theta) for ratio in ratios]
+    traced = [share_of_specular(ratio, theta, low) for ratio in ratios]
+    return agreement(found, traced, SHARE_ERROR, height_to_width=ratios[:, None], theta=theta)
+
+
+def crossings(height_to_width: float, theta: Any) -> Any:
+    """d = 2 r |cot theta|, whole and fractional part."""
+    return np.divmod(2 * height_to_width / np.abs(np.tan(theta)), 1.0)
+
+
+def exchanged_cases(height_to_width: float, theta: Any) -> Any:
+    """p_r as printed."""
+    whole, rest = crossings(height_to_width, theta)
+    return np.where(whole % 2 == 0, 0.5 + 0.5 * rest, 1.0 - 0.5 * rest)
+
+
+def exchanged_cases_of_the_crevice(height_to_width: float, theta: Any) -> Any:
+    """The conditional probability as printed."""
+    whole, rest = crossings(height_to_width, theta)
+    return np.where(whole % 2 == 0, rest, 1.0 - rest)
+
+
+@erratum(
+    id="S2.01",
+    section="2.2.1",
+    statement="Rectangular teeth: the probability of specular reflection, r the height over the width.",
+    printed=Formula(
+        r"p_r(\theta) = \begin{cases} \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
+        r" 1 - \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
+        exchanged_cases,
+    ),
+    corrected=Formula(
+        r"p_r(\theta) = \begin{cases} 1 - \frac12\{d\} & \lfloor d \rfloor \text{ even} \\"
+        r" \frac12 + \frac12\{d\} & \lfloor d \rfloor \text{ odd} \end{cases}, \quad d = 2r\,|\cot\theta|",
+        lambda ratio, theta: RectangularTeethLaw(ratio).branches(theta)[0][..., 0],
+    ),
+    reason="Steep rays, with d near 0, meet no side and are specular, so the even case is the one that starts at 1. "
+    "The two cases are exchanged.",
+    kind="numeric",
+)
+def specular_share_of_rectangular_teeth(probability: Code) -> Verdict:
+    return compared_with_tracing(probability, 0.0)
+
+
+@erratum(
+    id="S2.02",
+    section="2.2.1",
+    statement="Rectangular teeth: the probability of specular reflection for rays that enter a crevice.",
+    printed=Formula(
+        r"\begin{cases} \{d\} & \lfloor d \rfloor \text{ even} \\"
+        r" 1 - \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
+        exchanged_cases_of_the_crevice,
+    ),
+    corrected=Formula(
+        r"\begin{cases} 1 - \{d\} & \lfloor d \rfloor \text{ even} \\"
+        r" \{d\} & \lfloor d \rfloor \text{ odd} \end{cases}",
+        lambda ratio, theta: 1.0 - crevice_retro(ratio, theta),
+    ),
+    reason="Unfolded, the ray crosses d widths, hence ⌊d⌋ or ⌊d⌋ + 1 sides, the latter with probability {d}. An even "
+    "number of sides makes it specular.",
+    kind="numeric",
+)
+def specular_share_of_a_crevice(probability: Code) -> Verdict:
+    return compared_with_tracing(probability, 0.5)
+
+
+@erratum(
+    id="S2.18",
+    section="2.3.1",
+    equation="2.5",
+    statement="The ratio r̃ of the foreshortened rectangular teeth.",
+    printed=Formula(r"\tilde r = (1 + m/J)^{-1/2} r", lambda r, m, J, xp: r / xp.sqrt(1 + m / J)),
+    corrected=Formula(r"\tilde r = (1 + m/J)^{1/2} r", lambda r, m, J, xp: r * xp.sqrt(1 + m / J)),
+    reason="Widths are compressed and heights are not, so height over width grows. The printed exponent is for width "
+    "over height, which section 2.3.1 says and sections 1.2.3 and 2.2.1 do not use.",
+)
+def ratio_of_foreshortened_teeth(ratio: Code) -> Verdict:
+    import sympy as sp
+
+    from ...geometry.disk import symbolic as sym
+
+    width, height = sp.symbols("width height", positive=True)
+    felt = height / (foreshortening(sym.m, sym.J, sp) * width)
+    return verify(ratio(height / width, sym.m, sym.J, sp), felt)

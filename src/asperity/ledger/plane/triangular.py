@@ -1,0 +1,293 @@
+"""Sections 2.2.2 and 2.3.2: the law of triangular teeth, and of the foreshortened ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...geometry import focusing_arcs, rectangular_teeth, trace, triangular_teeth
+from ...geometry.disk.disk import foreshortening
+from ...kernels.walls.triangular import TriangularTeethLaw
+from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
+from ...verification.entry import Code
+from ..entry_probability import SHARE_ERROR, share
+
+APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
+ENTRIES = 2000
+# How near to the angles where N changes, and to the tips.
+EDGE, TIP = 1e-4, 1e-9
+# Rounding of a ray between straight sides, with up to twenty bounces.
+TRACED = 1e-11
+# Of a midpoint sum over angles at which the law has kinks.
+FLUX_ERROR = 1e-4
+
+
+def rays_between(psi: float, low: float, high: float, number: int) -> tuple[Any, Any, Any]:
+    """Entry points (rows), angles (columns) strictly between two, and their traces; no ray aims at a corner."""
+    theta = low + (high - low) * (np.arange(number) + 0.381966) / number
+    x = (np.arange(ENTRIES) + 0.5) / ENTRIES
+    return x, theta, trace(triangular_teeth(psi), x[:, None], theta)
+
+
+def every_apex(check: Code) -> Verdict:
+    return every(*(check(psi) for psi in APEX_ANGLES))
+
+
+def most_hits(psi: float, theta: Any) -> Any:
+    """N = ceil(2 theta/psi), the number of triangles that the extreme ray crosses."""
+    return np.ceil(2 * theta / psi)
+
+
+def share_of_fewer(psi: float, theta: Any, shift: float = 0.0) -> Any:
+    """p_psi, with N shifted for the comparison."""
+    last = (most_hits(psi, theta) + shift - 0.5) * psi - theta
+    return (np.cos(theta - psi / 2) - np.cos(last)) / (2 * np.sin(theta) * np.sin(psi / 2))
+
+
+def outcomes(psi: float, theta: Any, half: Code) -> tuple[Any, Any]:
+    """The two outgoing angles of eq. 2.10, for N - 1 hits and for N; ``half`` rounds N/2."""
+    hits = most_hits(psi, theta)
+    pairs = half(hits / 2)
+    back, forth = np.pi + theta - 2 * psi * pairs, psi * (2 * pairs + 1) - theta
+    even = hits % 2 == 0
+    return np.where(even, forth - 2 * psi, back), np.where(even, back, forth)
+
+
+def two_outcomes(psi: float, theta: Any) -> tuple[Any, Any]:
+    """Probabilities and angles of the form with two outcomes, taken for all theta."""
+    fewer = np.clip(share_of_fewer(psi, theta), 0.0, 1.0)
+    return np.stack([fewer, 1.0 - fewer], axis=-1), np.stack(outcomes(psi, theta, np.floor), axis=-1)
+
+
+@erratum(
+    id="S2.03",
+    section="2.2.2",
+    statement="The tooth function of triangular teeth of period ε and apex angle ψ.",
+    printed=Formula(
+        r"t_n(x) = -\cot\tfrac\psi2\, x, \quad \cot\tfrac\psi2\, (x - 1) \quad\text{(on every cell)}",
+        lambda x, cell, period, cotangent, left: np.where(left, -cotangent * x, cotangent * (x - 1.0)),
+    ),
+    corrected=Formula(
+        r"t_n(x) = \begin{cases} -\cot\frac\psi2\, (x - \epsilon_n k) &"
+        r" \epsilon_n k \le x < \epsilon_n (k + \frac12) \\"
+        r" \cot\frac\psi2\, (x - \epsilon_n (k + 1)) & \epsilon_n (k + \frac12) \le x < \epsilon_n (k + 1) \end{cases}",
+        lambda x, cell, period, cotangent, left: np.where(
+            left, -cotangent * (x - period * cell), cotangent * (x - period * (cell + 1))
+        ),
+    ),
+    reason="The printed function is right for ε = 1 and k = 0 only. On other cells it is not periodic and takes "
+    "positive values.",
+    kind="numeric",
+)
+def tooth_function(function: Code) -> Verdict:
+    period, x = 0.25, np.linspace(0.0, 2.0, 401)[:-1]
+    cell = np.floor(x / period)
+
+    def check(psi: float) -> Verdict:
+        outline = triangular_teeth(psi).scaled(period).vertices
+        expected = np.interp(x - period * cell, outline[:, 0], outline[:, 1])
+        left = x - period * cell < period / 2
+        return agreement(function(x, cell, period, 1 / np.tan(psi / 2), left), expected, 1e-12, x=x)
+
+    return every_apex(check)
+
+
+@erratum(
+    id="S2.04",
+    section="2.2.2",
+    equation="2.10",
+    statement="Triangular teeth: the two outgoing angles for θ ≤ (π − ψ)/2, after N − 1 and after N hits.",
+    printed=Formula(
+        r"\text{the formulas below with } \lceil N/2 \rceil \text{ for } \lfloor N/2 \rfloor"
+        r"\text{ and a stray } -\theta \quad\text{(described, not quoted)}",
+        lambda psi, theta: outcomes(psi, theta, np.ceil),
+    ),
+    corrected=Formula(
+        r"\theta' = \begin{cases} \psi(N-1) - \theta,\ \pi + \theta - \psi N & N \text{ even} \\"
+        r" \pi + \theta - \psi(N-1),\ \psi N - \theta & N \text{ odd} \end{cases}, \quad"
+        r" N = \lceil 2\theta/\psi \rceil",
+        lambda psi, theta: outcomes(psi, theta, np.floor),
+    ),
+    reason="N triangles are crossed by N − 1 reflections, not by N. With that, floors replace the ceilings, the stray "
+    "term goes, and every angle lies in (0, π).",
+    kind="numeric",
+)
+def outcomes_of_triangular_teeth(angles: Code) -> Verdict:
+    def check(psi: float) -> Verdict:
+        _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
+        fewer, more = angles(psi, theta)
+        hits = most_hits(psi, theta)
+        expected = np.where(traced.collisions == hits, more, np.where(traced.collisions == hits - 1, fewer, np.nan))
+        return agreement(traced.theta, expected, TRACED, theta=theta)
+
+    return every_apex(check)
+
+
+@verified(
+    id="S2.05",
+    section="2.2.2",
+    statement="N = ⌈2θ/ψ⌉ is the number of triangles that the extreme ray crosses, so that there are N − 1 or N hits.",
+    printed=Formula(r"N = \lceil 2\theta/\psi \rceil", most_hits),
+    perturbed=lambda psi, theta: np.floor(2 * theta / psi),
+    reason="Unfolded about the bottom, the sides are rays at multiples of ψ. Traced rays with θ ≤ (π − ψ)/2 hit N − 1 "
+    "or N times.",
+    kind="numeric",
+)
+def number_of_hits(most: Code) -> Verdict:
+    def check(psi: float) -> Verdict:
+        _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
+        missing = most(psi, theta) - traced.collisions
+        # beside multiples of psi/2, where N changes, the rays next to the two tips
+        edges = psi / 2 * np.arange(1, np.floor((np.pi - psi) / psi) + 1)
+        beside = np.concatenate([[0.1 * psi], edges - EDGE, edges + EDGE])
+        beside = beside[beside < (np.pi - psi) / 2]
+        extreme = trace(triangular_teeth(psi), np.array([[TIP], [1 - TIP]]), beside).collisions.max(axis=0)
+        return every(
+            holds((missing == 0) | (missing == 1), "rays", theta=theta),
+            agreement(most(psi, beside), extreme, 0.0, theta=beside),
+        )
+
+    return every_apex(check)
+
+
+@erratum(
+    id="S2.06",
+    section="2.2.2",
+    statement="Triangular teeth: the probability of N − 1 hits for θ ≤ (π − ψ)/2.",
+    printed=Formula(r"p_\psi(\theta) = [\ldots]_+ \quad\text{(off by up to 0.49; described, not quoted)}"),
+    corrected=Formula(
+        r"p_\psi(\theta) = \frac{\cos(\theta - \psi/2) - \cos((N - \frac12)\psi - \theta)}{2 \sin\theta \sin(\psi/2)}",
+        lambda psi, theta: TriangularTeethLaw(psi).branches(theta)[0][..., 0],
+    ),
+    perturbed=lambda psi, theta: np.clip(share_of_fewer(psi, theta, shift=1.0), 0.0, 1.0),
+    reason="This is the share of entry points left of the ray through the last corner, and it is positive by itself. "
+    "No shift of N makes the printed formula right; the check is shown to refute one with N + 1 for N.",
+    kind="numeric",
+)
+def probability_of_fewer_hits(probability: Code) -> Verdict:
+    def check(psi: float) -> Verdict:
+        theta = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)[1]
+        wall = triangular_teeth(psi)
+        found = share(lambda x, theta: trace(wall, x, theta).collisions == most_hits(psi, theta) - 1, theta)
+        named = agreement(share_of_fewer(psi, theta), found, SHARE_ERROR, theta=theta)
+        return every(named, agreement(probability(psi, theta), found, SHARE_ERROR, theta=theta))
+
+    return every_apex(check)
+
+
+@erratum(
+    id="S2.07",
+    section="2.2.2",
+    statement="Triangular teeth: the law for all θ, ray by ray.",
+    printed=Formula(
+        r"\text{two outcomes, for all } \theta",
+        lambda psi, x, theta: np.where(
+            x < share_of_fewer(psi, theta), outcomes(psi, theta, np.floor)[0], outcomes(psi, theta, np.floor)[1]
+        ),
+    ),
+    corrected=Formula(
+        r"h = \arccos\bigl(\cos(\theta - \tfrac\psi2) - 2X \sin\theta \sin\tfrac\psi2\bigr),\ "
+        r"n = \Bigl\lfloor \frac{\theta + h}{\psi} + \frac12 \Bigr\rfloor,\ "
+        r"\theta' = \begin{cases} \pi + \theta - n\psi & n \text{ even} \\ n\psi - \theta & n \text{ odd} \end{cases}"
+        r"\ (h < \tfrac\pi2); \text{ else the mirror image}",
+        lambda psi, x, theta: TriangularTeethLaw(psi).respond(x, theta),
+    ),
+    reason="Rays with θ > (π − ψ)/2 may pass the bottom on its right, where the mirror image of the law holds: up to "
+    "four outcomes. The corrected law agrees with traced rays for all ψ and θ.",
+    kind="numeric",
+)
+def law_of_triangular_teeth(response: Code) -> Verdict:
+    def check(psi: float) -> Verdict:
+        x, theta, traced = rays_between(psi, 0.05, np.pi - 0.05, 23)
+        return agreement(response(psi, x[:, None], theta), traced.theta, TRACED, x=x[:, None], theta=theta)
+
+    return every_apex(check)
+
+
+@erratum(
+    id="S2.08",
+    section="2.2.2",
+    statement="Triangular teeth: the law leaves sin θ dθ invariant.",
+    printed=Formula(r"\int E[\cos^2\theta'] \sin\theta\, d\theta = 1.039 \ne \tfrac23", two_outcomes),
+    corrected=Formula(
+        r"\int_0^\pi \tilde P f(\theta) \sin\theta\, d\theta = \int_0^\pi f(\theta) \sin\theta\, d\theta",
+        lambda psi, theta: TriangularTeethLaw(psi).branches(theta),
+    ),
+    reason="A law of a wall preserves the flux, and the printed one does not. The check refutes even its repair, two "
+    "outcomes for all θ, whose mass is right and whose flux is not.",
+    kind="numeric",
+)
+def flux_of_triangular_teeth(law: Code) -> Verdict:
+    z = -1 + (2 * np.arange(20_000) + 1) / 20_000
+    theta = np.arccos(z)
+
+    def check(psi: float) -> Verdict:
+        probability, angle = law(psi, theta)
+        square = np.mean(np.sum(probability * np.cos(angle) ** 2, axis=-1))
+        # a symmetric law has <f, P g> = <P f, g>
+        forward = np.mean(z * np.sum(probability * np.cos(angle) ** 3, axis=-1))
+        backward = np.mean(z**3 * np.sum(probability * np.cos(angle), axis=-1))
+        # that it is the law of these teeth and of no others: the outcomes of traced rays, and how often they occur
+        x, some, traced = rays_between(psi, 0.05, np.pi - 0.05, 7)
+        probability, angle = law(psi, some)
+        apart = np.abs(traced.theta[..., None] - angle)
+        nearest = np.argmin(np.where(probability > 0, apart, np.inf), axis=-1)
+        occurs = np.stack([np.mean(nearest == i, axis=0) for i in range(probability.shape[-1])], axis=-1)
+        return every(
+            agreement(square, 1 / 3, FLUX_ERROR),
+            agreement(forward, backward, FLUX_ERROR),
+            agreement(np.min(apart, axis=-1), 0.0, TRACED, x=x[:, None], theta=some),
+            agreement(probability, occurs, 5.0 / ENTRIES),
+        )
+
+    return every_apex(check)
+
+
+@verified(
+    id="S2.21",
+    section="2.3.2",
+    statement="The apex angle of foreshortened triangular teeth.",
+    printed=Formula(
+        r"\tilde\psi = 2 \arctan\bigl((1 + m/J)^{-1/2} \tan(\psi/2)\bigr)",
+        lambda psi, m, J, xp: 2 * xp.atan(xp.tan(psi / 2) / xp.sqrt(1 + m / J)),
+    ),
+    perturbed=lambda psi, m, J, xp: 2 * xp.atan(xp.tan(psi / 2) * xp.sqrt(1 + m / J)),
+    reason="tan(ψ/2) is half the width over the depth, and widths are compressed. Teeth become narrower.",
+)
+def apex_angle_of_foreshortened_teeth(angle: Code) -> Verdict:
+    import sympy as sp
+
+    from ...geometry.disk import symbolic as sym
+
+    psi = sym.psi
+    half_width, depth = sp.Rational(1, 2), sp.cot(psi / 2) / 2
+    felt = foreshortening(sym.m, sym.J, sp) * half_width / depth
+    return verify(sp.tan(angle(psi, sym.m, sym.J, sp) / 2), felt, [psi > 0, psi < sp.pi])
+
+
+@convention(
+    id="S2.29",
+    section="2.2",
+    statement="Which cells of the examples are at most one period deep, as condition B3 asks.",
+    printed=Formula(r"\text{all of them}", lambda psi, ratio: (psi > 0, ratio > 0)),
+    corrected=Formula(
+        r"\psi \ge 2 \arctan\tfrac12 \text{ (triangular)}, \quad r \le 2 \text{ (rectangular)}, \quad \text{all arcs}",
+        lambda psi, ratio: (psi >= 2 * np.arctan(0.5), ratio <= 2),
+    ),
+    reason="The depths are cot(ψ/2)/2, r/2 and tan(ξ/2)/2. The laws hold for all parameters, so that B3 is only a "
+    "matter of units of depth.",
+    kind="numeric",
+)
+def cells_within_one_period(condition: Code) -> Verdict:
+    beside = np.array([-1e-4, 1e-4])
+    psi = np.append(np.linspace(0.1, 3.0, 57), 2 * np.arctan(0.5) + beside)
+    ratio, half_angle = np.append(np.linspace(0.05, 4.0, 57), 2 + beside), np.linspace(0.1, np.pi / 2, 59)
+    triangular, rectangular = condition(psi, ratio)
+    within = [
+        np.array([wall(value).depth <= 1.0 for value in values])
+        for wall, values in ((triangular_teeth, psi), (rectangular_teeth, ratio), (focusing_arcs, half_angle))
+    ]
+    return holds(
+        [triangular == within[0], rectangular == within[1], within[2]], "cells", psi=psi, height_to_width=ratio
+    )

@@ -1,0 +1,1 @@
+"""Entries of the ledger on the proof of the limit theorem."""

@@ -1,0 +1,262 @@
+"""Section 5.3.5: the regions that tile the zoomed plane, and the sizes that the iteration keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...geometry.disk import rolling
+from ...verification import (
+    Formula,
+    Verdict,
+    agreement,
+    by_reading,
+    convention,
+    erratum,
+    every,
+    holds,
+    no_excess,
+    verified,
+    verify,
+)
+from ...verification.entry import Code
+from ..samples import generator, kinetic_norm, masses, residual, unit_velocities
+
+good_states = by_reading(
+    id="S5.31",
+    section="5.3.5",
+    statement="The set Ω* of good states.",
+    printed=r"\Omega^* = (F \cup \Xi) \cup (A_3^*\times\mathbb S)",
+    corrected=r"\Omega^* = (F \cap \Xi) \cup (A_3^*\times\mathbb S^2_+)",
+    reason="Part (ii) bounds the complements of F and Ξ one by one, and part (iii) uses both properties. Hence the "
+    "intersection.",
+)
+
+
+@erratum(
+    id="S5.32",
+    section="5.3.5",
+    statement="The lower end of the angles of R̂*_ε, which tiles the plane in steps of ρ/ε.",
+    kind="numeric",
+    printed=Formula(r"-\rho/\varepsilon \le \alpha < \rho/(2\varepsilon)", lambda height: -height),
+    corrected=Formula(r"-\rho/(2\varepsilon) \le \alpha < \rho/(2\varepsilon)", lambda height: -height / 2),
+    reason="The height must be the step. As printed it is one and a half steps, and half of the plane is covered "
+    "twice.",
+)
+def height_of_the_region(low: Code) -> Verdict:
+    rng = generator()
+    height = rng.uniform(5, 50, 400)
+    alpha = rng.uniform(-3, 3, 400) * height
+    alpha[:200] = (np.rint(alpha[:200] / height[:200]) + 0.5) * height[:200] + np.where(np.arange(200) % 2, 1e-6, -1e-6)
+    above = alpha - np.arange(-9, 10)[:, np.newaxis] * height
+    times = np.sum((above >= low(height)) & (above < height / 2), axis=0)
+    return holds(times == 1, "angles are covered once", alpha=alpha, height=height)
+
+
+@erratum(
+    id="S5.33",
+    section="5.3.5",
+    statement="The shift from one of the 2k bands of R*_ε to the next, R*⁰ being {0 ≤ x₁ + α ≤ 1, -ρ/(2εk) ≤ α ≤ 0}.",
+    kind="numeric",
+    printed=Formula(
+        r"(1 + m/J)^{-1/2}\,\frac{\rho j}{\varepsilon k}\,\chi", lambda m, J, band: 2 * band / np.sqrt(1 + m / J)
+    ),
+    corrected=Formula(r"(m + J)^{1/2}\,\frac{\rho j}{2\varepsilon k}\,\chi", lambda m, J, band: np.sqrt(m + J) * band),
+    reason="The bands have height ρ/(2εk), and χ turns by (m + J)^(-1/2). The text has x₁ and x₁ + α interchanged, "
+    "too.",
+)
+def shift_of_the_bands(shift: Code) -> Verdict:
+    rng = generator()
+    m, J = masses(rng, 400)
+    bands = 12
+    band = 1 / (2 * bands)  # rho/eps is 1
+    alpha = rng.uniform(-0.5, 0.5, 400)
+    # half of them next to the edges of the bands
+    alpha[::2] = (np.rint(alpha[::2] / band * 0.9) + np.where(np.arange(200) % 2, 1e-9, -1e-9)) * band
+    j = np.arange(-bands + 1, bands + 1)[:, np.newaxis]
+    above = alpha - j * shift(m, J, band) / np.sqrt(m + J)
+    times = np.sum((above > -band) & (above <= 0), axis=0)
+    return holds(times == 1, "angles are covered once", m=m, J=J)
+
+
+def _corrected_width(rho: np.ndarray, eps: np.ndarray, L: float) -> np.ndarray:
+    ell = np.log(1 / rho)
+    gap = rolling.gap_radius(eps, rho)
+    return np.asarray((rho / 2 - gap) / eps - (L * ell + 1) - L * ell**2 / (4 * np.log(ell)))
+
+
+@erratum(
+    id="S5.34",
+    section="5.3.5",
+    statement="The half-width of the angles in Ξ, which must be nearly all of ρ/(2ε).",
+    kind="numeric",
+    printed=Formula(
+        r"\varepsilon^{-1}\Bigl(\frac\rho2 - \frac{12(L + 1)}{5\log^2(1/\rho)}\Bigr)",
+        lambda rho, eps, L: (rho / 2 - 12 * (L + 1) / (5 * np.log(1 / rho) ** 2)) / eps,
+    ),
+    corrected=Formula(
+        r"\varepsilon^{-1}(\rho/2 - \delta_0) - (L\log(1/\rho) + 1) - \frac{L\log(1/\rho)^2}{4\log\log(1/\rho)}",
+        _corrected_width,
+    ),
+    reason="As printed it is negative for every ρ < 1 and L ≥ 1, so Ξ is empty. From the corrected edge, a share that "
+    "tends to 1, the flights of the iteration end at the gap; R'_ε is to be changed likewise.",
+)
+def width_of_the_good_angles(width: Code) -> Verdict:
+    rho = np.array([1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
+    eps = rho**2.5  # so that the gaps take a share of 2 rho^(1/2)
+
+    def check(L: float) -> Verdict:
+        found = width(rho, eps, L)
+        nearly_all = no_excess(1 - 4 * np.sqrt(rho), found / (rho / (2 * eps)), rho=rho)
+        # a flight of L log + 1 and log/(4 loglog) more of L log each end where a second satellite comes within eps
+        ell = np.log(1 / rho)
+        end = eps * (found + (L * ell + 1) + ell / (4 * np.log(ell)) * (L * ell))
+        higher = 2 * np.sin(rho / 2) * np.sin(rho / 2 - end)
+        # in units of rho it is the distance in the zoomed plane
+        return every(nearly_all, agreement((higher / eps - 1) / rho, 0.0, 1e-3, rho=rho))
+
+    return every(check(1.0), check(2.0))
+
+
+@erratum(
+    id="S5.35",
+    section="5.3.5",
+    equation="3.96",
+    statement="The exponent of the lower bound log(1/ρ)^(-e) for log(1/ρ)^(-(3N+4)).",
+    kind="numeric",
+    printed=Formula(r"\log(1/\rho)^{-5N}", lambda N: 5 * N),
+    corrected=Formula(r"\log(1/\rho)^{-(3N+4)}", lambda N: 3 * N + 4),
+    reason="As printed it fails for N = 1. The product log^(-(3N+4)) C^(-N) is at least ρ for N ≤ log/(4 loglog) and "
+    "small ρ, and the conclusions hold.",
+)
+def exponent_of_the_lower_bound(exponent: Code) -> Verdict:
+    N = np.arange(1, 200)
+    ell = np.array([1e8, 1e10, 1e12])  # log(1/rho)
+    last = ell / (4 * np.log(ell))
+    product = exponent(last) * np.log(ell) + last * np.log(2.0)  # minus its logarithm, with C = 2
+    # no exponent below 3 N + 4 will do, and none above it is needed
+    return every(agreement(exponent(N), 3 * N + 4, 0.0, N=N), no_excess(product, ell))
+
+
+@erratum(
+    id="S5.36",
+    section="5.3.5",
+    equation="Claim 5.3.1",
+    statement="The bound of ε times the zoomed angle.",
+    kind="numeric",
+    printed=Formula(r"|\varepsilon\tilde\alpha_0| \le \varepsilon\rho/2", lambda eps, rho: eps * rho / 2),
+    corrected=Formula(r"|\varepsilon\tilde\alpha_0| \le \rho/2", lambda eps, rho: rho / 2),
+    reason="The zoomed angle is at most ρ/(2ε). The final bound by sin ρ still holds, because sin ν cos θ₀ is at "
+    "least a multiple of 1/log².",
+)
+def bound_of_the_zoomed_angle(bound: Code) -> Verdict:
+    eps, rho = 1e-3, 2 * np.pi / 100
+    alpha = generator().uniform(-3, 3, 4000) / eps
+    alpha[0] = (0.5 + 1e-9) * rho / eps
+    _, bar = residual(alpha, rho / eps)
+    size = np.abs(eps * bar)
+    return every(
+        no_excess(size, bound(eps, rho) * (1 + 1e-12), alpha=alpha), agreement(bound(eps, rho) / size.max(), 1.0, 1e-6)
+    )
+
+
+@erratum(
+    id="S5.37",
+    section="5.3.5",
+    equation="3.107",
+    statement="The size of a displacement y in terms of its contact G₀(y) and its turn Δα.",
+    kind="numeric",
+    printed=Formula(r"\|y\| \le |G_0(y)| + |\Delta\alpha|", lambda g, turn, m, J: g + turn),
+    corrected=Formula(
+        r"\|y\| \le m^{1/2}|G_0(y)| + (m + J)^{1/2}|\Delta\alpha|",
+        lambda g, turn, m, J: np.sqrt(m) * g + np.sqrt(m + J) * turn,
+    ),
+    reason="The displacement (-1, 0, 1) has G₀ = 0 and the norm (m + J)^(1/2). The final bound is O(1/log(1/ρ)) and "
+    "not 80/log(1/ρ)³, which still vanishes.",
+)
+def size_of_a_displacement(bound: Code) -> Verdict:
+    rng = generator()
+    m, J = masses(rng)
+    y = rng.normal(size=(3, m.size))
+    y[:2, ::4] = np.stack([-y[2], 0 * y[2]])[:, ::4]
+    y[2, 1::4] = 0
+    g = np.hypot(*rolling.straight_contact(*y))
+    size, found = kinetic_norm(y, m, J), bound(g, np.abs(y[2]), m, J)
+    # either term alone is attained
+    alone = (np.arange(m.size) % 4) < 2
+    return every(
+        no_excess(size, found, 1e-12, m=m, J=J), agreement(found[alone], size[alone], 1e-12, m=m[alone], J=J[alone])
+    )
+
+
+@verified(
+    id="S5.38",
+    section="5.3.5",
+    statement="The zoomed rectangle R*_ε has the area ρ/ε, so ερ⁻¹ makes measures of parts of it shares.",
+    printed=Formula(r"\varepsilon\rho^{-1}|R^*_\varepsilon| = 1", lambda eps, rho: eps / rho),
+    perturbed=lambda eps, rho: eps**2 / rho,
+    reason="R_ε has the sides ε and ρ, and both are divided by ε. Where the text has P × S² minus Ω* it means R*_ε × "
+    "S²₊.",
+)
+def area_of_the_zoomed_rectangle(factor: Code) -> Verdict:
+    import sympy as sp
+
+    from ...geometry.disk import symbolic as sym
+
+    eps, x1, alpha = sp.Symbol("epsilon", positive=True), sp.Symbol("x1"), sp.Symbol("alpha")
+    half = sym.rho / (2 * eps)
+    return verify(factor(eps, sym.rho) * sp.integrate(1, (x1, -alpha, 1 - alpha), (alpha, -half, half)), 1)
+
+
+@verified(
+    id="S5.39",
+    section="5.2",
+    equation="Claim 5.2.1",
+    statement="How many translates of the ε × ρ rectangle meet a rectangle of sides 2a and 2b, for ε, ρ ≤ 1/2.",
+    kind="numeric",
+    printed=Formula(
+        r"\frac{(2a + 1)(2b + 1)}{\varepsilon\rho}", lambda a, b, eps, rho: (2 * a + 1) * (2 * b + 1) / (eps * rho)
+    ),
+    perturbed=lambda a, b, eps, rho: 4 * a * b / (eps * rho),
+    reason="At most 2a/ε + 2 and 2b/ρ + 2 translates meet it in either direction, counted for random positions. For "
+    "ε = ρ = 1/2 the bound is attained.",
+)
+def number_of_rectangles(bound: Code) -> Verdict:
+    rng = generator()
+    a, b = rng.uniform(0.01, 5, (2, 4000))
+    eps, rho = np.exp(rng.uniform(np.log(1e-3), np.log(0.5), (2, 4000)))
+    sides, start = (a, b, eps, rho), rng.uniform(0, 1, (2, 4000))
+    along = np.floor(a / eps - start[0]) - np.floor(-a / eps - start[0]) + 1
+    across = np.floor(b / rho - start[1]) - np.floor(-b / rho - start[1]) + 1
+    # for eps = rho = 1/2 rectangles that are slightly larger than whole cells meet one more on either side
+    cells = np.arange(1, 40)
+    a, b = cells / 4 + 1e-9, cells[::-1] / 4 + 1e-9
+    most = (cells + 2) * (cells[::-1] + 2)
+    return every(
+        no_excess(along * across, bound(*sides), eps=sides[2], rho=sides[3]),
+        agreement(bound(a, b, 0.5, 0.5), most, 1e-6),
+    )
+
+
+@convention(
+    id="S5.40",
+    section="5.2, 5.3",
+    equation="3.95, 3.113, 5.143",
+    statement="The bound of the angular velocity of a unit velocity.",
+    kind="numeric",
+    printed=Formula(r"|\omega| \le \|w\| = 1", lambda J: np.ones_like(J)),
+    corrected=Formula(r"|\omega| \le J^{-1/2}", lambda J: J**-0.5),
+    reason="As printed it needs J ≥ 1, but a unit disk has J ≤ m. In general constants change by J^(-1/2), and v₂ is "
+    "⟨w, e₂⟩/m in Claim 5.2.2.",
+)
+def bound_of_the_spin(bound: Code) -> Verdict:
+    rng = generator()
+    m, J = masses(rng)
+    w = unit_velocities(rng, m, J)
+    # for J > 1 the printed bound holds too; only what it says for light rims is at stake
+    spin = np.stack([0 * J, 0 * J, bound(J)])
+    return every(
+        no_excess(np.abs(w[2]), bound(J), 1e-12, m=m, J=J),
+        agreement(kinetic_norm(w, m, J), 1.0, 1e-12),
+        # attained by spin alone
+        agreement(kinetic_norm(spin, m, J), 1.0, 1e-12, J=J),
+    )

@@ -1,0 +1,114 @@
+"""What follows from a wall's gap: relaxation, diffusion in a channel, flatness."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..core.errors import AsperityError
+from ..core.estimates import Estimate, estimate_as_dict, finite, rounded
+from ..spectral import diffusivity, mean_squared_slope
+from ..spectral.consequences.mixing import relaxation_time, slem_from_gap
+
+if TYPE_CHECKING:
+    from ..geometry import Wall
+    from ..kernels import Law
+    from ..spectral import Diffusivity, SpectralGap, Spectrum
+
+
+@dataclass(frozen=True)
+class Consequences:
+    """What a study derives from the law and its gaps.
+
+    Attributes
+    ----------
+    slem : Estimate or None
+        The largest modulus in the spectrum off the constants; None where the gaps in both conventions are not known.
+    relaxation_time : Estimate or None
+        -1/ln(slem) in steps; its error is ``inf`` where slem may be 1.
+    diffusion : Diffusivity or None
+        Of a channel of half-width 1 and speed 1, the upper wall the mirror image of the lower.
+    flatness : float
+        The mean squared slope h; ``inf`` for walls with vertical pieces or overhangs.
+    refusal : str
+        Why there is no diffusivity, or empty.
+    """
+
+    slem: Estimate | None
+    relaxation_time: Estimate | None
+    diffusion: Diffusivity | None
+    flatness: float
+    refusal: str = ""
+
+    @property
+    def without_gap(self) -> bool:
+        """Whether it is certain that slem is 1."""
+        return self.slem is not None and self.slem.value - self.slem.error >= 1.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values; what is not known or infinite is None."""
+        found = self.diffusion
+        return {
+            "slem": self.slem and estimate_as_dict(self.slem),
+            "relaxation_time": self.relaxation_time and estimate_as_dict(self.relaxation_time),
+            "diffusivity": found and {
+                **estimate_as_dict(found), "eta": found.eta, "eta_error": finite(found.eta_error), "zeta": found.zeta,
+                "zeta_error": finite(found.zeta_error), "arrangement": found.arrangement,
+            },
+            "mean_squared_slope": finite(self.flatness),
+        }  # fmt: skip
+
+    def lines(self) -> list[str]:
+        """One line a fact."""
+        lines = []
+        if self.slem is not None and self.relaxation_time is not None:
+            if math.isfinite(self.relaxation_time.error):
+                time = f"relaxation time {rounded(self.relaxation_time)} steps"
+            else:
+                time = f"no relaxation time: slem {'is' if self.without_gap else 'may be'} 1"
+            lines.append(f"slem {rounded(self.slem)} ({self.slem.kind}: {self.slem.method}), {time}")
+        if self.diffusion is not None:
+            found = self.diffusion
+            eta = Estimate(found.eta, found.eta_error, found.kind, "")
+            lines.append(
+                f"channel of half-width 1, speed 1: D = {rounded(found)}, eta = {rounded(eta)}, "
+                f"zeta = {found.zeta:.6g} ({found.kind}: {found.method})"
+            )
+        else:
+            lines.append(f"diffusivity refused: {self.refusal}")
+        if math.isfinite(self.flatness):
+            use = "" if self.without_gap else "; for shallow walls the specular gap is about 4 h"
+            lines.append(f"mean squared slope h = {self.flatness:.6g}{use}")
+        return lines
+
+
+def consequences_of(
+    wall: Wall, law: Law, gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None
+) -> Consequences:
+    """Derive what follows; a diffusivity that is infinite or out of reach is None, with the reason."""
+    modulus_gap = _modulus_gap(gap, specular_gap, found)
+    slem = None if modulus_gap is None else slem_from_gap(modulus_gap)
+    time = None if modulus_gap is None else relaxation_time(modulus_gap)
+    diffusion, refusal = None, ""
+    try:
+        diffusion = diffusivity(law)
+    except AsperityError as reason:
+        refusal = str(reason)
+    return Consequences(slem, time, diffusion, mean_squared_slope(wall), refusal)
+
+
+def _modulus_gap(gap: SpectralGap | None, specular_gap: SpectralGap | None, found: Spectrum | None) -> Estimate | None:
+    """1 - slem. The gaps see the upper end of the spectrum, and in the other convention minus the odd functions' lower
+    end; the lower end on even functions is that of the spectrum that was computed.
+    """
+    if gap is None or specular_gap is None or found is None:
+        return None
+    if not specular_gap.self_adjoint:
+        return specular_gap
+    nearer = gap if gap.value <= specular_gap.value else specular_gap
+    lowest = int(found.values.argmin())
+    if -found.values[lowest] > 1.0 - nearer.value + nearer.error:
+        error = float(found.errors.total()[lowest])
+        return Estimate(1.0 + float(found.values[lowest]), error, "estimate", f"least eigenvalue in {found.basis!r}")
+    return Estimate(nearer.value, nearer.error, nearer.kind, f"gap in the {nearer.convention} convention")

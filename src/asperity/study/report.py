@@ -1,0 +1,240 @@
+"""A study as text and as plain values for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from ..core.estimates import Estimate, estimate_as_dict, finite, rounded
+from ..core.version import __version__
+
+if TYPE_CHECKING:
+    from ..kernels import KernelMatrix
+    from ..spectral import Enclosures, SpectralGap
+    from .result import StudyResult, TracerCheck
+
+# Rays of one wall: 4.5 standard errors are exceeded once in 150,000 walls whose every part is reachable.
+KAC_Z = 4.5
+
+
+def summary_of(study: StudyResult) -> str:
+    """The study as text, one fact a line."""
+    wall, disk = study.wall, study.disk
+    symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
+    lines = [
+        f"wall       {study.name}: period {wall.period:g}, depth {wall.depth:.6g}, length {wall.arc_length:.6g}, "
+        f"{_counted(len(wall.pieces), 'piece')}, "
+        + (_counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell")
+        + (f", {_counted(len(wall.islands), 'island')}" if wall.islands else "")
+        + f", {symmetry}"
+    ]
+    if study.tracer is not None:
+        lines += _tracer_lines(study.tracer)
+    lines += _block("law P~", _matrix_lines(study.matrix))
+    lines += [f"gap        {_gap_line(study, 'gap')}"]
+    lines += [f"           {_gap_line(study, 'specular_gap')}"]
+    lines += [
+        *_block("spectrum", _spectrum_lines(study)),
+        *_block("enclosed", _enclosure_lines(study)),
+        *_block("follows", study.consequences.lines()),
+        f"disk       mass {disk.mass:g}, inertia {disk.inertia:g}: foreshortening {disk.foreshortening:.6g}, "
+        f"so it feels the wall {1.0 / disk.foreshortening:.6g} times as deep",
+    ]
+    first, *more = _matrix_lines(study.collision_matrix)
+    lines += [
+        f"collision  K = delta x P~ x delta(pi - psi) with P~ of that deeper wall, {first}",
+        *(f"           {line}" for line in more),
+        f"           gap of that P~: {_gap_line(study, 'collision_gap')}",
+        f"           energy kept to {study.conservation['energy_defect']:.1e}, rolling momentum -m v1 + J omega "
+        f"to {study.conservation['rolling_momentum_defect']:.1e} (relative)",
+    ]
+    return "\n".join(lines)
+
+
+def _block(title: str, lines: Sequence[str]) -> list[str]:
+    """Lines under one title."""
+    return [f"{title if i == 0 else '':11s}{line}" for i, line in enumerate(lines)]
+
+
+def _tracer_lines(tracer: TracerCheck) -> list[str]:
+    total = sum(tracer.counts.values())
+    flagged = [f"{n} {status.replace('_', ' ')}" for status, n in tracer.counts.items() if n and status != "escaped"]
+    found, expected = tracer.mean_collisions, tracer.expected_collisions
+    lines = [
+        f"rays       {total} into the hollows; " + (f"not escaped: {', '.join(flagged)}" if flagged else "all escaped"),
+        f"           mean collisions {rounded(found)}, length of boundary over opening (Kac) {expected:.6g}, "
+        f"z = {tracer.z_score:+.2f}",
+    ]
+    if tracer.z_score < -KAC_Z:
+        share = 1.0 - found.value / expected
+        lines.append(
+            f"           Kac's formula presumes that every ray inside can come from the opening; {100.0 * share:.3g} % "
+            "of the boundary's rays cannot if the tracer is right, as those that stay in a mushroom's cap for ever"
+        )
+    elif tracer.z_score > KAC_Z:
+        lines.append("           more collisions than Kac's formula allows: do not trust this wall's numbers")
+    return lines
+
+
+def _matrix_lines(matrix: KernelMatrix) -> list[str]:
+    symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
+    rays = f" of {matrix.samples} rays" if matrix.samples else ""
+    noise = "" if symmetry.z_score is None else f" (z = {symmetry.z_score:+.2f} against the sampling noise)"
+    return [
+        f"{matrix.basis!r} by {matrix.method}{rays}: Frobenius error {_small(float(matrix.error))} "
+        f"({matrix.error.kind}), {_met(matrix.tolerance_met, matrix.requested_tolerance)}",
+        f"asymmetry {_small(float(symmetry))}{noise}, rows sum to 1 within {_small(float(rows))}",
+    ]
+
+
+def _gap_line(study: StudyResult, which: str) -> str:
+    gap: SpectralGap | None = getattr(study, which)
+    if gap is None:
+        return f"refused: {study.refusals.get(which, 'not asked for')}"
+    words = f"{gap.convention} convention: "
+    if not gap.self_adjoint:
+        return words + _contraction(gap, study.tolerance)
+    if gap.verdict == "no gap":
+        return words + "none (no gap): " + gap.evidence[0].split(":")[0]
+    met = _met(gap.error <= study.tolerance, study.tolerance)
+    if gap.verdict == "undecided" and gap.error >= abs(gap.value):
+        # rounding to its error would leave nothing of the number
+        words += f"not decided; {gap.value:.4g} at the finest basis, error up to {gap.error:.2g}"
+    else:
+        words += f"{rounded(gap)}, {gap.verdict}"
+    return f"{words} ({gap.kind}: {gap.method}), {met}"
+
+
+def _contraction(gap: SpectralGap, tolerance: float) -> str:
+    """What is true where there are no real eigenvalues to speak of."""
+    words = "P_F is not known to be self-adjoint, the cell has no mirror axis; "
+    if gap.verdict == "no gap":
+        return words + "its norm on functions of mean 0 is 1 (no gap)"
+    norm = Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method)
+    return (
+        f"{words}a step shrinks functions of mean 0 by the factor {rounded(norm)} at most, its norm there and the slem "
+        f"of P~ ({gap.kind}: {gap.method}), {_met(gap.error <= tolerance, tolerance)}"
+    )
+
+
+def _spectrum_lines(study: StudyResult) -> list[str]:
+    """Eigenvalues with their errors; then how they were found."""
+    found = study.spectrum
+    if found is None:
+        return [f"refused: {study.refusals['spectrum']}"]
+    numbers = found.estimates()
+    # the second largest modulus may be that of the most negative
+    order = sorted(range(len(numbers)), key=lambda i: (i > 0, -abs(numbers[i].value)))
+    shown = [rounded(numbers[i]) + ("" if found.parity[i] == "none" else f" {found.parity[i]}") for i in order]
+    caution = ""
+    if study.gap is not None and study.gap.verdict == "no gap":
+        caution = "; they belong to the grid, for the law has no gap"
+    method = found.estimates()[0].method
+    return [
+        f"the {len(shown)} of largest modulus: {', '.join(shown)} ({found.convention} convention, estimate: {method}"
+        f"{caution})",
+        f"completeness: {found.completeness}",
+    ]
+
+
+def _enclosure_lines(study: StudyResult) -> list[str]:
+    found = study.enclosures
+    if found is None:
+        return [f"refused: {study.refusals.get('enclosures', 'not asked for')}"]
+    return enclosures_as_text(found)
+
+
+def enclosures_as_text(found: Enclosures) -> list[str]:
+    """One line an enclosure, to paste into a paper, and one line of what they have in common."""
+    return [f"{found.convention} convention; {found.method}", *map(str, found)]
+
+
+def _small(value: float) -> str:
+    return f"{value:.2g}"
+
+
+def _met(met: bool | None, tolerance: float | None) -> str:
+    if met is None or tolerance is None:
+        return "no tolerance asked"
+    return f"tolerance {tolerance:g} {'met' if met else 'NOT met'}"
+
+
+def _counted(number: int, word: str) -> str:
+    return f"{number} {word}{'' if number == 1 else 's'}"
+
+
+def study_as_dict(study: StudyResult) -> dict[str, Any]:
+    """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
+    wall, disk, found = study.wall, study.disk, study.spectrum
+    return {
+        "asperity": __version__,
+        "tolerance": study.tolerance,
+        "wall": {
+            "name": study.name, "period": wall.period, "depth": wall.depth, "arc_length": wall.arc_length,
+            "pieces": len(wall.pieces), "hollows": len(wall.hollows), "islands": len(wall.islands),
+            "closes": wall.closes, "polygonal": wall.is_polygonal, "mirror_symmetric": wall.is_mirror_symmetric,
+        },
+        "tracer": None if study.tracer is None else {
+            "rays": dict(study.tracer.counts), "mean_collisions": estimate_as_dict(study.tracer.mean_collisions),
+            "kac": study.tracer.expected_collisions, "z_score": study.tracer.z_score,
+        },
+        "law": _matrix(study.matrix),
+        "gap": {"paper": _gap(study.gap), "specular": _gap(study.specular_gap)},
+        "eigenvalues": None if found is None else {
+            "convention": found.convention, "basis": repr(found.basis), "method": found.estimates()[0].method,
+            "values": found.values.tolist(), "errors": finite(found.errors.total()), "kind": "estimate",
+            "parity": list(found.parity), "completeness": found.completeness,
+            **{part: finite(getattr(found.errors, part)) for part in ("algebraic", "discretisation", "sampling")},
+        },
+        "enclosures": study.enclosures and enclosures_as_list(study.enclosures),
+        "collision": {
+            "mass": disk.mass, "inertia": disk.inertia, "foreshortening": disk.foreshortening,
+            "law": _matrix(study.collision_matrix), "gap": _gap(study.collision_gap), **study.conservation,
+        },
+        "consequences": study.consequences.as_dict(),
+        "refusals": dict(study.refusals),
+    }  # fmt: skip
+
+
+def gap_as_dict(gap: SpectralGap) -> dict[str, Any]:
+    """A gap as plain values, ready for JSON."""
+    return {
+        **estimate_as_dict(gap), "verdict": gap.verdict, "convention": gap.convention, "evidence": list(gap.evidence),
+        "self_adjoint": gap.self_adjoint,
+    }  # fmt: skip
+
+
+def quotation(gap: SpectralGap) -> str:
+    """One line to paste into a paper: value, error, kind, verdict, convention, method, version."""
+    number = "0" if gap.verdict == "no gap" else rounded(gap)
+    what = "spectral gap" if gap.self_adjoint else "not known to be self-adjoint: 1 - norm on functions of mean 0"
+    return (
+        f"{what} {number} ({gap.kind}), {gap.verdict}, {gap.convention} convention; {gap.method}; "
+        f"asperity {__version__}"
+    )
+
+
+def enclosures_as_list(found: Enclosures) -> list[dict[str, Any]]:
+    """Enclosures as plain values, ready for JSON."""
+    return [
+        {
+            "value": item.value, "low": item.low, "high": item.high, "label": item.label, "index": item.index,
+            "residual": item.residual, "kind": item.kind, "reason": item.reason, "parity": item.parity,
+            "method": found.method, "convention": found.convention,
+        }
+        for item in found
+    ]  # fmt: skip
+
+
+def _gap(gap: SpectralGap | None) -> dict[str, Any] | None:
+    return None if gap is None else gap_as_dict(gap)
+
+
+def _matrix(matrix: KernelMatrix) -> dict[str, Any]:
+    symmetry, rows = matrix.symmetry_defect(), matrix.stochastic_defect()
+    return {
+        "basis": repr(matrix.basis), "method": matrix.method, "samples": matrix.samples,
+        "frobenius_error": estimate_as_dict(matrix.error), "tolerance_met": matrix.tolerance_met,
+        "symmetry_defect": {"value": float(symmetry), "norm": symmetry.norm, "z_score": finite(symmetry.z_score)},
+        "stochastic_defect": {"value": float(rows), "norm": rows.norm},
+    }  # fmt: skip

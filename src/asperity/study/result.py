@@ -1,0 +1,92 @@
+"""What a study of a wall finds, as plain fields."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ..core.estimates import NORMAL_95, Estimate
+from ..geometry import Disk, Wall
+from ..kernels import CollisionLaw, KernelMatrix
+from ..spectral import Enclosures, SpectralGap, Spectrum
+from .consequences import Consequences
+
+
+@dataclass(frozen=True)
+class TracerCheck:
+    """What a sample of rays says of the tracer on this wall.
+
+    Attributes
+    ----------
+    counts : dict
+        Rays by status.
+    mean_collisions : Estimate
+        Mean number of collisions of the rays that enter a hollow.
+    expected_collisions : float
+        |boundary of the hollows| / |openings|: Kac's formula for hollows all of whose boundary can be reached from the
+        opening. Where a part cannot, as in the caps of mushrooms, the mean is smaller, by that part's share.
+    """
+
+    counts: Mapping[str, int]
+    mean_collisions: Estimate
+    expected_collisions: float
+
+    @property
+    def z_score(self) -> float:
+        """Deviation of the mean from Kac's formula in standard errors; 0 where every ray has the same number."""
+        deviation = self.mean_collisions.value - self.expected_collisions
+        return deviation / self.mean_collisions.error * NORMAL_95 if self.mean_collisions.error > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class StudyResult:
+    """Everything that `study_wall` found: the fields of a `Study`.
+
+    Attributes
+    ----------
+    name : str
+    wall : Wall
+    disk : Disk
+    tolerance : float
+        What was asked of the gaps, and of the image of every bin: times the root of their number in the Frobenius norm
+        of the matrices.
+    tracer : TracerCheck or None
+        None for walls without hollows, and for open walls, whose rays pass from cell to cell.
+    matrix : KernelMatrix
+        P~ of the wall in bins.
+    gap, specular_gap : SpectralGap or None
+        Of P~ in the paper's and in Feres' convention; where the law is not known to be self-adjoint there, for want of
+        a mirror axis, ``specular_gap.self_adjoint`` is False, and it is 1 - the contraction factor of functions of mean
+        0. None where ``refusals`` says why.
+    spectrum : Spectrum or None
+        The ten eigenvalues of P~ of largest modulus; of the matrix in bins where the law has no gap.
+    enclosures : Enclosures or None
+        Intervals that hold eigenvalues of P~ itself; None where ``refusals`` says why.
+    collision : CollisionLaw
+    collision_matrix : KernelMatrix
+        P~ of the foreshortened wall, in bins.
+    collision_gap : SpectralGap or None
+    conservation : dict
+        Largest relative change of the kinetic energy and of the rolling momentum in sampled collisions.
+    refusals : dict
+        By the name of the attribute, why a spectral quantity is missing.
+    consequences : Consequences
+        Relaxation time, diffusivity of a channel, mean squared slope.
+    """
+
+    name: str
+    wall: Wall
+    disk: Disk
+    tolerance: float
+    tracer: TracerCheck | None
+    matrix: KernelMatrix
+    gap: SpectralGap | None
+    specular_gap: SpectralGap | None
+    spectrum: Spectrum | None
+    enclosures: Enclosures | None
+    collision: CollisionLaw
+    collision_matrix: KernelMatrix
+    collision_gap: SpectralGap | None
+    conservation: Mapping[str, float]
+    refusals: Mapping[str, str]
+    consequences: Consequences

@@ -1,0 +1,259 @@
+"""The main job in one call: from a wall to its law, its symmetry, its spectral gap and a disk's collision law."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ..core.checks import positive_number
+from ..core.errors import AccuracyError, FileExistsRefusal, InputError
+from ..core.estimates import NORMAL_95, Estimate
+from ..geometry import Disk, Wall, trace
+from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
+from ..kernels.bases.measure import SINE
+from ..spectral import Enclosures, SpectralGap, Spectrum, enclosures, gaps_in_both_conventions, spectral_gap, spectrum
+from ..spectral.gap.law_spectrum import with_gap
+from ..spectral.gap.methods import law_eigenvalues
+from .consequences import consequences_of
+from .pictures import save_pictures
+from .report import study_as_dict, summary_of
+from .result import StudyResult, TracerCheck
+
+BINS = 128
+TOLERANCE = 1e-3
+CHECK_RAYS = 2**16
+EIGENVALUES = 10
+# Share of the tolerance that eigenvalues may spend.
+MATRIX_SHARE = 0.1
+# Eigenvalues that are enclosed, the constants' included: some seconds on a traced wall.
+ENCLOSED = 3
+# Rays of a sampled matrix: enough to see how many more it takes, and as many as a few seconds allow.
+FIRST_SAMPLES, MOST_SAMPLES = 2**20, 2**24
+PICTURES = ("wall.png", "kernel.png", "spectrum.png", "collision.png")
+DATA = ("kernel.npz", "study.json")
+
+
+@dataclass(frozen=True)
+class Study(StudyResult):
+    """Everything that `study_wall` found; ``summary()`` is text, ``to_json()`` a string, ``save`` writes files.
+
+    The attributes are those of `StudyResult`.
+    """
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain numbers and strings, ready for JSON; ``docs/command-line.md`` lists the keys."""
+        return study_as_dict(self)
+
+    def to_json(self) -> str:
+        """The study as JSON."""
+        return json.dumps(self.as_dict(), indent=2, allow_nan=False)
+
+    def summary(self) -> str:
+        """The study as text, one fact a line."""
+        return summary_of(self)
+
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
+        """Write the pictures, the matrix with its metadata, and the study as JSON; returns the paths.
+
+        Raises
+        ------
+        FileExistsRefusal
+            If one of the files exists and ``overwrite`` is False; nothing is written then.
+        InputError
+            If the folder cannot be made or written.
+        """
+        target = prepare_folder(folder, overwrite=overwrite)
+        try:
+            save_pictures(self, [target / name for name in PICTURES])
+            self.matrix.save(target / DATA[0], overwrite=True)
+            (target / DATA[1]).write_text(self.to_json() + "\n", encoding="utf-8")
+        except OSError as reason:
+            raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
+        return [target / name for name in (*PICTURES, *DATA)]
+
+
+def study_wall(
+    wall: Wall,
+    name: str = "wall",
+    disk: Disk | None = None,
+    *,
+    tolerance: float = TOLERANCE,
+    bins: int = BINS,
+    rng: np.random.Generator | None = None,
+) -> Study:
+    """Study a wall: trace it, make its law and matrix, test the symmetry, find the gap, collide a disk with it.
+
+    Parameters
+    ----------
+    wall : Wall
+    name : str
+        What the wall is called in summaries and titles.
+    disk : Disk, optional
+        By default the uniform disk, mass 1 and inertia 1/2.
+    tolerance : float
+        Error asked of the gaps and of the matrices; what was reached is reported.
+    bins : int
+        Size of the matrix.
+    rng : numpy.random.Generator, optional
+        ``np.random.default_rng(0)`` by default, so that a study repeats.
+
+    Returns
+    -------
+    Study
+        A quantity that a check forbids to quote (as a spectrum, where the sampled law looks irreversible) is None, and
+        ``refusals`` says why; the rest of the study stands.
+
+    Raises
+    ------
+    InputError
+        If the tolerance or the number of bins is unsuitable.
+    AccuracyError
+        If more than 1e-4 of the rays do not escape.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> report = study_wall(geo.rectangular_teeth(2.0), bins=16)
+    >>> report.gap.verdict, report.matrix.method
+    ('no gap', 'exact')
+    """
+    from tqdm import tqdm
+
+    positive_number("tolerance", tolerance)
+    basis = Bins(bins)
+    rng = rng or np.random.default_rng(0)
+    disk = disk or Disk()
+    refusals: dict[str, str] = {}
+
+    def gap_of(law: Law, which: str) -> SpectralGap | None:
+        try:
+            return spectral_gap(law, tolerance, rng)
+        except AccuracyError as reason:
+            refusals[which] = str(reason)
+            return None
+
+    # silent where standard error is not a terminal, and in the first two seconds
+    with tqdm(total=8, desc=name, delay=2, disable=None, leave=False) as progress:
+        tracer = check_tracer(wall, rng) if wall.hollows else None
+        progress.update()
+        law = WallLaw(wall)
+        matrix = _matrix(law, basis, tolerance, rng)
+        progress.update()
+        specular_gap = None
+        if law.mirror_symmetric:
+            try:
+                gap, specular_gap = gaps_in_both_conventions(law, tolerance, rng)
+            except AccuracyError as reason:
+                gap = None
+                refusals |= {"gap": str(reason), "specular_gap": str(reason)}
+        else:
+            gap, specular_gap = gap_of(law, "gap"), gap_of(law.in_specular_frame(), "specular_gap")
+        progress.update(2)
+        found = None
+        try:
+            found = _spectrum(law, matrix, gap, tolerance, rng)
+        except AccuracyError as reason:
+            refusals["spectrum"] = str(reason)
+        progress.update()
+        enclosed = None
+        try:
+            enclosed = _enclosures(law, gap, tolerance)
+        except (AccuracyError, InputError) as reason:
+            refusals["enclosures"] = str(reason)
+        progress.update()
+        collision = CollisionLaw.from_wall(wall, disk)
+        collision_matrix = _matrix(collision.law, basis, tolerance, rng)
+        progress.update()
+        collision_gap = gap_of(collision.law, "collision_gap")
+        progress.update()
+        consequences = consequences_of(wall, law, gap, specular_gap, found)
+    return Study(
+        name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed, collision,
+        collision_matrix, collision_gap, MappingProxyType(_conservation(collision, rng)), MappingProxyType(refusals),
+        consequences,
+    )  # fmt: skip
+
+
+def prepare_folder(folder: str | Path, *, overwrite: bool) -> Path:
+    """Make the output folder, and refuse it where a file of an earlier study would be lost."""
+    target = Path(folder)
+    try:
+        existing = [name for name in (*PICTURES, *DATA) if (target / name).exists()]
+        if existing and not overwrite:
+            raise FileExistsRefusal(
+                f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them"
+            )
+        target.mkdir(parents=True, exist_ok=True)
+        probe = target / ".asperity-probe"
+        probe.touch()
+        probe.unlink()
+    except FileExistsRefusal:
+        raise
+    except OSError as reason:
+        raise InputError(f"{target}: cannot write there ({reason.strerror}); choose another folder") from reason
+    return target
+
+
+def _spectrum(
+    law: WallLaw, matrix: KernelMatrix, gap: SpectralGap | None, tolerance: float, rng: np.random.Generator
+) -> Spectrum:
+    if gap is not None and gap.verdict == "no gap":
+        # whatever the basis, these are numbers of the grid; those of the matrix that is shown and saved
+        return with_gap(spectrum(matrix, k=EIGENVALUES), gap)
+    if gap is None:
+        return spectrum(law, EIGENVALUES, tolerance=MATRIX_SHARE * tolerance, rng=rng)
+    return with_gap(law_eigenvalues(law, EIGENVALUES, MATRIX_SHARE * tolerance, rng), gap)
+
+
+def _enclosures(law: WallLaw, gap: SpectralGap | None, tolerance: float) -> Enclosures:
+    if gap is not None and gap.verdict == "no gap":
+        raise AccuracyError("1 belongs to the essential spectrum, and no eigenvalue next to it is isolated", 0.0)
+    return enclosures(law, ENCLOSED, tolerance=MATRIX_SHARE * tolerance)
+
+
+def _matrix(law: Law, basis: Bins, tolerance: float, rng: np.random.Generator) -> KernelMatrix:
+    """In bins; where rays are needed, as many as the error of a first sample asks for."""
+    wanted = tolerance * float(np.sqrt(basis.size))
+    found = discretise(law, basis, tolerance=wanted, samples=FIRST_SAMPLES, rng=rng)
+    if not found.samples or found.tolerance_met:
+        return found
+    # the error falls at least like the root of their number
+    more = 2 ** math.ceil(2.0 * math.log2(float(found.error) / wanted))
+    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, MOST_SAMPLES), rng=rng)
+
+
+def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:
+    """Trace rays that enter the hollows with the invariant measure."""
+    wall = wall.cell
+    widths = np.array([hollow.width for hollow in wall.hollows])
+    lefts = np.array([hollow.left for hollow in wall.hollows])
+    which = rng.choice(len(widths), CHECK_RAYS, p=widths / widths.sum())
+    ray = trace(wall, lefts[which] + widths[which] * rng.random(CHECK_RAYS), SINE.sample(CHECK_RAYS, rng))
+    boundary = wall.arc_length - wall.flat_top
+    mean = Estimate(
+        float(np.mean(ray.collisions)), NORMAL_95 * float(np.std(ray.collisions, ddof=1) / np.sqrt(CHECK_RAYS)),
+        "estimate", f"spread of {CHECK_RAYS} rays",
+    )  # fmt: skip
+    return TracerCheck(MappingProxyType(ray.counts()), mean, float(boundary / widths.sum()))
+
+
+def _conservation(collision: CollisionLaw, rng: np.random.Generator) -> dict[str, float]:
+    """Largest relative change of energy and of rolling momentum over sampled collisions."""
+    velocity = rng.normal(size=(4096, 3))
+    velocity[:, 1] = -np.abs(velocity[:, 1])
+    disk = collision.disk
+    outgoing = collision.sample(velocity, rng)
+    energy = disk.inner(velocity, velocity)
+    scale = np.sqrt((disk.mass + disk.inertia) * energy)
+    return {
+        "energy_defect": float(np.max(np.abs(disk.inner(outgoing, outgoing) / energy - 1.0))),
+        "rolling_momentum_defect": float(
+            np.max(np.abs(disk.rolling_momentum(outgoing) - disk.rolling_momentum(velocity)) / scale)
+        ),
+    }
