@@ -1,1 +1,0 @@
-"""The entries of the ledger on kernels: reflection laws, collision laws and their matrices."""
