@@ -109,19 +109,12 @@ def distributions(tmp_path_factory):
     # not "build" alone: a folder of that name, left by an earlier build, would be imported in its place
     pytest.importorskip("build.__main__")
     copy = tmp_path_factory.mktemp("tree") / "asperity"
-    ignore = shutil.ignore_patterns(
-        ".git",
-        ".venv*",
-        "__pycache__",
-        ".*_cache",
-        ".hypothesis",
-        "*.egg-info",
-        "build",
-        "dist",
-        "study",
-        "bench-results",
-        "_build",
-    )
+    written = {".git", "build", "dist", "study", "bench-results", ".hypothesis"}
+    anywhere = shutil.ignore_patterns(".venv*", "__pycache__", ".*_cache", "*.egg-info", "_build")
+
+    def ignore(folder: str, names: list[str]) -> set[str]:
+        return anywhere(folder, names) | (written & set(names) if Path(folder) == ROOT else set())
+
     shutil.copytree(ROOT, copy, symlinks=True, ignore=ignore)
     done = subprocess.run(
         [sys.executable, "-m", "build", "--no-isolation", str(copy)], capture_output=True, text=True, check=False

@@ -171,10 +171,10 @@ def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):
     def refuse(*arguments, **keywords):
         raise AccuracyError("the counts speak against symmetry", 0.5)
 
-    monkeypatch.setattr("asperity.study.spectral_gap", refuse)
-    monkeypatch.setattr("asperity.study.gaps_in_both_conventions", refuse)
-    monkeypatch.setattr("asperity.study.spectrum", refuse)
-    monkeypatch.setattr("asperity.study.enclosures", refuse)
+    monkeypatch.setattr("asperity.study.study.spectral_gap", refuse)
+    monkeypatch.setattr("asperity.study.study.gaps_in_both_conventions", refuse)
+    monkeypatch.setattr("asperity.study.study.spectrum", refuse)
+    monkeypatch.setattr("asperity.study.study.enclosures", refuse)
     report = study_wall(geo.rectangular_teeth(1.0), bins=8)
     assert set(report.refusals) == {"gap", "specular_gap", "collision_gap", "spectrum", "enclosures"}
     assert report.summary().count("refused: the counts speak against symmetry") == 5

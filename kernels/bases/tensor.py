@@ -39,7 +39,7 @@ class TensorBasis(Basis):
 
     Examples
     --------
-    >>> from .bins import Bins
+    >>> from asperity.kernels import Bins
     >>> TensorBasis((Bins(2), Bins(3, weight="sin2"))).size
     6
     """

@@ -82,7 +82,7 @@ def discretise(
     Examples
     --------
     >>> from asperity.kernels.bases.bins import Bins
-    >>> from asperity.kernels.laws.ideal import maxwell
+    >>> from asperity.kernels import maxwell
     >>> P = discretise(maxwell(0.5), Bins(2))
     >>> P.array.round(12).tolist(), P.method
     ([[0.25, 0.75], [0.75, 0.25]], 'quadrature + exact')

@@ -232,7 +232,7 @@ class Combination(Law):
 
     Examples
     --------
-    >>> from asperity.kernels.laws.ideal import lambertian, specular
+    >>> from asperity.kernels import lambertian, specular
     >>> law = 0.25 * specular() + 0.75 * lambertian()
     >>> law
     0.25*specular() + 0.75*lambertian()
@@ -332,7 +332,7 @@ def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
 
     Examples
     --------
-    >>> from asperity.kernels.laws.ideal import retroreflection, specular
+    >>> from asperity.kernels import retroreflection, specular
     >>> mixture([specular(), retroreflection()], [0.5, 0.5])
     0.5*specular() + 0.5*retroreflection()
     """
@@ -385,7 +385,7 @@ class Composition(Law):
 
     Examples
     --------
-    >>> from asperity.kernels.laws.ideal import retroreflection, specular
+    >>> from asperity.kernels import retroreflection, specular
     >>> (specular() @ specular()).branches(1.0)[1].tolist()
     [1.0]
     """
@@ -453,7 +453,7 @@ class Power(Law):
 
     Examples
     --------
-    >>> from asperity.kernels.laws.ideal import specular
+    >>> from asperity.kernels import specular
     >>> (specular() ** 3).branches(1.0)[1].tolist() == [np.pi - 1.0]
     True
     """
@@ -529,7 +529,7 @@ class SpecularFrame(Law):
 
     Examples
     --------
-    >>> from asperity.kernels.laws.ideal import specular
+    >>> from asperity.kernels import specular
     >>> frame = specular().in_specular_frame()
     >>> frame, frame.frame, frame.branches(1.0)[1].tolist() == [1.0]
     (specular().in_specular_frame(), 'specular', True)

@@ -43,7 +43,7 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     --------
     How many reflections a law makes in the mean:
 
-    >>> from asperity.kernels.laws.ideal import retroreflection, specular
+    >>> from asperity.kernels import retroreflection, specular
     >>> count = Rules(lambda law: 1.0, lambda terms: sum(w * n for w, n in terms), sum, lambda n: n)
     >>> fold(0.5 * specular() + 0.5 * (specular() @ retroreflection()) ** 2, count)
     2.5

@@ -242,7 +242,7 @@ class KernelMatrix:
 
     Examples
     --------
-    >>> from .bins import Bins
+    >>> from asperity.kernels import Bins
     >>> P = KernelMatrix([[0.75, 0.25], [0.25, 0.75]], Bins(2), Estimate(0.0, 0.0, "bound", "given"))
     >>> (P @ P).array.round(14).tolist(), float(P.symmetry_defect())
     ([[0.625, 0.375], [0.375, 0.625]], 0.0)

@@ -34,7 +34,7 @@ def words_of(law: Law) -> Sum | None:
     Examples
     --------
     >>> from asperity.kernels.laws.phase_function import henyey_greenstein
-    >>> from asperity.kernels.laws.ideal import maxwell
+    >>> from asperity.kernels import maxwell
     >>> words_of(retroreflection() @ henyey_greenstein(0.5) @ specular())
     {(henyey_greenstein(-0.5),): 1.0}
     >>> words_of(maxwell(0.5) ** 2)
