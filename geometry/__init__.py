@@ -1,4 +1,4 @@
-"""Walls, disks and tracing: curves, walls by name, profile or file, and where rays go in them."""
+"""Walls and disks, the tracing of rays, and the collision of a disk with a rough wall."""
 
 from __future__ import annotations
 

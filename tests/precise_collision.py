@@ -27,7 +27,7 @@ MOST_STEPS, MOST_CONTACTS = 5_000, 40
 
 
 class Flight:
-    """A disk's state over a polygonal wall; lengths are in units of the wall, as in `geometry.contact_engine`."""
+    """A disk's state over a polygonal wall; lengths are in units of the wall, as in `geometry/collisions`."""
 
     def __init__(self, wall, disk, scale, spacing, position, velocity):
         self.corners = [(mp.mpf(float(x)), mp.mpf(float(y))) for x, y in wall.vertices]

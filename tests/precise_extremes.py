@@ -44,7 +44,7 @@ WALL_ERROR = 4 * EPS
 MOST_HITS = 10**15
 # Of rays that the rounding of the wall decides, those that leave later are left unknown.
 MOST_STORED_HITS = 100_000
-# Flights after which the tracer gives a ray up (`geometry.engine.MOST_STEPS`).
+# Flights after which the tracer gives a ray up (MOST_STEPS of `geometry/tracing/compiled/rays.py`).
 MOST_FLIGHTS = 1_000_000
 
 

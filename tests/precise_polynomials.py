@@ -1,4 +1,4 @@
-"""Coefficients of the polynomials in `angle_engine`, from 60 digits: run as a script, it prints them.
+"""Coefficients of the polynomials in `tracing/compiled/trigonometry`, from 60 digits: run as a script, it prints them.
 
 Each polynomial interpolates its function at Chebyshev nodes, which is within a small factor of the best approximation.
 """
@@ -27,7 +27,7 @@ def arcsine_rest(u: mp.mpf) -> mp.mpf:
     return (mp.asin(mp.sqrt(u)) / mp.sqrt(u) - 1) / u
 
 
-# Name in `angle_engine`, function, end of its interval in u a little widened, number of coefficients.
+# Name in `trigonometry`, function, end of its interval in u a little widened, number of coefficients.
 POLYNOMIALS: dict[str, tuple[Callable[[mp.mpf], mp.mpf], float, int]] = {
     "SINE": (sine_rest, 0.617, 6),
     "COSINE": (cosine_rest, 0.617, 6),

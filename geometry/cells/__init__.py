@@ -1,1 +1,1 @@
-"""The cell of a periodic wall: its hollows and their shapes, its validity and symmetry, profiles and files."""
+"""The cell of a periodic wall: its hollows and their shapes, validity, symmetry, measured profiles and wall files."""

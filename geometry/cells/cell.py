@@ -1,4 +1,4 @@
-"""What a wall is: its pieces over one period, its islands, and what follows from them without tracing a ray."""
+"""The cell of a periodic wall: its pieces over one period, its islands, and its properties that need no ray."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The hollows of a wall: what lies below each of its openings."""
+"""The hollows of a wall: each opening with the pieces below it."""
 
 from __future__ import annotations
 

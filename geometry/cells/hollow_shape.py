@@ -1,4 +1,4 @@
-"""The shape of a hollow: what remains of it without its place and its size. Its law depends on nothing else."""
+"""The shape of a hollow up to translation and scale, on which alone its law depends."""
 
 from __future__ import annotations
 

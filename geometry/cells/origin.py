@@ -1,4 +1,4 @@
-"""Where the cell of a wall begins: at one of its highest points, which is then the origin (condition B5').
+"""The origin of the cell: one of the wall's highest points, from which the period is taken (condition B5').
 
 (Rudzis 2022, section 1.3.1.) A wall without islands closes from any of its highest points on, whatever point of its
 period was given first and however far below y = 0 it lies: its law is that of the cell that begins there.

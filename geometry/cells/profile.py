@@ -1,4 +1,4 @@
-"""Measured profiles: from positions and heights to a wall, and from files to positions and heights."""
+"""Measured profiles: files read into positions and heights, and these made into the vertices of a wall."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The true disk against a rough wall, and the cylinder that replaces its configurations."""
+"""The collision of a disk with satellites, in the plane and in the straightened configuration space."""

@@ -1,4 +1,4 @@
-"""The configurations of a disk with satellites that a wall leaves free."""
+"""The configuration space of a disk with satellites above a wall."""
 
 from __future__ import annotations
 

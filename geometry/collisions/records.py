@@ -1,4 +1,4 @@
-"""What the compiled collision of the disk reads: the wall as tables, the ring of satellites and the masses as numbers.
+"""The wall, the ring of satellites and the masses as the tables and numbers of the compiled collision.
 
 Lengths are in units of the wall, so that the disk's radius is 1/scale.
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # A bound that is attained only by a satellite on the deepest point of the wall half-way between two others; the room
 # is for rounding.
 ROOM = 1e-9
-# Positions carry a few rounding errors of their size each, as those of rays do (engine.JOINT_ULPS).
+# Positions carry a few rounding errors of their size each, as those of rays do (`scene/tolerances`).
 SLACK = 16.0 * EPS
 
 

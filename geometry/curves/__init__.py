@@ -1,1 +1,1 @@
-"""Pieces of walls: segments, arcs and Bezier curves, and whether they cross."""
+"""Pieces of walls: segments, arcs and Bezier curves, and the test whether they cross."""

@@ -1,4 +1,4 @@
-"""Circular and elliptic arcs with axes along x and y: a class that every upright affine map keeps."""
+"""Circular and elliptic arcs with axes along x and y; scalings of x and y map them to such arcs."""
 
 from __future__ import annotations
 

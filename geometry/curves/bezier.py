@@ -1,4 +1,4 @@
-"""Quadratic and cubic Bezier curves: exact parabolas, and whatever a drawing program writes."""
+"""Quadratic and cubic Bezier curves; the quadratic ones are the arcs of parabolas."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do the pieces of a wall cross? Touching is allowed, and so are cusps and plates of zero thickness.
+"""Whether the pieces of a wall cross; touching, cusps and plates of zero thickness are allowed.
 
 The wall over one period is closed by a path above y = 0 and the winding number of the closed path is taken on every
 face that it cuts out of the plane. Around a crossing the winding number takes three consecutive values; around a

@@ -1,4 +1,4 @@
-"""What every piece of a wall can do: the base class of Segment, Arc and Bezier."""
+"""The base class of Segment, Arc and Bezier: points, tangents, lengths, boxes and images."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The disk: its masses and frame, how it rolls, its satellites, its charts, and the same in symbols."""
+"""The disk: masses and frame, rolling, satellites, charts, and the same formulas as sympy objects."""

@@ -1,4 +1,4 @@
-"""The charts of a disk with satellites: how it rolls about them, and the maps that straighten the rolling."""
+"""The charts of a disk with satellites: the maps of rolling about a satellite, and those that straighten it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a disk rolls about one of its satellites: each formula once, for numbers and for symbols alike.
+"""The formulas of a disk that rolls about one of its satellites, for arrays and for symbols alike.
 
 A configuration is (x1, x2, alpha): the centre, its height over the level where satellites touch the tops, and the
 angle. Lengths are in units of ``scale``, and so is ``alpha``, the length that the rim turns by: with ``scale`` 1 these

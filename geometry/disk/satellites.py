@@ -1,4 +1,4 @@
-"""The satellites of the disk: evenly spaced points on its rim, which alone touch the wall."""
+"""The satellites of the disk: evenly spaced points on its rim, the only points that touch the wall."""
 
 from __future__ import annotations
 

@@ -94,7 +94,7 @@ def branch_matrix(sign: Any, offset: Any) -> Any:
 def satellite_normal(number: Any) -> Any:
     """The inward unit normal n(q) at a configuration where satellite ``number`` touches a wall of unit normal k.
 
-    Source: Rudzis 2022, remark 4.6 and eq. 3.26, corrected; see `kinetics.contact_normal`.
+    Source: Rudzis 2022, remark 4.6 and eq. 3.26, corrected; see `contact_normal` in `disk/disk`.
     """
     return sp.Matrix(contact_normal(m, J, (k1, k2), alpha + number * rho, sp))
 

@@ -1,1 +1,1 @@
-"""Traced conditional distributions: the entry points between which the itinerary of a ray is the same."""
+"""The itineraries of rays at one incoming angle: the entry points at which they change, and Gauss nodes between."""

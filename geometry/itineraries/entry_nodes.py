@@ -1,4 +1,4 @@
-"""Where the samples of a row begin."""
+"""The entry points from which the search for changes of itinerary starts."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Pictures of walls with rays, and of collisions."""
+"""Pictures of walls with rays, and of collisions of the disk."""

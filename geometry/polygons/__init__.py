@@ -1,1 +1,1 @@
-"""Polygonal hollows sorted exactly into beams that are reflected alike."""
+"""The rays into polygonal hollows, divided exactly into beams of equal itinerary."""

@@ -1,4 +1,4 @@
-"""The rays into a polygonal hollow, sorted exactly into beams that are reflected alike."""
+"""The rays into a polygonal hollow, divided exactly into beams of equal itinerary."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Triangles of a polygonal hollow, with exact predicates and without new vertices."""
+"""The triangulation of a polygonal hollow, with exact predicates and without new vertices."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What the tracer reads of a wall: tables of its pieces, the plan of what is left out, and tolerances."""
+"""The tables of a wall for the compiled loops, their tolerances, and the plan of a trace."""

@@ -1,4 +1,4 @@
-"""Scenes with one of their short cuts switched off: what they save can be measured, and must not change a ray."""
+"""Scenes without one of the tracer's optimisations, to measure what it saves; no ray may change."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""Hollows whose rays are known in closed form: the numbers that `closed_engine` needs of each, as a row of a table.
+"""The table of the hollows that are reflected in closed form: of two lines, or of one circular arc.
 
-A *fan* is a hollow of two lines: unfolded about its apex, the copies of its triangle are a fan, a ray is straight, and
-it leaves through the copy of the opening that it meets first. A *bowl* is a hollow of one circular arc of at most a
-half circle: all hops of a ray are equal.
+`tracing/compiled/closed_forms` reads its rows. A *fan* is a hollow of two lines: unfolded about its apex, the copies
+of its triangle are a fan, a ray is straight, and it leaves through the copy of the opening that it meets first. A
+*bowl* is a hollow of one circular arc of at most a half circle: all hops of a ray are equal.
 
 Columns: kind (`NONE`, `FAN`, `BOWL`), left, right, doubt; then for a bowl the centre (2), radius, half angle; for a
 fan the apex (2), number of copies K, then for a ray that first meets the right line, and for one that first meets the

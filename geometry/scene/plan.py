@@ -1,4 +1,4 @@
-"""What the tracer will do with a wall, and what it leaves out."""
+"""The plan of a trace: pieces and hollows that are skipped, hollows in closed form, grids and symmetry."""
 
 from __future__ import annotations
 

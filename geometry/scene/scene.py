@@ -1,4 +1,4 @@
-"""A wall as the tables that the compiled loop reads: only what a ray can meet, hollow by hollow.
+"""The tables of a wall for the compiled loops: the pieces that a ray can meet, hollow by hollow.
 
 Flat tops have no place in the tables, and a table of a primitive that the wall does not have is None.
 

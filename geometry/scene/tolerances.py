@@ -1,4 +1,4 @@
-"""What the planar tracer resolves in double precision, as shares in units of the rounding error."""
+"""The tolerances of the planar tracer, in units of the rounding error."""
 
 from __future__ import annotations
 

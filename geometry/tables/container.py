@@ -1,4 +1,4 @@
-"""Where the centre of a disk may be: the convex region between straight walls."""
+"""The convex region between straight walls in which the centre of a disk flies."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Rays through the cell of a wall: the map of (x, theta), on threads, and again in double-double arithmetic."""
+"""Rays through the cell of a wall: the map (x, theta) -> (x', theta'), with refinement where doubles cannot decide."""

@@ -1,4 +1,4 @@
-"""Rays that double precision does not settle, traced again in double-double arithmetic."""
+"""Rays that double precision does not decide, traced again in double-double arithmetic."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Python answers a signal between two of its own instructions, in the main thread only. So while compiled loops run for
 long they run on other threads, and the main one waits, a moment at a time. A loop that may take long by itself reads
-a flag, a one-element array, every so often (`is_raised` in `stop_engine`), and ends when it is raised.
+a flag, a one-element array, every so often (`is_raised` in `compiled/interruption`), and ends when it is raised.
 """
 
 from __future__ import annotations

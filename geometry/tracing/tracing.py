@@ -27,7 +27,7 @@ LITTLE_WORK = 16
 FLAT, FAR = 2.0**-6, 2.0**6
 # pi to 65 digits.
 PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923, 10**64)
-# No limit in effect: rays are given up after 10^6 flights computed one by one (engine.MOST_STEPS), however many hits.
+# No limit in effect: a ray ends after MOST_STEPS flights computed one by one (`compiled/rays`), however many hits.
 MAX_COLLISIONS = 2**62
 
 

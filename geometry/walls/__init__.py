@@ -1,1 +1,1 @@
-"""Walls: the class, the named ones and their catalogue, and what lies inside the solid."""
+"""Walls: the class, the named walls and their catalogue, and the test for points inside the solid."""

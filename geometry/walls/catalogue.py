@@ -1,4 +1,4 @@
-"""The named walls by name, with default parameters; what the command line calls WALL."""
+"""The named walls with their default parameters, and the command line's argument WALL."""
 
 from __future__ import annotations
 

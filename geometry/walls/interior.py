@@ -1,4 +1,4 @@
-"""Is a point inside the solid of a wall? By the parity of the boundary's crossings above it."""
+"""Whether a point lies inside the solid of a wall, by the parity of the boundary's crossings above it."""
 
 from __future__ import annotations
 

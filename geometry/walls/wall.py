@@ -1,4 +1,4 @@
-"""A rough wall: one period of curves from left to right, and islands."""
+"""A rough wall: a cell with its constructors, its foreshortened image, its tables for tracing and its file."""
 
 from __future__ import annotations
 

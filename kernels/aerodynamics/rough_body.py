@@ -1,4 +1,4 @@
-"""A convex body whose boundary reflects by a rough wall's law: its scattering law and its resistance."""
+"""A convex body that reflects by the law of a rough wall: its scattering law and its resistance."""
 
 from __future__ import annotations
 

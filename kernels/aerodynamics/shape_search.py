@@ -1,4 +1,4 @@
-"""The best hollow of a family of walls."""
+"""The wall of a family with the least or the greatest resistance."""
 
 from __future__ import annotations
 

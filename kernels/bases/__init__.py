@@ -1,1 +1,1 @@
-"""The invariant measure, angles, and the orthonormal bases of functions on them."""
+"""The invariant measures, and orthonormal bases of functions of the angle with their quadrature."""

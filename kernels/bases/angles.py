@@ -1,4 +1,4 @@
-"""Angles without loss of digits: near grazing, where cosines cannot tell them apart, and at the ends of (0, pi)."""
+"""Angles to full relative accuracy: near grazing, where cosines cannot tell them apart, and at the ends of (0, pi)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sums of products e_i(theta) e_j(theta') over many pairs of angles, in the way that suits the basis."""
+"""Sums of products e_i(theta) e_j(theta') over many pairs of angles, for each kind of basis."""
 
 from __future__ import annotations
 

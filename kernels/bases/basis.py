@@ -1,4 +1,4 @@
-"""What every basis of L^2(sin theta d theta) offers."""
+"""The base class of the bases of L^2(sin theta d theta)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sorted edges and joined lists: where numbers and intervals lie among edges, and lists laid end to end."""
+"""Positions of numbers and intervals among sorted edges, and offsets of joined lists."""
 
 from __future__ import annotations
 

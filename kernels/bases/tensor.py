@@ -1,4 +1,4 @@
-"""Products of functions of several angles."""
+"""Bases of products of functions of several angles."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Collision laws of a disk: in the limit of small scale, of the true disk, and in billiards."""
+"""Collision laws of a disk: the limit law, the law of the true disk, and disks between walls."""

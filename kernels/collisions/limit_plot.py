@@ -1,4 +1,4 @@
-"""A picture of where the true disk goes, beside where its limit law says it goes."""
+"""A picture of the outgoing angles of the true disk beside those of its limit law."""
 
 from __future__ import annotations
 

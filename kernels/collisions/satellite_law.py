@@ -1,4 +1,4 @@
-"""The true disk's collision as a random law of velocities: its place and angle are uniform."""
+"""The true disk's collision as a random law of velocities: its position and angle are uniform."""
 
 from __future__ import annotations
 

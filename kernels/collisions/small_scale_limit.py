@@ -1,4 +1,4 @@
-"""How the true disk approaches its limit law: the distance of K^{Sigma, eps} from K, measured against eps."""
+"""The convergence of the true disk to its limit law: the distance of K^{Sigma, eps} from K as a function of eps."""
 
 from __future__ import annotations
 

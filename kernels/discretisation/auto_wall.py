@@ -1,4 +1,4 @@
-"""Which way `auto` takes to the matrix of a wall's law that has no closed form."""
+"""The choice of method, for `auto`, for the matrix of a wall's law that has no closed form."""
 
 from __future__ import annotations
 

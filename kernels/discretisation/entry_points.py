@@ -1,4 +1,4 @@
-"""Matrices of driven laws by a product rule: Gauss in the incoming angle, midpoints in the entry point."""
+"""Matrices of random maps by a product rule: Gauss nodes in the incoming angle, midpoints in the entry point."""
 
 from __future__ import annotations
 

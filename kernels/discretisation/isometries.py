@@ -1,4 +1,4 @@
-"""Matrices of laws made of isometries, by quadrature between their kinks: exact to rounding."""
+"""Matrices of laws made of isometries, by quadrature between their breakpoints: exact to rounding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The matrix of a law of isometries from its table: no sampling, and no search for kinks."""
+"""The matrix of a law of isometries from its table, without samples and without a search for breakpoints."""
 
 from __future__ import annotations
 

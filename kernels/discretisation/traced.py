@@ -1,4 +1,4 @@
-"""Matrices of the laws of traced walls to a tolerance: adaptive rows, and adaptive panels in the incoming angle."""
+"""Matrices of the laws of traced walls to a tolerance: adaptive in the entry point and in the incoming angle."""
 
 from __future__ import annotations
 

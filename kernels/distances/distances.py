@@ -1,4 +1,4 @@
-"""How far apart two laws are: Wasserstein distances of rows and of flux measures, and the paper's pseudometric."""
+"""Distances between laws: Wasserstein, conditional or joint, and the paper's pseudometric."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The outgoing angles of a law, one distribution for each incoming angle, whatever kind of law it is."""
+"""The distribution of the outgoing angle at each incoming angle, for every kind of law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Resampled counts of empirical kernels: what chance alone does to distances."""
+"""Resampled counts of empirical kernels: the distances that chance alone makes."""
 
 from __future__ import annotations
 

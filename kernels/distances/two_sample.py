@@ -1,4 +1,4 @@
-"""Do two laws differ? A test for empirical kernels."""
+"""A permutation test whether two empirical kernels come from one law."""
 
 from __future__ import annotations
 

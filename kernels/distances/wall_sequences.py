@@ -1,4 +1,4 @@
-"""How the laws of a sequence of walls converge, and what each step costs."""
+"""The convergence of the laws of a sequence of walls, and the cost of each step."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Conditional expectations of basis functions and of piecewise polynomials."""
+"""Conditional expectations E[f(Theta') | theta] of basis functions and of piecewise polynomials."""

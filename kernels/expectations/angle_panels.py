@@ -1,4 +1,4 @@
-"""Panels in the incoming angle with the means of a basis at their nodes: Kronrod's rule, smoothed at both ends."""
+"""Panels in the incoming angle with conditional expectations at Kronrod nodes, smoothed at both ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of a law against a basis: the functions theta -> E[e_j(Theta') | theta], as exactly as each kind of law can."""
+"""Conditional expectations theta -> E[e_j(Theta') | theta] of basis functions, as exact as each kind of law allows."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Hollows for wanted laws."""
+"""Walls made for a wanted law."""

@@ -1,1 +1,1 @@
-"""Reflection laws: the algebra of laws, and the laws that are known in closed form without a wall."""
+"""Reflection laws: their algebra, and the laws that need no wall."""

@@ -1,4 +1,4 @@
-"""Finite lists of branches: merging equal ones, chaining laws, and the kinks of a chain."""
+"""Finite lists of branches: merging equal ones, chaining laws, and the breakpoints of a chain."""
 
 from __future__ import annotations
 

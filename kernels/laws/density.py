@@ -1,4 +1,4 @@
-"""Laws with a density."""
+"""Laws with a density p(theta, theta') with respect to d theta'."""
 
 from __future__ import annotations
 

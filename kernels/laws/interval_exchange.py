@@ -1,4 +1,4 @@
-"""Symmetric matrices as involutions: intervals of angles that change places."""
+"""Symmetric matrices as involutions: exchanges of intervals of angles."""
 
 from __future__ import annotations
 

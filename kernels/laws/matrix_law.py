@@ -1,4 +1,4 @@
-"""The law of a kernel matrix: piecewise uniform."""
+"""The law of a kernel matrix, whose outgoing angles have a piecewise constant density."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws as functions of a uniform number and the incoming angle."""
+"""Laws as random maps: functions of a uniform number and the incoming angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Walking through the algebra of laws: what is known of the parts gives what is known of the whole."""
+"""Recursion over compound laws: properties of sums, products and powers from those of their parts."""
 
 from __future__ import annotations
 

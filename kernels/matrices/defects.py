@@ -1,4 +1,4 @@
-"""Defects of kernels as numbers with a norm: how far from symmetric, how far from stochastic."""
+"""Defects of kernels as numbers with a norm: the distances from symmetric and from stochastic ones."""
 
 from __future__ import annotations
 

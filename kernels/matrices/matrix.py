@@ -1,4 +1,4 @@
-"""A kernel as a matrix in an orthonormal basis, its algebra, and what is known of its error.
+"""A kernel as a matrix in an orthonormal basis, its algebra and its error.
 
 Bounds and quantiles of 95 % are added as they are, whether the terms are independent or not: a quantile of one term
 and bounds of the others are a quantile, and of several quantiles the sum is exceeded in less than 5 % of cases where

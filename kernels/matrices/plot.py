@@ -1,4 +1,4 @@
-"""The picture of a kernel matrix."""
+"""A picture of a kernel matrix."""
 
 from __future__ import annotations
 

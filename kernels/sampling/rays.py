@@ -1,4 +1,4 @@
-"""What rays add up to, a table for each part of them, and the matrix with its error that follows."""
+"""Sums over sampled rays, one table per replicate, and the matrix and error computed from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rays of randomised nets: scrambled Sobol sequences, to which rays can be added."""
+"""Rays of scrambled Sobol sequences, to which rays can be added."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The laws of walls: closed forms, exact polygons, and conditional distributions by tracing."""
+"""The laws of walls: closed forms, exact laws of polygons, and conditional distributions by tracing."""

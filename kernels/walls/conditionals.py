@@ -1,4 +1,4 @@
-"""Rows of the law of a traced wall by adaptive quadrature in the entry point, with an error for each."""
+"""Conditional distributions of the law of a traced wall, by adaptive quadrature in the entry point, with errors."""
 
 from __future__ import annotations
 

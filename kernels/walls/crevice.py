@@ -1,4 +1,4 @@
-"""One rectangular crevice: its widths that a ray crosses, modulo 2, and how often it reflects back."""
+"""One rectangular crevice: the widths that a ray crosses, modulo 2, and the probability of retroreflection."""
 
 from __future__ import annotations
 

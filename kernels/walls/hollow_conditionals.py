@@ -1,4 +1,4 @@
-"""Rows of one hollow, which remember where their neighbours' pieces are."""
+"""Conditional distributions of one hollow, which start from the itineraries of neighbouring angles."""
 
 from __future__ import annotations
 

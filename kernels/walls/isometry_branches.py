@@ -1,4 +1,4 @@
-"""Which isometry each branch of a law is: theta' = sign theta + offset."""
+"""The isometry theta' = sign theta + offset of each branch of a law."""
 
 from __future__ import annotations
 

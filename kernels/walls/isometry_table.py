@@ -1,4 +1,4 @@
-"""A law of isometries as a table: which isometry acts on which angles, with which probability."""
+"""A law of isometries as a table: isometries, intervals of angles and probabilities at their ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The exact law of a polygonal wall."""
+"""The exact law of a wall of straight pieces, from beams."""
 
 from __future__ import annotations
 

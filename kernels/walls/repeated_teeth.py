@@ -1,4 +1,4 @@
-"""Rectangular teeth of one shape several times: in closed form, with exact integrals up to grazing."""
+"""Powers of the law of rectangular teeth in closed form, with exact integrals up to grazing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The map of a wall's rays by tracing: what leaves at which angle, and what did not escape."""
+"""The map of a wall's rays by tracing: outgoing angles, and the mask of the rays that escaped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The law of a wall: in closed form where its hollows allow it, else by tracing rays."""
+"""The law of a wall, in closed form where its hollows allow it, else by traced rays."""
 
 from __future__ import annotations
 

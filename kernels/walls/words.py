@@ -1,4 +1,4 @@
-"""Laws as weighted sums of words: what the algebra alone makes of compositions, before anything is computed.
+"""Laws as weighted sums of words: compositions simplified by the algebra alone.
 
 A word is a chain of laws, the first one first; the empty word is the identity. As operators, for laws that keep
 sin(theta) d theta: retroreflection is the identity; specular reflection J commutes with laws that are mirror-symmetric;

@@ -1,1 +1,1 @@
-"""Intervals that hold eigenvalues of a law itself, and the trial functions and residuals they rest on."""
+"""Intervals that hold eigenvalues of a law itself, and the trial functions, residuals and norms behind them."""

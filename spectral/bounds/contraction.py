@@ -1,4 +1,4 @@
-"""Laws that are not self-adjoint in their convention, and what is true of them there: how much a step contracts."""
+"""Laws that are not self-adjoint in their convention: the reason, and their norm on functions of mean 0."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Intervals that hold eigenvalues of a law itself, each with what its claim rests on."""
+"""Intervals that hold eigenvalues of a law itself, each with the reason for its claim."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Residuals of trial functions, for the law itself and not for its matrix."""
+"""Residuals of trial functions under the law itself, not under its matrix."""
 
 from __future__ import annotations
 

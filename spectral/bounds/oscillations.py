@@ -1,4 +1,4 @@
-"""Fast oscillations that a law keeps: they show spectrum near 1 that slow trial functions do not see."""
+"""Rayleigh quotients of fast oscillations, which show spectrum near 1 that slow trial functions miss."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Enclosures for sums of words that begin and end with a Henyey-Greenstein scattering: of the whole spectrum at once.
+"""Enclosures of the whole spectrum of sums of words that begin and end with a Henyey-Greenstein scattering.
 
 The scattering HG(g) leaves of polynomials of degree n and more at most the share |g|^n, so that such a word is its
 matrix in the first n Legendre polynomials but for an operator of norm 2 |g|^n and the matrix' own error. What else the

@@ -1,4 +1,4 @@
-"""How far the rest of a spectrum stays from the eigenvalues that are enclosed."""
+"""The distance of the rest of a spectrum from the enclosed eigenvalues."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What follows from spectra: mixing, diffusion, channels, conductance, the billiard Laplacian."""
+"""Consequences of a spectrum: mixing times, diffusion in a channel, conductance, the billiard Laplacian."""

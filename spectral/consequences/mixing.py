@@ -1,4 +1,4 @@
-"""How long a chain of reflections takes to forget where it started."""
+"""Relaxation times and mixing times of a chain of reflections."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Even and odd functions under theta -> pi - theta: the two halves of a mirror-symmetric law, and their eigenvalues."""
+"""Even and odd functions under theta -> pi - theta: the two parts of a mirror-symmetric law, and their eigenvalues."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The largest eigenvalues of large symmetric matrices, with a count that proves that none was missed."""
+"""The largest eigenvalues of large symmetric matrices, with a count that proves that none is missed."""
 
 from __future__ import annotations
 

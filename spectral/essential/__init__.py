@@ -1,1 +1,1 @@
-"""The essential spectrum: what grazing rays, ideal parts and straight pieces keep of it."""
+"""The essential spectrum of a law: its edge, from grazing rays, ideal parts and straight pieces."""

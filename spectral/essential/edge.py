@@ -1,4 +1,4 @@
-"""How far the essential spectrum of a law reaches."""
+"""The edge of the essential spectrum of a law."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What ideal laws in a law, specular and Lambertian reflection and retroreflection, say of its spectrum."""
+"""The spectrum of laws made of ideal ones (specular, retroreflection, Lambertian), exactly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a law does to grazing rays, on which its essential spectrum depends."""
+"""The limit of a law at grazing incidence, on which its essential spectrum depends."""
 
 from __future__ import annotations
 

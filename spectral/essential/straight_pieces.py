@@ -1,4 +1,4 @@
-"""The part of a wall's law that is made by straight pieces alone, and how far its spectrum reaches."""
+"""The part of a wall's law that comes from straight pieces alone, and the edge of its spectrum."""
 
 from __future__ import annotations
 

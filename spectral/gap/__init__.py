@@ -1,1 +1,1 @@
-"""The spectral gap of a law: the methods, the verdict, and the spectrum that carries it."""
+"""The spectral gap and the spectrum of a law: the methods, the theorems and the verdict."""

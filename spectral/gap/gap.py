@@ -1,4 +1,4 @@
-"""The spectral gap of a law: a number with its error, a verdict and the evidence."""
+"""The spectral gap of a law in either convention: a number with its error, a verdict and the evidence."""
 
 from __future__ import annotations
 

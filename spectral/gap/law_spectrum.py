@@ -1,4 +1,4 @@
-"""The spectrum of a kernel, with the verdict on its gap."""
+"""The spectrum of a law or of a matrix, with the verdict on its gap."""
 
 from __future__ import annotations
 

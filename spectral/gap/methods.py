@@ -1,4 +1,4 @@
-"""Eigenvalues of laws: by enclosures where rows are known well enough, else by matrices of growing size."""
+"""Eigenvalues of laws: from enclosures where conditional expectations are accurate, else from growing matrices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Galerkin matrices of growing size, until the gap of one of them is known well enough."""
+"""Galerkin matrices of growing size, until the gap of one of them is accurate enough."""
 
 from __future__ import annotations
 

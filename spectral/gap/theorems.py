@@ -1,4 +1,4 @@
-"""What the structure of a law tells of its gap without computing."""
+"""Verdicts on the gap that follow from the structure of a law, by theorem."""
 
 from __future__ import annotations
 

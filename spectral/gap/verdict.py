@@ -1,4 +1,4 @@
-"""A spectral gap with what is known of it: its error, its verdict and the evidence."""
+"""A spectral gap with its error, its verdict and the evidence."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Error against run time: problems, runs, orders, and the report."""
+"""Error against run time: problems, measured runs, fitted orders, and the report."""

@@ -1,4 +1,4 @@
-"""The machine and the software on which times were taken, and the one core that they are taken on."""
+"""The machine and the software of a measurement, and the one core on which times are taken."""
 
 from __future__ import annotations
 

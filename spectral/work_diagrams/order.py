@@ -1,4 +1,4 @@
-"""The order of convergence that measurements show, with its confidence interval."""
+"""The order of convergence fitted to measured errors, with its confidence interval."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A quantity whose error is measured against run time: its reference value and the methods that compute it."""
+"""A quantity whose error is measured against run time: its reference value, and the methods that compute it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measure error against run time: each method at each budget, with its errors, its times, or why there are none."""
+"""Measured runs: the errors and times of each method at each budget, or the reason why there are none."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Compiled: where a satellite of the flying disk is, and when it first meets a piece of the wall.
+"""The position of a satellite of the flying disk, and its first contact with a piece of the wall: compiled.
 
-A satellite meets a line or an upright conic where F = 0, see `flight_engine`.
+A satellite meets a line or an upright conic where F = 0, with F as given at the end.
 
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
 bounds the third one. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is a
@@ -8,8 +8,8 @@ safe step; where the parabola has none, F has none. The steps converge quadratic
 of F are visited in their order, in both directions, until one lies on the piece.
 
 **No face is met from behind.** A satellite that leaves one piece within rounding of another one has F = 0 there, too.
-Whether it lies in front of that one is decided by the pieces' own places, see `sides_engine`: not of the other face of
-a plate without thickness, nor of the other side of a sharp peak.
+Whether it lies in front of that one is decided by the pieces' exact joints, see `double_double/sides`: not of the other
+face of a plate without thickness, nor of the other side of a sharp peak.
 
 Lengths are in units of the wall, so the disk's radius is 1/scale and the wall's tops are at height 0. In the time t a
 disk with velocities (v1, v2) and spin omega moves a satellite at the angle a from the lowest point by
@@ -20,8 +20,8 @@ which is evaluated by products, without cancellation. A line or an upright conic
 
 F(D) = f + g.D - curvature |D|^2/2     (y multiplied by the arc's stretch; curvature 0 for lines),
 
-where f and g belong to the start of the flight: the rows of the planar tracer's tables, see `scene`, with circles and
-ellipses in one table ``arcs``.
+where f and g belong to the start of the flight. The tables are those of the planar tracer, see `scene/scene`, with
+circles and ellipses in one table ``arcs``.
 """
 
 from __future__ import annotations

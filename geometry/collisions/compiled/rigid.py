@@ -1,7 +1,7 @@
 """The compiled collision of the disk with satellites: flights and reflections until it is back at height 0.
 
-Only `rigid` and `cylinder` import this file, inside functions, because it loads numba. Lengths are in units of the
-wall, see `flight_engine`.
+Only `collisions/rigid` and `collisions/cylinder` import this file, inside functions, because it loads numba. Lengths
+are in units of the wall, see `contact`.
 """
 
 from __future__ import annotations

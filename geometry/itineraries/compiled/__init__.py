@@ -1,1 +1,1 @@
-"""The compiled march along entry points, changes of itinerary, and Gauss rules between them."""
+"""The compiled search for changes of itinerary, and the Gauss rules between them."""

@@ -1,4 +1,4 @@
-"""Compiled search for the changes of itinerary along a row. Imported inside functions only.
+"""Compiled search for the entry points at which the itinerary changes, at one incoming angle.
 
 For one incoming angle the map x -> theta' is analytic between changes of the itinerary. A row is a chain of samples,
 each with the label of its itinerary; gaps between samples of different labels are halved, all of them once a round.

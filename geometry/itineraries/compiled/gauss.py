@@ -1,4 +1,4 @@
-"""Compiled Gauss rules on a piece of a row on which the itinerary does not change. Imported inside functions only.
+"""Compiled Gauss rules between two neighbouring changes of itinerary.
 
 The rules are those in s with x = a + (b - a) s^2 (3 - 2 s): the square roots at tangencies are then analytic at both
 ends. ``rules`` are what `gauss_tables` gives. ``nodes`` are the outgoing angles and masses of a row, with spare room.

@@ -1,4 +1,4 @@
-"""The compiled march along rows: pieces of equal itinerary, and Gauss nodes on each. Imported inside functions only.
+"""Compiled march along the entry points of one angle: intervals of equal itinerary, and Gauss nodes on each.
 
 A node whose label is not that of its piece is a change that was overlooked; it is put among the samples.
 """

@@ -1,4 +1,4 @@
-"""Compiled comparison of the pieces of two neighbouring angles, and the angle between them at which one appears."""
+"""Compiled comparison of the itineraries at two neighbouring angles, and the angle at which one of them appears."""
 
 from __future__ import annotations
 

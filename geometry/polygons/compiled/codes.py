@@ -1,4 +1,4 @@
-"""What lies beyond the edge of a triangle of a hollow, in place of the number of an edge."""
+"""Codes of an edge of a triangle of a hollow beyond which the opening or a wall lies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables of the compiled loop that splits beams, and the heap that holds the largest beam on top. Loads numba.
+"""The tables of the compiled loop that splits beams, and the heap that holds the largest beam on top.
 
 A slot of the tables is one beam:
 

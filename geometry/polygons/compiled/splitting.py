@@ -3,7 +3,7 @@
 A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0, and an
 unfolded vertex (X, Y) is the functional f = X s - Y c - p, positive where it lies right of the line. A beam is a convex
 polygon of such vectors. The generators have p, s and abs(c) of one sign, and cutting only mixes them with positive
-weights: every component keeps its relative accuracy down to grazing. `beam_tables` says where a beam's numbers stand.
+weights: every component keeps its relative accuracy down to grazing. `columns` says where a beam's numbers stand.
 """
 
 from __future__ import annotations

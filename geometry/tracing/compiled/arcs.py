@@ -1,9 +1,9 @@
-"""Where a ray meets an arc and how it leaves it: compiled, and taken in by the loop of `engine`. Loads numba.
+"""The first hit of a ray on a circular or elliptic arc, and the reflection there: compiled.
 
 A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0 with r measured from its first joint and n0 the unit normal there,
 towards the free side; kappa > 0 is focusing. Its one front root is (B + sqrt(D)) / (kappa |v|^2), and
 2 B / (kappa |v|^2) where the ray starts on the arc itself. An elliptic arc is the same in stretched coordinates. The
-columns of the tables are explained in `scene`.
+columns of the tables are explained in `scene/scene`.
 """
 
 from __future__ import annotations

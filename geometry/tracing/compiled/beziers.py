@@ -1,7 +1,7 @@
-"""Where a ray meets a Bezier piece: compiled, and taken in by the loop of `engine`. Loads numba.
+"""The first hit of a ray on a Bezier piece, and the reflection there: compiled.
 
 A piece b(s), 0 <= s <= 1, is hit where g(s) = (b(s) - p) x v falls through zero; the root at the ray's own start is
-divided out. The columns of the table are explained in `scene`.
+divided out. The columns of the table are explained in `scene/scene`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""Rays through hollows whose reflection is known in closed form: see `closed_forms`. Loads numba.
+"""The outgoing angles of rays into hollows of two lines or of one circular arc, in closed form: compiled.
 
-Rays are taken in blocks that fit into the first-level cache, and those of one hollow together. The loops over a block
-have no branches and change their arrays in place, so that the compiler makes vector instructions of them; all they
-compute is sums, products, quotients, roots and choices, so that a ray's result does not depend on its block.
+The numbers of a hollow are a row of the table of `scene/closed_forms`. Rays are taken in blocks that fit into the
+first-level cache, and those of one hollow together. The loops over a block have no branches and change their arrays in
+place, so that the compiler makes vector instructions of them; all they compute is sums, products, quotients, roots and
+choices, so that a ray's result does not depend on its block.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Arrays that grow while a compiled loop fills them: copies with more room. Loads numba.
+"""Arrays that grow while a compiled loop fills them: copies with more room.
 
 Plain loops, because numba takes seconds to compile a concatenation.
 """

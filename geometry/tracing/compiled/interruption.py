@@ -1,4 +1,4 @@
-"""Compiled: is the flag raised that tells a long loop to end? Loads numba."""
+"""Whether the flag is raised that ends a long compiled loop."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
-"""The pieces close to a ray's start, which the loop of `engine` leaves aside. Loads numba.
+"""Hits of a ray on pieces within rounding of its start: compiled.
 
-Where a piece is met so close that the start's rounding may count, before or behind it, the loop only says so, and all
-such pieces are looked at again in a function of its own: the loop has no call in it.
+The loop of `rays` sets such pieces aside, and a function of its own looks at them again, so that the loop has no call.
 """
 
 from __future__ import annotations
@@ -61,7 +60,7 @@ def curve_at(kind, index, beziers):
 def starts_in_front(
     own_kind, own_index, own_s, kind, index, s, joints, circles, ellipses, beziers, px, py, vx, vy, flown, slack
 ):  # fmt: skip
-    """Whether the ray's start lies in front of a piece that is nearby, or may do so; see `sides_engine`."""
+    """Whether the ray's start lies in front of a piece that is nearby, or may do so; see `double_double/sides`."""
     if own_kind in (LID, SIDE):
         # no piece lies above the opening or beyond a side: one within rounding of them is met there
         return True

@@ -1,15 +1,15 @@
 """The compiled loop of the planar tracer: the hollow that a ray enters, and its flights to the exit.
 
 Every optional table is an array or ``None``; numba compiles one version for each combination that occurs, and the
-branches of absent primitives are pruned from it. Layout of the tables: `scene`.
+branches of absent primitives are pruned from it. Layout of the tables: `scene/scene`.
 
 The formulas are stable by themselves; there is no epsilon that decides which piece is hit:
 
 * The side of a ray on which a joint V lies is the sign of c = (V - p) x v. A segment is hit from its free side exactly
   if c goes from >= 0 at its start to <= 0 at its end. Neighbours share the number c, so that no ray slips between them.
-* Arcs and Bezier pieces: see `arc_engine` and `bezier_engine`.
-* A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact places of the
-  joints, see `sides_engine`: not the other face of a plate without thickness, nor the other side of a sharp peak.
+* Arcs and Bezier pieces: see `arcs` and `beziers`.
+* A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact joints, see
+  `double_double/sides`: not the other face of a plate without thickness, nor the other side of a sharp peak.
 * The hit point is put back on its piece, and the velocity is renormalised, once a bounce.
 """
 
@@ -91,7 +91,7 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, close, bounces
     """Follow a ray through the cells of the grid to its first line before ``time``.
 
     Returns the flight time (inf if none), the line, the share of it, the time to the first corner on the way that is
-    met within rounding, and whether lines are nearby (see `nearby_engine`). Lines are listed in every cell that they
+    met within rounding, and whether lines are nearby (see `nearby`). Lines are listed in every cell that they
     nearly touch, so the walk's own rounding leaves
     out no line that the ray can meet; the signs at the joints are the same numbers in every cell.
     """

@@ -1,6 +1,6 @@
 """Runs in closed form: the hits that a ray makes in a row on one circular arc, or between two facing lines.
 
-Imported by `engine` alone, because it loads numba. Both functions return the state after the run and its number of
+Imported by `rays` alone, because it loads numba. Both functions return the state after the run and its number of
 hits, 0 where the run is not worth it; they stop short of the last hits, which the ordinary loop then judges.
 """
 
@@ -16,7 +16,7 @@ SHORTEST_RUN = 4.0
 # The number of hits left carries some eight rounding errors of itself; the last two are left to the ordinary loop.
 COUNT_ROUNDING = 1.0 - 16.0 * 2.0**-52
 LAST_HITS = 2.0
-# Ends of the facing parts, and the pieces beyond them, are known to JOINT_ULPS of `engine`, once for each of the two.
+# Ends of the facing parts, and the pieces beyond them, are known to JOINT_ULPS, once for each of the two.
 END_SLACKS = 2.0
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
@@ -56,7 +56,7 @@ def skip_hops(arc, px, py, vx, vy, most):
 def skip_crossings(pair, nx, ny, px, py, vx, vy, slack, most):
     """Carry a ray that has just left a line for the line facing it by an even number of hits, at most ``most``.
 
-    ``pair`` is a row of the table of that name (see `scene`), (nx, ny) the unit normal of the line. With beta the angle
+    ``pair`` is a row of the table ``pairs`` of `scene/scene`, (nx, ny) the unit normal of the line. With beta the angle
     between the lines, g the gap at the ray and alpha the angle of its velocity with the direction u of the apex, the
     unfolded lines are a fan: hit k lies
 

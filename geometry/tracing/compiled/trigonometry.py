@@ -1,4 +1,4 @@
-"""Sine and cosine of an angle, and the angle of a direction, as polynomials without branches. Loads numba.
+"""Sine and cosine of an angle, and the angle of a direction, as polynomials without branches.
 
 A loop over rays that calls these functions is compiled to vector instructions, several rays at once, which calls of the
 mathematical library would prevent. Only sums, products, quotients and choices occur, so that a ray's result does not

@@ -1,4 +1,4 @@
-"""Circular and elliptic arcs in double-double arithmetic, for `refined_engine`."""
+"""Hits of a ray on circular and elliptic arcs in double-double arithmetic."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def refined_arcs(arcs):
 def arc_hit(arc, own, px, py, vx, vy, error):
     """Flight time to the front of one arc, inf if none; time of a contact that is undecided, or inf; and the height.
 
-    The height is that of `arc_engine.arc_time`. ``error`` bounds the transversal error of the ray there.
+    The height is that of `arc_time` in `compiled/arcs`. ``error`` bounds the transversal error of the ray there.
     """
     nothing = (np.inf, 0.0)
     n0x, n0y, curvature = (arc[2], arc[3]), (arc[4], arc[5]), (arc[6], arc[7])

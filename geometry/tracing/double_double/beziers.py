@@ -1,4 +1,4 @@
-"""Bezier pieces in double-double arithmetic, for `refined_engine`."""
+"""Hits of a ray on Bezier pieces in double-double arithmetic."""
 
 from __future__ import annotations
 

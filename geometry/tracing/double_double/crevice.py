@@ -1,4 +1,4 @@
-"""Compiled: how many widths of a crevice a ray crosses, modulo 2, in double-double arithmetic."""
+"""The number of widths of a crevice that a ray crosses, modulo 2, in double-double arithmetic."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""The compiled tracer in double-double arithmetic, for the few rays that double precision does not settle.
+"""The compiled tracer in double-double arithmetic, for the few rays that double precision does not decide.
 
-Only `refinement` imports this file, because it loads numba. The formulas are those of `engine`, one for one; those of
-curves are in `refined_arc_engine` and `refined_bezier_engine`. What is exact is the wall: its joints are the doubles of
-the tables, segments join them, a circular arc goes through both of its joints and subtends the double in its table
-(elliptic arcs in stretched coordinates), and a Bezier piece has the coefficients of its table but the highest, which
-takes it to its end joint. The ray starts from exact doubles, too.
+Only `refinement` imports this file, because it loads numba. The formulas are those of `compiled/rays`, one for one;
+those of curves are in `arcs` and `beziers`. What is exact is the wall: its joints are the doubles of the tables,
+segments join them, a circular arc goes through both of its joints and subtends the double in its table (elliptic arcs
+in stretched coordinates), and a Bezier piece has the coefficients of its table but the highest, which takes it to its
+end joint. The ray starts from exact doubles, too.
 
 Three sizes accompany a ray.
 
@@ -55,7 +55,7 @@ NO_PIECE, LID, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 WIDTH_MARGIN = 1.0 + 2.0**-20
 # Where the accumulated rounding exceeds this share of the cell, nothing is settled.
 LARGEST_ERROR = 2.0**-50
-# Shorter runs are followed hit by hit, so that they check those of `skips`; of a longer one the last hits are.
+# Shorter runs are followed hit by hit, so that they check those of `compiled/runs`; of a longer one the last hits are.
 LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")

@@ -1,4 +1,4 @@
-"""Whether a ray that leaves one piece within rounding of another one lies in front of that one. Loads numba.
+"""Whether a ray that leaves one piece within rounding of another one lies in front of that one.
 
 The place of a ray is wrong by some rounding errors of the hollow's size. So its distance from a piece says nothing
 where it is of that size: beside the tip of a sharp peak, in the apex of a narrow wedge, and on a plate that is thinner

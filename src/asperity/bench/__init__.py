@@ -1,1 +1,1 @@
-"""The library's own measurements: error against run time, extreme cases, what scenes leave out, regressions."""
+"""The library's own measurements: error against run time, extreme cases, savings of the tracer, regressions."""

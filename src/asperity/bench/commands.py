@@ -1,4 +1,4 @@
-"""What ``asperity bench`` does."""
+"""The runs and the output of ``asperity bench``."""
 
 from __future__ import annotations
 

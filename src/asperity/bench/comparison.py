@@ -1,4 +1,4 @@
-"""Two runs of the benchmark side by side: what became slower or less exact, and whether that is chance."""
+"""Two runs of the benchmark compared: rows that became slower or less exact, and whether that is chance."""
 
 from __future__ import annotations
 

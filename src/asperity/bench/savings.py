@@ -1,4 +1,4 @@
-"""What each scene of the standard set leaves out, and what that saves: timed with it, and with it switched off."""
+"""The time that each optimisation of the tracer saves on the walls of the standard set."""
 
 from __future__ import annotations
 

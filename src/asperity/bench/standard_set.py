@@ -1,4 +1,4 @@
-"""Run the standard set: every problem in a process that can be ended, every report in a file that can be continued."""
+"""The standard set: every problem in a process that can be ended, every report in a file that can be continued."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Checks of what callers pass in: one line where it is used, one clear message when it fails."""
+"""Checks of arguments: one line where it is used, one clear message when it fails."""
 
 from __future__ import annotations
 

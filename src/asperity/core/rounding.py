@@ -1,4 +1,4 @@
-"""The rounding of double precision, in which tolerances are measured."""
+"""The rounding error of double precision, in units of which tolerances are given."""
 
 from __future__ import annotations
 

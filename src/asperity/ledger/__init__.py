@@ -1,4 +1,4 @@
-"""The ledger of formulas: its index, its text, and the entries in three folders."""
+"""The ledger of formulas: its index, its text, and its entries on the plane, the disk and the proof."""
 
 from .index import entries, findings, selected
 

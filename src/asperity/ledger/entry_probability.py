@@ -1,4 +1,4 @@
-"""The probability of an outcome over the entry points, by tracing: the places where it changes, by bisection."""
+"""The probability of an outcome over the entry points, by tracing and bisection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ledger: every formula of Rudzis 2022 that was checked, gathered from its folders."""
+"""The ledger: every formula of Rudzis 2022 that was checked, collected from its folders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the numeric checks of this room share: random disks and velocities, and a wall searched by brute force."""
+"""Samples for the numeric checks of the ledger: random disks and velocities, and a wall searched by brute force."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ledger in words: as a table, as JSON, in LaTeX, and as a page of the documentation."""
+"""The ledger as a table, as JSON, in LaTeX, and as a page of the documentation."""
 
 from __future__ import annotations
 

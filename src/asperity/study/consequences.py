@@ -1,4 +1,4 @@
-"""What follows from a wall's gap: relaxation, diffusion in a channel, flatness."""
+"""The consequences of a wall's gap that a study reports: relaxation, diffusion in a channel, flatness."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of the command line: of a study, and the gallery of the named walls."""
+"""The pictures of a study, and the gallery of the named walls."""
 
 from __future__ import annotations
 

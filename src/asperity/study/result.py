@@ -1,4 +1,4 @@
-"""What a study of a wall finds, as plain fields."""
+"""The results of a study of a wall, as plain fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The main job in one call: from a wall to its law, its symmetry, its spectral gap and a disk's collision law."""
+"""A study of a wall in one call: its law, its symmetry, its spectral gap and a disk's collision law."""
 
 from __future__ import annotations
 

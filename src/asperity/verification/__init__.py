@@ -1,4 +1,4 @@
-"""How a formula is verified: identities by proof, numbers by measurement, and the entry that holds both.
+"""Verification of formulas: identities by proof, numbers by comparison, and the entry that holds both.
 
 Names are imported when they are first used; sympy and flint only when an identity is asked about.
 """

@@ -1,4 +1,4 @@
-"""Identities and inequalities of a user's own: proved, refuted with a counterexample, or undecided."""
+"""Decides identities and inequalities of a user's own: proved, refuted with a counterexample, or undecided."""
 
 from __future__ import annotations
 

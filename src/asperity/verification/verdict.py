@@ -1,4 +1,4 @@
-"""What a check answers: never a bare yes or no; and verdicts from numbers."""
+"""The verdict of a check, never a bare yes or no, and verdicts from comparisons of numbers."""
 
 from __future__ import annotations
 

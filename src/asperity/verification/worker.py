@@ -1,4 +1,4 @@
-"""A process of its own that decides identities, so that it can be ended when the time is up.
+"""A separate process that decides identities, so that it can be ended when the time is up.
 
 It is no copy of this process, which may have threads, but a fresh interpreter; it ends with this one.
 """

@@ -1,4 +1,4 @@
-"""Extreme rays and walls: single rays against what 50 digits say of them.
+"""Single rays on extreme walls and at extreme angles, against 50 digits.
 
 The rays and their references lie in ``extreme_rays.json``, which ``tests/precise_extremes.py`` writes.
 """

@@ -1,4 +1,4 @@
-"""One line of the stability report."""
+"""One row of the stability report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a law is from Lambert's: the Wasserstein distance of the rows, averaged over the incoming angle."""
+"""The distance of a law from Lambert's: Wasserstein, averaged over the incoming angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Quantities that can be read off the matrix of a law: the matrix itself, the first moment, the resistance."""
+"""Quantities that a law's matrix gives: the matrix itself, the first moment, the resistance."""
 
 from __future__ import annotations
 

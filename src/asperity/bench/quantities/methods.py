@@ -1,4 +1,4 @@
-"""The ways from a wall to the matrix of its law, each on its own and as the library chooses."""
+"""The methods for the matrix of a wall's law, each on its own and as the library chooses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a quantity of the standard set is."""
+"""A quantity of the standard set: its problem on each wall, with methods and budgets."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""How measurements run: processes that can be ended, timing, stored references."""
+"""The running of measurements: processes that can be ended, timing, stored references."""

@@ -1,4 +1,4 @@
-"""Processes that can be ended, and the time that they share: the only safe way to stop a compiled loop."""
+"""Processes that can be ended, and the time that they divide: the only safe way to stop a compiled loop."""
 
 from __future__ import annotations
 

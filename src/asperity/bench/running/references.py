@@ -1,4 +1,4 @@
-"""References that are stored beside the code: JSON files that committed scripts have written."""
+"""Stored references: JSON files that committed scripts have written."""
 
 from __future__ import annotations
 
