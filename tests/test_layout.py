@@ -1,6 +1,7 @@
 """The layout: folders lie on floors, imports go down and never round, and a listing tells where things are."""
 
 import ast
+import re
 from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -11,6 +12,8 @@ import asperity
 from asperity import geometry, kernels, spectral
 
 ROOT = Path(asperity.__file__).parent
+TREE = Path(__file__).parents[1]
+CONTRIBUTING = (TREE / "CONTRIBUTING.md").read_text(encoding="utf-8")
 ROOMS = ("geometry", "kernels", "spectral")
 MOST_MODULES = 14
 # Every folder once, from the ground up; a room's own names come after its folders.
@@ -107,6 +110,20 @@ def test_numba_stands_in_the_compiled_folders_only():
         at_top = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)]
         if any(node.module == "numba" for node in at_top):
             assert set(name.split(".")) & set(COMPILED) or name == "geometry.scene.grid", name
+
+
+def test_contributing_lists_the_folders_from_the_ground_up():
+    block = re.search(r"^## Where things are$.*?^```text$(.*?)^```$", CONTRIBUTING, re.DOTALL | re.MULTILINE)
+    assert block is not None
+    listed = [line.split()[0].removeprefix("src/asperity/") for line in block[1].splitlines() if line]
+    of_a_room = [name for name in FLOORS if name.split(".")[0] in ROOMS and name.count(".") == 1]
+    of_the_house = [name for name in FLOORS if name not in ROOMS and "." not in name]
+    assert [name.replace("/", ".") for name in listed] == [f for f in FLOORS if f in (*of_a_room, *of_the_house)]
+
+
+def test_every_file_that_contributing_names_exists():
+    named = re.findall(r"`((?:src|tests|docs|benchmarks|constraints|geometry|kernels|spectral)/[\w./]*)`", CONTRIBUTING)
+    assert [name for name in named if not (TREE / name).exists()] == []
 
 
 @pytest.mark.parametrize("room", [geometry, kernels, spectral], ids=ROOMS)
