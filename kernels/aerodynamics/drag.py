@@ -16,8 +16,8 @@ from ..bases.basis import AngleFunction, Basis
 from ..bases.measure import SINE, gauss_rule
 from ..bases.momentum import Directions
 from ..bases.panels import Panels
-from ..discretisation.discretisation import SEED_WITHOUT_RNG
 from ..discretisation.isometries import has_chain
+from ..discretisation.method import SEED_WITHOUT_RNG
 from ..discretisation.methods import MatrixMaker
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix

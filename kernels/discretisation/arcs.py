@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,10 @@ from ..bases.intervals import between_cuts, edges_inside, ragged
 from ..bases.measure import gauss_on_intervals
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..bases.panels import Panels
+from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
+from ..walls.circular_arc import CircularArcLaw
+from .method import Budget, MethodName, computed, rounding
 
 # Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
 # pi - xi, both within 2 xi / MOST_HITS, and are counted there.
@@ -29,6 +34,20 @@ CHUNK = 2**21
 NOISE_PROBES = 5
 # Rows are integrals over delta in an interval of length 2 sin(xi) at most, with ends known to about pi eps.
 ROUNDING = 4.0 * np.pi * EPS
+
+
+class Arcs:
+    """The law of circular arcs by Gauss rules on the polygons of each number of hits."""
+
+    name: MethodName = "quadrature"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, CircularArcLaw)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        symmetric, error = arc_matrix(cast(CircularArcLaw, law).half_angle, basis)
+        how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
+        return computed(symmetric, basis, self.name, error + rounding(basis), how)
 
 
 def arc_matrix(half_angle: float, basis: Basis) -> tuple[Floats, float]:

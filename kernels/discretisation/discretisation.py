@@ -15,15 +15,14 @@ from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
-from .methods import MatrixMaker, Method
-
-SEED_WITHOUT_RNG = 0
+from .method import SEED_WITHOUT_RNG, MethodName
+from .methods import MatrixMaker
 
 
 def discretise(
     law: Law,
     basis: Basis,
-    method: Method = "auto",
+    method: MethodName = "auto",
     tolerance: float = 1e-8,
     samples: int | None = None,
     rng: np.random.Generator | None = None,
@@ -93,8 +92,8 @@ def discretise(
         raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for theta, with weight 'sin', got {basis!r}")
-    if method not in get_args(Method):
-        raise InputError(f"method: expected one of {', '.join(get_args(Method))}, got {method!r}")
+    if method not in get_args(MethodName):
+        raise InputError(f"method: expected one of {', '.join(get_args(MethodName))}, got {method!r}")
     if finite_number("tolerance", tolerance) < 0.0:
         raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
     number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -35,24 +34,19 @@ from ..walls.isometry_branches import table_of
 from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
 from ..walls.wall_law import WallLaw
 from ..walls.words import Word, factors_of, law_of, words_of
-from .arcs import arc_matrix
+from .arcs import Arcs
 from .auto_wall import wall_matrix
 from .densities import action_matrix, density_matrix, map_matrix
 from .entry_points import entry_matrix
 from .isometries import branch_matrix, has_chain
 from .isometry_tables import table_matrix
+from .method import Budget, Method, MethodName, isometric_rounding, rounding
 from .products import product_matrix
 from .scattering import is_scattered, scattered_matrix
 from .traced import LARGEST_ROW, MOST_FLIGHTS, is_affordable, row_matrix
 
-Method = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
+COMPUTED: tuple[Method, ...] = (Arcs(),)
 
-# Rounding of an exact matrix: the edges of n cells carry a rounding error each, which moves a share of about n eps of
-# a cell's measure; 1.2e-13 was measured where n eps is 1.1e-13.
-ROUNDING = 8.0 * EPS
-# Edges and offsets of isometries are rounded to about an ulp. That moves a share of about n eps of each of some n
-# cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
-DISPLACED = EPS
 # Flights of adaptive rows that nobody asked for by name: they take about as long as two million rays; beyond them the
 # shortfall is reported.
 QUICK_FLIGHTS = 4_000_000
@@ -60,7 +54,7 @@ QUICK_FLIGHTS = 4_000_000
 # fiftieth are not whole, and in bottles with a neck of a hundredth of their width rows have no end.
 THOROUGH_ROW = 0.25
 # Methods that a sum has if all its terms have them.
-SUMMABLE: tuple[Method, ...] = ("exact", "quadrature", "qmc")
+SUMMABLE: tuple[MethodName, ...] = ("exact", "quadrature", "qmc")
 
 
 @dataclass(frozen=True)
@@ -79,7 +73,7 @@ class MatrixMaker:
     patient: bool
     thorough: bool = False
 
-    def make(self, law: Law, method: Method) -> KernelMatrix:
+    def make(self, law: Law, method: MethodName) -> KernelMatrix:
         """The matrix of a law; the facts of the whole law are put in by `discretise`."""
         if isinstance(law, WallLaw) and law.closed_form is None and method in ("auto", "qmc", "monte-carlo"):
             # before its exact law is looked for, which may take a second
@@ -101,7 +95,7 @@ class MatrixMaker:
         rows = self.rows(law, float("inf"), MOST_FLIGHTS, THOROUGH_ROW)
         return min(found, rows, key=lambda matrix: float(matrix.error))
 
-    def sampled(self, law: Law, method: Method) -> KernelMatrix:
+    def sampled(self, law: Law, method: MethodName) -> KernelMatrix:
         """The matrix by rays."""
         if method == "qmc":
             return self.from_net(Net(law, self.basis, self.rng), self.samples)
@@ -114,7 +108,7 @@ class MatrixMaker:
         found = net.sampled(samples, symmetrise=self.symmetrise)
         return self._from_rays("qmc", found, f"spread of {PARTS} nets")
 
-    def _from_rays(self, method: Method, found: tuple[SampledArray, int, float], how: str) -> KernelMatrix:
+    def _from_rays(self, method: MethodName, found: tuple[SampledArray, int, float], how: str) -> KernelMatrix:
         array, used, lost = found
         if lost:
             how += ", plus a bound for rays that did not escape"
@@ -140,13 +134,13 @@ class MatrixMaker:
             f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
             "plus undecided entry points"
         )
-        return self._result(symmetric, "quadrature", error + ROUNDING * self.basis.size, "estimate", how)
+        return self._result(symmetric, "quadrature", error + rounding(self.basis), "estimate", how)
 
-    def methods(self, law: Law) -> tuple[Method, ...]:
+    def methods(self, law: Law) -> tuple[MethodName, ...]:
         """The methods that a law has, the best first; ``"monte-carlo"``, which all have, last."""
         closed_form = _replacement(law)
-        driven: tuple[Method, ...] = ("qmc",) if responder(law) is not None else ()
-        found: tuple[Method, ...]
+        driven: tuple[MethodName, ...] = ("qmc",) if responder(law) is not None else ()
+        found: tuple[MethodName, ...]
         if closed_form is not None:
             found = (*self.methods(closed_form)[:-1], *driven)
         elif has_chain(law):
@@ -167,12 +161,12 @@ class MatrixMaker:
             found = ("quadrature", *driven)
         return (*dict.fromkeys(found), "monte-carlo")
 
-    def _check_method(self, law: Law, method: Method) -> None:
+    def _check_method(self, law: Law, method: MethodName) -> None:
         methods = self.methods(law)
         if method != "auto" and method not in methods:
             raise InputError(f"method: {law!r} has no method {method!r}; it has {', '.join(methods)}")
 
-    def _made_by(self, law: Law, method: Method) -> KernelMatrix:
+    def _made_by(self, law: Law, method: MethodName) -> KernelMatrix:
         self._check_method(law, method)
         if method == "exact":
             return self._sum(law, method) if _is_sum_of_others(law) else self._exact(law)
@@ -199,7 +193,7 @@ class MatrixMaker:
         )
         # two Markov kernels cannot be further apart than their norms together
         furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(self.basis.size))
-        error = min(omitted + _rounding(self.basis), furthest)
+        error = min(omitted + isometric_rounding(self.basis), furthest)
         found = self._result(symmetric, "exact", error, "bound", how + (f", plus {left}" if omitted else ""))
         return found if table is None else replace(found, unresolved=table.unresolved)
 
@@ -219,20 +213,20 @@ class MatrixMaker:
         words = words_of(law)
         return [(1.0, factors_of(law))] if words is None else [(weight, word) for word, weight in words.items()]
 
-    def _word_methods(self, word: Word) -> tuple[Method, ...]:
+    def _word_methods(self, word: Word) -> tuple[MethodName, ...]:
         if _is_short(word):
             return self.methods(law_of(word))
         if all(map(lists_branches, word)):
             return ("exact", "quadrature", "monte-carlo")
         return ("quadrature", "monte-carlo") if all(map(_is_computable, word)) else ("monte-carlo",)
 
-    def _chained(self, law: Law, method: Method) -> KernelMatrix:
+    def _chained(self, law: Law, method: MethodName) -> KernelMatrix:
         self._check_method(law, method)
         terms = self._terms(law)
         made = [(weight, self._word(word, method)) for weight, word in terms]
         return made[0][1] if len(terms) == 1 else self._summed(made)
 
-    def _word(self, word: Word, method: Method) -> KernelMatrix:
+    def _word(self, word: Word, method: MethodName) -> KernelMatrix:
         """The matrix of a chain: by the first way that meets the tolerance, or else with the least error."""
         if _is_short(word):
             return self.make(law_of(word), method)
@@ -250,7 +244,7 @@ class MatrixMaker:
             raise reasons[-1]
         return min(found, key=lambda matrix: float(matrix.error))
 
-    def _ways(self, word: Word, method: Method) -> list[Callable[[Word], KernelMatrix]]:
+    def _ways(self, word: Word, method: MethodName) -> list[Callable[[Word], KernelMatrix]]:
         methods = self._word_methods(word)
         ways: list[Callable[[Word], KernelMatrix]] = []
         if method != "quadrature" and "exact" in methods:
@@ -264,7 +258,7 @@ class MatrixMaker:
     def _scattered(self, word: Word) -> KernelMatrix:
         def isometric(chain: Sequence[Law], basis: Basis) -> tuple[Floats, float]:
             symmetric, omitted = self._isometric(law_of(tuple(chain)), basis)
-            return symmetric, omitted + _rounding(basis)
+            return symmetric, omitted + isometric_rounding(basis)
 
         symmetric, error = scattered_matrix(word, self.basis, isometric)
         how = "eigenvalues of scatterings between isometries, to rounding, plus omitted kinks and polynomials"
@@ -278,7 +272,7 @@ class MatrixMaker:
 
         symmetric, error = product_matrix(word, self.basis, make, self.tolerance)
         how = "what panels leave out between the factors, from their last coefficients, plus the factors' errors"
-        return self._result(symmetric, "quadrature", error + _rounding(self.basis), "estimate", how)
+        return self._result(symmetric, "quadrature", error + isometric_rounding(self.basis), "estimate", how)
 
     def _quadrature(self, law: Law) -> KernelMatrix:
         if isinstance(law, Combination):
@@ -288,6 +282,9 @@ class MatrixMaker:
         if isinstance(law, WallLaw):
             # asked for by name, or there is nothing else for the law that this one is a part of
             return self.rows(law, useless=float("inf"))
+        for method in COMPUTED:
+            if method.accepts(law, self.basis):
+                return method.matrix(law, self.basis, Budget(self.tolerance))
         how = "difference of the last two levels of quadrature"
         if isinstance(law, DensityLaw) and not isinstance(self.basis, Directions):
             # three smooth functions are integrated row by row below, on the law's own panels
@@ -297,9 +294,6 @@ class MatrixMaker:
             how = "masses of intervals, to rounding"
         elif isinstance(law, InvolutionLaw):
             symmetric, error = map_matrix(law.map, self.basis, self.tolerance)
-        elif isinstance(law, CircularArcLaw):
-            symmetric, error = arc_matrix(law.half_angle, self.basis)
-            how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
         elif isinstance(law, DrivenLaw) and not self._acts_accurately(law):
             symmetric, error = entry_matrix(law, self.basis, self.samples)
         else:
@@ -308,10 +302,10 @@ class MatrixMaker:
             if law.reversible:
                 # an under-resolved row of a reversible law shows as asymmetry
                 error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
-        error += ROUNDING * self.basis.size
+        error += rounding(self.basis)
         return self._result(symmetric, "quadrature", error, "estimate", how)
 
-    def _sum(self, law: Law, method: Method) -> KernelMatrix:
+    def _sum(self, law: Law, method: MethodName) -> KernelMatrix:
         return self._summed([(weight, self.make(term, method)) for weight, term in Combination.of(law).terms_checked()])
 
     def _summed(self, terms: list[tuple[float, KernelMatrix]]) -> KernelMatrix:
@@ -361,7 +355,7 @@ def _is_sum_of_others(law: Law) -> bool:
     return isinstance(law, Combination) and not lists_branches(law)
 
 
-def _common(each: Sequence[tuple[Method, ...]]) -> tuple[Method, ...]:
+def _common(each: Sequence[tuple[MethodName, ...]]) -> tuple[MethodName, ...]:
     return tuple(name for name in SUMMABLE if all(name in names for names in each))
 
 
@@ -380,10 +374,6 @@ def _is_computable(law: Law) -> bool:
             or getattr(part, "exact_law", None) is not None
         ),
     )
-
-
-def _rounding(basis: Basis) -> float:
-    return float(ROUNDING * basis.size + DISPLACED * basis.size**1.5)
 
 
 def _scaled_defect(single: tuple[float, KernelMatrix], total: KernelMatrix) -> SymmetryDefect | None:
