@@ -1,25 +1,30 @@
-"""Matrices of laws with a density, of deterministic laws, and of laws known by their action on functions."""
+"""Matrices of laws with a density and of deterministic laws, by rules on levels until two of them agree."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
-from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.assembly import add_products, cell_index
 from ..bases.basis import Basis
+from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
-from ..expectations.angle_panels import NODES, AnglePanels
+from ..bases.momentum import Directions
+from ..laws.density import DensityLaw
+from ..laws.involution import InvolutionLaw
+from ..laws.law import Law
+from ..laws.least_resistance import LeastResistanceLaw
+from ..matrices.matrix import KernelMatrix
+from .method import Budget, MethodName, computed, rounding, until_settled
 
-# Evaluations of a density, values of basis functions in `law.apply`, and points of a map that are affordable: each is
-# about a second or two.
-MOST_DENSITY_VALUES, MOST_APPLY_VALUES, MOST_MAP_POINTS = 2**25, 2**26, 2**20
+# Evaluations of a density, and points of a map that are affordable: each is about a second or two.
+MOST_DENSITY_VALUES, MOST_MAP_POINTS = 2**25, 2**20
 # Gauss nodes in theta' on an interval, by the largest share that it has of a panel on which the law's 16 nodes reach
 # rounding. The singularities are then 3/8 of the panel away from its ends, and q nodes on a share r miss rho^(-2 q)
 # with rho + 1/rho = 2 + 3/(2 r): 1e-12 or less in each case.
@@ -34,10 +39,6 @@ MIRROR_TOLERANCE = 4.0 * EPS * np.pi
 CHUNK = 2**21
 # Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.
 ROW_CHUNK = 2**17
-# Kinks that panels begin with; the share of the tolerance that one of them may spend, and what rounding leaves.
-FIRST_KINKS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
-# Rows are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
-GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 BISECTIONS = 60
 # A map is mostly singular where it jumps, as a square root if it comes from grazing or goes there.
 GRADING = 0.25 ** np.arange(1.0, 17.0)
@@ -58,13 +59,48 @@ class HasDensity(Protocol):
     def mirror_symmetric(self) -> bool | None: ...
 
 
-class HasAction(Protocol):
-    """What is asked of a law known by its action on functions."""
+class Densities:
+    """Laws with a density by Gauss rules whose order doubles."""
 
-    def apply(self, function: Callable[[Floats], Floats], theta: ArrayLike) -> Floats: ...
-    def kinks(self, limit: int) -> tuple[Floats, float]: ...
-    @property
-    def fan_out(self) -> int: ...
+    name: MethodName = "quadrature"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        # the three smooth functions of Directions are integrated angle by angle, on the law's own panels: see Actions
+        return isinstance(law, DensityLaw) and not isinstance(basis, Directions)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        return _settled(*density_matrix(cast(DensityLaw, law), basis, budget.tolerance), basis)
+
+
+class Maps:
+    """Deterministic laws, theta' = T(theta), by rules between the jumps of T that are halved."""
+
+    name: MethodName = "quadrature"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, InvolutionLaw)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        return _settled(*map_matrix(cast(InvolutionLaw, law).map, basis, budget.tolerance), basis)
+
+
+class LeastResistance:
+    """The law of least resistance in bins, from the masses of intervals and their images."""
+
+    name: MethodName = "quadrature"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, LeastResistanceLaw) and isinstance(basis, Bins)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        flux = cast(LeastResistanceLaw, law).flux(cast(Bins, basis))
+        symmetric = basis.heights[:, None] * flux * basis.heights
+        return computed(symmetric, basis, self.name, rounding(basis), "masses of intervals, to rounding")
+
+
+def _settled(symmetric: Floats, error: float, basis: Basis) -> KernelMatrix:
+    how = "difference of the last two levels of quadrature"
+    return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
 def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Floats, float]:
@@ -85,8 +121,8 @@ def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Flo
         order = affordable[0] if affordable else ROW_NODES[-1]
         if min(cost) <= MOST_ROW_VALUES:
             levels = _row_levels(law, basis, edges, outer, order)
-            return _until_settled((_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance)
-    return _until_settled(_density_levels(law, basis, edges), tolerance)
+            return until_settled((_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance)
+    return until_settled(_density_levels(law, basis, edges), tolerance)
 
 
 def _with_mirror_image(half: Floats) -> Floats:
@@ -183,7 +219,7 @@ def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: f
     width = np.diff(ends)[:, None] * GRADING
     graded = (ends[:-1, None] + width).ravel(), (ends[1:, None] - width).ravel()
     edges = np.unique(np.concatenate((basis.edges, ends, *graded)))
-    return _until_settled(_map_levels(map_angle, basis, edges), tolerance)
+    return until_settled(_map_levels(map_angle, basis, edges), tolerance)
 
 
 def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floats) -> Iterator[Floats]:
@@ -241,48 +277,3 @@ def _bisected(low: Floats, high: Floats, before: Callable[[Floats], NDArray[np.b
             early = before(middle)
             low, high = np.where(early, middle, low), np.where(early, high, middle)
     return high
-
-
-def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, P e_j> by Kronrod's rule in theta with P e_j from ``law.apply``, and an estimate of its Frobenius error.
-
-    Panels between edges and kinks are halved until each is settled or the work exceeds about a second. The error is the
-    sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
-    """
-    try:
-        kinks = law.kinks(FIRST_KINKS)[0]
-    except InputError:
-        kinks = np.empty(0)
-    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, kinks)))
-    low, high = edges[:-1], edges[1:]
-    total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0
-    values = NODES.size * basis.size * max(int(law.fan_out), 1)
-    while low.size:
-        spent += values * low.size
-        # the next round is twice as large at most
-        last = spent + 2 * values * low.size > MOST_APPLY_VALUES
-        settled = np.zeros(low.size, dtype=np.bool_)
-        step = max(1, CHUNK // max(values, basis.size**2))
-        for start in range(0, low.size, step):
-            panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
-            panels.image = law.apply(basis.evaluate, panels.angle)
-            difference = panels.differences(basis)
-            done = last | (difference <= max(PANEL_SHARE * tolerance, SETTLED))
-            settled[start : start + step] = done
-            total += panels.kept(done).values(basis).sum(axis=0)
-            error += float(difference[done].sum())
-        middle = 0.5 * (low + high)[~settled]
-        low, high = np.append(low[~settled], middle), np.append(middle, high[~settled])
-    return total, error
-
-
-def _until_settled(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:
-    """The first level that differs from the one before by no more than the tolerance, or the last; the difference."""
-    current = next(levels)
-    difference = np.inf
-    for finer in levels:
-        difference = float(np.linalg.norm(finer - current))
-        current = finer
-        if difference <= tolerance:
-            break
-    return current, difference

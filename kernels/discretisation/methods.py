@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
@@ -12,14 +13,9 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
 from ..bases.basis import Basis
-from ..bases.bins import Bins
 from ..bases.legendre import Legendre
 from ..bases.mirror import mirror_refinement, reflection_matrix
-from ..bases.momentum import Directions
-from ..laws.density import DensityLaw
-from ..laws.involution import InvolutionLaw
 from ..laws.law import Combination, DrivenLaw, Law, SpecularFrame
-from ..laws.least_resistance import LeastResistanceLaw
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.random_map import responder
 from ..laws.structure import holds_of_all, lists_branches
@@ -34,9 +30,10 @@ from ..walls.isometry_branches import table_of
 from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
 from ..walls.wall_law import WallLaw
 from ..walls.words import Word, factors_of, law_of, words_of
+from .actions import Actions
 from .arcs import Arcs
 from .auto_wall import wall_matrix
-from .densities import action_matrix, density_matrix, map_matrix
+from .densities import Densities, LeastResistance, Maps
 from .entry_points import entry_matrix
 from .isometries import branch_matrix, has_chain
 from .isometry_tables import table_matrix
@@ -45,7 +42,7 @@ from .products import product_matrix
 from .scattering import is_scattered, scattered_matrix
 from .traced import LARGEST_ROW, MOST_FLIGHTS, is_affordable, row_matrix
 
-COMPUTED: tuple[Method, ...] = (Arcs(),)
+COMPUTED: tuple[Method, ...] = (Arcs(), Densities(), LeastResistance(), Maps(), Actions())
 
 # Flights of adaptive rows that nobody asked for by name: they take about as long as two million rays; beyond them the
 # shortfall is reported.
@@ -155,7 +152,7 @@ class MatrixMaker:
             found = tuple(name for name in self.methods(law.law)[:-1] if name != "exact")
         elif isinstance(law, DrivenLaw):
             rows = isinstance(law, WallLaw) and is_affordable(law.wall, self.basis)
-            accurate = isinstance(law, CircularArcLaw) or rows or self._acts_accurately(law)
+            accurate = isinstance(law, CircularArcLaw) or rows or Actions().accepts(law, self.basis)
             found = ("quadrature", "qmc") if accurate else ("qmc", "quadrature")
         else:
             found = ("quadrature", *driven)
@@ -285,25 +282,9 @@ class MatrixMaker:
         for method in COMPUTED:
             if method.accepts(law, self.basis):
                 return method.matrix(law, self.basis, Budget(self.tolerance))
+        symmetric, error = entry_matrix(cast(DrivenLaw, law), self.basis, self.samples)
         how = "difference of the last two levels of quadrature"
-        if isinstance(law, DensityLaw) and not isinstance(self.basis, Directions):
-            # three smooth functions are integrated row by row below, on the law's own panels
-            symmetric, error = density_matrix(law, self.basis, self.tolerance)
-        elif isinstance(law, LeastResistanceLaw) and isinstance(self.basis, Bins):
-            symmetric, error = self.basis.heights[:, None] * law.flux(self.basis) * self.basis.heights, 0.0
-            how = "masses of intervals, to rounding"
-        elif isinstance(law, InvolutionLaw):
-            symmetric, error = map_matrix(law.map, self.basis, self.tolerance)
-        elif isinstance(law, DrivenLaw) and not self._acts_accurately(law):
-            symmetric, error = entry_matrix(law, self.basis, self.samples)
-        else:
-            symmetric, error = action_matrix(law, self.basis, self.tolerance)
-            how = "difference of the rules of Gauss and Kronrod, panel by panel"
-            if law.reversible:
-                # an under-resolved row of a reversible law shows as asymmetry
-                error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
-        error += rounding(self.basis)
-        return self._result(symmetric, "quadrature", error, "estimate", how)
+        return self._result(symmetric, "quadrature", error + rounding(self.basis), "estimate", how)
 
     def _sum(self, law: Law, method: MethodName) -> KernelMatrix:
         return self._summed([(weight, self.make(term, method)) for weight, term in Combination.of(law).terms_checked()])
@@ -332,14 +313,6 @@ class MatrixMaker:
             self._result(restriction @ inner.symmetric @ flip @ restriction.T, inner.method, 0.0, "bound", ""),
             error=inner.error,
         )
-
-    def _acts_accurately(self, law: DrivenLaw) -> bool:
-        """Whether ``law.apply`` is accurate for the functions of the basis.
-
-        A law driven by an entry point averages over a fixed rule, unless it has an `apply` of its own, which is then
-        accurate for smooth functions: those of Legendre, not those with edges.
-        """
-        return type(law)._apply is not DrivenLaw._apply and isinstance(self.basis, Legendre)
 
     def _result(self, symmetric: Floats, method: str, error: float, kind: ErrorKind, how: str) -> KernelMatrix:
         return KernelMatrix(symmetric, self.basis, frobenius_error(error, kind, how), method=method)

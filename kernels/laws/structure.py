@@ -60,6 +60,11 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     return rules.leaf(law) if closed_form is None else fold(closed_form, rules)
 
 
+def is_compound(law: Law) -> bool:
+    """Whether `fold` takes the law apart into others."""
+    return isinstance(law, (Combination, Composition, Power, SpecularFrame))
+
+
 def holds_of_all(law: Law, promise: Callable[[Law], bool]) -> bool:
     """Whether every part of a law that is no combination of others keeps a promise."""
     return fold(law, Rules(promise, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))

@@ -15,7 +15,7 @@ from ...core.rounding import EPS
 from ...kernels import Basis, Bins, CircularArcLaw, Composition, DensityLaw, Law, Legendre, Panels, PolygonLaw, WallLaw
 from ...kernels.bases.measure import SINE, gauss_on_intervals
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
-from ...kernels.discretisation.densities import GRAZING_EDGES
+from ...kernels.discretisation.actions import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import BasisRows, function_rows, height_of, integrates_panels, weighted_rows
 from ...kernels.laws.density import GAUSS_NODES, split_rows

@@ -1,0 +1,92 @@
+"""Matrices of laws known by their action on functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.checks import Floats
+from ...core.errors import InputError
+from ..bases.basis import Basis
+from ..bases.legendre import Legendre
+from ..expectations.angle_panels import NODES, AnglePanels
+from ..laws.law import DrivenLaw, Law
+from ..laws.structure import is_compound
+from ..matrices.matrix import KernelMatrix
+from .method import Budget, MethodName, computed, rounding
+
+# Values of basis functions in `law.apply` that are affordable: about a second or two.
+MOST_VALUES = 2**26
+# Numbers held at a time.
+CHUNK = 2**21
+# Kinks that panels begin with; the share of the tolerance that one of them may spend, and what rounding leaves.
+FIRST_KINKS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
+# Angles are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
+GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
+
+
+class HasAction(Protocol):
+    """What is asked of a law known by its action on functions."""
+
+    def apply(self, function: Callable[[Floats], Floats], theta: ArrayLike) -> Floats: ...
+    def kinks(self, limit: int) -> tuple[Floats, float]: ...
+    @property
+    def fan_out(self) -> int: ...
+
+
+class Actions:
+    """Any law that is not made of others and whose `apply` is accurate, by Kronrod's rule in the incoming angle."""
+
+    name: MethodName = "quadrature"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        if is_compound(law):
+            return False
+        # A law driven by an entry point averages over a fixed rule, unless it has an `_apply` of its own, which is then
+        # accurate for smooth functions: those of Legendre, not those with edges.
+        own = type(law)._apply is not DrivenLaw._apply and isinstance(basis, Legendre)
+        return not isinstance(law, DrivenLaw) or own
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        symmetric, error = action_matrix(law, basis, budget.tolerance)
+        if law.reversible:
+            # an under-resolved angle of a reversible law shows as asymmetry
+            error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
+        how = "difference of the rules of Gauss and Kronrod, panel by panel"
+        return computed(symmetric, basis, self.name, error + rounding(basis), how)
+
+
+def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+    """<e_i, P e_j> by Kronrod's rule in theta with P e_j from ``law.apply``, and an estimate of its Frobenius error.
+
+    Panels between edges and kinks are halved until each is settled or the work exceeds about a second. The error is the
+    sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
+    """
+    try:
+        kinks = law.kinks(FIRST_KINKS)[0]
+    except InputError:
+        kinks = np.empty(0)
+    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, kinks)))
+    low, high = edges[:-1], edges[1:]
+    total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0
+    values = NODES.size * basis.size * max(int(law.fan_out), 1)
+    while low.size:
+        spent += values * low.size
+        # the next round is twice as large at most
+        last = spent + 2 * values * low.size > MOST_VALUES
+        settled = np.zeros(low.size, dtype=np.bool_)
+        step = max(1, CHUNK // max(values, basis.size**2))
+        for start in range(0, low.size, step):
+            panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
+            panels.image = law.apply(basis.evaluate, panels.angle)
+            difference = panels.differences(basis)
+            done = last | (difference <= max(PANEL_SHARE * tolerance, SETTLED))
+            settled[start : start + step] = done
+            total += panels.kept(done).values(basis).sum(axis=0)
+            error += float(difference[done].sum())
+        middle = 0.5 * (low + high)[~settled]
+        low, high = np.append(low[~settled], middle), np.append(middle, high[~settled])
+    return total, error
