@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity import kernels as ker
+from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import row_matrix
 from asperity.kernels.walls.conditionals import adaptive_rows
 
@@ -76,7 +77,7 @@ def outcomes(
             for k, miss in enumerate(distance.tolist()):
                 yield Outcome("row", kind, tolerance, float(rows.error[k]), miss, entry["row_errors"][k])
             if within:
-                matrix, error, _ = row_matrix(wall, ker.Legendre(2), tolerance, most_flights)
+                matrix, error, _ = row_matrix(wall, ker.Legendre(2), Budget(tolerance, segments=most_flights))
                 miss = abs(float(matrix[1, 1]) - float.fromhex(entry["moment"]))
                 yield Outcome("moment", kind, tolerance, error, miss, entry["moment_error"])
                 # finer tolerances would end at the same number of flights

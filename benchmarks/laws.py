@@ -13,6 +13,7 @@ from asperity import kernels as ker
 from asperity.bench.running.timing import least_time
 from asperity.geometry.polygons.beams import beams_of
 from asperity.kernels.discretisation.isometry_tables import table_matrix
+from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import row_matrix
 from asperity.kernels.walls.polygon import table_of_beams
 
@@ -57,7 +58,7 @@ def _moment(what: str, wall: geo.Wall, exact: float, repeats: int) -> LawTime:
 
 def _rows(wall: geo.Wall, tolerance: float, repeats: int) -> LawTime:
     """By adaptive rows, as if the arc had no quadrature of its own."""
-    (matrix, reported, _), seconds = least_time(lambda: row_matrix(wall, ker.Legendre(2), tolerance), repeats)
+    (matrix, reported, _), seconds = least_time(lambda: row_matrix(wall, ker.Legendre(2), Budget(tolerance)), repeats)
     error = abs(float(matrix[1, 1]) - ARC_MOMENT)
     what = f"focusing arc by adaptive rows, first moment to {tolerance:g}"
     return LawTime(what, error, reported, seconds, _monte_carlo(wall) / seconds**0.5)

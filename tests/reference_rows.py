@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity.kernels import Legendre
+from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import panel_edges
 from random_curved_walls import COUNT, random_curved_wall
 from textbook_tracer import compiled, follow, table_of
@@ -182,7 +183,7 @@ def midpoint_sum(table, theta, left, right, shift):
 def moment_of(wall):
     """<u, P u>/<u, u> and its error: flat tops, which reflect u to -u, in closed form."""
     table, (left, right) = table_of(wall), opening(wall)
-    edges, missed = panel_edges(wall, Legendre(2), CUT_TOLERANCE, CUT_FLIGHTS)
+    edges, missed = panel_edges(wall, Legendre(2), Budget(CUT_TOLERANCE, segments=CUT_FLIGHTS))
     share, flat = (right - left) / wall.period, 1.0 - (right - left) / wall.period
     if missed > ROUGH:
         rng = np.random.default_rng(11)

@@ -16,10 +16,10 @@ from ..bases.basis import AngleFunction, Basis
 from ..bases.measure import SINE, gauss_rule
 from ..bases.momentum import Directions
 from ..bases.panels import Panels
-from ..discretisation.isometries import has_chain
 from ..discretisation.method import SEED_WITHOUT_RNG
 from ..discretisation.methods import MatrixMaker
 from ..laws.law import Law
+from ..laws.structure import has_chain
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import half_width
 from ..sampling.monte_carlo import DEFAULT_SAMPLES

@@ -94,7 +94,7 @@ class _Ways:
         """The matrix by adaptive rows, if they meet the tolerance in less time than so many rays would."""
         if not self.affordable or rays < MANY_RAYS:
             return None
-        rows = self.maker.rows(self.law, self.maker.tolerance, most_flights=rays)
+        rows = self.maker.rows(self.law, self.maker.tolerance, rays)
         return rows if float(rows.error) <= self.maker.tolerance else None
 
     def rows_or_all_rays(self) -> KernelMatrix:

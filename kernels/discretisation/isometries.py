@@ -12,7 +12,13 @@ from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals
 from ..laws.branches import preimages
-from ..laws.law import Combination, Composition, Power, SpecularFrame
+from ..laws.law import Law
+from ..laws.structure import Rules, fold, has_chain, lists_branches
+from ..matrices.matrix import KernelMatrix
+from ..walls.isometry_branches import table_of
+from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
+from .isometry_tables import bounded, table_matrix
+from .method import Budget, MethodName
 
 # A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
 # misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
@@ -32,6 +38,41 @@ class Branching(Protocol):
     def kinks(self, limit: int) -> tuple[Floats, float]: ...
     @property
     def fan_out(self) -> int: ...
+
+
+class Isometries:
+    """Laws that list their isometries, by Gauss rules between the kinks of these."""
+
+    name: MethodName = "exact"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        # the isometries of chains may be too many: see `chains`
+        return lists_branches(law) and not has_chain(law)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        symmetric, omitted = isometric_matrix(law, basis, budget.tolerance)
+        how = "Gauss rules between the kinks of isometries, to rounding"
+        return bounded(symmetric, basis, omitted, how + (", plus omitted kinks" if omitted else ""))
+
+
+def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
+    """The matrix of a law that lists its isometries, and a bound of its Frobenius error apart from rounding."""
+    table = table_of(law)
+    if table is not None:
+        return table_matrix(table, basis)
+    teeth = fold(law, REPEATED_TEETH)
+    if teeth is not None:
+        return repeated_teeth_matrix(teeth[0], basis, exchanged=teeth[1])
+    return branch_matrix(law, basis, tolerance)
+
+
+# Repeated teeth, and whether they are in the other frame: these have exact integrals up to grazing.
+REPEATED_TEETH: Rules[tuple[RepeatedTeethLaw, bool] | None] = Rules(
+    lambda law: (law, False) if isinstance(law, RepeatedTeethLaw) else None,
+    lambda terms: None,
+    lambda parts: None,
+    lambda found: None if found is None else (found[0], not found[1]),
+)
 
 
 def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
@@ -67,13 +108,6 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     for chosen, nodes in ((narrow, order_narrow), (~narrow, order)):
         _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total)
     return total, omitted * worst
-
-
-def has_chain(law: object) -> bool:
-    """Whether branches follow one another somewhere in the law, so that their numbers multiply."""
-    if isinstance(law, Combination):
-        return any(has_chain(term) for _, term in law.terms)
-    return isinstance(law, (Composition, Power)) or (isinstance(law, SpecularFrame) and has_chain(law.law))
 
 
 def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:

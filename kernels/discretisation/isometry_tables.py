@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import cast
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,9 +16,13 @@ from ..bases.intervals import between_cuts, edges_inside
 from ..bases.legendre import Legendre
 from ..bases.measure import gauss_on_intervals
 from ..bases.panels import Panels
+from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
 from ..walls.crevice_tail import crevice_nodes, first_crossing
+from ..walls.isometry_branches import table_of
 from ..walls.isometry_table import IsometryTable
 from ..walls.rectangular import crevice_pieces
+from .method import Budget, MethodName, computed, isometric_rounding
 
 # Products of two functions of a basis times a sinusoid, on a piece of width w, vary like exp(n w) with n the
 # stiffness below. Gauss with m nodes misses (n w / 2)^(2m) / (2m)! of them: 3e-15 and less for these pairs of (n w, m),
@@ -26,6 +33,29 @@ MORE_NODES = 18
 FEW = 0.1
 # Pieces, or nodes, held at a time.
 CHUNK = 2**20
+
+
+class IsometryTables:
+    """Laws that are a table of isometries, by masses and Gauss rules on every piece of it."""
+
+    name: MethodName = "exact"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return table_of(law) is not None
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        table = cast(IsometryTable, table_of(law))
+        symmetric, omitted = table_matrix(table, basis)
+        how = "masses and Gauss rules on every piece of the table of isometries, to rounding"
+        found = bounded(symmetric, basis, omitted, how + (", plus unresolved beams" if omitted else ""))
+        return replace(found, unresolved=table.unresolved)
+
+
+def bounded(symmetric: Floats, basis: Basis, omitted: float, how: str) -> KernelMatrix:
+    """The exact matrix whose error apart from rounding has a bound."""
+    # two Markov kernels cannot be further apart than their norms together
+    furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(basis.size))
+    return computed(symmetric, basis, "exact", min(omitted + isometric_rounding(basis), furthest), how, "bound")
 
 
 def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:

@@ -11,14 +11,11 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind
-from ...core.rounding import EPS
 from ..bases.basis import Basis
-from ..bases.legendre import Legendre
 from ..bases.mirror import mirror_refinement, reflection_matrix
 from ..laws.law import Combination, DrivenLaw, Law, SpecularFrame
-from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.random_map import responder
-from ..laws.structure import holds_of_all, lists_branches
+from ..laws.structure import has_chain, holds_of_all, lists_branches
 from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.counts import SampledArray
@@ -26,8 +23,6 @@ from ..sampling.monte_carlo import independent_rays
 from ..sampling.sobol import PARTS, Net
 from ..walls.circular_arc import CircularArcLaw
 from ..walls.conditionals import is_few
-from ..walls.isometry_branches import table_of
-from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
 from ..walls.wall_law import WallLaw
 from ..walls.words import Word, factors_of, law_of, words_of
 from .actions import Actions
@@ -35,21 +30,16 @@ from .arcs import Arcs
 from .auto_wall import wall_matrix
 from .densities import Densities, LeastResistance, Maps
 from .entry_points import entry_matrix
-from .isometries import branch_matrix, has_chain
-from .isometry_tables import table_matrix
-from .method import Budget, Method, MethodName, isometric_rounding, rounding
+from .isometries import Isometries, isometric_matrix
+from .isometry_tables import IsometryTables
+from .method import MOST_SEGMENTS, QUICK_SEGMENTS, Budget, Method, MethodName, isometric_rounding, rounding
 from .products import product_matrix
-from .scattering import is_scattered, scattered_matrix
-from .traced import LARGEST_ROW, MOST_FLIGHTS, is_affordable, row_matrix
+from .scattering import Diagonal, is_scattered, scattered_matrix
+from .traced import Traced
 
+EXACT: tuple[Method, ...] = (IsometryTables(), Diagonal(), Isometries())
 COMPUTED: tuple[Method, ...] = (Arcs(), Densities(), LeastResistance(), Maps(), Actions())
 
-# Flights of adaptive rows that nobody asked for by name: they take about as long as two million rays; beyond them the
-# shortfall is reported.
-QUICK_FLIGHTS = 4_000_000
-# Flights of one row, as a share of all, where a thorough answer is wanted: in some steep Bezier hollows rows with a
-# fiftieth are not whole, and in bottles with a neck of a hundredth of their width rows have no end.
-THOROUGH_ROW = 0.25
 # Methods that a sum has if all its terms have them.
 SUMMABLE: tuple[MethodName, ...] = ("exact", "quadrature", "qmc")
 
@@ -89,7 +79,7 @@ class MatrixMaker:
         found = wall_matrix(self, law)
         if not self.thorough or float(found.error) <= self.tolerance or not is_few(law.wall):
             return found
-        rows = self.rows(law, float("inf"), MOST_FLIGHTS, THOROUGH_ROW)
+        rows = self.rows(law, float("inf"), MOST_SEGMENTS)
         return min(found, rows, key=lambda matrix: float(matrix.error))
 
     def sampled(self, law: Law, method: MethodName) -> KernelMatrix:
@@ -119,19 +109,10 @@ class MatrixMaker:
             raw_defect=array.raw_defect,
         )
 
-    def rows(
-        self, law: WallLaw, useless: float, most_flights: int = QUICK_FLIGHTS, largest_row: float = LARGEST_ROW
-    ) -> KernelMatrix:
+    def rows(self, law: WallLaw, fallback: float, segments: int = QUICK_SEGMENTS) -> KernelMatrix:
         """The matrix by adaptive rows; unless they were asked for, within a second or so, if they can be of use."""
-        limits = (MOST_FLIGHTS, None) if self.patient else (most_flights, useless)
-        symmetric, error, rays = row_matrix(
-            law.wall, self.basis, self.tolerance, limits[0], useless=limits[1], largest_row=largest_row
-        )
-        how = (
-            f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
-            "plus undecided entry points"
-        )
-        return self._result(symmetric, "quadrature", error + rounding(self.basis), "estimate", how)
+        segments, fallback = (MOST_SEGMENTS, float("inf")) if self.patient else (segments, fallback)
+        return Traced().matrix(law, self.basis, Budget(self.tolerance, segments=segments, fallback=fallback))
 
     def methods(self, law: Law) -> tuple[MethodName, ...]:
         """The methods that a law has, the best first; ``"monte-carlo"``, which all have, last."""
@@ -144,14 +125,14 @@ class MatrixMaker:
             found = _common([self._word_methods(word) for _, word in self._terms(law)])
         elif lists_branches(law):
             found = ("exact", "quadrature", *driven)
-        elif self._is_diagonal(law):
+        elif Diagonal().accepts(law, self.basis):
             found = ("exact", "quadrature")
         elif isinstance(law, Combination):
             found = _common([self.methods(term) for _, term in law.terms_checked()])
         elif isinstance(law, SpecularFrame):
             found = tuple(name for name in self.methods(law.law)[:-1] if name != "exact")
         elif isinstance(law, DrivenLaw):
-            rows = isinstance(law, WallLaw) and is_affordable(law.wall, self.basis)
+            rows = Traced().accepts(law, self.basis)
             accurate = isinstance(law, CircularArcLaw) or rows or Actions().accepts(law, self.basis)
             found = ("quadrature", "qmc") if accurate else ("qmc", "quadrature")
         else:
@@ -173,36 +154,12 @@ class MatrixMaker:
             return self._sum(law, method)
         return self.sampled(law, method)
 
-    def _is_diagonal(self, law: Law) -> bool:
-        return isinstance(law, HenyeyGreensteinLaw) and isinstance(self.basis, Legendre)
-
     def _exact(self, law: Law) -> KernelMatrix:
-        if isinstance(law, HenyeyGreensteinLaw) and self._is_diagonal(law):
-            diagonal = np.diag(law.g ** np.arange(float(self.basis.size)))
-            how = "eigenvalues g^l of the polynomials of degree l, to rounding"
-            return self._result(diagonal, "exact", EPS * self.basis.size**0.5, "bound", how)
-        table = table_of(law)
-        symmetric, omitted = self._isometric(law, self.basis)
-        how, left = (
-            ("masses and Gauss rules on every piece of the table of isometries, to rounding", "unresolved beams")
-            if table is not None
-            else ("Gauss rules between the kinks of isometries, to rounding", "omitted kinks")
-        )
-        # two Markov kernels cannot be further apart than their norms together
-        furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(self.basis.size))
-        error = min(omitted + isometric_rounding(self.basis), furthest)
-        found = self._result(symmetric, "exact", error, "bound", how + (f", plus {left}" if omitted else ""))
-        return found if table is None else replace(found, unresolved=table.unresolved)
-
-    def _isometric(self, law: Law, basis: Basis) -> tuple[Floats, float]:
-        """The matrix of a law of isometries, and a bound of its error apart from rounding."""
-        table = table_of(law)
-        if table is not None:
-            return table_matrix(table, basis)
-        inner = law.law if isinstance(law, SpecularFrame) else law
-        if isinstance(inner, RepeatedTeethLaw):
-            return repeated_teeth_matrix(inner, basis, exchanged=inner is not law)
-        return branch_matrix(law, basis, self.tolerance)
+        budget = Budget(self.tolerance)
+        for method in EXACT[:-1]:
+            if method.accepts(law, self.basis):
+                return method.matrix(law, self.basis, budget)
+        return EXACT[-1].matrix(law, self.basis, budget)
 
     # ---- laws one after the other ----------------------------------------------------------------------------
     def _terms(self, law: Law) -> list[tuple[float, Word]]:
@@ -254,7 +211,7 @@ class MatrixMaker:
 
     def _scattered(self, word: Word) -> KernelMatrix:
         def isometric(chain: Sequence[Law], basis: Basis) -> tuple[Floats, float]:
-            symmetric, omitted = self._isometric(law_of(tuple(chain)), basis)
+            symmetric, omitted = isometric_matrix(law_of(tuple(chain)), basis, self.tolerance)
             return symmetric, omitted + isometric_rounding(basis)
 
         symmetric, error = scattered_matrix(word, self.basis, isometric)
@@ -278,7 +235,7 @@ class MatrixMaker:
             return self._flipped(law)
         if isinstance(law, WallLaw):
             # asked for by name, or there is nothing else for the law that this one is a part of
-            return self.rows(law, useless=float("inf"))
+            return self.rows(law, float("inf"))
         for method in COMPUTED:
             if method.accepts(law, self.basis):
                 return method.matrix(law, self.basis, Budget(self.tolerance))

@@ -7,12 +7,13 @@ of isometries alone, whose integrals against polynomials are exact: only what g^
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
+from ...core.rounding import EPS
 from ..bases.assembly import cell_index, one_blas_thread
 from ..bases.basis import Basis
 from ..bases.legendre import DEGREES_PER_PANEL, DIGITS, Legendre
@@ -21,6 +22,8 @@ from ..bases.panels import Panels
 from ..laws.law import Law
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import lists_branches
+from ..matrices.matrix import KernelMatrix
+from .method import Budget, MethodName, computed
 
 # Polynomials that a scattering leaves with less than this factor are left out.
 NEGLIGIBLE = 1e-17
@@ -31,6 +34,20 @@ CHUNK = 2**21
 
 # The matrix of a chain of isometries in a basis, and a bound of its Frobenius error; None where none is known.
 IsometricMatrix = Callable[[Sequence[Law], Basis], tuple[Floats, float]]
+
+
+class Diagonal:
+    """Henyey-Greenstein scattering in Legendre polynomials, where it is diagonal."""
+
+    name: MethodName = "exact"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, HenyeyGreensteinLaw) and isinstance(basis, Legendre)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        diagonal = np.diag(cast(HenyeyGreensteinLaw, law).g ** np.arange(float(basis.size)))
+        how = "eigenvalues g^l of the polynomials of degree l, to rounding"
+        return computed(diagonal, basis, self.name, EPS * basis.size**0.5, how, "bound")
 
 
 class JointBasis(Basis):

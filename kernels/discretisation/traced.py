@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +16,19 @@ from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..expectations.angle_panels import NODES, AnglePanels
 from ..expectations.basis_means import VALUES_AT_ONCE, means_of_basis
+from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
 from ..walls.conditionals import WallRows
-from ..walls.hollow_conditionals import NO_LIMIT
+from ..walls.wall_law import WallLaw
+from .method import MOST_SEGMENTS, Budget, MethodName, computed, rounding
 
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Flights of rays, from one collision to the next, after which the matrix is handed over as it is, with the error that
-# it has: some seconds. Who may give up gives one row this share of them, or so many: longer ones have pieces without
-# number.
-MOST_FLIGHTS, LARGEST_ROW, LEAST_LARGEST_ROW = 40_000_000, 0.02, 80_000
+# At the limit on its ray segments a matrix is returned with the error reached so far. One angle may use at most this
+# fraction of the limit, but at least so many: in some steep Bezier hollows angles with a fiftieth are not complete, and
+# in bottles with a neck of a hundredth of their width they have no end. If another method can take over, it is less.
+ANGLE_SHARE, SHARE_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
@@ -52,10 +56,6 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# The error after the first rows tells whether the flights will do; later ones do not, because errors fall by jumps,
-# when the last of the pieces that matter are seen. The error of nine walls fell like the flights to a power of 1.6 to
-# 2.2, and rows are done again at each stage. On fourteen walls this told apart those whose rows were of use.
-PRESUMED_ORDER, ROWS_AGAIN = 1.75, 2.0
 # A stage that would leave more than this share of the error is not begun, nor one that would need a jump by more than
 # this to be of use.
 WORTHWHILE, LARGEST_JUMP = 0.5, 4.0
@@ -67,6 +67,32 @@ LEAST_CUT = 1e-7
 FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
 # Rounds in which rows are done again that have overlooked a piece.
 MOST_MENDINGS = 8
+
+
+class Traced:
+    """Walls by adaptive quadrature in the entry point and in the incoming angle.
+
+    Parameters
+    ----------
+    any_wall : bool
+        Also walls whose rays, sampled, are likely to do better.
+    """
+
+    name: MethodName = "quadrature"
+
+    def __init__(self, any_wall: bool = False) -> None:
+        self.any_wall = any_wall
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, WallLaw) and (self.any_wall or is_affordable(law.wall, basis))
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        symmetric, error, rays = row_matrix(cast(WallLaw, law).wall, basis, budget)
+        how = (
+            f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
+            "plus undecided entry points"
+        )
+        return computed(symmetric, basis, self.name, error + rounding(basis), how)
 
 
 def is_affordable(wall: Wall, basis: Basis) -> bool:
@@ -82,23 +108,13 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
     predicted = ROWS_A_PIECE * FLIGHTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
     overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
-    return bool(wall.closes) and not overhangs and predicted <= MOST_FLIGHTS
+    return bool(wall.closes) and not overhangs and predicted <= MOST_SEGMENTS
 
 
-def row_matrix(
-    wall: Wall,
-    basis: Basis,
-    tolerance: float,
-    most_flights: int = MOST_FLIGHTS,
-    *,
-    useless: float | None = None,
-    largest_row: float = LARGEST_ROW,
-) -> tuple[Floats, float, int]:
+def row_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
-    Where ``useless`` is given, it stops as soon as the first rows speak against an error below that with so many
-    flights, and rows without number are cut short, at the share ``largest_row`` of the flights; if it is infinite, only
-    these.
+    If the first angles speak against an error below ``budget.fallback``, these are all.
 
     A panel's error is half the difference of Kronrod's and Gauss's rule where the rows have a kink, and that difference
     scaled by what dividing the panel showed where they are smooth. Signs differ from panel to panel: their errors, and
@@ -109,14 +125,14 @@ def row_matrix(
     if isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS:
         inner = Legendre(FEWEST_FUNCTIONS)
         share = min(SPREAD_MARGIN * max(basis.size - 1, 1) / (FEWEST_FUNCTIONS - 1), 1.0)
-    wanted = None if useless is None else useless / share
-    matrix, error, rays = _Integrator(wall, inner, tolerance / share, most_flights, wanted, largest_row).run()
+    scaled = replace(budget, tolerance=budget.tolerance / share, fallback=budget.fallback / share)
+    matrix, error, rays = _Integrator(wall, inner, scaled).run()
     return np.ascontiguousarray(matrix[: basis.size, : basis.size]), share * error, rays
 
 
-def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_flights: int = MOST_FLIGHTS) -> tuple[Floats, float]:
+def panel_edges(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float]:
     """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
-    integrator = _Integrator(wall, basis, tolerance, most_flights, None)
+    integrator = _Integrator(wall, basis, budget)
     _, error, _ = integrator.run()
     edges = np.union1d(integrator.panels.low, integrator.panels.high)
     return np.union1d(edges, np.pi - edges) if integrator.halved else edges, error
@@ -125,22 +141,10 @@ def panel_edges(wall: Wall, basis: Basis, tolerance: float, most_flights: int = 
 class _Integrator:
     """One matrix in the making."""
 
-    def __init__(
-        self,
-        wall: Wall,
-        basis: Basis,
-        tolerance: float,
-        most_flights: int,
-        useless: float | None,
-        largest_row: float = LARGEST_ROW,
-    ) -> None:
-        self.basis = basis
-        self.tolerance = max(tolerance, 8.0 * EPS * basis.size)
-        self.most_flights = most_flights
-        # an error that is of no use, where there is something else to turn to
-        self.useless = useless if useless is not None and math.isfinite(useless) else None
-        self.rays, self.flights, self.row_count = 0, 0, 0
-        self.judged, self.hopeless = False, False
+    def __init__(self, wall: Wall, basis: Basis, budget: Budget) -> None:
+        self.basis, self.budget = basis, budget
+        self.tolerance = max(budget.tolerance, 8.0 * EPS * basis.size)
+        self.rays, self.segments, self.row_count = 0, 0, 0
         self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
@@ -154,7 +158,8 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        longest = NO_LIMIT if useless is None else max(int(largest_row * most_flights), LEAST_LARGEST_ROW)
+        share = SHARE_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_SHARE
+        longest = max(int(share * budget.segments), LEAST_SEGMENTS)
         self.rows = WallRows(wall, degree, inside, least, longest)
         edges = basis.edges
         if self.halved:
@@ -166,35 +171,38 @@ class _Integrator:
         self._add_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
-        """Divide panels until the error is small enough, or no flights are left: first for coarser tolerances.
+        """Divide panels until the error is small enough, or no segments are left: first for coarser tolerances.
 
         The best matrix on the way is returned: a stage that has to stop may leave its rows worse than it found them.
         """
         tolerance = self.first_tolerance
+        self._begin(tolerance)
+        error, *_ = self._measure()
+        if self.budget.out_of_reach(error, self.segments):
+            return *self.best, self.rays
         while True:
-            self._begin(tolerance)
             self._meet(tolerance)
-            if self.flights >= self.most_flights or self.hopeless or tolerance <= self.tolerance:
-                break
             following = self._following(tolerance)
             if following is None:
-                break
+                return *self.best, self.rays
             tolerance = following
-        return *self.best, self.rays
+            self._begin(tolerance)
 
     def _following(self, tolerance: float) -> float | None:
-        """The tolerance of the next stage; None if there is something else to turn to, and flights for little more."""
+        """The tolerance of the next stage; None at the end, and if what is left is for little more than the fallback.
+
+        The error after the first angles tells whether the segments will do; later ones do not, because errors fall by
+        jumps, when the last of the pieces that matter are seen.
+        """
+        if self.segments >= self.budget.segments or tolerance <= self.tolerance:
+            return None
         wanted = max(STAGE_RATIO * tolerance, self.tolerance)
-        if self.useless is None:
+        if math.isinf(self.budget.fallback):
             return wanted
         error = self.best[1]
-        reachable = self._reachable(error)
-        hoped = min(WORTHWHILE * min(error, tolerance), LARGEST_JUMP * self.useless)
-        return max(wanted, reachable) if reachable < hoped else None
-
-    def _reachable(self, error: float) -> float:
-        """What the flights that are left are likely to make of an error now."""
-        return float(error / max(self.most_flights / (ROWS_AGAIN * self.flights), 1.0) ** PRESUMED_ORDER)
+        predicted = self.budget.predicted(error, self.segments)
+        hoped = min(WORTHWHILE * min(error, tolerance), LARGEST_JUMP * self.budget.fallback)
+        return max(wanted, predicted) if predicted < hoped else None
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage; rows whose error is too large for its tolerance are done again."""
@@ -206,14 +214,11 @@ class _Integrator:
         self._mend()
 
     def _meet(self, tolerance: float) -> None:
-        """Divide panels until the error is below the tolerance, or no flights are left."""
+        """Divide panels until the error is below the tolerance, or no segments are left."""
         goal = tolerance
         while True:
-            matrix, panels, rows, hidden = self._state()
-            error = rows + math.hypot(panels, hidden)
-            if error < self.best[1]:
-                self.best = matrix, error
-            if error <= tolerance or self.flights >= self.most_flights or self._is_hopeless(error):
+            error, panels, rows, hidden = self._measure()
+            if error <= tolerance or self.segments >= self.budget.segments:
                 return
             # errors that only the asymmetry shows lie in panels whose rules agree by chance
             goal = min(goal, max(tolerance - hidden, 0.25 * (panels + rows)))
@@ -222,11 +227,13 @@ class _Integrator:
                 return
             self._divide(chosen)
 
-    def _is_hopeless(self, error: float) -> bool:
-        """Whether the error of the first rows spoke against one that is of use."""
-        if not self.judged and self.useless is not None:
-            self.judged, self.hopeless = True, self._reachable(error) > self.useless
-        return self.hopeless
+    def _measure(self) -> tuple[float, float, float, float]:
+        """The error now and its parts: that of the panels, that of the rows, and what the asymmetry tells."""
+        matrix, panels, rows, hidden = self._state()
+        error = rows + math.hypot(panels, hidden)
+        if error < self.best[1]:
+            self.best = matrix, error
+        return error, panels, rows, hidden
 
     def _state(self) -> tuple[Floats, float, float, float]:
         """The matrix, the errors that its panels and its rows are known to have, and what its asymmetry tells."""
@@ -254,7 +261,7 @@ class _Integrator:
         # a panel far below the worst waits for a later round
         chosen &= able & (panels.error > 0.02 * np.max(panels.error, where=able, initial=0.0))
         # no more than what is left of the budget buys, at the cost of a row so far
-        left = (self.most_flights - self.flights) * self.row_count / max(1, self.flights)
+        left = (self.budget.segments - self.segments) * self.row_count / max(1, self.segments)
         most = int(left) // (2 * len(NODES))
         worst = np.zeros(len(order), dtype=np.bool_)
         worst[order[max(0, len(order) - most) :]] = True
@@ -310,7 +317,7 @@ class _Integrator:
         for first in range(0, len(panel), ROWS_AT_ONCE):
             few = slice(first, first + ROWS_AT_ONCE)
             rows = self.rows(panels.angle[panel[few], node[few]], tolerance[panel[few]])
-            self.rays, self.flights = self.rays + rows.rays, self.flights + rows.flights
+            self.rays, self.segments = self.rays + rows.rays, self.segments + rows.flights
             self.row_count += len(rows.theta)
             panels.image[panel[few], node[few]] = means_of_basis(self.basis, rows.nodes, rows.weights, rows.starts)
             panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)

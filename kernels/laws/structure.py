@@ -65,6 +65,11 @@ def is_compound(law: Law) -> bool:
     return isinstance(law, (Combination, Composition, Power, SpecularFrame))
 
 
+def has_chain(law: Law) -> bool:
+    """Whether laws follow one another somewhere in the law, so that the numbers of their branches multiply."""
+    return fold(law, Rules(lambda _: False, lambda terms: any(fact for _, fact in terms), lambda _: True, lambda f: f))
+
+
 def holds_of_all(law: Law, promise: Callable[[Law], bool]) -> bool:
     """Whether every part of a law that is no combination of others keeps a promise."""
     return fold(law, Rules(promise, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))

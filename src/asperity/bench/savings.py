@@ -13,6 +13,7 @@ from ..geometry import Trace, trace
 from ..geometry.scene.ablations import without_formulas, without_grid, without_pairs, without_runs
 from ..geometry.scene.scene import Scene, scene_in_one
 from ..kernels import KernelMatrix, Legendre, PolygonLaw, WallLaw, discretise
+from ..kernels.discretisation.method import Budget
 from ..kernels.discretisation.traced import row_matrix
 from .quantities.walls import standard_names, wall_of
 from .running.timing import SideBySide, side_by_side
@@ -240,7 +241,7 @@ def _half(name: str, wall: Wall) -> Saving:
 
 def _rows(wall: Wall | WithoutMirror, tolerance: float) -> tuple[Floats, float, float]:
     """Matrix, error and rays of adaptive rows: their time is that of their rays, without its noise."""
-    symmetric, error, rays = row_matrix(wall, BASIS, tolerance)  # type: ignore[arg-type]
+    symmetric, error, rays = row_matrix(wall, BASIS, Budget(tolerance))  # type: ignore[arg-type]
     return symmetric, error, float(rays)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...kernels import KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
+from ...kernels.discretisation.method import Budget
 from ...kernels.discretisation.traced import row_matrix
 from ...kernels.matrices.matrix import frobenius_error
 from .quantity import QUICK_RAYS, RAYS
@@ -88,7 +89,7 @@ def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
 
 def adaptive_row_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
     """By adaptive rows to the tolerance 1/budget, whatever the wall."""
-    symmetric, error, rays = row_matrix(wall, basis, 1.0 / budget)
+    symmetric, error, rays = row_matrix(wall, basis, Budget(1.0 / budget))
     how = frobenius_error(error, "estimate", f"adaptive rows, {rays} rays")
     return KernelMatrix(symmetric, basis, how, method="adaptive rows")
 
