@@ -16,13 +16,12 @@ from ..bases.basis import AngleFunction, Basis
 from ..bases.measure import SINE, gauss_rule
 from ..bases.momentum import Directions
 from ..bases.panels import Panels
-from ..discretisation.method import SEED_WITHOUT_RNG
-from ..discretisation.methods import MatrixMaker
+from ..discretisation.method import Budget
+from ..discretisation.methods import recipe
 from ..laws.law import Law
 from ..laws.structure import has_chain
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import half_width
-from ..sampling.monte_carlo import DEFAULT_SAMPLES
 
 CostFunction = Callable[[Floats, Floats], Floats]
 
@@ -121,9 +120,7 @@ def resistance(
     else:
         basis, coefficients, missed = _represented(weighted, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
-    source = np.random.default_rng(SEED_WITHOUT_RNG)
-    share = MATRIX_SHARE * wanted / max(size, 1.0)
-    matrix = MatrixMaker(basis, share, DEFAULT_SAMPLES, source, False, patient=False, thorough=True).make(law, "auto")
+    matrix = recipe(law, "auto")(basis, Budget(MATRIX_SHARE * wanted / max(size, 1.0)))
     value = float(np.sum(coefficients * matrix.symmetric))
     error = _error(matrix, coefficients) + missed
     how = f"{matrix.method} on {basis!r} ({matrix.error.method})"

@@ -1,119 +1,127 @@
-"""The choice of method, for `auto`, for the matrix of a wall's law that has no closed form."""
+"""The choice of `auto` for the law of a wall that has no closed form: five rules, in this order."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import math
+from dataclasses import replace
+from typing import cast
 
 from ...core.errors import AccuracyError
+from ..bases.basis import Basis
+from ..laws.law import Law
+from ..matrices.matrix import KernelMatrix
 from ..sampling.sobol import Net
-from ..walls.wall_law import FEW_PIECES
-from .traced import is_affordable
-
-if TYPE_CHECKING:
-    from ..matrices.matrix import KernelMatrix
-    from ..walls.wall_law import WallLaw
-    from .methods import MatrixMaker
+from ..walls.conditionals import is_few
+from ..walls.wall_law import FEW_PIECES, WallLaw
+from .isometry_tables import IsometryTables
+from .method import QUICK_SEGMENTS, Budget, MethodName
+from .sampled import net_matrix
+from .traced import Traced
 
 # So many rays tell how many the tolerance needs: the error of a scrambled net falls like their number to a power of
 # about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
 FIRST_RAYS, NET_ORDER, NET_MARGIN = 2**14, 0.75, 2.0
-# So many rays take long enough for a look at adaptive rows, with as many flights: a ray has two or three.
+# So many rays take long enough for a pilot run of traced angles, with as many segments: a ray has two or three.
 MANY_RAYS = 2**17
-# Rows that take longer than all rays must promise this share of their error.
-ROW_ADVANTAGE = 0.5
+# Traced angles that take longer than all rays must predict this share of their error.
+TRACED_ADVANTAGE = 0.5
 
 
-def wall_matrix(maker: MatrixMaker, law: WallLaw) -> KernelMatrix:
-    """The matrix by the way that promises the tolerance soonest, or else the least error in a second or two.
+class AutoWall:
+    """Walls without closed form, by what predicts the tolerance soonest, or else the least error in a second or two.
 
-    Isometries of few pieces; as many rays as the tolerance needs, or adaptive rows where these promise it sooner;
-    isometries of many pieces; adaptive rows, as long as they promise more than all the rays; all the rays. The more
-    exact matrix is returned.
-    """
-    # found in less time than a few rays
-    if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
-        return maker.make(law.exact_law, "auto")
-    ways = _Ways(maker, law, is_affordable(law.wall, maker.basis), Net(law, maker.basis, maker.rng))
-    found = ways.within_the_tolerance()
-    if found is not None:
-        return found
-    if law.exact_law is not None:
-        return maker.make(law.exact_law, "auto")
-    return ways.rows_or_all_rays() if ways.affordable else ways.rays(maker.samples)
+    1. Isometries, if the wall has few pieces and these resolve: found in less time than a few rays.
+    2. As many rays as the tolerance needs, by a pilot run of a few, if that is less than all; adaptive quadrature
+       where it meets the tolerance with fewer segments.
+    3. Isometries of many pieces, if these resolve.
+    4. Adaptive quadrature, if its first angles predict half of the error of all rays.
+    5. All rays; of the last two the more exact matrix.
 
-
-@dataclass
-class _Ways:
-    """Rays and adaptive rows to one matrix.
-
-    Attributes
-    ----------
-    affordable : bool
-        Whether rows are worth a look.
-    promised : float
-        The error that all rays promise, by what a few of them have shown; infinite where these do not tell.
+    Where the budget has more than a second for segments, as for a `resistance`, and the tolerance was not met, adaptive
+    quadrature goes on until they are spent.
     """
 
-    maker: MatrixMaker
-    law: WallLaw
-    affordable: bool
-    net: Net
-    promised: float = float("inf")
+    name: MethodName = "auto"
 
-    def rays(self, number: int) -> KernelMatrix:
-        """The matrix by at least so many rays; the net goes on where it was."""
-        return self.maker.from_net(self.net, number)
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, WallLaw) and law.closed_form is None
 
-    def within_the_tolerance(self) -> KernelMatrix | None:
-        """The matrix by fewer rays than asked for, or by rows where these are sooner; None if all rays are needed."""
-        maker, number = self.maker, FIRST_RAYS
-        # not even an order of 1 in the number of rays would meet the tolerance: a look at a few is in vain
-        if not self.affordable and maker.tolerance * maker.samples < 1.0:
-            return None
-        while number < maker.samples:
-            try:
-                found = self.rays(number)
-            except AccuracyError:
-                # a bin without rays, or rays that do not escape: these few are no measure
-                return None
-            error = float(found.error)
-            if error <= maker.tolerance:
-                return found
-            self.promised = error * (number / maker.samples) ** NET_ORDER
-            needed = NET_MARGIN * number * (error / maker.tolerance) ** (1.0 / NET_ORDER)
-            if needed > maker.samples:
-                return None
-            number = max(2 * number, int(needed))
-            rows = self._few_rows(number)
-            if rows is not None:
-                return rows
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        wall_law = cast(WallLaw, law)
+        quick = replace(budget, segments=min(budget.segments, QUICK_SEGMENTS))
+        found = self._quick(wall_law, basis, quick)
+        more = budget.segments > quick.segments and is_few(wall_law.wall)
+        if not more or float(found.error) <= budget.tolerance:
+            return found
+        return _more_exact(found, Traced().matrix(law, basis, budget))
+
+    def _quick(self, law: WallLaw, basis: Basis, budget: Budget) -> KernelMatrix:
+        if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
+            return IsometryTables().matrix(law.exact_law, basis, budget)
+        net = Net(law, basis, budget.rng)
+        found, predicted = _few_rays(law, net, basis, budget)
+        if found is not None:
+            return found
+        if law.exact_law is not None:
+            return IsometryTables().matrix(law.exact_law, basis, budget)
+        if not Traced().accepts(law, basis):
+            return net_matrix(net, basis, budget)
+        return _traced_or_all_rays(law, net, basis, budget, predicted)
+
+
+def _few_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget) -> tuple[KernelMatrix | None, float]:
+    """The matrix within the tolerance by fewer rays than all, or None; and the error that all rays predict.
+
+    The latter is infinite where a few rays do not tell.
+    """
+    predicted, number, affordable = math.inf, FIRST_RAYS, Traced().accepts(law, basis)
+    # not even an order of 1 in the number of rays would meet the tolerance: a pilot run is in vain
+    if not affordable and budget.tolerance * budget.rays < 1.0:
+        return None, predicted
+    while number < budget.rays:
+        try:
+            found = net_matrix(net, basis, replace(budget, rays=number))
+        except AccuracyError:
+            # a bin without rays, or rays that do not escape: these few are no measure
+            break
+        error = float(found.error)
+        if error <= budget.tolerance:
+            return found, error
+        predicted = error * (number / budget.rays) ** NET_ORDER
+        needed = NET_MARGIN * number * (error / budget.tolerance) ** (1.0 / NET_ORDER)
+        if needed > budget.rays:
+            break
+        number = max(2 * number, int(needed))
+        if affordable and number >= MANY_RAYS:
+            found = Traced().matrix(law, basis, replace(budget, segments=number, fallback=budget.tolerance))
+            if float(found.error) <= budget.tolerance:
+                return found, predicted
+    return None, predicted
+
+
+def _traced_or_all_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget, predicted: float) -> KernelMatrix:
+    """The more exact of the two; no rays where tracing angles predicts more, nor the reverse where rays will do."""
+    rays = _all_rays(net, basis, budget) if predicted <= budget.tolerance else None
+    if rays is not None:
+        predicted = float(rays.error)
+        if predicted <= budget.tolerance:
+            return rays
+    fallback = max(TRACED_ADVANTAGE * predicted, budget.tolerance)
+    traced = Traced().matrix(law, basis, replace(budget, fallback=fallback))
+    error = float(traced.error)
+    if error <= budget.tolerance or error <= predicted < math.inf:
+        return traced
+    rays = _all_rays(net, basis, budget) if rays is None else rays
+    return traced if rays is None else _more_exact(traced, rays)
+
+
+def _all_rays(net: Net, basis: Basis, budget: Budget) -> KernelMatrix | None:
+    """The matrix by rays; None if too many do not escape, where traced angles count theirs in their error."""
+    try:
+        return net_matrix(net, basis, budget)
+    except AccuracyError:
         return None
 
-    def _few_rows(self, rays: int) -> KernelMatrix | None:
-        """The matrix by adaptive rows, if they meet the tolerance in less time than so many rays would."""
-        if not self.affordable or rays < MANY_RAYS:
-            return None
-        rows = self.maker.rows(self.law, self.maker.tolerance, rays)
-        return rows if float(rows.error) <= self.maker.tolerance else None
 
-    def rows_or_all_rays(self) -> KernelMatrix:
-        """The more exact of the two; rays are not traced where rows promise more, nor rows where rays will do."""
-        tolerance = self.maker.tolerance
-        rays = self._all_rays() if self.promised <= tolerance else None
-        if rays is not None:
-            self.promised = float(rays.error)
-            if self.promised <= tolerance:
-                return rays
-        rows = self.maker.rows(self.law, max(ROW_ADVANTAGE * self.promised, tolerance))
-        if float(rows.error) <= tolerance or float(rows.error) <= self.promised < float("inf"):
-            return rows
-        rays = self._all_rays() if rays is None else rays
-        return rows if rays is None else min(rows, rays, key=lambda matrix: float(matrix.error))
-
-    def _all_rays(self) -> KernelMatrix | None:
-        """The matrix by rays; None if too many do not escape, where rows count theirs in their error."""
-        try:
-            return self.rays(self.maker.samples)
-        except AccuracyError:
-            return None
+def _more_exact(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
+    return min(first, second, key=lambda matrix: float(matrix.error))

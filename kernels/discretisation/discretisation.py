@@ -15,8 +15,8 @@ from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
-from .method import SEED_WITHOUT_RNG, MethodName
-from .methods import MatrixMaker
+from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SEED_WITHOUT_RNG, Budget, MethodName
+from .methods import recipe
 
 
 def discretise(
@@ -100,9 +100,11 @@ def discretise(
     source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
-    maker = MatrixMaker(basis, tolerance, number, source, symmetrise, patient=method == "quadrature")
+    # asked for by name, quadrature may take some seconds
+    segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
+    budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise)
     return replace(
-        maker.make(law, method),
+        recipe(law, method)(basis, budget),
         law=repr(law),
         reversible=law.reversible,
         mirror_symmetric=law.mirror_symmetric,

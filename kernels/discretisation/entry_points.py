@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -10,11 +10,27 @@ from ...core.checks import Floats
 from ..bases.assembly import cell_index
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..laws.law import DrivenLaw
+from ..laws.law import DrivenLaw, Law
+from ..matrices.matrix import KernelMatrix
+from .method import Budget, MethodName, computed, rounding
 
 # Rays at a time.
 CHUNK = 2**18
 FEWEST_ENTRY_POINTS = 4
+
+
+class EntryPoints:
+    """Laws driven by an entry point, by Gauss rules in the incoming angle and midpoints in the entry point."""
+
+    name: MethodName = "quadrature"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return isinstance(law, DrivenLaw)
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        symmetric, error = entry_matrix(cast(DrivenLaw, law), basis, budget.rays)
+        how = "difference of the last two levels of quadrature"
+        return computed(symmetric, basis, self.name, error + rounding(basis), how)
 
 
 def entry_matrix(law: DrivenLaw, basis: Basis, samples: int) -> tuple[Floats, float]:

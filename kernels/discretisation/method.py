@@ -98,6 +98,22 @@ class Method(Protocol):
         ...
 
 
+class Recipe(Protocol):
+    """How the matrix of a law is made: by a method that takes it whole, or from the matrices of its parts."""
+
+    def has(self, wanted: MethodName, basis: Basis) -> bool:
+        """Whether the matrix can be made in this way."""
+        ...
+
+    def without_rays(self, basis: Basis) -> bool:
+        """Whether no part needs rays."""
+        ...
+
+    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
+        """The matrix; only where `has` says so."""
+        ...
+
+
 def computed(
     symmetric: Floats, basis: Basis, name: MethodName, error: float, how: str, kind: ErrorKind = "estimate"
 ) -> KernelMatrix:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -16,12 +17,15 @@ from ..bases.legendre import Legendre
 from ..bases.measure import SINE
 from ..bases.panels import Panels
 from ..laws.involution import InvolutionLaw
-from ..laws.law import Combination, Law
+from ..laws.law import Law
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
+from ..walls.words import law_of
 from .densities import jumps_of_map
-from .scattering import degrees_kept, local_values, split
+from .isometries import Isometries, isometric_matrix
+from .method import Budget, MethodName, Recipe, computed, isometric_rounding
+from .scattering import degrees_kept, is_scattered, local_values, scattered_matrix, split
 
 # Panels of this width and degree to begin with; narrower ones follow the polynomials of a basis, n of them on (0, pi).
 WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
@@ -40,10 +44,76 @@ TAIL = 3.0
 PROBES, PROBED = np.array([0.0711, 0.2939, 0.5387, 0.8123]), 2.0
 # Panels that together make up this share of the error are cut in so many: every time all factors are made again.
 MARKED, PARTS = 0.9, 4
+# Whether a factor needs rays is asked for any panels.
+ANY_PANELS = Panels(np.array([0.0, np.pi]), DEGREE)
 # Of scatterings nearer to a mirror than this the matrix is made as that of any other density.
 HIGHEST_DEGREE = 4096
 
-Maker = Callable[[Law, Basis], KernelMatrix]
+
+class Factor(Recipe, Protocol):
+    """A law of a chain, and the weighted laws that it is a sum of."""
+
+    law: Law
+
+    @property
+    def terms(self) -> Sequence[tuple[float, Factor]]: ...
+
+
+class Chain:
+    """Laws one after the other: by isometries, else by scatterings between isometries, else through panels.
+
+    The first of these that meets the tolerance is taken, or else the most exact. Through panels go chains no part of
+    which needs rays.
+    """
+
+    def __init__(self, factors: Sequence[Factor]) -> None:
+        self.factors = factors
+        self.laws = tuple(factor.law for factor in factors)
+
+    def has(self, wanted: MethodName, basis: Basis) -> bool:
+        isometric = all(map(lists_branches, self.laws))
+        computable = isometric or (wanted != "exact" and self.without_rays(basis))
+        return wanted in ("auto", "exact", "quadrature") and computable
+
+    def without_rays(self, basis: Basis) -> bool:
+        return all(factor.without_rays(ANY_PANELS) for factor in self.factors)
+
+    def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
+        found: list[KernelMatrix] = []
+        reasons: list[InputError] = []
+        for method in self._methods(wanted):
+            try:
+                found.append(method(basis, budget))
+            except InputError as reason:
+                # more branches than can be listed, or panels than can be held
+                reasons.append(reason)
+            if found and float(found[-1].error) <= budget.tolerance:
+                break
+        if not found:
+            raise reasons[-1]
+        return min(found, key=lambda matrix: float(matrix.error))
+
+    def _methods(self, wanted: MethodName) -> Iterator[Callable[[Basis, Budget], KernelMatrix]]:
+        if wanted != "quadrature" and all(map(lists_branches, self.laws)):
+            yield lambda basis, budget: Isometries().matrix(law_of(self.laws), basis, budget)
+        if wanted != "exact":
+            if is_scattered(self.laws):
+                yield self._scattered
+            yield self._through_panels
+
+    def _scattered(self, basis: Basis, budget: Budget) -> KernelMatrix:
+        def isometric(laws: Sequence[Law], joint: Basis) -> tuple[Floats, float]:
+            symmetric, omitted = isometric_matrix(law_of(tuple(laws)), joint, budget.tolerance)
+            return symmetric, omitted + isometric_rounding(joint)
+
+        symmetric, error = scattered_matrix(self.laws, basis, isometric)
+        how = "eigenvalues of scatterings between isometries, to rounding, plus omitted kinks and polynomials"
+        return computed(symmetric, basis, "quadrature", error, how)
+
+    def _through_panels(self, basis: Basis, budget: Budget) -> KernelMatrix:
+        symmetric, error = product_matrix(self.factors, basis, budget)
+        how = "what panels leave out between the factors, from their last coefficients, plus the factors' errors"
+        return computed(symmetric, basis, "quadrature", error + isometric_rounding(basis), how)
 
 
 @dataclass(frozen=True)
@@ -59,7 +129,7 @@ class _Level:
         return float(self.lost.sum()) + self.factors
 
 
-def product_matrix(laws: Sequence[Law], basis: Basis, make: Maker, tolerance: float) -> tuple[Floats, float]:
+def product_matrix(factors: Sequence[Factor], basis: Basis, budget: Budget) -> tuple[Floats, float]:
     r"""<e_i, P_1 P_2 ... e_j> with each factor's matrix on panels, and an estimate of its Frobenius error.
 
     Between two factors stands the projection Q on the panels: what is lost there is <P_k* ... e_i, (1 - Q) P_{k+1} ...
@@ -69,21 +139,20 @@ def product_matrix(laws: Sequence[Law], basis: Basis, make: Maker, tolerance: fl
 
     Parameters
     ----------
-    laws : sequence of Law
-        The factors, the first one first.
+    factors : sequence of Factor
+        The first one first.
     basis : Basis
-    make : callable
-        The matrix of a law in a basis, with its error.
-    tolerance : float
-        Wanted error. If the largest number of panels does not do, the error says so.
+    budget : Budget
+        If the largest number of panels does not meet its tolerance, the error says so.
     """
-    edges = _first_edges(laws, basis)
+    of_each = replace(budget, tolerance=budget.tolerance / (2.0 * len(factors)))
+    edges = _first_edges([term.law for factor in factors for _, term in factor.terms], basis)
     best: _Level | None = None
     while True:
-        level = _level(laws, basis, _panels(edges, basis), make)
+        level = _level(factors, basis, _panels(edges, basis), of_each)
         if best is None or level.error < best.error:
             best = level
-        if level.lost.sum() <= max(0.5 * tolerance, 0.1 * level.factors):
+        if level.lost.sum() <= max(0.5 * budget.tolerance, 0.1 * level.factors):
             return best.symmetric, best.error
         order = np.argsort(level.lost)[::-1]
         marked = order[: 1 + int(np.searchsorted(np.cumsum(level.lost[order]), MARKED * level.lost.sum()))]
@@ -110,8 +179,9 @@ def _panels(edges: Floats, basis: Basis) -> Panels:
     return Panels(edges, degree)
 
 
-def _level(laws: Sequence[Law], basis: Basis, panels: Panels, make: Maker) -> _Level:
-    factors = {law: _Factor(_terms(law, panels, make)) for law in dict.fromkeys(laws)}
+def _level(chain: Sequence[Factor], basis: Basis, panels: Panels, budget: Budget) -> _Level:
+    laws = [factor.law for factor in chain]
+    factors = {law: _OnPanels(_terms(factor, panels, budget)) for law, factor in _distinct(chain).items()}
     angle, mass = SINE.quadrature(panels.edges, _nodes(basis, panels))
     ends = (local_values(basis, angle).T @ local_values(panels, angle).multiply(mass[:, None])).toarray().T
     with one_blas_thread():
@@ -123,7 +193,7 @@ def _level(laws: Sequence[Law], basis: Basis, panels: Panels, make: Maker) -> _L
 
 
 def _passed_on(
-    functions: Floats, factors: Sequence[tuple[_Factor, bool]], panels: Panels
+    functions: Floats, factors: Sequence[tuple[_OnPanels, bool]], panels: Panels
 ) -> tuple[Floats, list[Floats]]:
     """The functions after all factors, or their adjoints, and what the panels leave out of them after each."""
     left_out = [TAIL * _last_two(functions, panels)]
@@ -158,7 +228,7 @@ def _probed(law: Law, matrix: Floats, functions: Floats, panels: Panels) -> Floa
 
 
 @dataclass(frozen=True)
-class _Factor:
+class _OnPanels:
     """A law as a weighted sum: weight, law, its matrix and the error of that."""
 
     terms: list[tuple[float, Law, Floats, float]]
@@ -172,17 +242,26 @@ class _Factor:
         return sum(weight * error for weight, _, _, error in self.terms)
 
 
-def _terms(law: Law, panels: Panels, make: Maker) -> list[tuple[float, Law, Floats, float]]:
-    if isinstance(law, Combination):
-        parts = [(weight, _terms(term, panels, make)) for weight, term in law.terms_checked() if weight > 0.0]
-        return [(weight * share, one, matrix, error) for weight, terms in parts for share, one, matrix, error in terms]
+def _distinct(chain: Sequence[Factor]) -> dict[Law, Factor]:
+    found: dict[Law, Factor] = {}
+    for factor in chain:
+        found.setdefault(factor.law, factor)
+    return found
+
+
+def _terms(factor: Factor, panels: Panels, budget: Budget) -> list[tuple[float, Law, Floats, float]]:
+    return [(weight, term.law, *_on_panels(term, panels, budget)) for weight, term in factor.terms]
+
+
+def _on_panels(factor: Factor, panels: Panels, budget: Budget) -> tuple[Floats, float]:
+    law = factor.law
     if isinstance(law, HenyeyGreensteinLaw) and degrees_kept(law) <= HIGHEST_DEGREE:
         polynomials = Legendre(degrees_kept(law))
         angle, mass = SINE.quadrature(panels.edges, _nodes(polynomials, panels))
         ends = local_values(panels, angle).T @ (mass[:, None] * polynomials.evaluate(angle))
-        return [(1.0, law, np.asarray((ends * law.g ** np.arange(polynomials.n)) @ ends.T), 0.0)]
-    matrix = make(law, panels)
-    return [(1.0, law, matrix.symmetric, float(matrix.error))]
+        return np.asarray((ends * law.g ** np.arange(polynomials.n)) @ ends.T), 0.0
+    matrix = factor.matrix("auto", panels, budget)
+    return matrix.symmetric, float(matrix.error)
 
 
 def _nodes(basis: Basis, panels: Panels) -> int:
@@ -192,9 +271,9 @@ def _nodes(basis: Basis, panels: Panels) -> int:
 
 
 def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
-    """Edges of the basis and of the factors, at most WIDEST apart."""
+    """Edges of the basis and of the laws, at most WIDEST apart."""
     special = [basis.edges]
-    for law in dict.fromkeys(_parts(laws)):
+    for law in dict.fromkeys(laws):
         special.append(np.asarray(getattr(law, "breakpoints", ())))
         if isinstance(law, InvolutionLaw):
             jumps = jumps_of_map(law.map)
@@ -209,9 +288,3 @@ def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
     found[-1] = np.pi
     widest = min(WIDEST, OSCILLATION / basis.n) if isinstance(basis, Legendre) else WIDEST
     return split(found, widest)
-
-
-def _parts(laws: Sequence[Law]) -> list[Law]:
-    """The laws, sums as their terms."""
-    nested = [_parts([term for _, term in law.terms]) if isinstance(law, Combination) else [law] for law in laws]
-    return [law for parts in nested for law in parts]

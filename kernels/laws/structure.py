@@ -28,12 +28,15 @@ class Rules(Generic[Fact]):
         From the facts of laws applied one after the other, the first one first; of none for the identity.
     turned : callable
         From the fact of a law to that of the law in the other frame.
+    whole : callable, optional
+        From a law that is made of others, and what its parts say, to the fact; by default what the parts say.
     """
 
     leaf: Callable[[Law], Fact]
     mixture: Callable[[Sequence[tuple[float, Fact]]], Fact]
     chain: Callable[[Sequence[Fact]], Fact]
     turned: Callable[[Fact], Fact]
+    whole: Callable[[Law, Fact], Fact] = lambda law, fact: fact
 
 
 def fold(law: Law, rules: Rules[Fact]) -> Fact:
@@ -49,13 +52,14 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     2.5
     """
     if isinstance(law, Combination):
-        return rules.mixture([(weight, fold(term, rules)) for weight, term in law.terms_checked() if weight > 0.0])
+        terms = [(weight, fold(term, rules)) for weight, term in law.terms_checked() if weight > 0.0]
+        return rules.whole(law, rules.mixture(terms))
     if isinstance(law, Composition):
-        return rules.chain([fold(part, rules) for part in law.laws])
+        return rules.whole(law, rules.chain([fold(part, rules) for part in law.laws]))
     if isinstance(law, Power):
-        return rules.chain([fold(law.law, rules)] * law.exponent)
+        return rules.whole(law, rules.chain([fold(law.law, rules)] * law.exponent))
     if isinstance(law, SpecularFrame):
-        return rules.turned(fold(law.law, rules))
+        return rules.whole(law, rules.turned(fold(law.law, rules)))
     closed_form = getattr(law, "closed_form", None)
     return rules.leaf(law) if closed_form is None else fold(closed_form, rules)
 

@@ -1,0 +1,64 @@
+"""Matrices of laws by rays: from nets, or independent ones."""
+
+from __future__ import annotations
+
+from ..bases.basis import Basis
+from ..laws.law import Law
+from ..laws.random_map import responder
+from ..matrices.matrix import KernelMatrix, frobenius_error
+from ..sampling.counts import SampledArray
+from ..sampling.monte_carlo import independent_rays
+from ..sampling.sobol import PARTS, Net
+from .method import Budget, MethodName
+
+
+class Sobol:
+    """Laws driven by a uniform number, by rays of scrambled Sobol sequences."""
+
+    name: MethodName = "qmc"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return responder(law) is not None
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        return net_matrix(Net(law, basis, budget.rng), basis, budget)
+
+
+class MonteCarlo:
+    """Any law, by independent rays."""
+
+    name: MethodName = "monte-carlo"
+
+    def accepts(self, law: Law, basis: Basis) -> bool:
+        return True
+
+    def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
+        found = independent_rays(law, basis, budget.rays, budget.rng, budget.symmetrise)
+        spread = "variance of multinomial counts" if basis.is_partition else "spread of parts"
+        return _sampled(self.name, found, basis, budget, spread)
+
+
+def net_matrix(net: Net, basis: Basis, budget: Budget) -> KernelMatrix:
+    """The matrix by at least ``budget.rays`` rays of a net, which goes on where it was."""
+    found = net.sampled(budget.rays, symmetrise=budget.symmetrise)
+    return _sampled("qmc", found, basis, budget, f"spread of {PARTS} nets")
+
+
+def _sampled(
+    name: MethodName, found: tuple[SampledArray, int, float], basis: Basis, budget: Budget, how: str
+) -> KernelMatrix:
+    array, used, lost = found
+    if lost:
+        how += ", plus a bound for rays that did not escape"
+    return KernelMatrix(
+        array.symmetric,
+        basis,
+        frobenius_error(array.error, "estimate", how),
+        method=name,
+        counts=array.counts,
+        replicates=array.replicates,
+        symmetrised=budget.symmetrise,
+        samples=used,
+        unresolved=lost,
+        raw_defect=array.raw_defect,
+    )
