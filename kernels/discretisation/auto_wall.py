@@ -88,9 +88,9 @@ def _few_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget) -> tuple[Ker
         if error <= budget.tolerance:
             return found, error
         predicted = error * (number / budget.rays) ** NET_ORDER
-        needed = NET_MARGIN * number * (error / budget.tolerance) ** (1.0 / NET_ORDER)
-        if needed > budget.rays:
+        if error > budget.tolerance * (budget.rays / (NET_MARGIN * number)) ** NET_ORDER:
             break
+        needed = NET_MARGIN * number * (error / budget.tolerance) ** (1.0 / NET_ORDER)
         number = max(2 * number, int(needed))
         if affordable and number >= MANY_RAYS:
             found = Traced().matrix(law, basis, replace(budget, segments=number, fallback=budget.tolerance))

@@ -44,12 +44,8 @@ def discretise(
         estimated from stands in its ``method``. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random
         shifts of one; the error is from their spread; in a basis that is mirror-symmetric, as the law is, each ray
         counts with its mirror image. ``"monte-carlo"``: independent rays; the error is from the variance of the
-        counts. The error of sampled matrices is a 95 % quantile. ``"auto"`` takes the first
-        of these that the law has, except that quadrature in the entry point comes after ``"qmc"`` for driven laws
-        without a wall. Of a wall without closed form it takes what promises the tolerance soonest: isometries of few
-        pieces; as many rays as the tolerance needs, where that is less than ``samples``; isometries of many pieces;
-        quadrature, unless a first look speaks against it; all rays; and of the last two the more exact matrix.
-        ``KernelMatrix.method`` says what was used.
+        counts. The error of sampled matrices is a 95 % quantile. ``"auto"`` takes the first method of the table in
+        the notes that accepts the law; ``KernelMatrix.method`` says which kind it was.
     tolerance : float
         Wanted Frobenius error of ``symmetric``. If it is not met the matrix says so: in its ``error`` and its repr.
     samples : int, optional
@@ -74,9 +70,33 @@ def discretise(
 
     Notes
     -----
+    The methods in the order in which ``"auto"`` asks them; each of the others asks those that bear its name.
+
+    1. ``AutoWall`` (auto): a wall without closed form, by what predicts the tolerance soonest. Isometries of few
+       pieces; as many rays as the tolerance needs, where that is less than ``samples``; isometries of many pieces;
+       adaptive quadrature, unless a pilot run speaks against it; all rays; and of the last two the more exact matrix.
+    2. ``IsometryTables`` (exact): isometries on pieces of the angle, with probabilities; so are polygonal walls.
+    3. ``Isometries`` (exact): any other law that lists its isometries and is no composition.
+    4. ``Diagonal`` (exact): Henyey-Greenstein scattering, in `Legendre`.
+    5. ``Arcs`` (quadrature): circular arcs.
+    6. ``Densities`` (quadrature): laws with a density.
+    7. ``LeastResistance`` (quadrature): `LeastResistanceLaw`, in `Bins`.
+    8. ``Maps`` (quadrature): deterministic laws.
+    9. ``Actions`` (quadrature): any other law that does not average over entry points; an own ``_apply`` of one that
+       does, in `Legendre`.
+    10. ``Traced`` (quadrature): walls of few pieces, for laws that they are a part of.
+    11. ``Sobol`` (qmc): laws driven by one uniform number.
+    12. ``Traced`` (quadrature): any wall.
+    13. ``EntryPoints`` (quadrature): any other law that averages over entry points; ``samples`` nodes.
+    14. ``MonteCarlo`` (monte-carlo): any law.
+
+    Methods 1 to 9 are asked for a law as a whole, then for its parts: a sum from its terms, a law in the other frame
+    from the law in this one, a composition from its factors, if none of them needs rays. Methods 10 to 14 are the last.
+
     A composition is discretised as the operator that it is: the result is the Galerkin matrix of the product, not
     the product of Galerkin matrices, which differs unless the basis is invariant. Compositions are simplified by the
     algebra first: isometries are moved through mirror-symmetric laws, scatterings joined, mixtures multiplied out.
+    They are then done by isometries, else by scatterings between isometries, else through adapted panels.
 
     Examples
     --------

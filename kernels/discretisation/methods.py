@@ -46,8 +46,8 @@ def recipe(law: Law, wanted: MethodName) -> Callable[[Basis, Budget], KernelMatr
     """
 
     def made(basis: Basis, budget: Budget) -> KernelMatrix:
-        # chains that are sampled are sampled as they stand
-        found = fold(law, RULES) if wanted == "monte-carlo" else _simplified(law)
+        # independent rays need nothing but the law as it stands
+        found = _Law(law) if wanted == "monte-carlo" else _simplified(law)
         if wanted != "auto" and not found.has(wanted, basis):
             names = ", ".join(_names(found, basis))
             raise InputError(f"method: {law!r} has no method {wanted!r}; it has {names}")

@@ -1,0 +1,78 @@
+"""The table of methods: its order, how a method is added, and what laws made of others make of it."""
+
+import re
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import InputError
+from asperity.kernels.discretisation import methods
+from asperity.kernels.discretisation.method import Budget, computed
+
+BASIS = ker.Bins(4)
+HG, TEETH = ker.henyey_greenstein, ker.RectangularTeethLaw(0.8)
+
+
+def test_the_docstring_of_discretise_is_the_table_of_methods():
+    stated = re.findall(r"^ *(\d+)\. ``(\w+)`` \((.+?)\):", ker.discretise.__doc__, re.MULTILINE)
+    asked = [(type(method).__name__, method.name) for method in methods.METHODS + methods.SAMPLED]
+    assert stated == [(str(number), *names) for number, names in enumerate(asked, start=1)]
+
+
+class Flat:
+    """The recipe "Add a method" of CONTRIBUTING.md: the Lambertian law, whose matrix is a product of two vectors."""
+
+    name = "exact"
+
+    def accepts(self, law, basis):
+        return law == ker.lambertian()
+
+    def matrix(self, law, basis, budget):
+        return computed(np.outer(basis.constant, basis.constant), basis, self.name, 1e-15, "one product", "bound")
+
+
+@pytest.fixture
+def _with_flat(monkeypatch):
+    monkeypatch.setattr(methods, "METHODS", (Flat(), *methods.METHODS))
+
+
+@pytest.mark.usefixtures("_with_flat")
+def test_a_new_method_is_used_for_the_law_and_for_all_that_is_made_of_it():
+    found = ker.discretise(ker.lambertian(), BASIS)
+    assert found.method == "exact" and found.error.method == "one product"
+    assert ker.discretise(ker.lambertian(), BASIS, "quadrature").method == "quadrature"
+    assert ker.discretise(ker.maxwell(0.5), BASIS, "exact").method == "exact"
+    assert ker.discretise(0.5 * ker.lambertian() + 0.5 * HG(0.5), BASIS).method == "exact + quadrature"
+    assert ker.discretise(ker.lambertian().in_specular_frame(), BASIS).method == "quadrature"
+
+
+def test_a_law_without_the_method_is_told_which_it_has():
+    with pytest.raises(InputError, match=r"lambertian.*no method 'exact'; it has quadrature, monte-carlo"):
+        ker.discretise(ker.maxwell(0.5), BASIS, "exact")
+    with pytest.raises(InputError, match="it has qmc, quadrature, monte-carlo"):
+        ker.discretise(ker.WallLaw(geo.mushrooms(0.3, 0.5)), BASIS, "exact")
+
+
+def test_a_prediction_does_not_exceed_the_error_that_is_there():
+    budget = Budget(1e-8, segments=100, fallback=1e-3)
+    assert budget.predicted(0.5, 100) == 0.5 and not budget.out_of_reach(1e-3, 100)
+    assert budget.out_of_reach(1e-2, 100) and not budget.out_of_reach(1e-2, 1)
+
+
+def test_sums_with_chains_that_are_too_long_to_be_multiplied_out_have_matrices():
+    long = (0.5 * TEETH + 0.5 * HG(0.4)) ** 6
+    total = 0.5 * long + 0.5 * ker.lambertian()
+    found, part = (ker.discretise(law, BASIS, tolerance=1e-4) for law in (total, long))
+    flat = ker.discretise(ker.lambertian(), BASIS)
+    error = float(found.error) + float(part.error)
+    assert np.linalg.norm(found.symmetric - 0.5 * part.symmetric - 0.5 * flat.symmetric) <= error
+    mirrored = ker.discretise(total @ ker.specular(), BASIS, tolerance=1e-4)
+    turned = found.in_specular_frame()
+    assert np.linalg.norm(mirrored.symmetric - turned.symmetric) <= float(mirrored.error) + float(found.error)
+
+
+def test_a_wall_takes_a_tolerance_of_zero_as_one_that_is_out_of_reach():
+    found = ker.discretise(ker.WallLaw(geo.dispersing_arcs(0.5)), ker.Legendre(2), tolerance=0.0, samples=2**14)
+    assert 0.0 < float(found.error) < 1e-2
