@@ -97,6 +97,28 @@ class Law(ABC):
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         """`apply` for checked arguments."""
 
+    # ---- what a law may know besides; each has a default ------------------------------------------------------
+    @property
+    def closed_form(self) -> Law | None:
+        """The same law as one with formulas of its own; None where there is none, or this is it.
+
+        Compound laws have none as a whole; `asperity.kernels.laws.structure.fold` puts in those of their parts.
+        """
+        return None
+
+    @property
+    def exact_law(self) -> Law | None:
+        """The closed form, or else the same law as a table of isometries, which may take a second to find."""
+        return self.closed_form
+
+    @property
+    def is_isometric(self) -> bool:
+        """Whether the law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
+
+        False for compound laws; `asperity.kernels.laws.structure.made_of_isometries` asks their parts.
+        """
+        return False
+
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
         """The adjoint kernel in L^2(sin theta d theta); the law itself where it is reversible."""
@@ -144,6 +166,11 @@ class BranchLaw(Law):
 
     reversible = True
     exact_apply = True
+
+    @property
+    def is_isometric(self) -> bool:
+        """True."""
+        return True
 
     @abstractmethod
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from ...core.errors import InputError
-from .law import BranchLaw, Combination, Composition, Law, Power, SpecularFrame
+from .law import Combination, Composition, Law, Power, SpecularFrame
 
 Fact = TypeVar("Fact")
 # Asked of a law to see whether it lists isometries.
@@ -60,8 +60,7 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
         return rules.whole(law, rules.chain([fold(law.law, rules)] * law.exponent))
     if isinstance(law, SpecularFrame):
         return rules.whole(law, rules.turned(fold(law.law, rules)))
-    closed_form = getattr(law, "closed_form", None)
-    return rules.leaf(law) if closed_form is None else fold(closed_form, rules)
+    return rules.leaf(law) if law.closed_form is None else fold(law.closed_form, rules)
 
 
 def is_compound(law: Law) -> bool:
@@ -84,16 +83,12 @@ def made_of_isometries(law: Law) -> bool:
 
     So are the laws of walls of straight pieces, specular reflection, retroreflection, and all that is made of them.
     """
-    return holds_of_all(law, _is_isometric)
+    return holds_of_all(law, lambda part: part.is_isometric)
 
 
 def lists_branches(law: Law) -> bool:
     """Whether every part of a law answers when asked for its isometries: more than that it is made of them."""
     return holds_of_all(law, _answers)
-
-
-def _is_isometric(law: Law) -> bool:
-    return isinstance(law, BranchLaw) or bool(getattr(law, "is_polygonal", False))
 
 
 def _answers(law: Law) -> bool:

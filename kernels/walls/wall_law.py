@@ -103,8 +103,8 @@ class WallLaw(DrivenLaw):
             object.__setattr__(self, "mirror_symmetric", self.closed_form.mirror_symmetric)
 
     @property
-    def is_polygonal(self) -> bool:
-        """Whether every piece of the wall is straight, so that the law is made of isometries."""
+    def is_isometric(self) -> bool:
+        """Whether every piece of the wall is straight."""
         return self.wall.is_polygonal
 
     @cached_property

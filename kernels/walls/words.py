@@ -73,8 +73,7 @@ def factors_of(law: Law) -> Word:
 
 def _leaf(law: Law) -> Sum | None:
     # a polygonal wall's law as a table of isometries
-    exact = getattr(law, "exact_law", None)
-    return {reduced((law if exact is None else exact,)): 1.0}
+    return {reduced((law.exact_law or law,)): 1.0}
 
 
 def _mixture(terms: Sequence[tuple[float, Sum | None]]) -> Sum | None:

@@ -92,7 +92,7 @@ def without_identity(law: Law) -> tuple[float, Law]:
     """
     turned = isinstance(law, SpecularFrame)
     inner = law.law if isinstance(law, SpecularFrame) else law
-    inner = getattr(inner, "closed_form", None) or inner
+    inner = inner.closed_form or inner
     if not isinstance(inner, Combination):
         return 1.0, law
     terms = [(weight, SpecularFrame.of(term) if turned else term) for weight, term in inner.terms_checked()]

@@ -167,8 +167,7 @@ def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essentia
 def _steps(law: Law) -> Iterator[tuple[Basis, int]]:
     """Bases and numbers of rays; for sampled laws the basis stops growing before the rays do."""
     inner = law.law if isinstance(law, SpecularFrame) else law
-    if getattr(inner, "closed_form", None) is not None:
-        inner = inner.closed_form  # type: ignore[attr-defined]
+    inner = inner.closed_form or inner
     if isinstance(inner, CircularArcLaw) and inner.half_angle > SHALLOW:
         for degree, smallest in ARC_PANELS:
             yield Panels.for_wall(_OneArc(inner.half_angle), degree, smallest), FIRST_SAMPLES
