@@ -10,6 +10,7 @@ import pytest
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
+from asperity.kernels.laws.law import RandomMap
 from asperity.kernels.sampling.sobol import PARTS
 
 
@@ -136,8 +137,8 @@ def test_rays_that_never_escape_are_counted_bounded_and_finally_refused() -> Non
     class Leaky(Bounce):
         lost: float = 0.0
 
-        def outcomes(self, x: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self.respond(x, theta), x > self.lost
+        def random_map(self) -> RandomMap:
+            return lambda x, theta: (self.respond(x, theta), x > self.lost)
 
     whole, few = (ker.discretise(Leaky(lost=lost), ker.Bins(8), samples=2**16) for lost in (0.0, 5e-5))
     assert whole.unresolved == 0.0 < few.unresolved < 1e-4

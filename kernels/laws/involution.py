@@ -12,7 +12,7 @@ from ...core.errors import InputError
 from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
 from ..bases.measure import SINE
-from .law import Law
+from .law import Law, RandomMap
 
 PROBES = 4096
 # Width of a probe pair in probability. Rounding of the map (1e-16 or so) then shows as 1e-10 in the slope.
@@ -108,6 +108,10 @@ class InvolutionLaw(Law):
                 f"map: expected sin(theta) d theta to be preserved, got {cells.min():.3g} to {cells.max():.3g} of what "
                 f"each of {CELLS} equal cells should receive"
             )
+
+    def random_map(self) -> RandomMap:
+        """The map, whatever the number."""
+        return lambda x, theta: (np.asarray(self.map(theta), dtype=np.float64), None)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self._mapped(theta)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_array, generator, whole_number
 from ...core.errors import InputError
@@ -18,12 +19,17 @@ from .branches import chained, chained_kinks, merged
 
 # Half the spacing of rng.random(): draws of exactly 0, an entry through a tip of the wall, become this instead.
 SMALLEST_DRAW = 2.0**-54
+# The ends of (0, 1) in double precision.
+SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 # Weights such as 0.1, ..., 0.4 typed in decimals sum to 1 within a few roundings; a forgotten term does not.
 WEIGHT_TOLERANCE = 1e-12
 # More evaluations than this for one incoming angle are not a computation that anybody wants to wait for.
 MOST_EVALUATIONS = 10**7
 # Nested calls of `apply` beyond this would meet Python's own limit on recursion.
 DEEPEST_POWER = 100
+
+# From uniform numbers and incoming angles: the outgoing angles and, for traced rays, which of them escaped.
+RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
 
 
 class Law(ABC):
@@ -119,6 +125,10 @@ class Law(ABC):
         """
         return False
 
+    def random_map(self) -> RandomMap | None:
+        """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
+        return None
+
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
         """The adjoint kernel in L^2(sin theta d theta); the law itself where it is reversible."""
@@ -180,11 +190,17 @@ class BranchLaw(Law):
         """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the
         probability under sin(theta)/2 d theta of the angles, mostly near grazing, where more were left out."""
 
+    def random_map(self) -> RandomMap:
+        """The branch in whose share of (0, 1) the number lies."""
+        return lambda x, theta: (self._branch_taken(x, theta), None)
+
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        return self._branch_taken(rng.random(theta.shape), theta)
+
+    def _branch_taken(self, x: Floats, theta: Floats) -> Floats:
         probability, outgoing = self.branches(theta)
         cumulative = np.cumsum(probability, axis=-1)
-        draw = rng.random(theta.shape)[..., None] * cumulative[..., -1:]
-        choice = np.argmax(draw < cumulative, axis=-1)
+        choice = np.argmax(x[..., None] * cumulative[..., -1:] < cumulative, axis=-1)
         return np.asarray(np.take_along_axis(outgoing, choice[..., None], axis=-1)[..., 0])
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
@@ -211,6 +227,10 @@ class DrivenLaw(Law):
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x`` in (0, 1), as a share of the period, and the angle ``theta``."""
 
+    def random_map(self) -> RandomMap:
+        """`respond`."""
+        return lambda x, theta: (self.respond(x, theta), None)
+
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.respond(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
 
@@ -218,6 +238,11 @@ class DrivenLaw(Law):
         x = (np.arange(self.fan_out) + 0.5) / self.fan_out
         outgoing = self.respond(x.reshape((-1,) + (1,) * theta.ndim), theta)
         return np.asarray(np.mean(np.asarray(function(outgoing), dtype=np.float64), axis=0))
+
+
+def entry_inside(x: Floats) -> Floats:
+    """Move uniform numbers that fell on an end of (0, 1) to the nearest float64 inside it."""
+    return np.asarray(np.clip(x, SMALLEST, LARGEST))
 
 
 def set_facts(law: Law, **facts: object) -> None:
@@ -591,6 +616,17 @@ class SpecularFrame(Law):
 
     def kinks(self, limit: int) -> tuple[Floats, float]:
         return self.law.kinks(limit)
+
+    def random_map(self) -> RandomMap | None:
+        inner = self.law.random_map()
+        if inner is None:
+            return None
+
+        def mirrored(x: Floats, theta: Floats) -> tuple[Floats, NDArray[np.bool_] | None]:
+            outgoing, escaped = inner(x, theta)
+            return flipped(outgoing), escaped
+
+        return mirrored
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return flipped(self.law.sample(theta, rng))

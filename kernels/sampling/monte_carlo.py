@@ -6,8 +6,7 @@ import numpy as np
 
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..laws.law import Law
-from ..laws.random_map import entry_inside
+from ..laws.law import DrivenLaw, Law, entry_inside
 from .counts import BATCHES, LARGEST_REPLICATES, SampledArray
 from .rays import RaySums, progress_bar
 from .sobol import PARTS
@@ -30,16 +29,17 @@ def independent_rays(
     sums = RaySums(law, basis, parts)
     chunk = sums.chunk
     sums.each = max(-(-samples // parts), 1)
-    traced = getattr(law, "outcomes", None) if getattr(law, "closed_form", None) is None else None
+    # the map of a driven law tells besides which rays escaped
+    reflect = law.random_map() if isinstance(law, DrivenLaw) and law.closed_form is None else None
     with progress_bar(parts * sums.each) as bar:
         for part in range(parts):
             for index, start in enumerate(range(0, sums.each, chunk)):
                 own = np.random.default_rng([*root, part, index])
                 theta = SINE.sample(min(chunk, sums.each - start), own)
-                if traced is None:
+                if reflect is None:
                     outgoing = law.sample(theta, own)
                 else:
-                    outgoing, escaped = traced(entry_inside(own.random(theta.shape)), theta)
+                    outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta)
                     sums.count_lost(escaped)
                 sums.add(part, theta, outgoing)
                 bar.update(theta.size)

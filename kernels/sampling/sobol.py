@@ -10,8 +10,7 @@ from ..bases.angles import kept_inside
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.mirror import is_mirror_symmetric
-from ..laws.law import Law
-from ..laws.random_map import entry_inside, responder
+from ..laws.law import Law, entry_inside
 from .counts import SampledArray
 from .rays import RaySums, progress_bar
 
@@ -46,12 +45,12 @@ class Net:
     def __init__(self, law: Law, basis: Basis, rng: np.random.Generator) -> None:
         from scipy.stats.qmc import Sobol
 
-        respond = responder(law)
-        if respond is None:
+        reflect = law.random_map()
+        if reflect is None:
             raise InputError(
                 f"method: {law!r} is not driven by a uniform number, so it has no 'qmc'; use 'monte-carlo'"
             )
-        self.respond = respond
+        self.reflect = reflect
         self.sums = RaySums(law, basis, PARTS)
         self.halved = law.mirror_symmetric is True and is_mirror_symmetric(basis)
         source = np.random.default_rng(rng.integers(0, 2**63, size=2))
@@ -86,7 +85,7 @@ class Net:
         points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS + self.beyond[:, None]
         x, u = np.moveaxis(points, -1, 0)
         theta: Floats = kept_inside(SINE.quantile(0.5 * u if self.halved else u))
-        outgoing, escaped = self.respond(entry_inside(x), theta)
+        outgoing, escaped = self.reflect(entry_inside(x), theta)
         self.sums.count_lost(escaped)
         for part in range(PARTS):
             self.sums.add(part, theta[part], outgoing[part])

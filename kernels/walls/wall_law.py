@@ -14,7 +14,7 @@ from ...core.checks import Floats, angles
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ..bases.basis import AngleFunction
-from ..laws.law import Combination, DrivenLaw, Law, specular
+from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
 from .circular_arc import CircularArcLaw
 from .conditionals import AdaptiveRows, adaptive_rows, is_few
 from .isometry_branches import table_of
@@ -135,6 +135,10 @@ class WallLaw(DrivenLaw):
         ``x`` in (0, 1) is the entry point as a share of the period. Never raises an AccuracyError.
         """
         return traced_outcomes(self.wall, x, theta)
+
+    def random_map(self) -> RandomMap:
+        """`outcomes`."""
+        return self.outcomes
 
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""

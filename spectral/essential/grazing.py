@@ -13,7 +13,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ...kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
-from ...kernels.laws.random_map import entry_inside, responder
+from ...kernels.laws.law import entry_inside
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -230,9 +230,9 @@ def _row(law: Law, angle: float, end: int, parts: tuple[tuple[float, float], ...
         near = outgoing < 0.5 * np.pi
         return np.stack([np.where(near, share, 0.0), np.where(near, 0.0, share)], axis=-1)
 
-    respond = responder(law) if isinstance(law, DrivenLaw) else None
-    if respond is not None:
-        found = [_entry_integral(lambda x: ratio(respond(x, np.full(x.shape, theta))[0]), *part) for part in parts]
+    reflect = law.random_map() if isinstance(law, DrivenLaw) else None
+    if reflect is not None:
+        found = [_entry_integral(lambda x: ratio(reflect(x, np.full(x.shape, theta))[0]), *part) for part in parts]
         value, error = sum((part[0] for part in found), np.zeros(2)), sum(part[1] for part in found)
     else:
         value, error = law.apply(ratio, np.array([theta]))[0], 0.0
