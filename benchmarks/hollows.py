@@ -36,8 +36,8 @@ def main() -> None:
         smallest = min(smallest, p_value)
         graph = "yes" if np.all(np.diff(chain[:, 0]) >= 0.0) else "no"
         print(
-            f"| {seed} | {len(chain)} | {graph} | {float(law.unresolved):.1e} | {law.table().mass() - 1.0:.1e} "
-            f"| {balance:.1e} | {p_value:.3f} |",
+            f"| {seed} | {len(chain)} | {graph} | {float(law.unresolved):.1e} "
+            f"| {law.isometry_table().mass() - 1.0:.1e} | {balance:.1e} | {p_value:.3f} |",
             flush=True,
         )
     print(f"\nSmallest p-value of {HOLLOWS}: {smallest:.2g}")

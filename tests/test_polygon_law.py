@@ -12,8 +12,8 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.kernels.discretisation.isometries import branch_matrix
-from asperity.kernels.walls.isometry_branches import isometries, table_of
-from asperity.kernels.walls.isometry_table import IsometryTable
+from asperity.kernels.laws.isometry_table import IsometryTable
+from asperity.kernels.walls.isometry_branches import isometries
 from traced_pairs import chi_square_p
 
 EPS = float(np.finfo(np.float64).eps)
@@ -39,7 +39,7 @@ def law_of(name: str) -> ker.PolygonLaw:
 @pytest.mark.parametrize("psi", [1e-3, 0.05, 0.7, math.pi / 3, math.pi / 2, 2.0, 2.9, math.pi - 1e-4])
 def test_the_table_of_triangular_teeth_is_their_law(psi: float) -> None:
     law = ker.TriangularTeethLaw(psi)
-    table = law.table()
+    table = law.isometry_table()
     assert table is not None and table.mass() == pytest.approx(1.0, abs=1e-14)
     theta = np.concatenate([[1e-9, 1e-4, math.pi - 1e-4], np.random.default_rng(1).uniform(0.001, 3.14, 500)])
     (share, angle), (expected, outgoing) = table.branches(theta), law.branches(theta)
@@ -102,7 +102,7 @@ def test_probabilities_sum_to_one_and_are_linear_in_the_cotangent_between_kinks(
     theta = np.random.default_rng(2).uniform(0.01, 3.13, 2000)
     probability, outgoing = law.branches(theta)
     assert np.abs(probability.sum(axis=-1) - 1.0).max() < 1e-14
-    assert law.table().mass() == pytest.approx(1.0, abs=1e-13)
+    assert law.isometry_table().mass() == pytest.approx(1.0, abs=1e-13)
     assert probability.min() >= 0.0 and outgoing.min() > 0.0 and outgoing.max() < math.pi
     kinks, left_out = law.kinks(10**6)
     assert left_out < 0.1
@@ -219,9 +219,9 @@ def test_signs_from_the_table_are_those_found_by_probing() -> None:
         share, outgoing = law.branches(theta)
         for k in (1, 3):
             assert np.allclose((probability * np.cos(k * image)).sum(-1), (share * np.cos(k * outgoing)).sum(-1))
-    frame = table_of(ker.TriangularTeethLaw(0.7).in_specular_frame())
+    frame = ker.TriangularTeethLaw(0.7).in_specular_frame().isometry_table()
     assert frame is not None
     share, outgoing = frame.branches(theta)
     wanted = ker.TriangularTeethLaw(0.7).in_specular_frame().apply(np.cos, theta)
     assert np.allclose((share * np.cos(outgoing)).sum(-1), wanted, atol=1e-13)
-    assert table_of(ker.lambertian()) is None
+    assert ker.lambertian().isometry_table() is None

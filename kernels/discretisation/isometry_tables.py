@@ -16,11 +16,11 @@ from ..bases.intervals import between_cuts, edges_inside
 from ..bases.legendre import Legendre
 from ..bases.measure import gauss_on_intervals
 from ..bases.panels import Panels
+from ..laws.isometry_table import IsometryTable
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.crevice_tail import crevice_nodes, first_crossing
 from ..walls.isometry_branches import table_of
-from ..walls.isometry_table import IsometryTable
 from ..walls.rectangular import crevice_pieces
 from .method import Budget, MethodName, computed, isometric_rounding
 

@@ -16,6 +16,7 @@ from ...core.errors import InputError
 from ..bases.angles import flipped
 from ..bases.basis import AngleFunction, Frame
 from .branches import chained, chained_kinks, merged
+from .isometry_table import IsometryTable
 
 # Half the spacing of rng.random(): draws of exactly 0, an entry through a tip of the wall, become this instead.
 SMALLEST_DRAW = 2.0**-54
@@ -127,6 +128,10 @@ class Law(ABC):
 
     def random_map(self) -> RandomMap | None:
         """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
+        return None
+
+    def isometry_table(self) -> IsometryTable | None:
+        """All isometries of the law with their probabilities; None if it has others, or they cannot be listed."""
         return None
 
     # ---- the algebra -----------------------------------------------------------------------------------------
@@ -356,6 +361,12 @@ class Combination(Law):
     def kinks(self, limit: int) -> tuple[Floats, float]:
         parts = [law.kinks(limit) for weight, law in self.terms_checked() if weight > 0.0]
         return np.unique(np.concatenate([kinks for kinks, _ in parts])), min(sum(left for _, left in parts), 1.0)
+
+    def isometry_table(self) -> IsometryTable | None:
+        """The sum of the terms' tables; None if a term has none."""
+        terms = [(weight, law.isometry_table()) for weight, law in self.terms_checked() if weight > 0.0]
+        tables = [table.scaled(weight) for weight, table in terms if table is not None]
+        return IsometryTable.joined(tables) if len(tables) == len(terms) else None
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.terms_checked()
@@ -628,6 +639,10 @@ class SpecularFrame(Law):
 
         return mirrored
 
+    def isometry_table(self) -> IsometryTable | None:
+        table = self.law.isometry_table()
+        return None if table is None else table.in_specular_frame()
+
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return flipped(self.law.sample(theta, rng))
 
@@ -665,6 +680,10 @@ class IsometryLaw(BranchLaw):
     def kinks(self, limit: int) -> tuple[Floats, float]:
         """None at all."""
         return np.empty(0), 0.0
+
+    def isometry_table(self) -> IsometryTable:
+        """The one isometry."""
+        return IsometryTable.sent_back(1.0) if self.retro else IsometryTable.flat(1.0)
 
     def __repr__(self) -> str:
         return "retroreflection()" if self.retro else "specular()"

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles
-from ..laws.law import Combination, IsometryLaw, Law, SpecularFrame
-from .isometry_table import IsometryTable
+from ..laws.isometry_table import IsometryTable
+from ..laws.law import Law
 
 # Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.
 KINKS = 20_000
@@ -39,7 +39,7 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     ([1.0], [-1.0], [1.0])
     """
     incoming = angles("theta", theta)
-    table = table_of(law)
+    table = law.isometry_table()
     if table is not None:
         return table.rows(incoming)
     edges = np.concatenate([[0.0], law.kinks(KINKS)[0], [np.pi]])
@@ -55,15 +55,5 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
 
 
 def table_of(law: Law) -> IsometryTable | None:
-    """The table of a law, or None for a law that has none: one that is not made of isometries, or is a composition."""
-    if isinstance(law, IsometryLaw):
-        return IsometryTable.sent_back(1.0) if law.retro else IsometryTable.flat(1.0)
-    if isinstance(law, SpecularFrame):
-        table = table_of(law.law)
-        return None if table is None else table.in_specular_frame()
-    if isinstance(law, Combination):
-        terms = [(weight, table_of(term)) for weight, term in law.terms_checked() if weight > 0.0]
-        tables = [table.scaled(weight) for weight, table in terms if table is not None]
-        return IsometryTable.joined(tables) if len(tables) == len(terms) else None
-    made = getattr(law, "table", None)
-    return None if made is None else made()
+    """The former name of `Law.isometry_table`."""
+    return law.isometry_table()

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw
-from .isometry_table import IsometryTable
 from .traced_map import traced_angles
 from .triangular import TriangularTeethLaw
 
@@ -115,7 +115,7 @@ class PolygonLaw(BranchLaw):
         if shape.height_to_width is not None:
             return IsometryTable.of_crevice(1.0, shape.height_to_width)
         if shape.apex_angle is not None:
-            table = TriangularTeethLaw(shape.apex_angle).table()
+            table = TriangularTeethLaw(shape.apex_angle).isometry_table()
             if table is not None:
                 return table
         from ...geometry.polygons.beams import beams_of
@@ -123,7 +123,7 @@ class PolygonLaw(BranchLaw):
         beams = beams_of(shape.vertices, tolerance=self.tolerance, max_beams=self.max_beams, mirror_symmetric=symmetric)
         return table_of_beams(beams)
 
-    def table(self) -> IsometryTable:
+    def isometry_table(self) -> IsometryTable:
         """All isometries with their probabilities."""
         return self._table
 

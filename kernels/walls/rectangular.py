@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, positive_number
 from ..bases.angles import flipped
+from ..laws.crevice import crevice_kinks, crevice_retro, crossings_modulo_two
+from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entry_points
-from .crevice import crevice_kinks, crevice_retro, crossings_modulo_two
-from .isometry_table import IsometryTable
 
 LARGEST_COUNT = 2.0**62
 
@@ -75,7 +75,7 @@ class RectangularTeethLaw(BranchLaw):
         """The angles where d is a whole number, cot theta = k / (2 r), and the probability beyond the last of them."""
         return crevice_kinks(self.height_to_width, limit)
 
-    def table(self) -> IsometryTable:
+    def isometry_table(self) -> IsometryTable:
         """Half of it flat tops, half of it crevices."""
         return IsometryTable.joined([IsometryTable.flat(0.5), IsometryTable.of_crevice(0.5, self.height_to_width)])
 

@@ -12,8 +12,8 @@ from ..bases.angles import flipped, kept_inside
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals
+from ..laws.crevice import crevice_kinks, crevice_retro
 from ..laws.law import BranchLaw
-from .crevice import crevice_kinks, crevice_retro
 from .crevice_tail import crevice_nodes, first_crossing
 
 # A polynomial of this degree in the triangle wave is still cheap to integrate.

@@ -12,8 +12,8 @@ from ...core.rounding import EPS
 from ..bases.angles import flipped, kept_inside, mixed_arccos
 from ..bases.intervals import without_outermost
 from ..laws.branches import merged
+from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entry_points
-from .isometry_table import IsometryTable
 
 # Kinks closer together than this are one kink computed in two ways.
 KINK_SPACING = 16.0 * EPS
@@ -115,7 +115,7 @@ class TriangularTeethLaw(BranchLaw):
             return kinks, 0.0
         return without_outermost(kinks, max(kinks.size - limit, 0))
 
-    def table(self) -> IsometryTable | None:
+    def isometry_table(self) -> IsometryTable | None:
         """The pieces between the kinks, or None where there are too many."""
         if 4.0 * np.pi / self.angle > MOST_LISTED_KINKS:
             return None

@@ -14,11 +14,10 @@ from ...core.checks import Floats, angles
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ..bases.basis import AngleFunction
+from ..laws.isometry_table import IsometryTable
 from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
 from .circular_arc import CircularArcLaw
 from .conditionals import AdaptiveRows, adaptive_rows, is_few
-from .isometry_branches import table_of
-from .isometry_table import IsometryTable
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .traced_map import LOST_TOLERANCE, traced_angles, traced_outcomes
@@ -151,9 +150,9 @@ class WallLaw(DrivenLaw):
         """Those of the exact law."""
         return super().kinks(limit) if self.exact_law is None else self.exact_law.kinks(limit)
 
-    def table(self) -> IsometryTable | None:
+    def isometry_table(self) -> IsometryTable | None:
         """That of the exact law, or None."""
-        return None if self.exact_law is None else table_of(self.exact_law)
+        return None if self.exact_law is None else self.exact_law.isometry_table()
 
     def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
         return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)

@@ -12,6 +12,7 @@ from ...core.checks import Floats
 from ...core.estimates import ErrorKind
 from ...kernels import DensityLaw, InvolutionLaw, Law, MatrixLaw, WallLaw
 from ...kernels.laws.ideal import LambertianLaw
+from ...kernels.laws.law import IsometryLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import Rules, fold, made_of_isometries
 from .grazing import SWAP, GrazingLimit, grazing_limit
@@ -115,12 +116,10 @@ def _leaf(law: Law) -> _Part:
     if isinstance(law, (LambertianLaw, HenyeyGreensteinLaw, MatrixLaw)):
         return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
     if made_of_isometries(law):
-        limit = grazing_limit(law) if not hasattr(law, "retro") else None
-        grazing = limit.matrix if limit else (np.eye(2) if getattr(law, "retro", False) else SWAP)
+        limit = _ideal_limit(law) if isinstance(law, IsometryLaw) else grazing_limit(law)
         # an isometric law cannot enlarge anything: what its grazing limit is matters in sums with other walls only
         note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
-        errors = (limit.error, limit.entry_error) if limit else (0.0, 0.0)
-        return _Part((1.0, 1.0), grazing, *errors, True, (note,), 1.0)
+        return _Part((1.0, 1.0), limit.matrix, limit.error, limit.entry_error, True, (note,), 1.0)
     limit = grazing_limit(law)
     errors = (limit.error, limit.entry_error)
     how = f"-> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
@@ -146,6 +145,10 @@ def _leaf(law: Law) -> _Part:
                 f"spectrum up to {reach}"
             )
     return _Part(kept, limit.matrix, *errors, False, tuple(notes), share)
+
+
+def _ideal_limit(law: IsometryLaw) -> GrazingLimit:
+    return GrazingLimit(np.eye(2) if law.retro else SWAP, 0.0, 0.0)
 
 
 def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:

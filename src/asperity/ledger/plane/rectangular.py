@@ -8,7 +8,7 @@ import numpy as np
 
 from ...geometry import rectangular_teeth, trace
 from ...geometry.disk.disk import foreshortening
-from ...kernels.walls.crevice import crevice_retro
+from ...kernels.laws.crevice import crevice_retro
 from ...kernels.walls.rectangular import RectangularTeethLaw
 from ...verification import Formula, Verdict, agreement, erratum, verify
 from ...verification.entry import Code

@@ -14,6 +14,7 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import kept_inside
 from ..bases.intervals import ragged, without_outermost
+from .crevice import crevice_kinks, crevice_retro
 
 Whole = NDArray[np.int64]
 
@@ -256,8 +257,6 @@ class IsometryTable:
             found.append((query, number[piece], self.density(at, piece) / np.sin(at)))
         everyone = np.arange(theta.size)
         for crevice in self.crevices:
-            from .crevice import crevice_retro
-
             retro = crevice.share * crevice_retro(crevice.height_to_width, theta)
             outcomes = (1, 0) if crevice.exchanged else (0, 1)
             for isometry, probability in zip(outcomes, (crevice.share - retro, retro), strict=True):
@@ -283,8 +282,6 @@ class IsometryTable:
 
     def kinks(self, limit: int) -> tuple[Floats, float]:
         """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of those left out."""
-        from .crevice import crevice_kinks
-
         lists, left_out = [self.ends], 0.0
         for crevice in self.crevices:
             kinks, omitted = crevice_kinks(crevice.height_to_width, max(limit // len(self.crevices), 1))
