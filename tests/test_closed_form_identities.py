@@ -21,7 +21,7 @@ ANGLES = [0.02, 0.3, 0.7, math.pi / 4, 1.1, math.pi / 3, math.pi / 2, 2.0, 2.9, 
 
 # ---- laws that hold for every wall --------------------------------------------------------------------------------
 def flux_pairing(law: BranchLaw, f: Callable, g: Callable, limit: int, order: int) -> float:
-    kinks, _ = law.kinks(limit)
+    kinks, _ = law.breakpoints(limit)
     angle, weight = SINE.quadrature(np.concatenate([[0.0], kinks, [math.pi]]), order)
     return float(weight @ (f(angle) * law.apply(g, angle)))
 
@@ -54,7 +54,7 @@ def test_rectangular_law_is_in_detailed_balance(ratio: float) -> None:
 @pytest.mark.parametrize("angle", [0.05, 0.7, math.pi / 4, 1.1, math.pi / 2, 2.0, 2.9, math.pi - 1e-3])
 def test_triangular_branches_are_smooth_between_kinks(angle: float) -> None:
     law = TriangularTeethLaw(angle)
-    kinks, left_out = law.kinks(10**6)
+    kinks, left_out = law.breakpoints(10**6)
     assert left_out == 0.0
     edges = np.concatenate([[0.0], kinks, [math.pi]])
     eight = rule_by_slot(law, edges, 8)
@@ -71,7 +71,7 @@ def rule_by_slot(law: BranchLaw, edges: np.ndarray, order: int) -> np.ndarray:
 
 @pytest.mark.parametrize("law", [TriangularTeethLaw(0.7), TriangularTeethLaw(2.0), RectangularTeethLaw(1.3)])
 def test_every_slot_is_one_isometry_between_kinks(law: BranchLaw) -> None:
-    kinks, _ = law.kinks(400)
+    kinks, _ = law.breakpoints(400)
     edges = np.concatenate([[0.0], kinks, [math.pi]])
     low, width = edges[:-1, None], np.diff(edges)[:, None]
     theta = low + width * np.array([0.1, 0.3, 0.6, 0.9])
@@ -85,17 +85,17 @@ def test_every_slot_is_one_isometry_between_kinks(law: BranchLaw) -> None:
 
 
 def test_rectangular_kinks_say_how_much_they_leave_out() -> None:
-    kinks, left_out = RectangularTeethLaw(1.0).kinks(101)
+    kinks, left_out = RectangularTeethLaw(1.0).breakpoints(101)
     assert kinks.size == 101
     # cot(theta) = k/2, k = 1..50: beyond lies cot(theta) > 25, of probability 1 - 25/sqrt(1 + 625)
     assert abs(left_out - (1.0 - 25.0 / math.sqrt(626.0))) < 1e-15
-    assert RectangularTeethLaw(1e8).kinks(100)[1] > 0.99
+    assert RectangularTeethLaw(1e8).breakpoints(100)[1] > 0.99
 
 
 def test_triangular_kinks_are_cut_to_the_limit_around_normal_incidence() -> None:
     law = TriangularTeethLaw(1e-3)
-    everything, nothing = law.kinks(10**6)
-    some, left_out = law.kinks(200)
+    everything, nothing = law.breakpoints(10**6)
+    some, left_out = law.breakpoints(200)
     assert nothing == 0.0
     assert some.size <= 200
     assert np.isin(some.round(12), everything.round(12)).all()
@@ -112,7 +112,7 @@ def test_triangular_correlation_has_the_value_found_by_an_independent_program() 
 
 def test_arc_correlation_has_the_value_found_by_an_independent_program() -> None:
     law = CircularArcLaw(1.2)
-    kinks, _ = law.kinks(1000)
+    kinks, _ = law.breakpoints(1000)
     angle, weight = SINE.quadrature(np.concatenate([[0.0], kinks, [math.pi]]), 6)
     ratio = 3.0 * float(weight @ (np.cos(angle) * law.apply(np.cos, angle)))
     assert abs(ratio - 0.327558333378) < 1e-12
@@ -131,7 +131,7 @@ def test_shallow_arcs_relax_at_four_times_their_mean_squared_slope() -> None:
     # <u, P_F u>/<u, u> = 1 - 4h (1 + O(h)) with h = [ln(sec xi + tan xi) - sin xi]/sin xi
     for xi, allowance in ((0.1, 0.01), (0.02, 0.0005)):
         law = CircularArcLaw(xi).in_specular_frame()
-        angle, weight = SINE.quadrature(np.concatenate([[0.0], CircularArcLaw(xi).kinks(100)[0], [math.pi]]), 16)
+        angle, weight = SINE.quadrature(np.concatenate([[0.0], CircularArcLaw(xi).breakpoints(100)[0], [math.pi]]), 16)
         decay = 1.0 - 3.0 * float(weight @ (np.cos(angle) * law.apply(np.cos, angle)))
         h = (math.log(1.0 / math.cos(xi) + math.tan(xi)) - math.sin(xi)) / math.sin(xi)
         assert abs(decay / (4.0 * h) - 1.0) < allowance
@@ -140,7 +140,7 @@ def test_shallow_arcs_relax_at_four_times_their_mean_squared_slope() -> None:
 def test_arc_law_is_in_detailed_balance_and_preserves_the_measure() -> None:
     for xi in (0.3, 1.0, math.pi / 2):
         law = CircularArcLaw(xi)
-        angle, weight = SINE.quadrature(np.concatenate([[0.0], law.kinks(240)[0], [math.pi]]), 8)
+        angle, weight = SINE.quadrature(np.concatenate([[0.0], law.breakpoints(240)[0], [math.pi]]), 8)
         f, g = f_test(angle), g_test(angle)
         there, back = weight @ (f * law.apply(g_test, angle)), weight @ (g * law.apply(f_test, angle))
         assert abs(there - back) < 1e-10

@@ -281,7 +281,7 @@ def test_branches_of_compounds_are_merged_and_act_like_the_law(law: Law) -> None
 
 @pytest.mark.parametrize("law", COMPOUNDS[:3], ids=repr)
 def test_compounds_are_smooth_between_their_kinks(law: Law) -> None:
-    kinks, left_out = law.kinks(300)
+    kinks, left_out = law.breakpoints(300)
     edges = np.concatenate([[0.0], kinks, [math.pi]])
     sums = []
     for order in (8, 16):
@@ -296,8 +296,16 @@ def test_laws_with_a_density_have_no_branches() -> None:
     for law in (lambertian(), maxwell(0.5), specular() @ lambertian(), CircularArcLaw(1.0)):
         with pytest.raises(InputError, match="not a finite mixture of isometries"):
             law.branches(1.0)
-    with pytest.raises(InputError, match="no list of kinks"):
-        lambertian().kinks(10)
+
+
+def test_a_law_says_whether_it_knows_its_breakpoints() -> None:
+    for unknown in (lambertian(), maxwell(0.5), specular() @ lambertian(), CircularArcLaw(1.0) @ specular()):
+        assert unknown.breakpoints(10)[1] == math.inf
+    teeth = RectangularTeethLaw(1.0)
+    found, left_out = (0.5 * teeth + 0.5 * lambertian()).breakpoints(10)
+    assert np.array_equal(found, teeth.breakpoints(10)[0]) and left_out == math.inf
+    tilted = MatrixLaw([[0.25, 0.75], [0.75, 0.25]]).in_specular_frame()
+    assert tilted.outgoing_breakpoints == pytest.approx(math.pi / 2) and teeth.outgoing_breakpoints.size == 0
 
 
 def test_powers_out_of_reach_say_what_to_do() -> None:

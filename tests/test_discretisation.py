@@ -71,7 +71,7 @@ class Swap(ker.BranchLaw):
         specular = (np.abs(theta - np.pi / 2) < self.steep).astype(np.float64)
         return np.stack([specular, 1.0 - specular], -1), np.stack([np.pi - theta, theta], -1)
 
-    def kinks(self, limit: int) -> tuple[np.ndarray, float]:
+    def breakpoints(self, limit: int) -> tuple[np.ndarray, float]:
         return np.array([np.pi / 2 - self.steep, np.pi / 2 + self.steep]), 0.0
 
 

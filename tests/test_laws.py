@@ -194,7 +194,7 @@ def test_breakpoints_let_densities_jump() -> None:
 
 
 def test_laws_are_immutable() -> None:
-    for law, name in ((DensityLaw(tilted), "breakpoints"), (specular(), "retro"), (henyey_greenstein(0.1), "g")):
+    for law, name in ((DensityLaw(tilted), "sampling_error"), (specular(), "retro"), (henyey_greenstein(0.1), "g")):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(law, name, 1.0)
     with pytest.raises(ValueError, match="read-only"):

@@ -104,7 +104,7 @@ def test_probabilities_sum_to_one_and_are_linear_in_the_cotangent_between_kinks(
     assert np.abs(probability.sum(axis=-1) - 1.0).max() < 1e-14
     assert law.isometry_table().mass() == pytest.approx(1.0, abs=1e-13)
     assert probability.min() >= 0.0 and outgoing.min() > 0.0 and outgoing.max() < math.pi
-    kinks, left_out = law.kinks(10**6)
+    kinks, left_out = law.breakpoints(10**6)
     assert left_out < 0.1
     edges = np.concatenate([[0.05], kinks[(kinks > 0.05) & (kinks < 3.09)], [3.09]])
     width = np.diff(edges)

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
 from .measure import SINE
+
+# Halvings, after which an interval of angles has no width left.
+BISECTIONS = 60
 
 
 def ragged(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -70,3 +75,14 @@ def without_outermost(angles: Floats, number: int) -> tuple[Floats, float]:
     """
     kept = angles[(number + 1) // 2 : angles.size - number // 2]
     return kept, float(SINE.cdf(kept[0]) + SINE.mass(kept[-1], np.pi)) if kept.size else 1.0
+
+
+def bisected(low: Floats, high: Floats, before: Callable[[Floats], NDArray[np.bool_]]) -> Floats:
+    """Where, between ``low`` and ``high``, what is true ``before`` that angle ceases to be; one an interval."""
+    low, high = low.copy(), high.copy()
+    if low.size:
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            early = before(middle)
+            low, high = np.where(early, middle, low), np.where(early, high, middle)
+    return high

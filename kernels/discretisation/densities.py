@@ -13,11 +13,12 @@ from ...core.rounding import EPS
 from ..bases.assembly import add_products, cell_index
 from ..bases.basis import Basis
 from ..bases.bins import Bins
+from ..bases.intervals import bisected
 from ..bases.legendre import Legendre
-from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
+from ..bases.measure import gauss_on_intervals, gauss_rule, SINE
 from ..bases.momentum import Directions
 from ..laws.density import DensityLaw
-from ..laws.involution import InvolutionLaw
+from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
 from ..matrices.matrix import KernelMatrix
@@ -39,12 +40,8 @@ MIRROR_TOLERANCE = 4.0 * EPS * np.pi
 CHUNK = 2**21
 # Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.
 ROW_CHUNK = 2**17
-BISECTIONS = 60
 # A map is mostly singular where it jumps, as a square root if it comes from grazing or goes there.
 GRADING = 0.25 ** np.arange(1.0, 17.0)
-# A measure-preserving map keeps measures of intervals; rounding of the map and of the measure stays below this.
-JUMP_TOLERANCE = 1e-9
-JUMP_PROBES = 4096
 
 
 class HasDensity(Protocol):
@@ -53,6 +50,8 @@ class HasDensity(Protocol):
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats: ...
     def panels(self, theta: Floats) -> Floats: ...
     def incoming_edges(self, edges: Floats) -> Floats: ...
+    @property
+    def outgoing_breakpoints(self) -> Floats: ...
     @property
     def resolution(self) -> float: ...
     @property
@@ -109,7 +108,7 @@ def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Flo
     Product rules, which do not see a peak narrower than the cells of a partition: there each row is integrated over
     theta' by itself, between the edges of cells and of the law's own panels for that row.
     """
-    edges = np.unique(np.concatenate((basis.edges, np.asarray(getattr(law, "breakpoints", ())))))
+    edges = np.unique(np.concatenate((basis.edges, law.outgoing_breakpoints)))
     if basis.is_partition and law.resolution < np.diff(edges).max():
         outer = np.unique(np.concatenate((edges, law.incoming_edges(edges))))
         mirrored = law.mirror_symmetric is True and np.abs(edges + edges[::-1] - np.pi).max() <= MIRROR_TOLERANCE
@@ -252,28 +251,4 @@ def _crossings(map_angle: Callable[[Floats], Floats], basis: Basis, fine: Floats
     last = cell_index(basis, np.asarray(map_angle(high), dtype=np.float64))
     changing = first != last
     low, high, first = low[changing], high[changing], first[changing]
-    return _bisected(low, high, lambda middle: cell_index(basis, np.asarray(map_angle(middle))) == first)
-
-
-def jumps_of_map(map_angle: Callable[[Floats], Floats]) -> Floats:
-    """Where a measure-preserving map jumps or turns round: there the measure between two images changes."""
-    probe = SINE.quantile((np.arange(JUMP_PROBES) + 0.5) / JUMP_PROBES)
-    image = SINE.cdf(np.asarray(map_angle(probe), dtype=np.float64))
-    broken = np.abs(np.abs(np.diff(image)) - SINE.mass(probe[:-1], probe[1:])) > JUMP_TOLERANCE
-    low, high, start = probe[:-1][broken], probe[1:][broken], image[:-1][broken]
-
-    def still_whole(middle: Floats) -> NDArray[np.bool_]:
-        moved = np.abs(SINE.cdf(np.asarray(map_angle(middle), dtype=np.float64)) - start)
-        return np.asarray(np.abs(moved - SINE.mass(low, middle)) <= JUMP_TOLERANCE)
-
-    return _bisected(low, high, still_whole)
-
-
-def _bisected(low: Floats, high: Floats, before: Callable[[Floats], NDArray[np.bool_]]) -> Floats:
-    low, high = low.copy(), high.copy()
-    if low.size:
-        for _ in range(BISECTIONS):
-            middle = 0.5 * (low + high)
-            early = before(middle)
-            low, high = np.where(early, middle, low), np.where(early, high, middle)
-    return high
+    return bisected(low, high, lambda middle: cell_index(basis, np.asarray(map_angle(middle))) == first)

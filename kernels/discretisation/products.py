@@ -16,13 +16,12 @@ from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE
 from ..bases.panels import Panels
-from ..laws.involution import InvolutionLaw
+from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.law import Law
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
 from ..walls.words import law_of
-from .densities import jumps_of_map
 from .isometries import Isometries, isometric_matrix
 from .method import Budget, MethodName, Recipe, computed, isometric_rounding
 from .scattering import degrees_kept, is_scattered, local_values, scattered_matrix, split
@@ -274,7 +273,7 @@ def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
     """Edges of the basis and of the laws, at most WIDEST apart."""
     special = [basis.edges]
     for law in dict.fromkeys(laws):
-        special.append(np.asarray(getattr(law, "breakpoints", ())))
+        special.append(law.outgoing_breakpoints)
         if isinstance(law, InvolutionLaw):
             jumps = jumps_of_map(law.map)
             special += [jumps, np.asarray(law.map(basis.edges[1:-1]))] if jumps.size <= KINKS else []

@@ -7,13 +7,9 @@ from itertools import count
 import numpy as np
 
 from ...core.checks import Floats
-from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
-from ..discretisation.densities import jumps_of_map
-from ..laws.density import DensityLaw
-from ..laws.involution import InvolutionLaw
-from ..laws.law import Combination, Law, SpecularFrame
+from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
 from .distributions import ENTRY_POINTS, outgoing_distributions, parts_of
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
@@ -77,22 +73,6 @@ def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup
     return Estimate(value, error, joint_kind(first, second), how)
 
 
-def kinks_of(law: Law, limit: int) -> Floats:
-    """Incoming angles where rows are not smooth, as far as the law knows them."""
-    if isinstance(law, Combination):
-        return np.unique(np.concatenate([kinks_of(term, limit) for weight, term in law.terms if weight]))
-    if isinstance(law, SpecularFrame):
-        return kinks_of(law.law, limit)
-    if isinstance(law, InvolutionLaw):
-        return jumps_of_map(law.map)
-    if isinstance(law, DensityLaw):
-        return np.asarray(law.breakpoints)
-    try:
-        return law.kinks(limit)[0]
-    except InputError:
-        return np.empty(0)
-
-
 def _is_atomic(law: Law) -> bool:
     """Whether rows consist of atoms, so that no cells are needed to resolve them."""
     return not np.any(parts_of(law, np.array([PROBE]), np.array([0.0, np.pi]))[0])
@@ -100,8 +80,8 @@ def _is_atomic(law: Law) -> bool:
 
 def _panels(first: Law, second: Law, level: int) -> tuple[Floats, Floats]:
     limit = KINKS * 2**level
-    kinks = [kinks_of(law, limit) for law in (first, second)]
-    coarse = np.unique(np.concatenate((np.linspace(0.0, np.pi, PANELS + 1), *kinks)))
+    points = [law.breakpoints(limit)[0] for law in (first, second)]
+    coarse = np.unique(np.concatenate((np.linspace(0.0, np.pi, PANELS + 1), *points)))
     pieces = 2**level
     fine = coarse[:-1, None] + np.arange(pieces) / pieces * np.diff(coarse)[:, None]
     edges = np.append(fine.ravel(), np.pi)
@@ -109,16 +89,8 @@ def _panels(first: Law, second: Law, level: int) -> tuple[Floats, Floats]:
 
 
 def _edges(first: Law, second: Law, level: int) -> Floats:
-    jumps = [_density_jumps(law) for law in (first, second)]
-    return np.unique(np.concatenate((np.linspace(0.0, np.pi, CELLS * 2**level + 1), *jumps)))
-
-
-def _density_jumps(law: Law) -> Floats:
-    if isinstance(law, Combination):
-        return np.concatenate([_density_jumps(term) for _, term in law.terms])
-    if isinstance(law, SpecularFrame):
-        return np.asarray(np.pi - _density_jumps(law.law)[::-1])
-    return np.asarray(law.breakpoints) if isinstance(law, DensityLaw) else np.empty(0)
+    points = [law.outgoing_breakpoints for law in (first, second)]
+    return np.unique(np.concatenate((np.linspace(0.0, np.pi, CELLS * 2**level + 1), *points)))
 
 
 def _nodes(low: Floats, high: Floats, sup: bool) -> tuple[Floats, Floats]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
@@ -23,20 +24,27 @@ MOST_BRANCHES = 64
 Branches = Callable[[Floats], tuple[Floats, Floats]]
 
 
+def joined(parts: Sequence[tuple[Floats, float]]) -> tuple[Floats, float]:
+    """The breakpoints of a sum from those of its terms."""
+    left_out = sum(left for _, left in parts)
+    found = np.unique(np.concatenate([points for points, _ in parts]))
+    return found, left_out if math.isinf(left_out) else min(left_out, 1.0)
+
+
 class Branching(Protocol):
     """What a chain asks of its laws."""
 
     def branches(self, theta: Floats, /) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles at incoming angles."""
 
-    def kinks(self, limit: int, /) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int, /) -> tuple[Floats, float]:
         """Where the branches change, at most about ``limit`` of them, and the measure of those left out."""
 
 
 def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
     """Add up branches with equal outgoing angles; slots left with probability 0 get the angle of the first used one.
 
-    The order of slots stays, so that a slot that was one isometry between two kinks remains so.
+    The order of slots stays, so that a slot that was one isometry between two breakpoints remains so.
     """
     probability, outgoing = probability.copy(), kept_inside(outgoing)
     slots = probability.shape[-1]
@@ -67,23 +75,32 @@ def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats]:
     return probability, outgoing
 
 
-def chained_kinks(laws: Sequence[Branching], limit: int) -> tuple[Floats, float]:
-    """Kinks of a chain, and the probability of those left out.
+def chained_breakpoints(laws: Sequence[Branching], limit: int) -> tuple[Floats, float]:
+    """Breakpoints of a chain, and the probability of those left out; none are known unless all laws know theirs.
 
-    They are those of the first law, and where its branches meet kinks of the rest.
+    They are those of the first law, and where its branches meet breakpoints of the rest.
     """
-    kinks, left_out = laws[0].kinks(limit)
-    for place in range(1, len(laws)):
-        target, more = laws[place].kinks(limit)
-        sources = preimages(partial(chained, laws[:place]), np.concatenate([[0.0], kinks, [np.pi]]), target)
-        kinks = np.unique(np.concatenate([kinks, sources]))
-        left_out += more
-    return kinks, min(left_out, 1.0)
+    if not laws:
+        return np.empty(0), 0.0
+    each = [law.breakpoints(limit) for law in laws]
+    left_out = sum(left for _, left in each)
+    if math.isinf(left_out):
+        return np.empty(0), math.inf
+    found = each[0][0]
+    try:
+        for place in range(1, len(laws)):
+            between = np.concatenate([[0.0], found, [np.pi]])
+            sources = preimages(partial(chained, laws[:place]), between, each[place][0])
+            found = np.unique(np.concatenate([found, sources]))
+    except InputError:
+        # the laws before the last have no branches, or together too many
+        return np.empty(0), math.inf
+    return found, min(left_out, 1.0)
 
 
-def preimages(branches: Branches, kinks: Floats, targets: Floats) -> Floats:
-    """Angles that some branch maps to a target, for every interval between kinks; both are sorted."""
-    low, high = kinks[:-1], kinks[1:]
+def preimages(branches: Branches, breakpoints: Floats, targets: Floats) -> Floats:
+    """Angles that some branch maps to a target, for every interval between breakpoints; both are sorted."""
+    low, high = breakpoints[:-1], breakpoints[1:]
     proper = high > low
     low, high = low[proper], high[proper]
     probe = low + np.array([[0.25], [0.75]]) * (high - low)

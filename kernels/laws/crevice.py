@@ -57,7 +57,7 @@ def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
     return np.asarray(np.minimum(rest, 2.0 - rest))
 
 
-def crevice_kinks(height_to_width: float, limit: int) -> tuple[Floats, float]:
+def crevice_breakpoints(height_to_width: float, limit: int) -> tuple[Floats, float]:
     """The angles where d is a whole number, at most about ``limit``, and the measure of the angles beyond them."""
     last = max((limit - 1) // 2, 0)
     if last == 0:

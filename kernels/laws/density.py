@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError
 
@@ -51,7 +52,8 @@ class DensityLaw(Law):
 
     Attributes
     ----------
-    breakpoints : ndarray
+    outgoing_breakpoints : ndarray
+        The angles given, in increasing order.
     reversible, mirror_symmetric : bool
         Measured: sin(theta) p(theta, theta') is symmetric, p(pi - theta, pi - theta') = p(theta, theta'), both on a
         grid of probes within 1e-9 of the largest value.
@@ -75,7 +77,7 @@ class DensityLaw(Law):
     asperity.errors.InputError: density: expected rows that integrate to 1, got 2 at theta = 0.015...
     """
 
-    breakpoints: Floats = frozen(())
+    outgoing_breakpoints: Floats = frozen(())
     sampling_error: float = 0.0
     fan_out = PANEL_COUNTS[0] * GAUSS_NODES
     _function: DensityFunction
@@ -85,7 +87,8 @@ class DensityLaw(Law):
         if not callable(density):
             raise InputError(f"density: expected a function of (theta, theta_out), got {density!r}")
         points = np.unique(finite_array("breakpoints", breakpoints))
-        set_facts(self, _function=density, breakpoints=frozen(points[(points > 0.0) & (points < np.pi)]))
+        inside = frozen(points[(points > 0.0) & (points < np.pi)])
+        set_facts(self, _function=density, outgoing_breakpoints=inside)
         set_facts(self, _panel_count=self._panels_needed())
         set_facts(self, fan_out=(self._grid(self._panel_count).size - 1) * GAUSS_NODES)
         reversible, mirror_symmetric = self._measured_symmetries()
@@ -131,6 +134,10 @@ class DensityLaw(Law):
         """Angles theta between which the integrals of p(theta, .) between the given edges vary smoothly."""
         return self._grid(self._panel_count)
 
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        """Those of the outgoing angle: by detailed balance they are some of the incoming one too."""
+        return self.outgoing_breakpoints, math.inf
+
     # ---- what every law does ---------------------------------------------------------------------------------
     def adjoint(self) -> Law:
         """The law with density sin(theta') p(theta', theta) / sin(theta); itself if it is reversible.
@@ -142,7 +149,7 @@ class DensityLaw(Law):
         try:
             return DensityLaw(
                 lambda theta, out: SINE.density(out) * self.density(out, theta) / SINE.density(theta),
-                self.breakpoints,
+                self.outgoing_breakpoints,
             )
         except InputError as reason:
             raise InputError(
@@ -200,15 +207,15 @@ class DensityLaw(Law):
 
     # ---- construction ----------------------------------------------------------------------------------------
     def _grid(self, panels: int) -> Floats:
-        return np.unique(np.concatenate([np.linspace(0.0, np.pi, panels + 1), self.breakpoints]))
+        return np.unique(np.concatenate([np.linspace(0.0, np.pi, panels + 1), self.outgoing_breakpoints]))
 
     def _cells(self) -> Floats:
         edges = self._grid(self._panel_count)
         share = np.arange(CELLS_PER_PANEL) / CELLS_PER_PANEL
         inner = (edges[:-1, None] + share * np.diff(edges)[:, None]).ravel()
         # A jump of the density is approached from both sides.
-        gap = 4.0 * EPS
-        return np.unique(np.concatenate([inner, [np.pi], self.breakpoints - gap, self.breakpoints + gap]))
+        gap, jumps = 4.0 * EPS, self.outgoing_breakpoints
+        return np.unique(np.concatenate([inner, [np.pi], jumps - gap, jumps + gap]))
 
     def _row_quadrature(self, edges: Floats, order: int) -> tuple[Floats, Floats]:
         outgoing, weight = gauss_on_intervals(edges[..., :-1].ravel(), edges[..., 1:].ravel(), order)

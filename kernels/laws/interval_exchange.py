@@ -95,7 +95,7 @@ class IntervalExchangeLaw(Law):
         angle = SINE.quantile(np.clip(moved, 0.0, 1.0))
         return kept_inside(np.where(self.partner[piece] == piece, theta, angle))
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """All angles between two pieces."""
         return np.asarray(SINE.quantile(self.starts[1:])), 0.0
 

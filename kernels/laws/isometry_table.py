@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import kept_inside
 from ..bases.intervals import ragged, without_outermost
-from .crevice import crevice_kinks, crevice_retro
+from .crevice import crevice_breakpoints, crevice_retro
 
 Whole = NDArray[np.int64]
 
@@ -280,11 +280,11 @@ class IsometryTable:
     def _columns(self) -> tuple[Floats, ...]:
         return self.sign, self.offset, self.low, self.high, self.start, self.end
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of those left out."""
         lists, left_out = [self.ends], 0.0
         for crevice in self.crevices:
-            kinks, omitted = crevice_kinks(crevice.height_to_width, max(limit // len(self.crevices), 1))
+            kinks, omitted = crevice_breakpoints(crevice.height_to_width, max(limit // len(self.crevices), 1))
             lists.append(kinks)
             left_out = max(left_out, omitted)
         found = np.unique(np.concatenate(lists))

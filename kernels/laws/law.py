@@ -15,7 +15,7 @@ from ...core.checks import Floats, angles, finite_array, generator, whole_number
 from ...core.errors import InputError
 from ..bases.angles import flipped
 from ..bases.basis import AngleFunction, Frame
-from .branches import chained, chained_kinks, merged
+from .branches import chained, chained_breakpoints, joined, merged
 from .isometry_table import IsometryTable
 
 # Half the spacing of rng.random(): draws of exactly 0, an entry through a tip of the wall, become this instead.
@@ -88,14 +88,6 @@ class Law(ABC):
             f"{self!r} is not a finite mixture of isometries, so it has no branches; use sample() or apply()"
         )
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        """Increasing angles in (0, pi) between which rows vary smoothly with theta, at most about ``limit`` of them.
-
-        Also returns the probability under sin(theta)/2 d theta of the angles where more kinks were left out. Raises
-        an InputError for laws whose kinks are not known.
-        """
-        raise InputError(f"{self!r} has no list of kinks; use sample() or apply()")
-
     @abstractmethod
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         """`sample` for checked arguments."""
@@ -125,6 +117,26 @@ class Law(ABC):
         False for compound laws; `asperity.kernels.laws.structure.made_of_isometries` asks their parts.
         """
         return False
+
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        """Increasing incoming angles in (0, pi) between which P~(theta, .) varies smoothly, about ``limit`` at most.
+
+        Also returns the probability under sin(theta)/2 d theta of the angles where others were left out; inf where
+        the law does not know whether there are others.
+        """
+        return np.empty(0), math.inf
+
+    @property
+    def outgoing_breakpoints(self) -> Floats:
+        """Outgoing angles at which densities jump or have a kink, whatever the incoming angle, as far as known."""
+        return np.empty(0)
+
+    def kinks(self, limit: int) -> tuple[Floats, float]:
+        """The former name of `breakpoints`; raises an InputError where these are not known."""
+        found, left_out = self.breakpoints(limit)
+        if math.isinf(left_out):
+            raise InputError(f"{self!r} has no list of breakpoints; use sample() or apply()")
+        return found, left_out
 
     def random_map(self) -> RandomMap | None:
         """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
@@ -173,10 +185,10 @@ class Law(ABC):
 
 
 class BranchLaw(Law):
-    """A law made of isometries theta' = sign theta + offset, whose probabilities are smooth between kinks.
+    """A law made of isometries theta' = sign theta + offset, whose probabilities are smooth between breakpoints.
 
-    Subclasses give `branches` and `kinks`. Between two neighbouring kinks every slot of `branches` is one fixed
-    isometry with a smooth probability, so that quadrature between the kinks is exact to rounding.
+    Subclasses give `branches` and `breakpoints`. Between two neighbouring breakpoints every slot of `branches` is one
+    fixed isometry with a smooth probability, so that quadrature between them is exact to rounding.
     """
 
     reversible = True
@@ -191,7 +203,7 @@ class BranchLaw(Law):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
 
     @abstractmethod
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the
         probability under sin(theta)/2 d theta of the angles, mostly near grazing, where more were left out."""
 
@@ -358,9 +370,12 @@ class Combination(Law):
         probability = np.concatenate([weight * share for weight, share, _ in parts], axis=-1)
         return merged(probability, np.concatenate([angle for _, _, angle in parts], axis=-1))
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        parts = [law.kinks(limit) for weight, law in self.terms_checked() if weight > 0.0]
-        return np.unique(np.concatenate([kinks for kinks, _ in parts])), min(sum(left for _, left in parts), 1.0)
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return joined([law.breakpoints(limit) for weight, law in self.terms_checked() if weight > 0.0])
+
+    @property
+    def outgoing_breakpoints(self) -> Floats:
+        return np.unique(np.concatenate([law.outgoing_breakpoints for _, law in self.terms]))
 
     def isometry_table(self) -> IsometryTable | None:
         """The sum of the terms' tables; None if a term has none."""
@@ -489,8 +504,8 @@ class Composition(Law):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         return chained(self.laws, angles("theta", theta))
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        return chained_kinks(self.laws, limit)
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return chained_breakpoints(self.laws, limit)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for law in self.laws:
@@ -539,8 +554,8 @@ class Power(Law):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         return chained((self.law,) * self.exponent, angles("theta", theta))
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        return chained_kinks((self.law,) * self.exponent, limit) if self.exponent else (np.empty(0), 0.0)
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return chained_breakpoints((self.law,) * self.exponent, limit)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for _ in range(self.exponent):
@@ -625,8 +640,12 @@ class SpecularFrame(Law):
         probability, outgoing = self.law.branches(theta)
         return probability, flipped(outgoing)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        return self.law.kinks(limit)
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return self.law.breakpoints(limit)
+
+    @property
+    def outgoing_breakpoints(self) -> Floats:
+        return np.asarray(np.pi - self.law.outgoing_breakpoints[::-1])
 
     def random_map(self) -> RandomMap | None:
         inner = self.law.random_map()
@@ -677,7 +696,7 @@ class IsometryLaw(BranchLaw):
         outgoing = theta.copy() if self.retro else flipped(theta)
         return np.ones((*theta.shape, 1)), outgoing[..., None]
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """None at all."""
         return np.empty(0), 0.0
 

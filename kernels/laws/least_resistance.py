@@ -71,7 +71,7 @@ class LeastResistanceLaw(Law):
         image = np.stack([-size, partner], axis=-1) * np.where(x < 0.0, -1.0, 1.0)[..., None]
         return np.stack([1.0 - away, away], axis=-1), kept_inside(image + 0.5 * np.pi)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Where the formula changes."""
         x = np.array([SPLIT_BEGINS, self.split_ends, np.pi - 3.0 * self.split_ends])
         return 0.5 * np.pi + np.concatenate((-x[::-1], x)), 0.0
@@ -91,7 +91,7 @@ class LeastResistanceLaw(Law):
     @cached_property
     def mean_cosine(self) -> float:
         """E[cos(theta' - theta)] under sin(theta)/2 d theta, by Gauss rules between the kinks."""
-        edges = np.concatenate(([0.0], self.kinks(6)[0], [np.pi]))
+        edges = np.concatenate(([0.0], self.breakpoints(6)[0], [np.pi]))
         fine = np.concatenate((edges, 0.5 * np.pi + _graded(self.split_ends), 0.5 * np.pi - _graded(self.split_ends)))
         fine = np.unique(fine)
         angle, mass = SINE.quadrature(fine, NODES)

@@ -89,7 +89,8 @@ class MatrixLaw(DensityLaw):
             )
         masses = SINE.mass(edges[:-1], edges[1:])
         array = array / sums[:, None]
-        set_facts(self, array=frozen(array), edges=frozen(edges), breakpoints=frozen(edges[1:-1]), _masses=masses)
+        set_facts(self, array=frozen(array), edges=frozen(edges), _masses=masses)
+        set_facts(self, outgoing_breakpoints=frozen(edges[1:-1]))
         set_facts(self, frame=getattr(matrix, "frame", "paper"), fan_out=size * GAUSS_NODES)
         flux = masses[:, None] * array
         set_facts(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= SYMMETRY_TOLERANCE * np.max(flux)))

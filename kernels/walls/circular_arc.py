@@ -98,7 +98,7 @@ class CircularArcLaw(DrivenLaw):
         """Number of reflections of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
         return np.asarray(self._rotation(entry_points(x), angles("theta", theta))[3].astype(np.int64))
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Incoming angles at which rows gain or lose an interval of X, and the probability of those left out.
 
         They are theta = xi (1 + 1/k) and xi k/(k + 1), their mirror images, xi and pi/2 -+ xi; they accumulate at xi

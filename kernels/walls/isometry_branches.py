@@ -42,7 +42,7 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     table = law.isometry_table()
     if table is not None:
         return table.rows(incoming)
-    edges = np.concatenate([[0.0], law.kinks(KINKS)[0], [np.pi]])
+    edges = np.concatenate([[0.0], law.breakpoints(KINKS)[0], [np.pi]])
     right = np.clip(np.searchsorted(edges, incoming, side="right"), 1, len(edges) - 1)
     low, high = edges[right - 1], edges[right]
     # the midpoint towards the farther end of the interval

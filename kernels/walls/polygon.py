@@ -144,8 +144,8 @@ class PolygonLaw(BranchLaw):
         """Probabilities and outgoing angles, merged by isometry, shape ``theta.shape + (branches,)``."""
         return self._table.branches(theta)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        return self._table.kinks(limit)
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return self._table.breakpoints(limit)
 
     def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, positive_number
 from ..bases.angles import flipped
-from ..laws.crevice import crevice_kinks, crevice_retro, crossings_modulo_two
+from ..laws.crevice import crevice_breakpoints, crevice_retro, crossings_modulo_two
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entry_points
 
@@ -71,9 +71,9 @@ class RectangularTeethLaw(BranchLaw):
         retro = 0.5 * crevice_retro(self.height_to_width, theta)
         return np.stack([1.0 - retro, retro], axis=-1), np.stack([flipped(theta), theta], axis=-1)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The angles where d is a whole number, cot theta = k / (2 r), and the probability beyond the last of them."""
-        return crevice_kinks(self.height_to_width, limit)
+        return crevice_breakpoints(self.height_to_width, limit)
 
     def isometry_table(self) -> IsometryTable:
         """Half of it flat tops, half of it crevices."""

@@ -12,7 +12,7 @@ from ..bases.angles import flipped, kept_inside
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals
-from ..laws.crevice import crevice_kinks, crevice_retro
+from ..laws.crevice import crevice_breakpoints, crevice_retro
 from ..laws.law import BranchLaw
 from .crevice_tail import crevice_nodes, first_crossing
 
@@ -55,8 +55,8 @@ class RepeatedTeethLaw(BranchLaw):
         retro = self.retro(crevice_retro(self.height_to_width, theta))
         return np.stack([1.0 - retro, retro], axis=-1), np.stack([flipped(theta), theta], axis=-1)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        return crevice_kinks(self.height_to_width, limit)
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
+        return crevice_breakpoints(self.height_to_width, limit)
 
     def retro(self, distance: Floats) -> Floats:
         """The probability of retroreflection for a distance q."""

@@ -94,7 +94,7 @@ class TriangularTeethLaw(BranchLaw):
         )
         return merged(probability, outgoing)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The angles where N or an active bound on X changes; where there are too many, those nearest to pi/2."""
         psi = self.angle
         # No ray passes on the left from theta = (pi + psi)/2 on, so larger multiples of psi/2 play no part.
@@ -119,7 +119,7 @@ class TriangularTeethLaw(BranchLaw):
         """The pieces between the kinks, or None where there are too many."""
         if 4.0 * np.pi / self.angle > MOST_LISTED_KINKS:
             return None
-        kinks, _ = self.kinks(2 * MOST_LISTED_KINKS)
+        kinks, _ = self.breakpoints(2 * MOST_LISTED_KINKS)
         edges = np.unique(np.concatenate([[0.0], kinks, [0.5 * np.pi, np.pi]]))
         low, high = edges[:-1], edges[1:]
         middle = 0.5 * (low + high)

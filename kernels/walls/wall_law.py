@@ -146,9 +146,9 @@ class WallLaw(DrivenLaw):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         return super().branches(theta) if self.exact_law is None else self.exact_law.branches(theta)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
+    def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Those of the exact law."""
-        return super().kinks(limit) if self.exact_law is None else self.exact_law.kinks(limit)
+        return super().breakpoints(limit) if self.exact_law is None else self.exact_law.breakpoints(limit)
 
     def isometry_table(self) -> IsometryTable | None:
         """That of the exact law, or None."""

@@ -91,7 +91,7 @@ def residuals(
     ``mirrored`` says that each function is even or odd, and the law mirror-symmetric; an error of a quotient below
     ``quotient_error`` is good enough.
     """
-    if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.breakpoints.size:
+    if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.outgoing_breakpoints.size:
         return _smooth_residuals(law, basis, vectors, values)
     function = _TrialFunctions(law, basis, vectors, quotient_error)
     low, high = _first_panels(law, basis)
@@ -153,7 +153,7 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
     for part in {part for word in words_of(law) or () for part in word}:
         if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
             # the law is symmetric: where p(theta, .) has kinks, p(., theta') has them
-            edges += [part.breakpoints, part.incoming_edges(basis.edges)]
+            edges += [part.outgoing_breakpoints, part.incoming_edges(basis.edges)]
             edges += [np.pi - one for one in edges[-2:]] if law.frame == "specular" else []
     joint = np.unique(np.clip(np.concatenate(edges), 0.0, np.pi))
     return joint[:-1], joint[1:]

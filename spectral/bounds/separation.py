@@ -137,7 +137,7 @@ def _trace(law: DensityLaw, nodes: int) -> float:
 
 def _squared_norm(law: DensityLaw, nodes: int) -> float:
     """The integral of p(theta, theta') p(theta', theta), which for a reversible law is that of the squared kernel."""
-    edges = np.unique(np.concatenate((_edges(), np.asarray(getattr(law, "breakpoints", ())))))
+    edges = np.unique(np.concatenate((_edges(), law.outgoing_breakpoints)))
     theta, weight = gauss_rule(edges, nodes)
     density = law.density(theta[:, None], theta)
     return float(weight @ (density * density.T) @ weight)

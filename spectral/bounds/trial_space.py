@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...core.errors import InputError
 from ...kernels import Law, Legendre, Panels
 from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
@@ -20,7 +20,7 @@ from ..eigenvalues.parity import Parity
 # Degree on each panel: Kronrod's rule is then still exact for products of two functions.
 DEGREE = 6
 # Kinks that the law knows become edges at once, the widest panel of the first level is this.
-FIRST_KINKS, WIDEST = 40, np.pi / 10
+FIRST_BREAKPOINTS, WIDEST = 40, np.pi / 10
 # Nearest distance of two edges.
 NARROWEST = 1e-7
 # A level divides the worst panels, those that hold this share of the squared residuals.
@@ -220,11 +220,9 @@ def _room(values: Floats, k: int) -> float:
 def _first_edges(law: Law, mirrored: bool) -> Floats:
     """Kinks that the law knows, and panels that are not too wide between them; from 0 to pi or pi/2."""
     end = 0.5 * np.pi if mirrored else np.pi
-    try:
-        kinks = law.kinks(FIRST_KINKS)[0]
-    except InputError:
-        kinks = np.empty(0)
-    marks = np.append(kinks[(kinks > NARROWEST) & (kinks < end - NARROWEST)], [0.0, end])
+    points, left_out = law.breakpoints(FIRST_BREAKPOINTS)
+    used = (points > NARROWEST) & (points < end - NARROWEST) & math.isfinite(left_out)
+    marks = np.append(points[used], [0.0, end])
     marks = np.unique(marks)
     marks = marks[np.append(np.diff(marks) > NARROWEST, True)]
     parts = np.ceil(np.diff(marks) / WIDEST).astype(int)
