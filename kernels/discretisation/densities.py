@@ -15,9 +15,9 @@ from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.intervals import bisected
 from ..bases.legendre import Legendre
-from ..bases.measure import gauss_on_intervals, gauss_rule, SINE
+from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.momentum import Directions
-from ..laws.density import DensityLaw
+from ..laws.density import DensityLaw, cut_by_edges
 from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
@@ -166,20 +166,9 @@ def row_intervals(
     law: HasDensity, edges: Floats, theta: Floats
 ) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
     """Row, ends and number of Gauss nodes of the intervals into which cells and panels together cut (0, pi)."""
-    panels = law.panels(theta)
-    fixed = np.broadcast_to(edges, (theta.size, edges.size))
-    merged = np.concatenate((panels, fixed), axis=1)
-    # The panel of an interval is the one whose left edge came last.
-    widths = np.concatenate((np.diff(panels, axis=1), np.zeros((theta.size, 1 + edges.size))), axis=1)
-    number = np.concatenate((np.arange(panels.shape[1]), np.zeros(edges.size, dtype=np.int64)))
-    place = np.argsort(merged, axis=1, kind="stable")
-    merged = np.take_along_axis(merged, place, axis=1)
-    panel = np.maximum.accumulate(number[place], axis=1)[:, :-1]
-    width = np.diff(merged, axis=1)
-    row, column = np.nonzero(width > 0.0)
-    share = width[row, column] / widths[row, panel[row, column]]
+    row, low, high, share = cut_by_edges(law.panels(theta), edges)
     nodes = np.asarray(SHARE_NODES)[np.searchsorted(SHARES, share)]
-    return row, merged[row, column], merged[row, column + 1], nodes
+    return row, low, high, nodes
 
 
 def _density_levels(law: HasDensity, basis: Basis, edges: Floats) -> Iterator[Floats]:

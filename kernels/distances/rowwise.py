@@ -9,9 +9,9 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
-from ..laws.law import Law
+from ..laws.law import ENTRY_POINTS, Law
 from ..matrices.matrix import KernelMatrix, joint_kind
-from .distributions import ENTRY_POINTS, outgoing_distributions, parts_of
+from .distributions import on_cells, outgoing_distributions
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean, wasserstein
 
@@ -42,6 +42,7 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
     The error is the difference of two levels, which differ in the nodes, in the kinks that are known to them, and in
     the cells on which densities are resolved.
     """
+    first, second = on_cells(first), on_cells(second)
     found: list[float] = []
     error = np.inf
     smooth = not (_is_atomic(first) and _is_atomic(second))
@@ -75,7 +76,7 @@ def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup
 
 def _is_atomic(law: Law) -> bool:
     """Whether rows consist of atoms, so that no cells are needed to resolve them."""
-    return not np.any(parts_of(law, np.array([PROBE]), np.array([0.0, np.pi]))[0])
+    return not np.any(law.distribution(np.array([PROBE]), np.array([0.0, np.pi])).below)
 
 
 def _panels(first: Law, second: Law, level: int) -> tuple[Floats, Floats]:

@@ -7,14 +7,16 @@ from collections.abc import Callable
 from dataclasses import FrozenInstanceError
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
-from ..bases.measure import SINE, gauss_on_intervals
+from ..bases.intervals import cell_among
+from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
+from .distribution import Distribution
 from .law import Law, set_facts
 
 DensityFunction = Callable[[Floats, Floats], Floats]
@@ -30,6 +32,8 @@ SYMMETRY_TOLERANCE = 1e-9
 PANEL_COUNTS = (16, 32, 64, 128, 256, 512, 1024)
 GAUSS_NODES = 16
 CHECK_NODES = 8
+# Gauss nodes on a cell of a grid, and on a panel of the law's own where those are narrower.
+CELL_NODES = 6
 # Means of functions are settled where two rules differ by no more than this share of the function's largest value; each
 # panel is cut into so many parts at most. A function that jumps is not settled by these.
 SETTLED, MOST_PARTS = 1e-13, 8
@@ -137,6 +141,25 @@ class DensityLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Those of the outgoing angle: by detailed balance they are some of the incoming one too."""
         return self.outgoing_breakpoints, math.inf
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """Gauss rules between the edges, cut by those of the law's own panels where these are narrower."""
+        step = max(1, CHUNK // (CELL_NODES * edges.size))
+        parts = [self._cell_masses(theta[start : start + step], edges) for start in range(0, theta.size, step)]
+        below = Distribution.of_cells(np.concatenate(parts)).below
+        return Distribution.without_atoms(below / below[:, -1:])
+
+    def _cell_masses(self, theta: Floats, edges: Floats) -> Floats:
+        cells = edges.size - 1
+        if self.resolution >= float(np.diff(edges).max()):
+            angle, weight = gauss_rule(edges, CELL_NODES)
+            masses = self.density(theta[:, None], angle) * weight
+            return np.asarray(masses.reshape(theta.size, cells, CELL_NODES).sum(axis=2))
+        row, low, high, _ = cut_by_edges(self.panels(theta), edges)
+        angle, weight = (part.reshape(-1, CELL_NODES) for part in gauss_on_intervals(low, high, CELL_NODES))
+        mass = (self.density(theta[row, None], angle) * weight).sum(axis=1)
+        cell = row * cells + cell_among(edges, 0.5 * (low + high))
+        return np.asarray(np.bincount(cell, weights=mass, minlength=theta.size * cells).reshape(-1, cells))
 
     # ---- what every law does ---------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -272,6 +295,25 @@ def split_rows(edges: Floats, parts: int) -> Floats:
     share = np.arange(parts) / parts
     fine = (edges[..., :-1, None] + share * np.diff(edges, axis=-1)[..., None]).reshape(*edges.shape[:-1], -1)
     return np.concatenate([fine, edges[..., -1:]], axis=-1)
+
+
+def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
+    """The intervals into which edges and the panels of each row together cut (0, pi).
+
+    Returns the number of the row, both ends, and the width as a share of that of the panel.
+    """
+    rows, count = len(panels), edges.size
+    merged = np.concatenate((panels, np.broadcast_to(edges, (rows, count))), axis=1)
+    # The panel of an interval is the one whose left edge came last.
+    widths = np.concatenate((np.diff(panels, axis=1), np.zeros((rows, 1 + count))), axis=1)
+    number = np.concatenate((np.arange(panels.shape[1]), np.zeros(count, dtype=np.int64)))
+    place = np.argsort(merged, axis=1, kind="stable")
+    merged = np.take_along_axis(merged, place, axis=1)
+    panel = np.maximum.accumulate(number[place], axis=1)[:, :-1]
+    width = np.diff(merged, axis=1)
+    row, column = np.nonzero(width > 0.0)
+    share = width[row, column] / widths[row, panel[row, column]]
+    return row, merged[row, column], merged[row, column + 1], share
 
 
 def _probes() -> Floats:

@@ -14,6 +14,7 @@ from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..matrices.matrix import KernelMatrix
+from .distribution import Distribution
 from .law import Law
 
 # Fluxes that differ by less, relative to a cell, are equal; smaller masses are rounding and are left where they are.
@@ -98,6 +99,10 @@ class IntervalExchangeLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """All angles between two pieces."""
         return np.asarray(SINE.quantile(self.starts[1:])), 0.0
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The image is the one atom."""
+        return Distribution.of_atoms(edges, self.image(theta)[:, None], np.ones((theta.size, 1)))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.image(theta)

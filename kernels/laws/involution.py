@@ -14,6 +14,7 @@ from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
 from ..bases.intervals import bisected
 from ..bases.measure import SINE
+from .distribution import Distribution
 from .law import Law, RandomMap
 
 PROBES = 4096
@@ -116,6 +117,11 @@ class InvolutionLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Where the map jumps or turns round, as far as 4096 probes show it."""
         return jumps_of_map(self.map), 0.0
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The image is the one atom."""
+        image = np.asarray(self.map(theta), dtype=np.float64)
+        return Distribution.of_atoms(edges, kept_inside(image)[:, None], np.ones((theta.size, 1)))
 
     def random_map(self) -> RandomMap:
         """The map, whatever the number."""

@@ -16,6 +16,7 @@ from ...core.errors import InputError
 from ..bases.angles import flipped
 from ..bases.basis import AngleFunction, Frame
 from .branches import chained, chained_breakpoints, joined, merged
+from .distribution import Distribution
 from .isometry_table import IsometryTable
 
 # Half the spacing of rng.random(): draws of exactly 0, an entry through a tip of the wall, become this instead.
@@ -26,6 +27,8 @@ SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
 WEIGHT_TOLERANCE = 1e-12
 # More evaluations than this for one incoming angle are not a computation that anybody wants to wait for.
 MOST_EVALUATIONS = 10**7
+# Entry points of a driven law, each an atom of its distribution.
+ENTRY_POINTS = 4096
 # Nested calls of `apply` beyond this would meet Python's own limit on recursion.
 DEEPEST_POWER = 100
 
@@ -146,6 +149,14 @@ class Law(ABC):
         """All isometries of the law with their probabilities; None if it has others, or they cannot be listed."""
         return None
 
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """P~(theta_k, .) for every theta_k, with its atoms if the law knows them; ``edges`` go from 0 to pi.
+
+        By default the expectations of indicator functions.
+        """
+        below = self.apply(lambda angle: (angle[..., None] < edges).astype(np.float64), theta)
+        return Distribution.without_atoms(np.maximum.accumulate(below, axis=1))
+
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
         """The adjoint kernel in L^2(sin theta d theta); the law itself where it is reversible."""
@@ -214,6 +225,11 @@ class BranchLaw(Law):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self._branch_taken(rng.random(theta.shape), theta)
 
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The branches are atoms."""
+        probability, outgoing = self.branches(theta)
+        return Distribution.of_atoms(edges, outgoing, probability)
+
     def _branch_taken(self, x: Floats, theta: Floats) -> Floats:
         probability, outgoing = self.branches(theta)
         cumulative = np.cumsum(probability, axis=-1)
@@ -247,6 +263,12 @@ class DrivenLaw(Law):
     def random_map(self) -> RandomMap:
         """`respond`."""
         return lambda x, theta: (self.respond(x, theta), None)
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """Equally spaced entry points, each an atom."""
+        x = (np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS
+        outgoing = self.respond(x, theta[:, None])
+        return Distribution.of_atoms(edges, outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self.respond(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
@@ -383,6 +405,10 @@ class Combination(Law):
         tables = [table.scaled(weight) for weight, table in terms if table is not None]
         return IsometryTable.joined(tables) if len(tables) == len(terms) else None
 
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        terms = self.terms_checked()
+        return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in terms])
+
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.terms_checked()
         cumulative = np.cumsum([weight for weight, _ in terms])
@@ -507,6 +533,10 @@ class Composition(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return chained_breakpoints(self.laws, limit)
 
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The branches, if there are any that can be listed, as atoms; else by `apply`."""
+        return atoms_of(self, theta, edges) or super().distribution(theta, edges)
+
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for law in self.laws:
             theta = law.sample(theta, rng)
@@ -557,6 +587,10 @@ class Power(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return chained_breakpoints((self.law,) * self.exponent, limit)
 
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The branches, if there are any that can be listed, as atoms; else by `apply`."""
+        return atoms_of(self, theta, edges) or super().distribution(theta, edges)
+
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         for _ in range(self.exponent):
             theta = self.law.sample(theta, rng)
@@ -577,6 +611,15 @@ class Power(Law):
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)} ** {self.exponent}"
+
+
+def atoms_of(law: Law, theta: Floats, edges: Floats) -> Distribution | None:
+    """The branches of a law as atoms; None where it has none, or too many."""
+    try:
+        probability, outgoing = law.branches(theta)
+    except InputError:
+        return None
+    return Distribution.of_atoms(edges, outgoing, probability)
 
 
 def as_base(law: Law) -> str:
@@ -661,6 +704,9 @@ class SpecularFrame(Law):
     def isometry_table(self) -> IsometryTable | None:
         table = self.law.isometry_table()
         return None if table is None else table.in_specular_frame()
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        return self.law.distribution(theta, (np.pi - edges)[::-1]).mirrored()
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return flipped(self.law.sample(theta, rng))

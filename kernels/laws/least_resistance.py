@@ -12,6 +12,7 @@ from ..bases.angles import kept_inside
 from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
+from .distribution import Distribution
 from .law import Law
 
 # From here on rays are split, in x = theta - pi/2: where the partner 3 x - pi of x would be grazing.
@@ -75,6 +76,11 @@ class LeastResistanceLaw(Law):
         """Where the formula changes."""
         x = np.array([SPLIT_BEGINS, self.split_ends, np.pi - 3.0 * self.split_ends])
         return 0.5 * np.pi + np.concatenate((-x[::-1], x)), 0.0
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """Two atoms."""
+        probability, outgoing = self.images(theta)
+        return Distribution.of_atoms(edges, outgoing, probability)
 
     def potential(self, theta: Floats) -> Floats:
         """phi, the certificate: phi(theta) + phi(theta') <= cos(theta' - theta), with equality on the law."""

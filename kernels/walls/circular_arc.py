@@ -13,6 +13,7 @@ from ..bases.angles import flipped, kept_inside, mixed_arccos
 from ..bases.basis import AngleFunction
 from ..bases.intervals import ragged
 from ..bases.measure import SINE, gauss_on_intervals
+from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entry_points
 
 # Rows jump where the number of hits N changes. Each of the first intervals gets its own Gauss rule; beyond MOST_HITS
@@ -111,6 +112,10 @@ class CircularArcLaw(DrivenLaw):
         kinks = np.unique(np.concatenate([left, np.pi - left]))
         low, high = self.half_angle * count / (count + 1.0), self.half_angle * (count + 1.0) / count
         return kinks[(kinks > 0.0) & (kinks < np.pi)], min(float(2.0 * SINE.mass(low, min(high, np.pi))), 1.0)
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The masses between the edges, as integrals of a sine."""
+        return Distribution.of_cells(self.row_masses(theta, edges))
 
     def _rotation(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
         """Whether the ray is followed in the mirror, its angle there, the chord's angle delta <= pi/2, and N."""

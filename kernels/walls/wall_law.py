@@ -14,10 +14,12 @@ from ...core.checks import Floats, angles
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ..bases.basis import AngleFunction
+from ..bases.intervals import cell_among
+from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
 from .circular_arc import CircularArcLaw
-from .conditionals import AdaptiveRows, adaptive_rows, is_few
+from .conditionals import AdaptiveRows, WallRows, adaptive_rows, is_few
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .traced_map import LOST_TOLERANCE, traced_angles, traced_outcomes
@@ -40,6 +42,8 @@ MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
 FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
 # `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
+# Error of the distribution function at the edges of cells.
+CELL_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -153,6 +157,26 @@ class WallLaw(DrivenLaw):
     def isometry_table(self) -> IsometryTable | None:
         """That of the exact law, or None."""
         return None if self.exact_law is None else self.exact_law.isometry_table()
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """That of the exact law; else by adaptive quadrature in the entry point, of many pieces by equally spaced ones.
+
+        Flat tops are atoms.
+        """
+        if self.exact_law is not None:
+            return self.exact_law.distribution(theta, edges)
+        if not is_few(self.wall):
+            return super().distribution(theta, edges)
+        found = WallRows(self.wall, 0, edges[1:-1])(theta, CELL_TOLERANCE)
+        owner = np.repeat(np.arange(theta.size), np.diff(found.starts))
+        level = found.nodes == (np.pi - theta)[owner]
+        cells = edges.size - 1
+        cell = owner * cells + cell_among(edges, found.nodes)
+        scattered = np.where(level, 0.0, found.weights)
+        masses = np.bincount(cell, weights=scattered, minlength=theta.size * cells).astype(np.float64)
+        flat = np.bincount(owner, weights=np.where(level, found.weights, 0.0), minlength=theta.size).astype(np.float64)
+        below = Distribution.of_cells(masses.reshape(-1, cells)).below
+        return Distribution(below, (np.pi - theta)[:, None], flat[:, None])
 
     def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
         return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
