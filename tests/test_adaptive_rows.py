@@ -9,10 +9,10 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.bases.panels import ONE_PANEL
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import KRONROD_SHARE, row_matrix
 from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
-from asperity.kernels.expectations.basis_means import has_costly_rows
 from asperity.kernels.walls.conditionals import adaptive_rows
 from plain_tracer import trace_plainly
 from random_curved_walls import random_curved_wall
@@ -109,8 +109,9 @@ def test_rows_that_fall_short_are_kept_where_they_know_more_than_rays():
 
 def test_a_look_at_some_rows_tells_a_chaotic_hollow_in_sums_and_in_the_other_convention_too():
     chaotic, tame = (ker.WallLaw(random_curved_wall(kind)) for kind in (13, 15))
-    assert has_costly_rows(0.5 * chaotic + 0.5 * ker.lambertian()) and has_costly_rows(chaotic.in_specular_frame())
-    assert not has_costly_rows(tame) and not has_costly_rows(ker.specular())
+    costly, cheap = (0.5 * chaotic + 0.5 * ker.lambertian(), chaotic.in_specular_frame()), (tame, ker.specular())
+    assert all(law.expectations(ONE_PANEL).are_costly() for law in costly)
+    assert not any(law.expectations(ONE_PANEL).are_costly() for law in cheap)
 
 
 def test_rows_of_channels_without_bottom_in_sight_are_those_of_the_closed_form():

@@ -216,3 +216,7 @@ def _graded_edges(special: list[float], followed: list[float], smallest: float) 
 def _grading(smallest: float) -> Floats:
     levels = int(np.ceil(np.log(smallest) / np.log(RATIO)))
     return np.asarray(RATIO ** np.arange(1, levels + 1, dtype=np.float64))
+
+
+# For questions to laws whose answer is the same on all panels.
+ONE_PANEL = Panels([0.0, np.pi], 0)

@@ -1,8 +1,9 @@
-"""Conditional expectations of piecewise polynomials under the law of circular arcs."""
+"""Conditional expectations of piecewise polynomials under the law of circular arcs, from the pieces of its rows."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,6 @@ from ..bases.intervals import cell_among, ragged
 from ..bases.legendre import legendre_moments
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.panels import Panels
-
-if TYPE_CHECKING:
-    from ..walls.circular_arc import CircularArcLaw
 
 # theta' moves by less than half a panel on pieces of this share of it or less: with half the nodes what Gauss's rule
 # misses of a polynomial falls by the share to the power of its degree.
@@ -29,6 +27,24 @@ MORE_NODES = 3
 SPREAD_PROBES = 9
 # Ends of pieces held at a time.
 PIECES_AT_ONCE = 2**15
+
+
+class ArcPieces(NamedTuple):
+    """Pieces of rows, each of shape (pieces,): the number of the row; whether it is followed in the mirror; the ends of
+    delta; N; whether the piece holds all the rays with more hits; whether its row has no width.
+    """
+
+    ray: NDArray[np.intp]
+    mirrored: NDArray[np.bool_]
+    lower: Floats
+    upper: Floats
+    hits: Floats
+    rest: NDArray[np.bool_]
+    alone: NDArray[np.bool_]
+
+
+# From incoming angles and the hits up to which rays are followed.
+PiecesOfRows: TypeAlias = Callable[[Floats, int], ArcPieces]
 
 
 class ArcLines(NamedTuple):
@@ -53,9 +69,8 @@ class ArcLines(NamedTuple):
         return np.asarray(np.bincount(self.ray, weights=values, minlength=rows), dtype=np.float64)
 
 
-def outgoing_lines(law: CircularArcLaw, theta: Floats, most_hits: int) -> ArcLines:
-    """The pieces of the rows at ``theta``, followed up to so many hits."""
-    pieces = law.pieces(theta, most_hits)
+def outgoing_lines(half_angle: float, pieces: ArcPieces, theta: Floats) -> ArcLines:
+    """The pieces of the rows at ``theta`` as lines."""
     base = np.where(pieces.mirrored, np.pi - theta[pieces.ray], theta[pieces.ray])
     slope = np.where(pieces.mirrored, 2.0, -2.0) * pieces.hits
     offset = np.where(pieces.mirrored, -base, np.pi + base)
@@ -63,18 +78,17 @@ def outgoing_lines(law: CircularArcLaw, theta: Floats, most_hits: int) -> ArcLin
     alone = pieces.alone & ~pieces.rest
     mass = np.where(alone, 1.0, SINE.mass(lower, upper))
     # rays with more hits than are followed leave together; a row of no width has one outgoing angle
-    end = np.where(pieces.mirrored, law.half_angle, np.pi - law.half_angle)
+    end = np.where(pieces.mirrored, half_angle, np.pi - half_angle)
     angle = np.where(pieces.rest, end, offset + slope * lower)
     return ArcLines(pieces.ray, slope, offset, lower, upper, mass, angle, pieces.rest | alone, pieces.rest)
 
 
-def arc_images(law: CircularArcLaw, panels: Panels, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
+def arc_images(lines: ArcLines, panels: Panels, theta: Floats) -> tuple[Floats, Floats]:
     r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (rows, functions), and the rows' errors.
 
     The outgoing angle is linear in the angle delta of the chord, of density sin(delta): on each piece between two
     edges the functions are polynomials in delta, and a Gauss rule is exact but for the sine.
     """
-    lines = outgoing_lines(law, theta, most_hits)
     ray, slope, offset, lower, upper = lines[:5]
     single = lines.single
     ends = np.sort(np.stack([offset + slope * lower, offset + slope * upper]), axis=0)
@@ -126,13 +140,15 @@ class ArcMeans:
 
     Parameters
     ----------
-    law : CircularArcLaw
+    half_angle : float
+    pieces : callable
+        The pieces of the rows at incoming angles, followed up to so many hits.
     panels : Panels
     vectors : array of shape (n, k)
     """
 
-    def __init__(self, law: CircularArcLaw, panels: Panels, vectors: Floats) -> None:
-        self.law, self.edges = law, panels.edges
+    def __init__(self, half_angle: float, pieces: PiecesOfRows, panels: Panels, vectors: Floats) -> None:
+        self.half_angle, self.pieces, self.edges = half_angle, pieces, panels.edges
         self._polynomials = panels.legendre_series(vectors)
         self._orders = self._polynomials.shape[1] // 2 + 1 + MORE_NODES
         self._angle, weight = (part.reshape(-1, self._orders) for part in gauss_rule(self.edges, self._orders))
@@ -143,7 +159,7 @@ class ArcMeans:
 
     def __call__(self, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
         """The means, shape (rows, k), and how much the rays with more hits can be off in the worst of the functions."""
-        lines = outgoing_lines(self.law, theta, most_hits)
+        lines = outgoing_lines(self.half_angle, self.pieces(theta, most_hits), theta)
         single, share = lines.single, lines.mass
         whole = lines.of_rows(share, theta.size)
         found = np.empty((len(single), self._polynomials.shape[2]))
@@ -161,7 +177,7 @@ class ArcMeans:
 
     def _spread(self, most_hits: int) -> float:
         """How much the functions vary where rays with more hits leave: within 2 xi/N of xi and of pi - xi."""
-        xi = self.law.half_angle
+        xi = self.half_angle
         near = xi + 2.0 * xi / most_hits * np.linspace(-1.0, 1.0, SPREAD_PROBES)
         values = []
         for angle in (near, np.pi - near):

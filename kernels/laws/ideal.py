@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, number_between
+from ..bases.basis import Basis
 from ..bases.measure import SINE
+from ..expectations.basis_means import Expectations, Unconditional
 from .density import DensityLaw
 from .law import Combination, specular
 
@@ -27,6 +29,10 @@ class LambertianLaw(DensityLaw):
         """sin(theta')/2, in the shape to which the two arguments broadcast."""
         shape = np.broadcast_shapes(np.shape(theta), np.shape(theta_out))
         return np.broadcast_to(SINE.density(theta_out), shape)
+
+    def expectations(self, basis: Basis) -> Expectations:
+        """The integrals of the basis."""
+        return Unconditional(basis)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return SINE.sample(theta.shape, rng)

@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, angles, finite_array, generator, whole_number
 from ...core.errors import InputError
 from ..bases.angles import flipped
-from ..bases.basis import AngleFunction, Frame
+from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.mirror import is_mirror_symmetric
+from ..expectations.basis_means import ByApply, Expectations, Mirrored, Weighted
 from .branches import chained, chained_breakpoints, joined, merged
 from .distribution import Distribution
 from .isometry_table import IsometryTable
@@ -156,6 +158,10 @@ class Law(ABC):
         """
         below = self.apply(lambda angle: (angle[..., None] < edges).astype(np.float64), theta)
         return Distribution.without_atoms(np.maximum.accumulate(below, axis=1))
+
+    def expectations(self, basis: Basis) -> Expectations:
+        """E[e_j(Theta') | theta] of all functions of a basis, with errors if the law knows them; by default `apply`."""
+        return ByApply(basis, self.apply, self.fan_out)
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -408,6 +414,9 @@ class Combination(Law):
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         terms = self.terms_checked()
         return Distribution.mixed([(weight, law.distribution(theta, edges)) for weight, law in terms])
+
+    def expectations(self, basis: Basis) -> Expectations:
+        return Weighted(basis, tuple((weight, law.expectations(basis)) for weight, law in self.terms_checked()))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         terms = self.terms_checked()
@@ -707,6 +716,12 @@ class SpecularFrame(Law):
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         return self.law.distribution(theta, (np.pi - edges)[::-1]).mirrored()
+
+    def expectations(self, basis: Basis) -> Expectations:
+        """By those of the law in a basis that is mirror-symmetric; by `apply` in others."""
+        if not is_mirror_symmetric(basis):
+            return super().expectations(basis)
+        return Mirrored(basis, self.law.expectations(basis), self.mirror_symmetric is True)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return flipped(self.law.sample(theta, rng))

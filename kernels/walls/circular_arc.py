@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between
 from ..bases.angles import flipped, kept_inside, mixed_arccos
-from ..bases.basis import AngleFunction
+from ..bases.basis import AngleFunction, Basis
 from ..bases.intervals import ragged
 from ..bases.measure import SINE, gauss_on_intervals
+from ..bases.panels import Panels
+from ..expectations.arcs import ArcMeans, ArcPieces, PiecesOfRows, arc_images, outgoing_lines
+from ..expectations.basis_means import Expectations, Means
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entry_points
 
@@ -24,20 +26,6 @@ FEWEST_HITS = 8
 NODES = 16
 # Evaluations of the function held in memory at a time.
 CHUNK = 2**14
-
-
-class ArcPieces(NamedTuple):
-    """Pieces of rows, each of shape (pieces,): the number of the row; whether it is followed in the mirror; the ends of
-    delta; N; whether the piece holds all the rays with more hits; whether its row has no width.
-    """
-
-    ray: NDArray[np.intp]
-    mirrored: NDArray[np.bool_]
-    lower: Floats
-    upper: Floats
-    hits: Floats
-    rest: NDArray[np.bool_]
-    alone: NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -116,6 +104,12 @@ class CircularArcLaw(DrivenLaw):
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The masses between the edges, as integrals of a sine."""
         return Distribution.of_cells(self.row_masses(theta, edges))
+
+    def expectations(self, basis: Basis) -> Expectations:
+        """Of polynomials on panels piece by piece, with errors; of others by `apply`."""
+        if isinstance(basis, Panels):
+            return _OnPanels(basis, self.half_angle, self.pieces)
+        return super().expectations(basis)
 
     def _rotation(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
         """Whether the ray is followed in the mirror, its angle there, the chord's angle delta <= pi/2, and N."""
@@ -212,3 +206,22 @@ def followed_hits(tolerance: float) -> int:
     Rays with more hits are a share of 1/(4 N^2), for theta within xi/N of xi, and leave within 2 xi/N of their place.
     """
     return int(np.clip(np.ceil((100.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))
+
+
+@dataclass(frozen=True)
+class _OnPanels(Expectations):
+    basis: Panels
+    half_angle: float
+    pieces: PiecesOfRows
+
+    @property
+    def has_errors(self) -> bool:
+        return True
+
+    def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
+        lines = outgoing_lines(self.half_angle, self.pieces(theta, followed_hits(tolerance)), theta)
+        return arc_images(lines, self.basis, theta)
+
+    def of(self, vectors: Floats) -> Means:
+        means = ArcMeans(self.half_angle, self.pieces, self.basis, vectors)
+        return lambda theta, tolerance: means(theta, followed_hits(tolerance))

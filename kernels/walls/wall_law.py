@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, angles
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ..bases.basis import AngleFunction
+from ..bases.basis import AngleFunction, Basis
 from ..bases.intervals import cell_among
+from ..expectations.basis_means import ByApply, Expectations
 from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
 from .circular_arc import CircularArcLaw
-from .conditionals import AdaptiveRows, WallRows, adaptive_rows, is_few
+from .conditionals import AdaptiveRows, TracedExpectations, WallRows, adaptive_rows, is_few
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
 from .traced_map import LOST_TOLERANCE, traced_angles, traced_outcomes
@@ -177,6 +178,14 @@ class WallLaw(DrivenLaw):
         flat = np.bincount(owner, weights=np.where(level, found.weights, 0.0), minlength=theta.size).astype(np.float64)
         below = Distribution.of_cells(masses.reshape(-1, cells)).below
         return Distribution(below, (np.pi - theta)[:, None], flat[:, None])
+
+    def expectations(self, basis: Basis) -> Expectations:
+        """Those of the exact law; else by adaptive quadrature in the entry point, of many pieces by `apply`."""
+        if self.exact_law is not None:
+            return self.exact_law.expectations(basis)
+        if not is_few(self.wall):
+            return ByApply(basis, self.apply, self.fan_out, traced=True)
+        return TracedExpectations(basis, self.wall)
 
     def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
         return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)

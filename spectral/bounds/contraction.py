@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.errors import AccuracyError, InputError
 from ...kernels import Law
-from ...kernels.expectations.basis_means import integrates_panels
+from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.structure import lists_branches
 
 # Angles at which the law is compared with its mirror image, and the difference of two means of cos(theta') that is
@@ -54,7 +54,7 @@ def refuse_unless_self_adjoint(law: Law) -> None:
 
 def why_not_self_adjoint(other: Law) -> str:
     """Why P J is not self-adjoint for a self-adjoint P, or that it is not known to be."""
-    if lists_branches(other) or integrates_panels(other):
+    if lists_branches(other) or other.expectations(ONE_PANEL).has_errors:
         try:
             here, there = (other.apply(np.cos, angle) for angle in (COMPARED, np.pi - COMPARED))
         except InputError:

@@ -15,7 +15,7 @@ from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
 from ...kernels import Basis, Bins, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
 from ...kernels.bases.measure import SINE
-from ...kernels.expectations.basis_means import integrates_panels, traces_rows
+from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import made_of_isometries
@@ -216,13 +216,14 @@ def enclosed_trials(
     law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
 ) -> EnclosedTrials:
     """`enclosures` of a law that is self-adjoint, with the trial functions."""
-    if basis is None and integrates_panels(law):
+    known = law.expectations(ONE_PANEL) if basis is None else None
+    if known is not None and known.has_errors:
         trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
         basis, values, vectors, names = trials.basis, trials.values, trials.vectors, trials.parities
         # rows are what costs: the functions that come next are looked at in the same ones
         both = residuals(
             law, basis, np.column_stack([vectors, trials.following]), np.append(values, trials.following_values),
-            MOST_TRACED_ROWS if traces_rows(law) else MOST_EXACT_ROWS,
+            MOST_TRACED_ROWS if known.is_traced else MOST_EXACT_ROWS,
             mirrored=trials.mirrored, quotient_error=TRIAL_SHARE * tolerance, leading=len(values),
         )  # fmt: skip
         found, after = both.split(len(values))

@@ -17,7 +17,7 @@ from ...kernels.bases.measure import SINE, gauss_on_intervals
 from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
-from ...kernels.expectations.basis_means import BasisRows, function_rows, height_of, integrates_panels, weighted_rows
+from ...kernels.expectations.basis_means import Means, height_of, weighted_means
 from ...kernels.laws.density import GAUSS_NODES, split_rows
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import SpecularFrame
@@ -204,7 +204,7 @@ def _integrals(
     )
 
 
-def image_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+def image_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     """What gives P v for the functions with the coefficients ``vectors``, and an error of the worst at each angle.
 
     Raises
@@ -216,10 +216,10 @@ def image_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
     words = words_of(law)
     if words is None:
         raise _refusal(law, "it is a sum of very many compositions")
-    return weighted_rows([(weight, _rule(law_of(word), basis, vectors)) for word, weight in words.items()])
+    return weighted_means([(weight, _rule(law_of(word), basis, vectors)) for word, weight in words.items()])
 
 
-def _rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+def _rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     if isinstance(law, Composition) and not holds_of_all(law, _is_exact):
         raise _refusal(law, "it is a composition with a law whose means are integrals by quadrature")
     if isinstance(law, SpecularFrame):
@@ -236,8 +236,9 @@ def _rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
         return _of_rules(partial(_means_of_density, law, basis, vectors), vectors.shape[1])
     if isinstance(law, CircularArcLaw) and isinstance(basis, Legendre):
         return _of_rules(partial(_means_of_arc, law, basis, vectors), vectors.shape[1])
-    if integrates_panels(law):
-        return function_rows(law, Panels(basis.edges, 0) if isinstance(basis, Bins) else basis, vectors)
+    found = law.expectations(Panels(basis.edges, 0) if isinstance(basis, Bins) else basis)
+    if found.has_errors:
+        return found.of(vectors)
     raise _refusal(law, "its means come without errors, and it does not promise to be exact (exact_apply)")
 
 
@@ -252,7 +253,7 @@ def _refusal(law: Law, reason: str) -> InputError:
     )
 
 
-def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> BasisRows:
+def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
     """By `apply`; rays of a polygon whose way was not found, a share s, change P v by 2 s^(1/2) max|v| at most."""
     unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda share: share))
     doubt = 2.0 * math.sqrt(unknown) * height_of(basis, vectors) if unknown else 0.0
@@ -267,7 +268,7 @@ def _unresolved(law: Law) -> float:
     return float(law.unresolved) if isinstance(law, PolygonLaw) else 0.0
 
 
-def _of_rules(means: Callable[..., Floats], functions: int) -> BasisRows:
+def _of_rules(means: Callable[..., Floats], functions: int) -> Means:
     """Means by two Gauss rules, and by a far finer one where these differ: the error is what both are from that."""
 
     def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:

@@ -13,8 +13,8 @@ from ...core.checks import Floats
 from ...kernels import Law, Legendre, Panels
 from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
+from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.expectations.angle_panels import KRONROD, NODES
-from ...kernels.expectations.basis_means import BasisRows, basis_rows, traces_rows
 from ..eigenvalues.parity import Parity
 
 # Degree on each panel: Kronrod's rule is then still exact for products of two functions.
@@ -76,7 +76,7 @@ def adapted_trials(law: Law, k: int, tolerance: float, most_levels: int = MOST_L
     panels with large ones are divided.
     """
     mirrored = bool(law.mirror_symmetric)
-    edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[traces_rows(law)]
+    edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[law.expectations(ONE_PANEL).is_traced]
     history: list[tuple[int, float]] = []
     goal = np.sqrt(tolerance)
     while True:
@@ -112,8 +112,7 @@ class _Level:
         half = 0.5 * np.diff(edges)
         angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
         self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
-        rows: BasisRows = basis_rows(law, self.panels)
-        self._images, _ = rows(angle.ravel(), row_tolerance)
+        self._images, _ = law.expectations(self.panels)(angle.ravel(), row_tolerance)
         # values of each panel's own functions, shape (panels, nodes, degree + 1); of norm 1 on what is kept
         self.norm = np.sqrt(0.5) if mirrored else 1.0
         self.local = self.panels.local(angle)[1] * self.norm

@@ -10,7 +10,7 @@ from ...core.checks import positive_number
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
-from ...kernels.expectations.basis_means import has_costly_rows, integrates_panels, traces_rows
+from ...kernels.bases.panels import ONE_PANEL
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
@@ -44,7 +44,7 @@ def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essent
 
     None for other laws, for fine tolerances, and near the essential spectrum.
     """
-    if tolerance < ROUGH or not traces_rows(law):
+    if tolerance < ROUGH or not law.expectations(ONE_PANEL).is_traced:
         return None
     for size, matrix_error in GLANCES:
         found = matrix_spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), EIGENVALUES)
@@ -61,7 +61,8 @@ def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap
     if isinstance(law, DensityLaw):
         found = (_gap_of_enclosures(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
         return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
-    if not integrates_panels(law) or has_costly_rows(law):
+    known = law.expectations(ONE_PANEL)
+    if not known.has_errors or known.are_costly():
         return None
     number = _number_to_enclose(law, edge)
     gap = None if number is None else _gap_of_enclosures(law, number, tolerance)

@@ -9,7 +9,7 @@ import numpy as np
 from ...core.checks import Floats, frozen
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, MatrixLaw, discretise
-from ...kernels.expectations.basis_means import has_costly_rows, integrates_panels
+from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.structure import made_of_isometries
 from ..bounds.enclosure import EnclosedTrials, as_power, enclosed_trials
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
@@ -37,7 +37,8 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: np.random.Generator
     if not made_of_isometries(law) and ideal_spectrum(law) is None:
         if isinstance(law, DensityLaw):
             return _of_density(law, k, tolerance)
-        if isinstance(law, MatrixLaw) or (integrates_panels(law) and not has_costly_rows(law)):
+        known = law.expectations(ONE_PANEL)
+        if isinstance(law, MatrixLaw) or (known.has_errors and not known.are_costly()):
             return _enclosed(law, k, tolerance)
     return _by_matrices(law, k, tolerance, rng)
 
