@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, positive_number, whole_number
+from ...core.checks import Floats, finite_array, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ..curves.bezier import Bezier
 from ..disk.disk import Disk
@@ -168,10 +168,8 @@ def from_the_tops(
 
 def check_kinds(disk: Disk, wall: Wall) -> None:
     """Refuse what is not a disk and a wall of segments and arcs."""
-    if not isinstance(disk, Disk):
-        raise InputError(f"disk: expected a Disk such as geo.Disk(mass=1.0, inertia=0.5), got {disk!r}")
-    if not isinstance(wall, Wall):
-        raise InputError(f"wall: expected a Wall such as geo.triangular_teeth(0.7), got {wall!r}")
+    instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+    instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
     beziers = sum(isinstance(piece, Bezier) for path in (wall.pieces, *wall.islands) for piece in path)
     if beziers:
         raise InputError(

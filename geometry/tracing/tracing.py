@@ -11,13 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, finite_array, finite_number, number_between, whole_number
-from ...core.errors import InputError
+from ...core.checks import Floats, angles, finite_array, finite_number, instance, number_between, whole_number
+from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
-    from ..walls.wall import Wall
 
 # Rays times pieces up to which rays are followed on the caller's own thread: with 10^6 flights each, of some 10 ns a
 # piece, they take a fraction of a second. Another thread costs 0.1 ms, as much as a few hundred flights.
@@ -337,5 +336,4 @@ def _climbs(wall: Wall, incoming: Floats, outgoing: Floats, escaped: NDArray[np.
 
 
 def _check_wall(wall: Wall) -> None:
-    if not hasattr(wall, "scene"):
-        raise InputError(f"wall: expected a Wall such as geo.triangular_teeth(0.7), got {wall!r}")
+    instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")

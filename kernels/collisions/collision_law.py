@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, finite_array, generator
+from ...core.checks import Floats, angles, finite_array, generator, instance
 from ...core.errors import InputError
+from ...geometry import Disk, Wall
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..laws.law import Combination, Law
@@ -19,7 +20,6 @@ from ..walls.isometry_branches import isometries
 from .velocity_matrices import isometry_matrix
 
 if TYPE_CHECKING:
-    from ...geometry import Disk, Wall
     from ..matrices.defects import SymmetryDefect
     from .operator import CollisionOperator
 
@@ -65,8 +65,7 @@ class CollisionLaw:
             raise InputError(f"law: expected a Law such as ker.WallLaw(wall.foreshorten(disk)), got {self.law!r}")
         if isinstance(self.law, Combination):
             self.law.terms_checked()
-        if not hasattr(self.disk, "rolling_momentum"):
-            raise InputError(f"disk: expected a Disk such as geo.Disk(mass=1.0, inertia=0.5), got {self.disk!r}")
+        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
         if self.law.frame != "paper":
             raise InputError("law: expected a law in the paper's convention, got one in the specular frame")
 
@@ -76,11 +75,9 @@ class CollisionLaw:
 
         Source: Rudzis 2022, section 1.3.7 and Theorem 5.1.
         """
-        from ...geometry import Wall
         from ..walls.wall_law import WallLaw
 
-        if not isinstance(wall, Wall):
-            raise InputError(f"wall: expected a Wall such as geo.triangular_teeth(0.7), got {wall!r}")
+        instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
         return cls(WallLaw(wall.foreshorten(disk)), disk)
 
     def sample(self, velocity: ArrayLike, rng: np.random.Generator) -> Floats:

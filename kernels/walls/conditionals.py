@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, finite_number
+from ...core.checks import Floats, angles, finite_number, instance
 from ...core.errors import InputError
+from ...geometry import Wall
 from ..bases.basis import AngleFunction
 from ..bases.legendre import Legendre
 from ..expectations.basis_means import Expectations, means_of_basis
 from .hollow_conditionals import NO_LIMIT, HollowRows
-
-if TYPE_CHECKING:
-    from ...geometry import Wall
 
 # Pieces of a wall up to which a row takes no more than some milliseconds.
 MOST_PIECES = 64
@@ -114,8 +111,7 @@ def adaptive_rows(
     >>> rows.weights.tolist(), bool(rows.mean(np.cos)[0] == cos(np.pi - 0.5))
     ([1.0], True)
     """
-    if not hasattr(wall, "scene"):
-        raise InputError(f"wall: expected a Wall such as geo.focusing_arcs(0.9), got {wall!r}")
+    instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
     if not finite_number("tolerance", tolerance) > 0.0:
         raise InputError(f"tolerance: expected a number greater than 0, got {tolerance!r}")
     incoming = np.atleast_1d(angles("theta", theta)).ravel()

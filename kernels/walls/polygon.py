@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, positive_number, whole_number
+from ...core.checks import Floats, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ...geometry import Wall
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw
 from .traced_map import traced_angles
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
-    from ...geometry import Wall
     from ...geometry.cells.hollow_shape import HollowShape
     from ...geometry.polygons.beams import Beams
 
@@ -82,8 +82,7 @@ class PolygonLaw(BranchLaw):
 
     def __post_init__(self) -> None:
         wall = self.wall
-        if not hasattr(wall, "hollows"):
-            raise InputError(f"wall: expected a Wall such as geo.triangular_teeth(0.7), got {wall!r}")
+        instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
         if not wall.is_polygonal:
             raise InputError(f"wall: expected segments only, got {wall!r}; use WallLaw(wall), which traces curves")
         if not wall.closes:

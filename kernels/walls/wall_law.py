@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles
-from ...core.errors import AccuracyError, InputError
+from ...core.checks import Floats, angles, instance
+from ...core.errors import AccuracyError
 from ...core.rounding import EPS
+from ...geometry import Wall
 from ..bases.basis import AngleFunction, Basis
 from ..bases.intervals import cell_among
 from ..expectations.basis_means import ByApply, Expectations
@@ -27,7 +28,6 @@ from .traced_map import LOST_TOLERANCE, traced_angles, traced_outcomes
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
-    from ...geometry import Wall
     from ...geometry.cells.hollow import Hollow
     from ...geometry.curves.curve import Curve
 
@@ -98,8 +98,7 @@ class WallLaw(DrivenLaw):
     mirror_symmetric: bool | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not hasattr(self.wall, "hollows"):
-            raise InputError(f"wall: expected a Wall such as geo.focusing_arcs(0.9), got {self.wall!r}")
+        instance("wall", self.wall, Wall, "geo.triangular_teeth(0.7)")
         # An asymmetric cell may still have a symmetric law, so its absence proves nothing.
         object.__setattr__(self, "mirror_symmetric", True if self.wall.is_mirror_symmetric else None)
         if self.closed_form is not None:

@@ -34,6 +34,20 @@ def finite_number(name: str, value: Any) -> float:
     return float(array)
 
 
+def instance(name: str, value: object, kind: type, example: str) -> None:
+    """Refuse what is not of a kind; the message has an example.
+
+    Examples
+    --------
+    >>> instance("count", "two", int, "2")
+    Traceback (most recent call last):
+    asperity.errors.InputError: count: expected an int such as 2, got 'two'
+    """
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOUaeiou" else "a"
+        raise InputError(f"{name}: expected {article} {kind.__name__} such as {example}, got {value!r}")
+
+
 def positive_number(name: str, value: Any) -> float:
     """Return ``value`` as a finite float greater than zero."""
     number = finite_number(name, value)
