@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
-from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..expectations.angle_panels import NODES, AnglePanels
@@ -32,7 +31,7 @@ class HasAction(Protocol):
     """What is asked of a law known by its action on functions."""
 
     def apply(self, function: Callable[[Floats], Floats], theta: ArrayLike) -> Floats: ...
-    def kinks(self, limit: int) -> tuple[Floats, float]: ...
+    def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
     @property
     def fan_out(self) -> int: ...
 
@@ -65,11 +64,8 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
     Panels between edges and kinks are halved until each is settled or the work exceeds about a second. The error is the
     sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
     """
-    try:
-        kinks = law.kinks(FIRST_KINKS)[0]
-    except InputError:
-        kinks = np.empty(0)
-    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, kinks)))
+    breaks = law.breakpoints(FIRST_KINKS)[0]
+    edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, breaks)))
     low, high = edges[:-1], edges[1:]
     total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0
     values = NODES.size * basis.size * max(int(law.fan_out), 1)

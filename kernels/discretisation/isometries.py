@@ -15,7 +15,6 @@ from ..laws.branches import preimages
 from ..laws.law import Law
 from ..laws.structure import Rules, fold, has_chain, lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.isometry_branches import table_of
 from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
 from .isometry_tables import bounded, table_matrix
 from .method import Budget, MethodName
@@ -35,7 +34,7 @@ class Branching(Protocol):
     """What is asked of a law here."""
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
-    def kinks(self, limit: int) -> tuple[Floats, float]: ...
+    def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
     @property
     def fan_out(self) -> int: ...
 
@@ -57,7 +56,7 @@ class Isometries:
 
 def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """The matrix of a law that lists its isometries, and a bound of its Frobenius error apart from rounding."""
-    table = table_of(law)
+    table = law.isometry_table()
     if table is not None:
         return table_matrix(table, basis)
     teeth = fold(law, REPEATED_TEETH)
@@ -85,13 +84,13 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     """
     worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_KINKS
-    kinks, omitted = law.kinks(limit)
+    kinks, omitted = law.breakpoints(limit)
     most = KINK_WORK // law.fan_out**2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 2 * limit <= most:
         limit *= 2
-        kinks, omitted = law.kinks(limit)
+        kinks, omitted = law.breakpoints(limit)
     edges = np.unique(np.concatenate((basis.edges, kinks)))
     edges = np.unique(
         np.concatenate((edges, preimages(law.branches, np.concatenate(([0.0], kinks, [np.pi])), basis.edges)))

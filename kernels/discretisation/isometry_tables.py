@@ -20,7 +20,6 @@ from ..laws.isometry_table import IsometryTable
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.crevice_tail import crevice_nodes, first_crossing
-from ..walls.isometry_branches import table_of
 from ..walls.rectangular import crevice_pieces
 from .method import Budget, MethodName, computed, isometric_rounding
 
@@ -41,10 +40,10 @@ class IsometryTables:
     name: MethodName = "exact"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        return table_of(law) is not None
+        return law.isometry_table() is not None
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        table = cast(IsometryTable, table_of(law))
+        table = cast(IsometryTable, law.isometry_table())
         symmetric, omitted = table_matrix(table, basis)
         how = "masses and Gauss rules on every piece of the table of isometries, to rounding"
         found = bounded(symmetric, basis, omitted, how + (", plus unresolved beams" if omitted else ""))

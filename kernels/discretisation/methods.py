@@ -193,8 +193,7 @@ def _names(found: _Law | _Sum, basis: Basis) -> tuple[MethodName, ...]:
 
 def _resolved(law: Law) -> Law:
     """The law; of a polygonal wall that is resolved into isometries, the table of these."""
-    exact: Law | None = getattr(law, "exact_law", None)
-    return law if exact is None else exact
+    return law.exact_law or law
 
 
 def _scaled_defect(weight: float, matrix: KernelMatrix, total: KernelMatrix) -> SymmetryDefect:

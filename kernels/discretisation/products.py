@@ -278,10 +278,7 @@ def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
             jumps = jumps_of_map(law.map)
             special += [jumps, np.asarray(law.map(basis.edges[1:-1]))] if jumps.size <= KINKS else []
             continue
-        try:
-            special.append(law.kinks(KINKS)[0])
-        except InputError:
-            continue
+        special.append(law.breakpoints(KINKS)[0])
     found = np.unique(np.clip(np.concatenate(special), 0.0, np.pi))
     found = found[np.append(True, np.diff(found) > SAME_EDGE)]
     found[-1] = np.pi

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ..bases.basis import Basis
 from ..laws.law import Law
-from ..laws.random_map import responder
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.counts import SampledArray
 from ..sampling.monte_carlo import independent_rays
@@ -18,7 +17,7 @@ class Sobol:
     name: MethodName = "qmc"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        return responder(law) is not None
+        return law.random_map() is not None
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         return net_matrix(Net(law, basis, budget.rng), basis, budget)

@@ -136,13 +136,6 @@ class Law(ABC):
         """Outgoing angles at which densities jump or have a kink, whatever the incoming angle, as far as known."""
         return np.empty(0)
 
-    def kinks(self, limit: int) -> tuple[Floats, float]:
-        """The former name of `breakpoints`; raises an InputError where these are not known."""
-        found, left_out = self.breakpoints(limit)
-        if math.isinf(left_out):
-            raise InputError(f"{self!r} has no list of breakpoints; use sample() or apply()")
-        return found, left_out
-
     def random_map(self) -> RandomMap | None:
         """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
         return None

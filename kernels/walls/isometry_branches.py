@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles
-from ..laws.isometry_table import IsometryTable
 from ..laws.law import Law
 
 # Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.
@@ -52,8 +51,3 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     rises = (outgoing[1] - outgoing[0]) * (second - incoming)[..., None] >= 0.0
     sign = np.where(rises, 1.0, -1.0)
     return probability[0], sign, outgoing[0] - sign * incoming[..., None]
-
-
-def table_of(law: Law) -> IsometryTable | None:
-    """The former name of `Law.isometry_table`."""
-    return law.isometry_table()
