@@ -1,0 +1,145 @@
+"""Hollows to choose from: polygons below an opening of width 1, drawn at random, and curved ones by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.checks import Floats, frozen
+from ...core.errors import AsperityError, InputError
+from ...core.estimates import Estimate
+from ..bases.legendre import Legendre
+from ..discretisation.discretisation import discretise
+from ..laws.law import Law
+from ..walls.polygon import PolygonLaw
+from ..walls.wall_law import WallLaw
+
+if TYPE_CHECKING:
+    from ...geometry import Wall
+
+# A polygon that leaves more flux than this unresolved by MOST_BEAMS beams is not taken: a search meets thousands.
+MOST_BEAMS, RESOLVED = 3000, 1e-11
+# Error asked of the moments of curved hollows; polygons have theirs to rounding.
+CURVED_TOLERANCE = 1e-9
+# Depths of drawn vertices are DEEPEST times the 3/2-th power of a uniform number: shallow ones are more often of use.
+DEEPEST, SHALLOWEST, DEPTH_POWER = 2.0, 0.02, 1.5
+# Share of drawn polygons whose vertices stand in the order of x, without overhangs.
+ORDERED = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class UnitHollow:
+    """A wall of period 1 that is one hollow, or flat.
+
+    Parameters
+    ----------
+    wall : Wall
+        Of period 1; its cell, scaled, is put side by side with others.
+    label : str
+    """
+
+    wall: Wall
+    label: str
+
+    @classmethod
+    def polygon(cls, vertices: ArrayLike) -> UnitHollow | None:
+        """The polygon through (0, 0), inner vertices of shape (n, 2), and (1, 0).
+
+        None if it is not one hollow, or does not keep to 0 <= x <= 1: others stand beside it.
+        """
+        from ...geometry import Wall
+
+        inner = np.asarray(vertices, dtype=np.float64).reshape(-1, 2)
+        if np.any(np.abs(inner[:, 0] - 0.5) > 0.5):
+            return None
+        try:
+            wall = Wall.from_vertices(np.concatenate([[(0.0, 0.0)], inner, [(1.0, 0.0)]]))
+        except InputError:
+            return None
+        if len(wall.hollows) != 1 or wall.flat_top > 0.0:
+            return None
+        return cls(wall, f"polygon of {len(inner)} inner vertices")
+
+    @property
+    def vertices(self) -> Floats | None:
+        """The inner vertices of a polygon, shape (n, 2); None of a curved hollow."""
+        return frozen(self.wall.vertices[1:-1]) if self.wall.is_polygonal else None
+
+    @property
+    def pieces(self) -> int:
+        """How many pieces it has."""
+        return len(self.wall.pieces)
+
+    @cached_property
+    def is_symmetric(self) -> bool:
+        """Whether it is its own mirror image."""
+        return self.wall.is_mirror_symmetric
+
+    def mirrored(self) -> UnitHollow:
+        """Its mirror image."""
+        return UnitHollow(self.wall.mirrored(), f"{self.label}, mirrored")
+
+    @cached_property
+    def law(self) -> Law:
+        """The law of the hollow alone."""
+        return PolygonLaw(self.wall, max_beams=MOST_BEAMS) if self.wall.is_polygonal else WallLaw(self.wall)
+
+    def moments(self, basis: Legendre) -> Floats | None:
+        """<e_l, P e_m> in a basis; None if they are not known to rounding within the limits of a search."""
+        law = self.law
+        try:
+            if isinstance(law, PolygonLaw):
+                return None if float(law.unresolved) > RESOLVED else discretise(law, basis, "exact").symmetric
+            return discretise(law, basis, tolerance=CURVED_TOLERANCE).symmetric
+        except AsperityError:
+            return None
+
+
+def flat() -> UnitHollow:
+    """No hollow: a flat top."""
+    from ...geometry import flat as flat_wall
+
+    return UnitHollow(flat_wall(), "flat top")
+
+
+def simple_hollows() -> list[UnitHollow]:
+    """Isosceles triangles and rectangles in steps."""
+    slopes = np.tan(np.linspace(0.05, 1.5, 30))
+    triangles = [UnitHollow.polygon([(0.5, -0.5 * slope)]) for slope in slopes]
+    depths = np.geomspace(0.05, 6.0, 24)
+    rectangles = [UnitHollow.polygon([(0.0, -depth), (1.0, -depth)]) for depth in depths]
+    return [hollow for hollow in (*triangles, *rectangles) if hollow is not None]
+
+
+def curved_hollows() -> list[UnitHollow]:
+    """Hollows with curved mirrors that polygons approach slowly: the double parabola, nearly a retroreflector."""
+    from ...geometry import double_parabola
+
+    return [UnitHollow(double_parabola(), "double parabola")]
+
+
+def random_polygons(number: int, most_vertices: int, rng: np.random.Generator) -> list[UnitHollow]:
+    """Polygons of 1 to ``most_vertices`` drawn vertices, half of them mirror-symmetric; invalid ones are left out."""
+    found = []
+    for draw in range(number):
+        count = int(rng.integers(1, most_vertices + 1))
+        x = np.sort(rng.random(count)) if rng.random() < ORDERED else rng.random(count)
+        y = -(SHALLOWEST + DEEPEST * rng.random(count) ** DEPTH_POWER)
+        vertices = np.column_stack([x, y])
+        if draw % 2:
+            left = vertices * (0.5, 1.0)
+            vertices = np.concatenate([left, (left * (-1.0, 1.0) + (1.0, 0.0))[::-1]])
+        hollow = UnitHollow.polygon(vertices)
+        if hollow is not None:
+            found.append(hollow)
+    return found
+
+
+def law_moments(law: Law, basis: Legendre, tolerance: float) -> tuple[Floats, Estimate]:
+    """The moments of a law and their error in the Frobenius norm."""
+    matrix = discretise(law, basis, tolerance=tolerance)
+    return matrix.symmetric, matrix.error

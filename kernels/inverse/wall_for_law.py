@@ -1,0 +1,428 @@
+"""A wall for a wanted law: hollows side by side whose mixture has the law's moments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.checks import Floats, frozen, generator, number_between, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import ErrorKind, Estimate
+from ...core.rounding import EPS
+from ..bases.bins import Bins
+from ..bases.legendre import Legendre
+from ..collisions.collision_law import CollisionLaw
+from ..discretisation.discretisation import discretise
+from ..distances.distances import Distance, distance
+from ..laws.law import Law
+from ..laws.matrix_law import MatrixLaw
+from ..matrices.matrix import KernelMatrix
+from ..walls.wall_law import WallLaw
+from .hollows import UnitHollow, curved_hollows, flat, random_polygons, simple_hollows
+from .hull import few_weights, nearest_weights, possible_gain
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ...geometry import Disk, Wall
+    from ...geometry.curves.curve import Curve
+
+# The search draws this many polygons at a time, with one vertex more every second time up to the most, ...
+DRAWN, MOST_VERTICES, ROUNDS = 60, 6, 14
+# ... and then moves the vertices of the best ones, this many at a time, each by so many trials.
+DESCENTS, MOVED, TRIALS = 16, 3, 80
+# Openings narrower than this share of the period are left out where the moments can be met without them.
+SMALLEST_OPENING = 1e-5
+# Moments of a law that is mirror-symmetric have no more than this between even and odd functions.
+SYMMETRIC = 1e-12
+# The moments of the wanted law are computed to this share of the tolerance.
+TARGET_SHARE = 0.01
+OUTSIDE = 1e3
+# Curved hollows take seconds each, and a wall that has one is traced: worth it for laws far from those of polygons.
+CURVED_FROM = 0.1
+# A step of the search that makes the defect smaller by less than this share is the last.
+LEAST_PROGRESS = 1e-3
+# Joint distances are of interest to two digits.
+DISTANCE_TOLERANCE = 1e-2
+# Rounding of a moment, for each of them.
+ROUNDED = 64.0 * EPS
+
+
+@dataclass(frozen=True, eq=False)
+class WallForLaw:
+    """A wall whose law has the moments of a wanted law; made by `wall_for`.
+
+    Attributes
+    ----------
+    wall : Wall
+        The hollows side by side, the widest first; period 1.
+    hollows : tuple of UnitHollow
+        Each below an opening of width 1.
+    weights : ndarray, shape (hollows,)
+        The widths of their openings in the wall; they add up to 1.
+    defect : Estimate
+        Frobenius distance of the moments <e_l, P e_m>, l, m < ``moments``, of the law of the finished wall from the
+        wanted ones, computed anew from that wall.
+    bound : Estimate
+        By how much the defect of any other mixture could be smaller, at most: of the same hollows where ``hollows``
+        were given (a bound), of all polygons of the family as far as the last step of the search could see (an
+        estimate). Never more than the defect itself.
+    history : ndarray, shape (steps, 3)
+        Before each step of the search: hollows tried, the defect, and by how much those that the step adds could make
+        it smaller, at most.
+    law : Law or None
+        The wanted law, in the paper's convention; None where moments alone were wanted.
+    moments : int
+    disk : Disk or None
+        Of `collision_for`: the law is that of the wall foreshortened by this disk.
+    """
+
+    wall: Wall
+    hollows: tuple[UnitHollow, ...]
+    weights: Floats
+    defect: Estimate
+    bound: Estimate
+    history: Floats
+    law: Law | None
+    moments: int
+    disk: Disk | None = None
+
+    @property
+    def wall_law(self) -> WallLaw:
+        """The law that the wall has, foreshortened where a disk feels it."""
+        return WallLaw(self.wall if self.disk is None else self.wall.foreshorten(self.disk))
+
+    @cached_property
+    def distance(self) -> Distance:
+        """The joint Wasserstein distance of the law of the wall from the wanted law: moments beyond the first count.
+
+        Raises
+        ------
+        InputError
+            If moments alone were wanted.
+        """
+        if self.law is None:
+            raise InputError("distance: expected a wanted law, got moments alone; compare with a law by ker.distance")
+        return distance(self.wall_law, self.law, kind="joint", tolerance=DISTANCE_TOLERANCE)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the wall."""
+        from ...geometry import draw_wall
+
+        axes = draw_wall(self.wall, ax=ax)
+        axes.set_title(f"{len(self.hollows)} hollows, defect {float(self.defect):.2g} in {self.moments} moments")
+        return axes
+
+    def __repr__(self) -> str:
+        return (
+            f"WallForLaw({self.law!r}, {len(self.hollows)} hollows, defect {float(self.defect):.3g} in {self.moments} "
+            f"moments, at most {float(self.bound):.3g} too much)"
+        )
+
+
+def wall_for(
+    law: Law | KernelMatrix,
+    moments: int = 10,
+    tolerance: float = 1e-10,
+    hollows: Sequence[Wall] | None = None,
+    rng: np.random.Generator | None = None,
+    *,
+    most_hollows: int | None = None,
+    smallest_opening: float = SMALLEST_OPENING,
+) -> WallForLaw:
+    r"""A wall whose reflection law has the moments <e_l, P e_m>, l, m < ``moments``, of a wanted law.
+
+    Parameters
+    ----------
+    law : Law or KernelMatrix
+        Reversible. A law in the specular frame is turned back first. A matrix in bins stands for its `MatrixLaw`, one
+        in Legendre polynomials for its moments, as many of them as it has.
+    moments : int
+        At least 2. The polynomials e_l are those of `Legendre`.
+    tolerance : float
+        Wanted defect.
+    hollows : sequence of Wall, optional
+        Walls of which a mixture is wanted, instead of a search. Each is taken with its mirror image.
+    rng : numpy.random.Generator, optional
+        For the search; ``np.random.default_rng(0)`` by default, so that the same call gives the same wall.
+    most_hollows : int, optional
+        The wall has at most this many hollows, and a larger defect.
+    smallest_opening : float
+        Hollows with a narrower opening, as a share of the period, are left out, if the defect allows it.
+
+    Returns
+    -------
+    WallForLaw
+        Also where the tolerance was not met: ``defect`` says what was reached, ``bound`` how much could be missing.
+
+    Raises
+    ------
+    InputError
+        If the law is not reversible, an argument is unsuitable, or no wall of ``hollows`` closes.
+
+    Notes
+    -----
+    The law of a wall whose hollows k have openings of width w_k is the mixture of their laws, sum w_k P_k. A law is
+    met in all its moments by finitely many hollows if its moments lie in the convex hull of those of hollows; every
+    symmetric law is a limit of such mixtures (Rudzis 2022, theorem 1.23 and corollary 1.8; Plakhov 2012, ch. 4). The
+    weights are those of the point of the hull that is nearest; hollows are isosceles triangles, rectangles and random
+    polygons of a growing number of vertices, whose laws are known exactly. Where these do not reach, the vertices of
+    the hollows along which the defect falls most are moved: a fully corrective conditional gradient.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker
+    >>> found = wall_for(ker.maxwell(0.5), moments=4)
+    >>> float(found.defect) < 1e-10, found.wall.closes, round(float(found.weights.sum()), 12)
+    (True, True, 1.0)
+    """
+    whole_number("moments", moments, 2)
+    positive_number("tolerance", tolerance)
+    number_between("smallest_opening", smallest_opening, 0.0, 1.0, closed="low")
+    if most_hollows is not None:
+        whole_number("most_hollows", most_hollows, 1)
+    rng = np.random.default_rng(0) if rng is None else generator(rng)
+    wanted, target, target_error = _target(law, moments, tolerance)
+    basis = Legendre(len(target))
+    search = _Search(basis, target, tolerance)
+    if hollows is None:
+        search.run(rng)
+    else:
+        search.add(_given(hollows))
+    chosen, weights = search.result(most_hollows, smallest_opening)
+    wall = side_by_side(chosen, weights)
+    finished = discretise(WallLaw(wall), basis, tolerance=0.1 * tolerance)
+    value = float(np.linalg.norm(finished.symmetric - target))
+    kind: ErrorKind = "bound" if {finished.error.kind, target_error.kind} == {"bound"} else "estimate"
+    defect = Estimate(value, float(finished.error) + float(target_error), kind, "moments of the finished wall")
+    if hollows is not None:
+        gain = possible_gain(search.points, search.target, search.weights) if most_hollows is None else value
+        bound = Estimate(
+            min(gain, value), ROUNDED * moments, "bound", f"duality gap over {len(search.hollows)} hollows"
+        )
+    else:
+        gain = float(search.history[-1][2]) if search.weights_are_best else value
+        bound = Estimate(min(gain, value), 0.0, "estimate", "duality gap over the hollows of the last step")
+    return WallForLaw(
+        wall,
+        tuple(chosen),
+        frozen(weights),
+        defect,
+        bound,
+        frozen(np.array(search.history).reshape(-1, 3)),
+        wanted,
+        len(target),
+    )
+
+
+def collision_for(
+    collision: CollisionLaw, disk: Disk | None = None, moments: int = 10, tolerance: float = 1e-10, **search: Any
+) -> WallForLaw:
+    """The wall on which a disk has a wanted rough collision law: that of its P~, unforeshortened.
+
+    Parameters
+    ----------
+    collision : CollisionLaw
+        K = delta (x) P~ (x) delta_{pi - psi}.
+    disk : Disk, optional
+        By default ``collision.disk``.
+    moments, tolerance, **search
+        As of `wall_for`, which finds a wall for P~.
+
+    Returns
+    -------
+    WallForLaw
+        Its ``wall``, foreshortened by the disk, has the law P~ (Rudzis 2022, section 1.3.7); ``defect`` and
+        ``distance`` are those of that foreshortened wall.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> wanted = ker.CollisionLaw(ker.maxwell(0.5), geo.Disk(1.0, 0.5))
+    >>> found = collision_for(wanted, moments=3)
+    >>> float(found.defect) < 1e-10, found.wall.foreshorten(wanted.disk).closes
+    (True, True)
+    """
+    if not isinstance(collision, CollisionLaw):
+        raise InputError(f"collision: expected a CollisionLaw such as ker.CollisionLaw(law, disk), got {collision!r}")
+    found = wall_for(collision.law, moments, tolerance, **search)
+    felt = disk or collision.disk
+    return replace(found, wall=found.wall.unforeshorten(felt), disk=felt)
+
+
+def side_by_side(hollows: Sequence[UnitHollow], weights: Floats) -> Wall:
+    """The wall of period 1 with the hollows from left to right below openings of the given widths."""
+    from ...geometry import Wall
+
+    ends = np.concatenate([[0.0], np.cumsum(weights)])
+    ends[-1] = 1.0
+    pieces: list[Curve] = []
+    for hollow, left, right in zip(hollows, ends[:-1].tolist(), ends[1:].tolist(), strict=True):
+        path = [piece.stretched(right - left, right - left).moved(left, 0.0) for piece in hollow.wall.cell.pieces]
+        joints = [(left, 0.0), *(piece.end for piece in path[:-1]), (right, 0.0)]
+        pieces += [piece.pinned(joints[k], joints[k + 1]) for k, piece in enumerate(path)]
+    return Wall(pieces, period=1.0)
+
+
+def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[Law | None, Floats, Estimate]:
+    """The wanted law, if there is one, its moments and their error."""
+    if isinstance(law, KernelMatrix):
+        if isinstance(law.basis, Legendre):
+            count = min(moments, law.basis.n)
+            matrix = law if law.frame == "paper" else law.in_specular_frame()
+            return None, matrix.symmetric[:count, :count], matrix.error
+        if not isinstance(law.basis, Bins):
+            raise InputError(
+                f"law: expected a Law, or a matrix in Bins or Legendre polynomials, got one in {law.basis!r}"
+            )
+        law = MatrixLaw(law)
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a Law such as ker.lambertian() or a KernelMatrix, got {law!r}")
+    if law.frame != "paper":
+        # the change is its own inverse
+        law = law.in_specular_frame()
+    if law.reversible is False:
+        raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
+    matrix = discretise(law, Legendre(moments), tolerance=TARGET_SHARE * tolerance)
+    return law, matrix.symmetric, matrix.error
+
+
+def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
+    from ...geometry import Wall
+
+    found = []
+    for k, wall in enumerate(walls):
+        if not isinstance(wall, Wall) or not wall.closes:
+            raise InputError(f"hollows[{k}]: expected a Wall without islands, got {wall!r}")
+        found.append(UnitHollow(wall.scaled(1.0 / wall.period), f"wall {k}"))
+    if not found:
+        raise InputError("hollows: expected at least one wall, got none")
+    return found
+
+
+class _Search:
+    """Hollows, the points of their moments, and the mixture of them that is nearest to the target."""
+
+    def __init__(self, basis: Legendre, target: Floats, tolerance: float) -> None:
+        n = len(target)
+        self.basis, self.tolerance = basis, tolerance
+        self.sign = (-1.0) ** np.arange(n)
+        odd = np.abs(target - self.sign[:, None] * target * self.sign)
+        self.is_symmetric = bool(odd.max() <= SYMMETRIC)
+        row, column = np.triu_indices(n)
+        # of every law the first row and column are those of the identity
+        used = (row > 0) & (((row + column) % 2 == 0) | (not self.is_symmetric))
+        self.row, self.column = row[used], column[used]
+        self.scale = np.where(self.row == self.column, 1.0, np.sqrt(2.0))
+        self.target = target[self.row, self.column] * self.scale
+        self.hollows: list[UnitHollow] = []
+        self.points = np.empty((0, len(self.target)))
+        self.weights = np.empty(0)
+        self.history: list[tuple[float, float, float]] = []
+        self.weights_are_best = True
+
+    def point(self, hollow: UnitHollow) -> Floats | None:
+        """The moments that count, of the hollow with its mirror image beside it where the target is symmetric."""
+        matrix = hollow.moments(self.basis)
+        return None if matrix is None else np.asarray(matrix[self.row, self.column] * self.scale)
+
+    def add(self, hollows: Sequence[UnitHollow]) -> None:
+        """Take hollows among those that are mixed; with their mirror images where the target is not symmetric."""
+        points = []
+        for hollow in hollows:
+            point = self.point(hollow)
+            if point is None:
+                continue
+            self.hollows.append(hollow)
+            points.append(point)
+            if not (self.is_symmetric or hollow.is_symmetric):
+                self.hollows.append(hollow.mirrored())
+                points.append(point * (self.sign[self.row] * self.sign[self.column]))
+        if not self.hollows:
+            raise InputError("hollows: expected one whose moments are known to rounding, got none")
+        if points:
+            self.points = np.vstack([self.points, *points])
+        if self.weights.size:
+            weights = np.concatenate([self.weights, np.zeros(len(points))])
+            gain = possible_gain(self.points, self.target, weights)
+            self.history.append((float(len(weights) - len(points)), self.defect, gain))
+        self.weights = nearest_weights(self.points, self.target)
+
+    @property
+    def defect(self) -> float:
+        return float(np.linalg.norm(self.weights @ self.points[: self.weights.size] - self.target))
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the tolerance is met, with room for what the finished wall rounds."""
+        return self.defect <= 0.1 * self.tolerance
+
+    def run(self, rng: np.random.Generator) -> None:
+        """Random polygons of more and more vertices, then moved ones."""
+        self.add([flat(), *simple_hollows()])
+        for step in range(ROUNDS):
+            self.add(random_polygons(DRAWN, min(2 + step // 2, MOST_VERTICES), rng))
+            if self.is_done:
+                return
+        if self.defect > CURVED_FROM:
+            self.add(curved_hollows())
+        for _ in range(DESCENTS):
+            before = self.defect
+            self.add([self.moved(hollow) for hollow in self.promising()])
+            if self.is_done or self.defect > (1.0 - LEAST_PROGRESS) * before:
+                return
+
+    def promising(self) -> list[UnitHollow]:
+        """The polygons along which the defect falls most."""
+        order = np.argsort(self.points @ (self.weights @ self.points - self.target))
+        polygons = [self.hollows[k] for k in order if self.hollows[k].wall.is_polygonal and self.hollows[k].pieces > 1]
+        return polygons[:MOVED]
+
+    def moved(self, hollow: UnitHollow) -> UnitHollow:
+        """The polygon with its vertices where the defect falls more, if Nelder and Mead's method finds such places."""
+        from scipy.optimize import minimize
+
+        residual = self.weights @ self.points - self.target
+        start = hollow.wall.vertices[1:-1]
+
+        def slope(places: Floats) -> float:
+            candidate = UnitHollow.polygon(places.reshape(-1, 2))
+            point = None if candidate is None else self.point(candidate)
+            return OUTSIDE if point is None else float(point @ residual)
+
+        found = minimize(slope, start.ravel(), method="Nelder-Mead", options={"maxfev": TRIALS})
+        return UnitHollow.polygon(found.x.reshape(-1, 2)) or hollow
+
+    def result(self, most: int | None, smallest: float) -> tuple[list[UnitHollow], Floats]:
+        """The hollows with weight, the widest first, and their weights, which sum to 1."""
+        doubled = np.array([1.0 if not self.is_symmetric or h.is_symmetric else 2.0 for h in self.hollows])
+        if most is not None and np.sum(doubled[self.weights > 0.0]) > most:
+            self.weights = few_weights(self.points, self.target, doubled, float(most))
+            self.weights_are_best = False
+        usable = np.ones(len(self.hollows), dtype=bool)
+        while True:
+            narrow = (self.weights > 0.0) & (self.weights < smallest * doubled)
+            if not narrow.any() or most is not None:
+                break
+            usable &= ~narrow
+            weights = np.zeros(len(self.hollows))
+            weights[usable] = nearest_weights(self.points[usable], self.target)
+            if float(np.linalg.norm(weights @ self.points - self.target)) > max(
+                2.0 * self.defect, 0.1 * self.tolerance
+            ):
+                break
+            self.weights = weights
+        chosen: list[UnitHollow] = []
+        widths: list[float] = []
+        for k in np.argsort(-self.weights, kind="stable"):
+            if self.weights[k] <= 0.0:
+                break
+            hollow = self.hollows[k]
+            both = [hollow] if doubled[k] == 1.0 else [hollow, hollow.mirrored()]
+            chosen += both
+            widths += [float(self.weights[k]) / len(both)] * len(both)
+        return chosen, np.array(widths)
