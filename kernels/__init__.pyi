@@ -33,6 +33,9 @@ from .distances.wall_sequences import ConvergenceStep as ConvergenceStep
 from .distances.wall_sequences import study_convergence as study_convergence
 from .inverse.two_mirror_hollow import TwoMirrorHollow as TwoMirrorHollow
 from .inverse.two_mirror_hollow import two_mirrors as two_mirrors
+from .inverse.wall_for_law import WallForLaw as WallForLaw
+from .inverse.wall_for_law import collision_for as collision_for
+from .inverse.wall_for_law import wall_for as wall_for
 from .laws.density import DensityLaw as DensityLaw
 from .laws.ideal import lambertian as lambertian
 from .laws.ideal import maxwell as maxwell

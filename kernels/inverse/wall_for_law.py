@@ -288,7 +288,13 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
     if law.reversible is False:
         raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
     matrix = discretise(law, Legendre(moments), tolerance=TARGET_SHARE * tolerance)
-    return law, matrix.symmetric, matrix.error
+    defect = float(np.linalg.norm(matrix.symmetric - matrix.symmetric.T))
+    if defect > 4.0 * float(matrix.error) + ROUNDED * moments:
+        raise InputError(
+            f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}, whose moments "
+            f"differ from their transpose by {defect:.2g}"
+        )
+    return law, 0.5 * (matrix.symmetric + matrix.symmetric.T), matrix.error
 
 
 def _given(walls: Sequence[Wall]) -> list[UnitHollow]:

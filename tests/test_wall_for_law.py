@@ -1,0 +1,162 @@
+"""Walls for wanted laws: their moments by another way than the search's, their bounds, and what is refused."""
+
+import numpy as np
+import pytest
+
+from asperity import InputError
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.kernels.inverse.hull import few_weights, nearest_weights, possible_gain
+
+MOMENTS = 5
+
+
+@pytest.fixture(scope="module")
+def lambert():
+    return ker.wall_for(ker.lambertian(), moments=MOMENTS)
+
+
+def moments_of(law, number=MOMENTS):
+    return ker.discretise(law, ker.Legendre(number), tolerance=1e-12).symmetric
+
+
+def test_the_wall_for_lamberts_law_has_its_moments_to_rounding(lambert):
+    assert float(lambert.defect) < 1e-12
+    assert float(lambert.defect) + lambert.defect.error < 1e-9
+    assert lambert.wall.closes and lambert.wall.period == 1.0
+
+
+def test_the_same_moments_come_from_rays(lambert):
+    matrix = ker.discretise(
+        ker.WallLaw(lambert.wall), ker.Legendre(MOMENTS), "qmc", samples=2**16, rng=np.random.default_rng(3)
+    )
+    wanted = np.zeros((MOMENTS, MOMENTS))
+    wanted[0, 0] = 1.0
+    assert np.linalg.norm(matrix.symmetric - wanted) < 2.0 * float(matrix.error)
+
+
+def test_the_same_call_gives_the_same_wall_to_the_bit(lambert):
+    assert ker.wall_for(ker.lambertian(), moments=MOMENTS).wall == lambert.wall
+
+
+@pytest.mark.parametrize(
+    "law",
+    [ker.maxwell(0.3), ker.henyey_greenstein(-0.5), 0.5 * ker.specular() + 0.5 * ker.retroreflection()],
+    ids=["maxwell", "henyey-greenstein", "fair coin"],
+)
+def test_diffuse_laws_are_met_to_rounding(law):
+    found = ker.wall_for(law, moments=MOMENTS)
+    assert float(found.defect) < 1e-12
+    assert np.abs(moments_of(ker.WallLaw(found.wall)) - moments_of(law)).max() < 1e-12
+
+
+def test_a_law_without_mirror_symmetry_is_met_with_mirrored_hollows_of_other_weight():
+    skew = geo.Wall.from_vertices([(0, 0), (0.3, -0.8), (1, 0)])
+    law = 0.5 * ker.WallLaw(skew) + 0.5 * ker.lambertian()
+    found = ker.wall_for(law, moments=3)
+    wanted = moments_of(law, 3)
+    assert abs(wanted[1, 2]) > 1e-3
+    assert np.abs(moments_of(ker.WallLaw(found.wall), 3) - wanted).max() < 1e-10
+
+
+def test_a_law_in_the_specular_frame_is_turned_back():
+    law = ker.maxwell(0.5)
+    assert ker.wall_for(law.in_specular_frame(), moments=3).wall == ker.wall_for(law, moments=3).wall
+
+
+def test_matrices_stand_for_laws_and_for_moments():
+    flux = ker.discretise(ker.henyey_greenstein(0.3), ker.Bins(6))
+    by_bins = ker.wall_for(flux, moments=4)
+    assert float(by_bins.defect) < 1e-12
+    assert np.abs(moments_of(ker.WallLaw(by_bins.wall), 4) - moments_of(ker.MatrixLaw(flux), 4)).max() < 1e-11
+    legendre = ker.discretise(ker.henyey_greenstein(0.3), ker.Legendre(4))
+    by_moments = ker.wall_for(legendre, moments=10)
+    assert by_moments.moments == 4 and float(by_moments.defect) < 1e-12
+    with pytest.raises(InputError, match="moments alone"):
+        _ = by_moments.distance
+
+
+def test_the_joint_distance_falls_with_the_moments():
+    law = ker.maxwell(0.5)
+    coarse, fine = ker.wall_for(law, moments=3), ker.wall_for(law, moments=8)
+    assert float(fine.distance) + fine.distance.error < float(coarse.distance) - coarse.distance.error
+
+
+def test_few_hollows_have_a_larger_defect_that_is_reported():
+    found = ker.wall_for(ker.lambertian(), moments=MOMENTS, most_hollows=4)
+    assert len(found.hollows) <= 4 and 1e-3 < float(found.defect) < 1.0
+    difference = moments_of(ker.WallLaw(found.wall)) - moments_of(ker.lambertian())
+    assert float(found.defect) == pytest.approx(np.linalg.norm(difference), rel=1e-9)
+
+
+def test_a_law_outside_the_hull_of_given_hollows_ends_with_its_distance_and_a_bound_of_rounding():
+    found = ker.wall_for(ker.lambertian(), moments=MOMENTS, hollows=[geo.flat(), geo.triangular_teeth(1.0)])
+    assert float(found.defect) > 0.5
+    assert found.bound.kind == "bound" and float(found.bound) < 1e-12
+    # no other share of flat tops is nearer
+    flat, teeth = moments_of(ker.specular()), moments_of(ker.TriangularTeethLaw(1.0))
+    others = [np.linalg.norm(w * flat + (1 - w) * teeth - moments_of(ker.lambertian())) for w in np.linspace(0, 1, 201)]
+    assert min(others) >= float(found.defect) * (1.0 - 1e-12)
+
+
+def test_the_wall_of_a_disk_is_unforeshortened():
+    disk = geo.Disk(1.0, 0.4)
+    wanted = ker.CollisionLaw(ker.maxwell(0.5), disk)
+    found = ker.collision_for(wanted, moments=4)
+    law = ker.CollisionLaw.from_wall(found.wall, disk).law
+    assert np.abs(moments_of(law, 4) - moments_of(wanted.law, 4)).max() < 1e-10
+    assert found.wall_law.wall == found.wall.foreshorten(disk)
+
+
+def test_the_wall_is_saved_loaded_and_mirrored(lambert, tmp_path):
+    lambert.wall.save(tmp_path / "wall.toml")
+    assert geo.load_wall(tmp_path / "wall.toml") == lambert.wall
+    mirrored = moments_of(ker.WallLaw(lambert.wall.mirrored()))
+    assert np.abs(mirrored - moments_of(ker.WallLaw(lambert.wall))).max() < 1e-12
+
+
+def test_the_picture_says_how_many_hollows(lambert):
+    assert f"{len(lambert.hollows)} hollows" in lambert.plot().get_title()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"law": "lambert"}, "law: expected a Law"),
+        ({"law": ker.lambertian(), "moments": 1}, "moments"),
+        ({"law": ker.lambertian(), "tolerance": 0.0}, "tolerance"),
+        ({"law": ker.lambertian(), "hollows": []}, "hollows: expected at least one"),
+        ({"law": ker.lambertian(), "hollows": ["flat"]}, r"hollows\[0\]: expected a Wall"),
+        ({"law": ker.lambertian(), "most_hollows": 0}, "most_hollows"),
+        ({"law": ker.TriangularTeethLaw(1.0) @ ker.henyey_greenstein(0.5)}, "symmetric"),
+    ],
+)
+def test_unsuitable_arguments_are_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        ker.wall_for(**arguments)
+
+
+def test_the_nearest_point_of_a_hull_is_that_of_quadratic_programming():
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        points, target = rng.normal(size=(9, 4)), rng.normal(size=4)
+        weights = nearest_weights(points, target)
+        residual = weights @ points - target
+        assert weights.min() >= 0.0 and weights.sum() == pytest.approx(1.0)
+        # the optimum's condition: no point lies further down the residual than the nearest one
+        assert np.min(points @ residual) >= residual @ (weights @ points) - 1e-12
+        assert possible_gain(points, target, weights) < 1e-6
+        others = rng.dirichlet(np.ones(9), size=200)
+        assert np.linalg.norm(others @ points - target, axis=1).min() >= np.linalg.norm(residual) - 1e-12
+        for other in others[:5]:
+            loss = np.linalg.norm(other @ points - target) - np.linalg.norm(residual)
+            assert possible_gain(points, target, other) >= loss - 1e-12
+
+
+def test_few_weights_keep_to_their_cost():
+    rng = np.random.default_rng(5)
+    points, cost = rng.normal(size=(40, 6)), rng.integers(1, 3, 40).astype(float)
+    weights = few_weights(points, np.zeros(6), cost, 4.0)
+    assert cost[weights > 0.0].sum() <= 4.0
+    one = np.linalg.norm(points[cost <= 4.0], axis=1).min()
+    assert np.linalg.norm(weights @ points) <= one
