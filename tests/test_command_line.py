@@ -239,3 +239,13 @@ def test_the_module_runs_as_a_program(tmp_path):
     failed = subprocess.run([*command, "study", "nosuch"], capture_output=True, text=True, cwd=tmp_path)
     assert failed.returncode == 1 and failed.stdout == ""
     assert failed.stderr.startswith("asperity: 'nosuch' is neither") and failed.stderr.count("\n") == 1
+
+
+def test_a_wall_is_realised_for_a_law_and_written(tmp_path):
+    path = tmp_path / "wall.toml"
+    result = run("realise", "maxwell:0.5", "--moments", "3", "--mass", "1", "--inertia", "0.5", "--out", str(path))
+    assert result.exit_code == 0 and "defect" in result.output and path.exists()
+    assert run("realise", "lambertian", "--out", str(path)).exit_code == 1
+    assert "expected lambertian" in run("realise", "lambert").output
+    assert "a number after" in run("realise", "maxwell:half").output
+    assert run("realise", "lambertian", "--mass", "1").exit_code == 2

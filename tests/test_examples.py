@@ -33,6 +33,7 @@ def test_every_example_has_a_test():
         "published_gap",
         "true_disk",
         "true_disk_pictures",
+        "wall_for_a_law",
     }
     assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
 
@@ -94,15 +95,23 @@ def test_the_gallery_draws_what_its_page_shows(tmp_path, monkeypatch):
     monkeypatch.setattr(gallery, "study_wall", lambda *_, **__: quick)
     monkeypatch.setattr(gallery.measured_profile, "main", lambda **_: quick)
     monkeypatch.setattr(gallery.least_resistance, "main", lambda picture: picture.touch())
+    monkeypatch.setattr(gallery.wall_for_a_law, "main", lambda picture: picture.touch())
     assert list(gallery.main(tmp_path / "gallery")) == ["focusing-arcs", "measured-profile"]
     sys.modules.pop("measured_profile", None)
     sys.modules.pop("least_resistance", None)
+    sys.modules.pop("wall_for_a_law", None)
     drawn = {path.name for path in (tmp_path / "gallery").iterdir()}
     named = {f"{study}-{name}" for study in ("focusing-arcs", "measured-profile") for name in PICTURES}
-    assert drawn == {"walls.png", "least-resistance.png", *named}
+    assert drawn == {"walls.png", "least-resistance.png", "wall-for-a-law.png", *named}
     page = EXAMPLES.parent / "gallery.md"
     committed = EXAMPLES.parent / "gallery"
     assert {path.name for path in committed.iterdir()} == drawn
     for name in drawn:
         assert f"gallery/{name}" in page.read_text(encoding="utf-8")
         assert (committed / name).stat().st_size < 150_000
+
+
+def test_walls_are_found_for_laws(tmp_path):
+    found = load("wall_for_a_law").main(moments=4, picture=tmp_path / "walls.png")
+    assert len(found) == 3 and (tmp_path / "walls.png").stat().st_size > 10_000
+    assert all(float(one.defect) < 1e-10 for one in found.values())

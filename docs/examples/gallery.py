@@ -7,6 +7,7 @@ from pathlib import Path
 
 import least_resistance
 import measured_profile
+import wall_for_a_law
 
 from asperity import geometry as geo
 from asperity.study import PICTURES, Study, study_wall
@@ -14,10 +15,11 @@ from asperity.study.pictures import draw_gallery
 
 
 def main(folder: Path, tolerance: float = 1e-3) -> dict[str, Study]:
-    """Write the named walls, the least resistance, and two studies, which are returned."""
+    """Write the named walls, the least resistance, walls for laws, and two studies, which are returned."""
     folder.mkdir(parents=True, exist_ok=True)
     draw_gallery(folder / "walls.png", overwrite=True)
     least_resistance.main(picture=folder / "least-resistance.png")
+    wall_for_a_law.main(picture=folder / "wall-for-a-law.png")
     studies = {
         "focusing-arcs": study_wall(geo.focusing_arcs(1.2), "focusing-arcs", tolerance=tolerance),
         "measured-profile": measured_profile.main(tolerance=tolerance),

@@ -20,7 +20,8 @@ def nearest_weights(points: Floats, target: Floats) -> Floats:
 
     Examples
     --------
-    >>> nearest_weights(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.array([0.25, 0.25])).tolist()
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    >>> nearest_weights(corners, np.array([0.25, 0.25])).round(14).tolist()
     [0.5, 0.25, 0.25]
     """
     from scipy.optimize import nnls

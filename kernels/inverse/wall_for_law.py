@@ -291,8 +291,8 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
     defect = float(np.linalg.norm(matrix.symmetric - matrix.symmetric.T))
     if defect > 4.0 * float(matrix.error) + ROUNDED * moments:
         raise InputError(
-            f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}, whose moments "
-            f"differ from their transpose by {defect:.2g}"
+            f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}; "
+            f"its moments differ from their transpose by {defect:.2g}"
         )
     return law, 0.5 * (matrix.symmetric + matrix.symmetric.T), matrix.error
 

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from . import __version__
-from .core.errors import AccuracyError, AsperityError, InputError
+from .core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile (mirrored to make it periodic, or profile.txt:seam=step)."""
@@ -149,6 +149,52 @@ def walls(out: Path | None, force: bool) -> None:
         click.echo(f"{entry.name:20s} {entry.summary}" + (f" [{parameters}]" if parameters else ""))
     if out is not None:
         click.echo(f"wrote {out}")
+
+
+@main.command()
+@click.argument("law")
+@click.option("--moments", default=10, show_default=True, help="Meet <e_l, P e_m> for all l, m below this number.")
+@click.option("--tolerance", default=1e-10, show_default=True, help="Defect asked for.")
+@click.option("--hollows", type=click.IntRange(min=1), help="At most this many hollows, with a larger defect.")
+@click.option("--mass", type=float, help="Unforeshorten the wall for a disk of this mass ...")
+@click.option("--inertia", type=float, help="... and this moment of inertia.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the search.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Write the wall into this TOML file.")
+@click.option("--force", is_flag=True, help="Replace the file if it exists.")
+def realise(
+    law: str, moments: int, tolerance: float, hollows: int | None, mass: float | None, inertia: float | None,
+    seed: int, out: Path | None, force: bool,
+) -> None:  # fmt: skip
+    """Find a wall whose reflection law has the moments of LAW, or on which a disk collides by it.
+
+    LAW is lambertian, specular, retroreflection, least-resistance, maxwell:NUMBER, henyey-greenstein:NUMBER, or a file
+    that KernelMatrix.save wrote.
+
+    \b
+    Examples:
+      asperity realise lambertian --out lambert.toml
+      asperity realise maxwell:0.5 --mass 1 --inertia 0.5 --out wall.toml
+    """
+    import numpy as np
+
+    from .geometry import Disk
+    from .kernels import wall_for
+    from .kernels.inverse.named_laws import law_from_text
+
+    if (mass is None) != (inertia is None):
+        raise click.UsageError("--mass and --inertia belong together; give both or none")
+    if out is not None and out.exists() and not force:
+        raise FileExistsRefusal(f"{out} exists; use another name or --force to replace it")
+    disk = None if mass is None or inertia is None else Disk(mass, inertia)
+    found = wall_for(law_from_text(law), moments, tolerance, rng=np.random.default_rng(seed), most_hollows=hollows)
+    wall = found.wall if disk is None else found.wall.unforeshorten(disk)
+    click.echo(f"wall       {len(found.hollows)} hollows, {len(wall.pieces)} pieces, depth {wall.depth:.6g}")
+    click.echo(f"defect     {found.defect} in {found.moments} moments; at most {float(found.bound):.2g} too much")
+    if found.law is not None:
+        click.echo(f"distance   {found.distance} (joint)")
+    if out is not None:
+        wall.save(out, overwrite=force)
+        click.echo(f"wrote      {out}")
 
 
 @main.command()
