@@ -31,6 +31,8 @@ from .distances.two_sample import difference_test as difference_test
 from .distances.wall_sequences import Convergence as Convergence
 from .distances.wall_sequences import ConvergenceStep as ConvergenceStep
 from .distances.wall_sequences import study_convergence as study_convergence
+from .inverse.cell_sequences import Dichotomy as Dichotomy
+from .inverse.cell_sequences import dichotomy as dichotomy
 from .inverse.design import WallDesign as WallDesign
 from .inverse.design import design_wall as design_wall
 from .inverse.two_mirror_hollow import TwoMirrorHollow as TwoMirrorHollow

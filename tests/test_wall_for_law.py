@@ -160,3 +160,18 @@ def test_few_weights_keep_to_their_cost():
     assert cost[weights > 0.0].sum() <= 4.0
     one = np.linalg.norm(points[cost <= 4.0], axis=1).min()
     assert np.linalg.norm(weights @ points) <= one
+
+
+def test_alternating_cells_do_not_converge_and_flattening_ones_do():
+    teeth, flat = geo.triangular_teeth(1.0), geo.flat()
+    alternating = ker.dichotomy([teeth, flat] * 3)
+    assert alternating.verdict == "does not converge"
+    assert alternating.diameters[-1] == alternating.diameters[0] > 0.02
+    assert alternating.distances[0, 2] == 0.0
+    flattening = ker.dichotomy([geo.triangular_teeth(np.pi - 2.0**-k) for k in range(1, 7)])
+    assert flattening.verdict == "converges"
+    assert np.all(np.diff(flattening.diameters) < 0.0)
+    # a scale that keeps the disk within 1 of its limit law is no small one
+    assert flattening.scales[0] == 1e-3
+    with pytest.raises(InputError, match="at least 4 walls"):
+        ker.dichotomy([teeth, flat])
