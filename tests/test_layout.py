@@ -23,7 +23,7 @@ FLOORS = [
     *("geometry.tracing.double_double", "geometry.tracing.compiled", "geometry.tracing"),
     *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries", "geometry.itineraries.compiled"),
     *("geometry.collisions.compiled", "geometry.collisions", "geometry.plotting", "geometry"),
-    *("kernels.bases", "kernels.matrices", "kernels.laws", "kernels.walls", "kernels.expectations", "kernels.sampling"),
+    *("kernels.bases", "kernels.matrices", "kernels.expectations", "kernels.laws", "kernels.walls", "kernels.sampling"),
     *("kernels.discretisation", "kernels.distances", "kernels.collisions", "kernels.inverse", "kernels.aerodynamics"),
     "kernels",
     *("spectral.eigenvalues", "spectral.essential", "spectral.bounds", "spectral.gap", "spectral.consequences"),
