@@ -107,7 +107,12 @@ class WallLaw(DrivenLaw):
 
     @property
     def is_isometric(self) -> bool:
-        """Whether every piece of the wall is straight."""
+        """`is_polygonal`."""
+        return self.is_polygonal
+
+    @property
+    def is_polygonal(self) -> bool:
+        """Whether every piece of the wall is straight, so that the law is made of isometries."""
         return self.wall.is_polygonal
 
     @cached_property
