@@ -1,0 +1,108 @@
+"""The recipe "Add a law" of CONTRIBUTING.md: one dataclass with sample and apply, and whatever else the law knows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError
+from asperity.kernels.bases.basis import AngleFunction
+from asperity.kernels.bases.measure import gauss_rule
+from asperity.kernels.laws.distribution import Distribution
+
+G = 0.2
+ANGLES, WEIGHTS = gauss_rule(np.array([0.0, np.pi]), 96)
+
+
+@dataclass(frozen=True)
+class LinearLaw(ker.Law):
+    """cos(theta') = u' has the density (1 + 3 g u u')/2: the eigenvalues are 1, g on cos(theta), and 0."""
+
+    g: float
+
+    reversible = True
+    mirror_symmetric = True
+    fan_out = ANGLES.size
+
+    def _sample(self, theta: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        slope, draw = 3.0 * self.g * np.cos(theta), rng.random(theta.shape)
+        return np.arccos((slope + 4.0 * draw - 2.0) / (1.0 + np.sqrt((1.0 - slope) ** 2 + 4.0 * slope * draw)))
+
+    def _apply(self, function: AngleFunction, theta: np.ndarray) -> np.ndarray:
+        density = 0.5 * np.sin(ANGLES) * (1.0 + 3.0 * self.g * np.cos(theta)[..., None] * np.cos(ANGLES))
+        weight = WEIGHTS * density
+        value = np.asarray(function(np.broadcast_to(ANGLES, weight.shape)), dtype=np.float64)
+        return np.sum(weight.reshape(weight.shape + (1,) * (value.ndim - weight.ndim)) * value, axis=theta.ndim)
+
+
+@dataclass(frozen=True)
+class KnownLinearLaw(LinearLaw):
+    """The same law, which knows its distribution function besides."""
+
+    def distribution(self, theta: np.ndarray, edges: np.ndarray) -> Distribution:
+        slope = 3.0 * self.g * np.cos(theta)[:, None]
+        return Distribution.without_atoms(np.sin(0.5 * edges) ** 2 + 0.25 * slope * np.sin(edges) ** 2)
+
+
+LAWS = [LinearLaw(G), KnownLinearLaw(G)]
+KNOWN = LAWS[1]
+
+
+def second(law: ker.Law) -> float:
+    """<e_1, P e_1> with e_1 = 3^(1/2) cos(theta)."""
+    return float(ker.discretise(law, ker.Legendre(4)).symmetric[1, 1])
+
+
+@pytest.mark.parametrize("law", LAWS, ids=repr)
+def test_a_law_of_two_methods_has_matrices_a_spectrum_and_a_resistance(law: ker.Law) -> None:
+    matrix = ker.discretise(law, ker.Legendre(4), tolerance=1e-10)
+    assert np.abs(matrix.symmetric - np.diag([1.0, G, 0.0, 0.0])).max() <= float(matrix.error) + 1e-12
+    binned = ker.discretise(law, ker.Bins(6), "monte-carlo", samples=2**14)
+    centres = (np.arange(6) - 2.5) / 3.0
+    exact = (1.0 + 3.0 * G * np.outer(centres, centres)) / 6.0
+    # the error is a quantile of 95 %
+    assert np.linalg.norm(binned.symmetric - exact) <= 1.5 * float(binned.error)
+    assert spec.spectrum(law, 2).values == pytest.approx([1.0, G], abs=1e-8)
+    gap = spec.spectral_gap(law, tolerance=1e-6)
+    assert abs(float(gap) - (1.0 - G)) <= gap.error + 1e-12
+    assert float(ker.resistance(law)) == pytest.approx(0.75 * (1.0 + G / 3.0 + math.pi**2 / 16.0), abs=1e-9)
+
+
+def test_a_law_composes_mixes_and_changes_its_frame() -> None:
+    law = LAWS[0]
+    assert second(law @ law) == second(law**2) == pytest.approx(G**2, abs=1e-9)
+    assert second(0.25 * law + 0.75 * ker.lambertian()) == pytest.approx(0.25 * G, abs=1e-9)
+    assert second(law.in_specular_frame()) == pytest.approx(-G, abs=1e-9)
+    assert second(ker.TriangularTeethLaw(1.1) @ law) == pytest.approx(G * second(ker.TriangularTeethLaw(1.1)), abs=1e-8)
+
+
+def test_distances_are_those_of_the_distribution_that_a_law_knows_or_of_its_expectations() -> None:
+    # W_1 between the rows at theta is 3 g |cos(theta)| pi/8
+    exact = 3.0 * G * math.pi / 16.0
+    by_apply, known = (ker.distance(law, ker.lambertian(), kind="rows", tolerance=1e-4) for law in LAWS)
+    assert abs(float(known) - exact) <= known.error and known.error <= 1e-4
+    assert float(by_apply) == pytest.approx(exact, abs=0.05)
+    mirrored = ker.distance(KNOWN.in_specular_frame(), ker.lambertian().in_specular_frame(), kind="rows")
+    assert abs(float(mirrored) - exact) <= mirrored.error
+    mixed = ker.distance(0.5 * KNOWN + 0.5 * ker.lambertian(), ker.lambertian(), kind="rows")
+    assert abs(float(mixed) - 0.5 * exact) <= mixed.error
+    # not with itself: of the later factor the matrix on cells counts, which `apply` gives roughly
+    product = ker.distance(KNOWN @ ker.specular(), ker.lambertian(), kind="rows", tolerance=1e-2)
+    assert abs(float(product) - exact) <= product.error
+
+
+def test_what_a_law_does_not_say_has_a_default() -> None:
+    law = LAWS[0]
+    assert law.closed_form is law.exact_law is law.random_map() is law.isometry_table() is None
+    points, left_out = law.breakpoints(8)
+    assert points.size == law.outgoing_breakpoints.size == 0 and left_out == math.inf
+    basis = ker.Legendre(2)
+    means, errors = law.expectations(basis)(np.array([1.0]), 1e-6)
+    assert means @ basis.project(np.cos) == pytest.approx([G * math.cos(1.0)]) and np.isnan(errors).all()
+    with pytest.raises(InputError, match="no method 'qmc'"):
+        ker.discretise(law, ker.Bins(4), "qmc")
