@@ -13,7 +13,7 @@ from asperity.errors import InputError
 from asperity.kernels import SINE, SINE_SQUARED, Bins, Legendre, Panels
 from asperity.kernels.bases import assembly as products_module
 from asperity.kernels.bases import measure as weights_module
-from asperity.kernels.bases.assembly import add_products, cell_index, one_blas_thread, overlaps
+from asperity.kernels.bases.assembly import add_products, one_blas_thread, overlaps
 from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
 
 UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]
@@ -332,10 +332,9 @@ def test_long_sums_are_cut_into_pieces_of_bounded_size(monkeypatch) -> None:
 
 def test_cells_of_angles_and_overlaps_with_known_functions() -> None:
     angle = np.array([0.0, 0.4, 0.5, 2.0, 3.0, np.pi])
-    assert cell_index(Bins(UNEVEN), angle).tolist() == [0, 1, 1, 3, 3, 3]
-    assert cell_index(Bins(2), angle).tolist() == [0, 0, 0, 1, 1, 1]
-    edges_only = SimpleNamespace(edges=np.array(UNEVEN))
-    assert cell_index(edges_only, angle).tolist() == [0, 1, 1, 3, 3, 3]
+    assert Bins(UNEVEN).index(angle).tolist() == [0, 1, 1, 3, 3, 3]
+    assert Bins(2).index(angle).tolist() == [0, 0, 0, 1, 1, 1]
+    assert Panels(UNEVEN, 1).index(angle).tolist() == [0, 1, 1, 3, 3, 3]
     # <1, cos> = 0, <sqrt(3) cos, cos> = 1 / sqrt(3); <1, cos^2> = 1/3, <P_2, cos^2> = 2 / (3 sqrt(5))
     found = overlaps(
         Legendre(3), lambda theta: np.stack([np.cos(theta), np.cos(theta) ** 2], axis=-1), [0.0, 1.0, np.pi]

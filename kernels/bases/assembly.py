@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from .basis import Basis
-from .intervals import cell_among
 from .measure import gauss_rule
 from .panels import Panels
 
@@ -32,12 +31,6 @@ def _blas() -> Any:
     return ThreadpoolController()
 
 
-def cell_index(basis: Basis, angle: Floats) -> NDArray[np.int64]:
-    """The cell of each angle in a partition of (0, pi)."""
-    index = getattr(basis, "index", None)
-    return cell_among(basis.edges, angle) if index is None else np.asarray(index(angle), dtype=np.int64)
-
-
 def overlaps(basis: Basis, functions: Callable[[Floats], Floats], edges: Floats) -> Floats:
     """<e_i, f_j>, shape (n, k), for functions f_j that are smooth between the edges: values of shape (angles, k)."""
     angle, weight = basis.measure.quadrature(edges, basis.nodes_per_interval)
@@ -47,11 +40,9 @@ def overlaps(basis: Basis, functions: Callable[[Floats], Floats], edges: Floats)
 def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats) -> None:
     """Add the sum of weight e_i(incoming) e_j(outgoing) over the pairs to ``total``, shape (n, n)."""
     if basis.is_partition:
-        add_masses(total, basis, cell_index(basis, incoming), cell_index(basis, outgoing), weight)
+        add_masses(total, basis, basis.index(incoming), basis.index(outgoing), weight)
         return
-    own = getattr(basis, "add_products", None)
-    if own is not None:
-        own(total, incoming, outgoing, weight)
+    if basis.add_products(total, incoming, outgoing, weight):
         return
     if isinstance(basis, Panels):
         (source, values), (target, images) = basis.local(incoming), basis.local(outgoing)

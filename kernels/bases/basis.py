@@ -7,9 +7,10 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
+from .intervals import cell_among
 from .measure import AngularMeasure
 
 Frame = Literal["paper", "specular"]
@@ -27,6 +28,16 @@ class Basis(ABC):
     def is_partition(self) -> bool:
         """Whether the functions are normalised indicators of cells, so that matrices of cell-to-cell masses exist."""
         return False
+
+    @property
+    def local_part(self) -> Basis:
+        """The functions that vanish outside some interval between edges; the whole basis but where it adds others."""
+        return self
+
+    @property
+    def polynomials_besides(self) -> int:
+        """The number of polynomials in cos(theta) on the whole of (0, pi) that stand beside the local part."""
+        return 0
 
     @property
     @abstractmethod
@@ -76,6 +87,17 @@ class Basis(ABC):
 
     def __hash__(self) -> int:
         return hash((type(self).__name__, self.key()))
+
+    def index(self, angle: ArrayLike) -> NDArray[np.int64]:
+        """The number of the interval between edges in which each angle lies."""
+        return cell_among(self.edges, np.asarray(angle, dtype=np.float64))
+
+    def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> bool:
+        """Add the sum of weight e_i(incoming) e_j(outgoing) to ``total``; returns False where the basis has no own way.
+
+        `asperity.kernels.bases.assembly.add_products` does it for those.
+        """
+        return False
 
     @abstractmethod
     def coarsened(self) -> tuple[Basis, Floats] | None:

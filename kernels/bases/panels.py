@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -68,13 +68,13 @@ class Panels(Basis):
         object.__setattr__(self, "_coefficients", frozen(self._orthonormalise()))
 
     @classmethod
-    def for_wall(cls, wall: Wall | Any, degree: int = 6, smallest: float = SMALLEST) -> Panels:
+    def for_wall(cls, wall: Wall, degree: int = 6, smallest: float = SMALLEST) -> Panels:
         """Panels for the law of a wall: graded towards grazing and, for one circular arc, its critical angles.
 
         Parameters
         ----------
         wall : Wall
-            The wall, or anything with ``pieces``; of a wall those of its ``cell`` are looked at.
+            The pieces of its ``cell`` are looked at.
         degree : int
             Degree on each panel.
         smallest : float
@@ -85,8 +85,12 @@ class Panels(Basis):
         The rows of the law of a circular arc of half angle xi have kinks at theta = xi (1 +- 1/N) and at their
         mirror images; they accumulate at xi, towards which the panels are graded instead of following them all.
         """
+        return cls.for_arc(_single_arc_half_angle(wall), degree, smallest)
+
+    @classmethod
+    def for_arc(cls, half_angle: float | None, degree: int = 6, smallest: float = SMALLEST) -> Panels:
+        """Panels as `for_wall` makes them for one circular arc; None for any other wall."""
         smallest = number_between("smallest", smallest, 1e-12, 0.5)
-        half_angle = _single_arc_half_angle(wall)
         special = [0.0, np.pi]
         followed: list[float] = []
         if half_angle is not None:
@@ -182,11 +186,13 @@ class Panels(Basis):
         return f"Panels(<{self._cells.size + 1} edges>, {self.degree}{weight})"
 
 
-def _single_arc_half_angle(wall: Any) -> float | None:
-    pieces = tuple(getattr(wall, "cell", wall).pieces)
-    if len(pieces) != 1 or not getattr(pieces[0], "is_circular", False):
+def _single_arc_half_angle(wall: Wall) -> float | None:
+    from ...geometry import Arc
+
+    pieces = wall.cell.pieces
+    if len(pieces) != 1 or not isinstance(pieces[0], Arc) or not pieces[0].is_circular:
         return None
-    half_angle = float(getattr(pieces[0], "half_span", 0.0))
+    half_angle = pieces[0].half_span
     return half_angle if 0.0 < half_angle <= 0.5 * np.pi else None
 
 

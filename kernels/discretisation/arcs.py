@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..bases.angles import flipped, kept_inside
-from ..bases.assembly import add_blocks, add_masses, cell_index
+from ..bases.assembly import add_blocks, add_masses
 from ..bases.basis import Basis
 from ..bases.intervals import between_cuts, edges_inside, ragged
 from ..bases.measure import gauss_on_intervals
@@ -194,7 +194,7 @@ def _add_rows(
     if basis.is_partition:
         target = np.clip(above - 1, 0, basis.size - 1)
         target = basis.size - 1 - target if mirrored else target
-        add_masses(total, basis, cell_index(basis, incoming)[row], target, mass)
+        add_masses(total, basis, basis.index(incoming)[row], target, mass)
         return float(mass.sum())
     width = np.diff(edges)[np.clip(above - 1, 0, edges.size - 2)]
     short = 2.0 * strips.hits[row] * (high - low) * basis.nodes_per_interval < width

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..bases.assembly import add_products, cell_index
+from ..bases.assembly import add_products
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.intervals import bisected
@@ -145,13 +145,13 @@ def _row_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, ord
 
 def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
     angle, mass = SINE.quadrature(outer, order)
-    source = cell_index(basis, angle)
+    source = basis.index(angle)
     flux = np.zeros(basis.size**2)
     step = max(1, ROW_CHUNK // (SHARE_NODES[0] * edges.size))
     for start in range(0, angle.size, step):
         part = slice(start, start + step)
         row, low, high, nodes = row_intervals(law, edges, angle[part])
-        target = cell_index(basis, 0.5 * (low + high))
+        target = basis.index(0.5 * (low + high))
         for count in SHARE_NODES:
             chosen = nodes == count
             outgoing, inner = gauss_on_intervals(low[chosen], high[chosen], count)
@@ -187,7 +187,7 @@ def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> F
     mass = weight * SINE.density(angle)
     total = np.zeros((basis.size, basis.size))
     step = max(CHUNK // angle.size // order, 1) * order
-    owner = cell_index(basis, 0.5 * (edges[1:] + edges[:-1])) if basis.is_partition else None
+    owner = basis.index(0.5 * (edges[1:] + edges[:-1])) if basis.is_partition else None
     values = basis.evaluate(angle) if owner is None else None
     for start in range(0, angle.size, step):
         rows = slice(start, start + step)
@@ -236,8 +236,8 @@ def _crossings(map_angle: Callable[[Floats], Floats], basis: Basis, fine: Floats
     """Angles inside the given intervals at which the image passes from one cell to another, one an interval."""
     inset = 1e-6 * np.diff(fine)
     low, high = fine[:-1] + inset, fine[1:] - inset
-    first = cell_index(basis, np.asarray(map_angle(low), dtype=np.float64))
-    last = cell_index(basis, np.asarray(map_angle(high), dtype=np.float64))
+    first = basis.index(np.asarray(map_angle(low), dtype=np.float64))
+    last = basis.index(np.asarray(map_angle(high), dtype=np.float64))
     changing = first != last
     low, high, first = low[changing], high[changing], first[changing]
-    return bisected(low, high, lambda middle: cell_index(basis, np.asarray(map_angle(middle))) == first)
+    return bisected(low, high, lambda middle: basis.index(np.asarray(map_angle(middle))) == first)

@@ -7,7 +7,6 @@ from typing import Any, cast
 import numpy as np
 
 from ...core.checks import Floats
-from ..bases.assembly import cell_index
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import DrivenLaw, Law
@@ -67,7 +66,7 @@ def _product_rule(law: DrivenLaw, basis: Basis, samples: int, split: int) -> Flo
 
 
 def _add_masses(total: Floats, basis: Basis, angle: Floats, outgoing: Floats, mass: Floats) -> None:
-    cell = cell_index(basis, angle)[:, None] * basis.size + cell_index(basis, outgoing)
+    cell = basis.index(angle)[:, None] * basis.size + basis.index(outgoing)
     weights = np.broadcast_to(mass[:, None], cell.shape).ravel()
     total += np.bincount(cell.ravel(), weights=weights, minlength=basis.size**2).reshape(total.shape)
 

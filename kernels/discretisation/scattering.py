@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..bases.assembly import cell_index, one_blas_thread
+from ..bases.assembly import one_blas_thread
 from ..bases.basis import Basis
 from ..bases.legendre import DEGREES_PER_PANEL, DIGITS, Legendre
 from ..bases.measure import AngularMeasure
@@ -55,7 +55,6 @@ class JointBasis(Basis):
 
     def __init__(self, basis: Basis, degrees: int) -> None:
         self.first, self.polynomials = basis, Legendre(degrees)
-        self.polynomial_degree = degrees
         # short enough for one rule on each to follow the polynomials
         self._edges = split(basis.edges, DEGREES_PER_PANEL * np.pi / degrees)
 
@@ -91,8 +90,16 @@ class JointBasis(Basis):
     def coarsened(self) -> None:
         return None
 
-    def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> None:
-        """As `products.add_products`, with the functions of the first basis as a sparse matrix."""
+    @property
+    def local_part(self) -> Basis:
+        return self.first
+
+    @property
+    def polynomials_besides(self) -> int:
+        return self.polynomials.n
+
+    def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> bool:
+        """As `asperity.kernels.bases.assembly.add_products`, with the local functions as a sparse matrix."""
         size = self.first.size
         step = max(1, CHUNK // self.polynomials.n)
         for start in range(0, incoming.size, step):
@@ -105,6 +112,7 @@ class JointBasis(Basis):
             total[:size, :size] += (source.T @ target.multiply(weight[part, None]).tocsr()).toarray()
             with one_blas_thread():
                 total[size:, size:] += before.T @ after
+        return True
 
 
 def split(edges: Floats, widest: float) -> Floats:
@@ -126,7 +134,7 @@ def local_values(basis: Basis, angle: Floats) -> Any:
 
     rows = np.arange(angle.size)
     if basis.is_partition:
-        cell = cell_index(basis, angle)
+        cell = basis.index(angle)
         return csr_array((basis.heights[cell], (rows, cell)), shape=(angle.size, basis.size))
     if isinstance(basis, Panels):
         panel, values = basis.local(angle)

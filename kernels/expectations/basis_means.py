@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
-from ..bases.assembly import cell_index
 from ..bases.basis import AngleFunction, Basis
 from ..bases.legendre import Legendre
 from ..bases.measure import gauss_rule
@@ -188,7 +187,7 @@ def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray
     rows, size = len(starts) - 1, basis.size
     if basis.is_partition:
         owner = np.repeat(np.arange(rows), np.diff(starts))
-        cell = owner * size + cell_index(basis, nodes)
+        cell = owner * size + basis.index(nodes)
         mass = np.bincount(cell, weights=weights, minlength=rows * size).reshape(rows, size)
         return np.asarray(mass * basis.evaluate(0.5 * (basis.edges[1:] + basis.edges[:-1])).max(0))
     if isinstance(basis, Panels):

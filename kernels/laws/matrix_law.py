@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import InputError
 from ..bases.angles import kept_inside
-from ..bases.basis import AngleFunction, Frame
+from ..bases.basis import AngleFunction, Basis, Frame
+from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
+from ..matrices.matrix import KernelMatrix
 from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw
 from .law import set_facts
 
 # Rows that were divided by their sum add up to 1 within a few roundings; rows of a matrix whose flux was symmetrised
 # instead do not, and are no law.
 ROW_SUM_TOLERANCE = 1e-9
-
-
-class _Binned(Protocol):
-    """What a KernelMatrix offers; the basis must be `Bins` in theta."""
-
-    @property
-    def array(self) -> Floats: ...
-    @property
-    def basis(self) -> object: ...
 
 
 class MatrixLaw(DensityLaw):
@@ -66,14 +57,16 @@ class MatrixLaw(DensityLaw):
     edges: Floats
     _masses: Floats
 
-    def __init__(self, matrix: _Binned | ArrayLike) -> None:
-        basis = getattr(matrix, "basis", None)
-        given: Any = matrix if basis is None else getattr(matrix, "array", None)
-        array = finite_array("matrix", given)
+    def __init__(self, matrix: KernelMatrix | ArrayLike) -> None:
+        basis = matrix.basis if isinstance(matrix, KernelMatrix) else None
+        array = finite_array("matrix", matrix.array if isinstance(matrix, KernelMatrix) else matrix)
         if array.ndim != 2 or array.shape[0] != array.shape[1] or array.size == 0:
             raise InputError(f"matrix: expected a square array of probabilities, got shape {array.shape}")
         size = array.shape[0]
         edges = SINE.quantile(np.arange(size + 1) / size) if basis is None else _bin_edges(basis, size)
+        self._fill(array, edges, matrix.frame if isinstance(matrix, KernelMatrix) else "paper")
+
+    def _fill(self, array: Floats, edges: Floats, frame: Frame) -> None:
         if array.min() < -NEGATIVE_TOLERANCE:
             row, column = np.unravel_index(int(np.argmin(array)), array.shape)
             raise InputError(
@@ -91,7 +84,7 @@ class MatrixLaw(DensityLaw):
         array = array / sums[:, None]
         set_facts(self, array=frozen(array), edges=frozen(edges), _masses=masses)
         set_facts(self, outgoing_breakpoints=frozen(edges[1:-1]))
-        set_facts(self, frame=getattr(matrix, "frame", "paper"), fan_out=size * GAUSS_NODES)
+        set_facts(self, frame=frame, fan_out=array.shape[0] * GAUSS_NODES)
         flux = masses[:, None] * array
         set_facts(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= SYMMETRY_TOLERANCE * np.max(flux)))
         even = bool(np.max(np.abs(masses - masses[::-1])) <= SYMMETRY_TOLERANCE)
@@ -118,7 +111,9 @@ class MatrixLaw(DensityLaw):
             raise InputError(
                 f"{self!r} does not preserve sin(theta) d theta (defect {defect:.2g}), so its adjoint is not a law"
             )
-        return MatrixLaw(_OnBins(reverse, self.edges, self.frame))
+        law = object.__new__(MatrixLaw)
+        law._fill(reverse, self.edges, self.frame)
+        return law
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         angle, weight = SINE.quadrature(self.edges, GAUSS_NODES)
@@ -142,25 +137,13 @@ class MatrixLaw(DensityLaw):
         return f"MatrixLaw({self.array.shape[0]} bins)"
 
 
-class _OnBins:
-    """An array with the edges of its bins, in the shape of a KernelMatrix."""
-
-    def __init__(self, array: Floats, edges: Floats, frame: Frame) -> None:
-        self.array, self.edges, self.frame, self.measure = array, edges, frame, SINE
-
-    @property
-    def basis(self) -> _OnBins:
-        return self
-
-
-def _bin_edges(basis: object, size: int) -> Floats:
-    edges, measure = getattr(basis, "edges", None), getattr(basis, "measure", None)
-    if edges is None or np.size(edges) != size + 1 or getattr(measure, "name", None) != "sin":
+def _bin_edges(basis: Basis, size: int) -> Floats:
+    if not isinstance(basis, Bins) or basis.size != size or basis.measure != SINE:
         raise InputError(
             f"matrix: expected a KernelMatrix on Bins in theta, got one on {basis!r}; discretise the law on Bins, or "
             "pass a plain array of probabilities"
         )
-    return np.asarray(edges, dtype=np.float64)
+    return basis.edges
 
 
 def _uniform_between(low: Floats, high: Floats, share: Floats) -> Floats:

@@ -14,7 +14,7 @@ from ...core.checks import Floats
 from ...core.errors import AccuracyError
 from ...core.estimates import LEVEL
 from ...core.rounding import EPS
-from ..bases.assembly import add_products, cell_index
+from ..bases.assembly import add_products
 from ..bases.basis import Basis
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, replicate_z_score, reversibility_z_score
 
@@ -55,7 +55,7 @@ class SampledArray:
 def count_pairs(basis: Basis, incoming: Floats, outgoing: Floats) -> Counts:
     """Numbers of pairs from cell i to cell j, shape (n, n)."""
     n = basis.size
-    cell = cell_index(basis, incoming).ravel() * n + cell_index(basis, outgoing).ravel()
+    cell = basis.index(incoming).ravel() * n + basis.index(outgoing).ravel()
     return np.bincount(cell, minlength=n * n).reshape(n, n).astype(np.int64, copy=False)
 
 

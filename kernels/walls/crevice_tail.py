@@ -68,7 +68,7 @@ def first_crossing(basis: Basis) -> int:
 
 def _stiffness(basis: Basis) -> int:
     """The number of polynomials in cos(theta) on the whole of (0, pi) that the basis has."""
-    return basis.size if isinstance(basis, Legendre) else int(getattr(basis, "polynomial_degree", 0))
+    return basis.size if isinstance(basis, Legendre) else basis.polynomials_besides
 
 
 def crevice_nodes(
@@ -138,7 +138,7 @@ def _cells(basis: Basis) -> tuple[Floats, int, int]:
         return regular, MORE_BLOCK_NODES, MORE_HALF_NODES
     both = np.unique(np.concatenate([regular, basis.edges, np.pi - basis.edges]))
     cells = both[(both > 0.0) & (both < 0.5 * np.pi)]
-    first = getattr(basis, "first", basis)
+    first = basis.local_part
     extra = first.degree if isinstance(first, Panels) else 0 if first.is_partition else first.nodes_per_interval
     if number:
         return cells, extra + MORE_BLOCK_NODES, extra + MORE_HALF_NODES

@@ -154,7 +154,9 @@ def _is_plain(run: float) -> bool:
 
 def _direction(side: Curve) -> Floats:
     """The unit tangent at the start; of a Bezier curve that stands still there its limit."""
-    points = np.array(getattr(side, "control_points", ()))
+    from ...geometry import Bezier
+
+    points = np.array(side.control_points if isinstance(side, Bezier) else ())
     ahead = [point for point in points[1:] - points[:1] if np.any(point)] if points.size else []
     return np.asarray(ahead[0] / np.hypot(*ahead[0]) if ahead else side.tangent(0.0))
 

@@ -170,19 +170,12 @@ def _steps(law: Law) -> Iterator[tuple[Basis, int]]:
     inner = inner.closed_form or inner
     if isinstance(inner, CircularArcLaw) and inner.half_angle > SHALLOW:
         for degree, smallest in ARC_PANELS:
-            yield Panels.for_wall(_OneArc(inner.half_angle), degree, smallest), FIRST_SAMPLES
+            yield Panels.for_arc(inner.half_angle, degree, smallest), FIRST_SAMPLES
         return
     samples = FIRST_SAMPLES
     for degree in DEGREES:
         yield Legendre(degree), samples
         samples = min(4 * samples, LARGEST_SAMPLES)
-
-
-class _OneArc:
-    """What `Panels.for_wall` looks at."""
-
-    def __init__(self, half_angle: float) -> None:
-        self.is_circular, self.half_span, self.pieces = True, half_angle, (self,)
 
 
 def _noise(level: Spectrum) -> float:
