@@ -13,6 +13,7 @@ from numpy.polynomial import legendre
 from scipy.special import ellipe
 
 from asperity.errors import AccuracyError, InputError
+from asperity.estimates import Estimate
 from asperity.kernels.bases.bins import Bins
 from asperity.kernels.bases.legendre import Legendre
 from asperity.kernels.bases.measure import SINE
@@ -22,8 +23,10 @@ from asperity.kernels.laws.involution import InvolutionLaw
 from asperity.kernels.laws.law import retroreflection, specular
 from asperity.kernels.laws.matrix_law import MatrixLaw
 from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw, henyey_greenstein
+from asperity.kernels.matrices.matrix import KernelMatrix
 
 THETA = np.array([1e-12, 1e-4, 0.2, 0.9, math.pi / 2, 2.2, 3.0, math.pi - 1e-4, math.pi - 1e-12])
+EXACT = Estimate(0.0, 0.0, "bound", "given")
 
 
 def polynomial(degree: int):
@@ -263,17 +266,18 @@ def test_matrix_law_samples_follow_rows_and_are_uniform_in_the_cosine() -> None:
 
 
 def test_a_matrix_law_measures_reversibility_with_the_masses_of_its_bins() -> None:
-    class OnBins:
-        def __init__(self, array: list[list[float]], edges: list[float]) -> None:
-            self.array, self.basis = np.array(array), Bins(np.array(edges))
+    def on_bins(array: list[list[float]], edges: list[float]) -> KernelMatrix:
+        basis = Bins(np.array(edges))
+        root = np.sqrt(basis.weights)
+        return KernelMatrix(root[:, None] * np.array(array) / root, basis, EXACT)
 
     # masses 1/4 and 3/4: detailed balance needs P[0, 1] = 3 P[1, 0]
     edges = [0.0, math.pi / 3, math.pi]
-    assert MatrixLaw(OnBins([[0.4, 0.6], [0.2, 0.8]], edges)).reversible is True
-    assert MatrixLaw(OnBins([[0.4, 0.6], [0.6, 0.4]], edges)).reversible is False
-    assert MatrixLaw(OnBins([[0.4, 0.6], [0.2, 0.8]], edges)).mirror_symmetric is None
+    assert MatrixLaw(on_bins([[0.4, 0.6], [0.2, 0.8]], edges)).reversible is True
+    assert MatrixLaw(on_bins([[0.4, 0.6], [0.6, 0.4]], edges)).reversible is False
+    assert MatrixLaw(on_bins([[0.4, 0.6], [0.2, 0.8]], edges)).mirror_symmetric is None
     with pytest.raises(InputError, match="does not preserve"):
-        MatrixLaw(OnBins([[0.4, 0.6], [0.6, 0.4]], edges)).adjoint()
+        MatrixLaw(on_bins([[0.4, 0.6], [0.6, 0.4]], edges)).adjoint()
 
 
 def test_matrices_that_are_no_laws_are_refused_by_row() -> None:
@@ -284,14 +288,7 @@ def test_matrices_that_are_no_laws_are_refused_by_row() -> None:
     with pytest.raises(InputError, match="square"):
         MatrixLaw([[0.5, 0.5]])
 
-    class InLegendre:
-        array, basis = np.eye(3), Legendre(3)
-
     with pytest.raises(InputError, match="on Bins in theta"):
-        MatrixLaw(InLegendre())
-
-    class InPsi:
-        array, basis = np.eye(2), Bins(2, weight="sin2")
-
+        MatrixLaw(KernelMatrix(np.eye(3), Legendre(3), EXACT))
     with pytest.raises(InputError, match="on Bins in theta"):
-        MatrixLaw(InPsi())
+        MatrixLaw(KernelMatrix(np.eye(2), Bins(2, weight="sin2"), EXACT))

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from types import SimpleNamespace
 
 import mpmath
 import numpy as np
 import pytest
 
+from asperity import geometry as geo
 from asperity.errors import InputError
 from asperity.kernels import SINE, SINE_SQUARED, Bins, Legendre, Panels
 from asperity.kernels.bases import assembly as products_module
@@ -243,7 +243,7 @@ def near(edges: np.ndarray, angle: float) -> bool:
 
 
 def test_panels_for_a_plain_wall_are_graded_to_grazing_alone() -> None:
-    basis = Panels.for_wall(SimpleNamespace(pieces=("a", "b")))
+    basis = Panels.for_wall(geo.triangular_teeth(1.0))
     edges = basis.edges
     # 0.35^9 < 1e-4 < 0.35^8: nine panels on either side of the middle, and no smaller ones
     assert edges[1] == pytest.approx(0.5 * np.pi * 0.35**9, rel=1e-14)
@@ -255,14 +255,13 @@ def test_panels_for_a_plain_wall_are_graded_to_grazing_alone() -> None:
     # the gaps wider than pi/24 are pi/2 0.65 0.35^k: they are cut into 8, 3 and 1 equal parts, those below stay whole
     assert edges.size - 1 == 2 * (8 + 3 + 8)
     assert np.ptp(np.diff(edges[(edges > 0.55) & (edges < 1.58)])) < 1e-13
-    fine = Panels.for_wall(SimpleNamespace(pieces=()), degree=2, smallest=1e-8)
+    fine = Panels.for_wall(geo.triangular_teeth(1.0), degree=2, smallest=1e-8)
     assert fine.edges[1] == pytest.approx(0.5 * np.pi * 0.35**18, rel=1e-14) and fine.degree == 2
 
 
 @pytest.mark.parametrize("half_angle", [0.3, 1.2])
 def test_panels_for_an_arc_follow_five_kinks_and_are_graded_to_where_they_gather(half_angle: float) -> None:
-    wall = SimpleNamespace(pieces=(SimpleNamespace(is_circular=True, half_span=half_angle),))
-    edges = Panels.for_wall(wall).edges
+    edges = Panels.for_wall(geo.focusing_arcs(half_angle)).edges
     mirrored = lambda angle: near(edges, angle) and near(edges, np.pi - angle)  # noqa: E731
     assert mirrored(half_angle)
     kinks = [half_angle * (1.0 + sign / n) for n in range(1, 6) for sign in (1.0, -1.0)]
@@ -280,28 +279,23 @@ def test_panels_for_an_arc_follow_five_kinks_and_are_graded_to_where_they_gather
 
 
 def test_angles_that_nearly_coincide_are_one_edge() -> None:
-    arc = lambda half_span, **more: SimpleNamespace(  # noqa: E731
-        pieces=(SimpleNamespace(is_circular=True, half_span=half_span, **more),)
-    )
     # pi/3 (1 + 1/2) is pi/2 up to rounding; at pi/2 both critical angles are one
     for half_angle in (np.pi / 3, 0.5 * np.pi, 0.5 * np.pi - 1e-7, 1e-3):
-        edges = Panels.for_wall(arc(half_angle)).edges
+        edges = Panels.for_arc(half_angle).edges
         assert np.diff(edges).min() > 1e-5 - 1e-12 and edges[-1] == np.pi
         assert np.abs(edges - half_angle).min() < 1e-5
-    plain = Panels.for_wall(SimpleNamespace(pieces=()))
-    assert Panels.for_wall(arc(0.5 * np.pi)) != plain
+    plain = Panels.for_wall(geo.flat())
+    assert Panels.for_arc(0.5 * np.pi) != plain == Panels.for_arc(None)
     # no circular arc of at most a quarter turn either way: nothing to follow
-    straight = SimpleNamespace(pieces=(SimpleNamespace(is_circular=False, half_span=1.2),))
-    two = SimpleNamespace(pieces=arc(1.2).pieces * 2)
-    partly = lambda **known: SimpleNamespace(pieces=(SimpleNamespace(**known),))  # noqa: E731
-    for wall in (arc(0.0), arc(1.6), arc(-0.3), straight, two, partly(half_span=1.2), partly(is_circular=True)):
+    two = geo.Wall(
+        [piece.stretched(0.5, 0.5).moved(x, 0.0) for x in (0.0, 0.5) for piece in geo.focusing_arcs(1.2).pieces]
+    )
+    for wall in (geo.elliptical_arcs(1.0, geo.Disk(1.0, 0.5)), two):
         assert Panels.for_wall(wall) == plain
-    inside = SimpleNamespace(cell=arc(1.2), pieces=())
-    assert Panels.for_wall(inside) == Panels.for_wall(arc(1.2))
     with pytest.raises(InputError, match="smallest"):
-        Panels.for_wall(arc(1.2), smallest=0.6)
+        Panels.for_arc(1.2, smallest=0.6)
     with pytest.raises(InputError, match="smallest"):
-        Panels.for_wall(arc(1.2), smallest=1e-13)
+        Panels.for_wall(geo.flat(), smallest=1e-13)
 
 
 @pytest.mark.parametrize(
