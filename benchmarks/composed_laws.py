@@ -33,6 +33,7 @@ from scipy.special import erfc
 from threadpoolctl import threadpool_limits
 
 from asperity import kernels as ker
+from asperity.core.tables import table
 from asperity.errors import InputError
 
 # Extended precision where the processor has it, so that errors near rounding can be told; rows of arcs are in float64.
@@ -734,18 +735,15 @@ def summary(found: Sequence[Outcome]) -> str:
     return f"{len(found)} | {len(told) - false} | {false} | {unknown} | {worst:.2g} | {median}"
 
 
-def table(found: Sequence[tuple[str, Outcome]]) -> str:
+def table_of(found: Sequence[tuple[str, Outcome]]) -> str:
     """A line for each method and kind of basis."""
     groups: dict[tuple[str, str], list[Outcome]] = defaultdict(list)
     for kind, one in found:
         groups[one.method, kind].append(one)
-    lines = [
-        "| method | basis | matrices | hold | do not | cannot be told | largest true/reported | median reported/true |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    lines += [f"| {method} | {kind} | {summary(some)} |" for (method, kind), some in sorted(groups.items())]
-    computed = [one for _, one in found if one.method != "rays"]
-    return "\n".join([*lines, f"| all but rays | | {summary(computed)} |"])
+    lines = [f"{method} | {kind} | {summary(some)}" for (method, kind), some in sorted(groups.items())]
+    lines.append(f"all but rays |  | {summary([one for _, one in found if one.method != 'rays'])}")
+    heads = "method | basis | matrices | hold | do not | cannot be told | largest true/reported | median reported/true"
+    return table(heads, lines)
 
 
 def main() -> None:
@@ -764,7 +762,8 @@ def main() -> None:
         if one.exceeds or one.is_open:
             print(one)
     dearest = max(found, key=lambda pair: pair[1].seconds)[1]
-    print(f"\n{table(found)}\n\n{sum(one.seconds for _, one in found):.0f} s of CPU, at most {dearest.seconds:.0f} s:")
+    print(f"\n{table_of(found)}\n")
+    print(f"{sum(one.seconds for _, one in found):.0f} s of CPU, at most {dearest.seconds:.0f} s:")
     print(dearest)
 
 

@@ -22,6 +22,8 @@ from asperity.kernels.aerodynamics import drag as functional
 from asperity.kernels.walls.circular_arc import CircularArcLaw
 from asperity.spectral.eigenvalues.standard_errors import sampling_errors, sampling_quantile
 
+from .pages import print_table
+
 REPEATS, RAYS, RESISTANCE_RAYS = 1000, 4096, 2**14
 TEETH, ARC = ker.TriangularTeethLaw(1.1), CircularArcLaw(1.2)
 SCATTERING, MAXWELL = ker.henyey_greenstein(0.6), ker.maxwell(0.4)
@@ -227,9 +229,8 @@ def main() -> None:
     options = parser.parse_args()
     for name, section in SECTIONS.items():
         if options.only in (None, name):
-            print("| estimate | law | basis | rays | repeats | held | reported / rms |\n|" + "---|" * 7, flush=True)
-            for title, found in section(options.repeats):
-                print(f"| {title} | {found.line()} |", flush=True)
+            rows = (f"{title} | {found.line()}" for title, found in section(options.repeats))
+            print_table("estimate | law | basis | rays | repeats | held | reported / rms", rows)
             print(flush=True)
 
 

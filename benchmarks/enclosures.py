@@ -15,6 +15,8 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 
+from .pages import print_table
+
 # The constants' eigenvalue and the next two by modulus.
 LISTED = 3
 DEGREES, MATRIX_TOLERANCE = 24, 1e-6
@@ -81,18 +83,19 @@ def held(case: Case) -> Iterator[Held]:
 
 def main() -> None:
     """Print the table."""
-    print("| wall | enclosure | label | far finer | Legendre | width / error | confirmed | s |")
-    print("|---|---|---|---|---|---|---|---|")
+    print_table("wall | enclosure | label | far finer | Legendre | width / error | confirmed | s", _rows())
+
+
+def _rows() -> Iterator[str]:
     for case in cases():
         start = time.process_time()
         for row in held(case):
             coarse, fine = row.coarse, row.fine
-            print(
-                f"| {row.wall} | [{coarse.low:.9f}, {coarse.high:.9f}] | {coarse.label} "
+            yield (
+                f"{row.wall} | [{coarse.low:.9f}, {coarse.high:.9f}] | {coarse.label} "
                 f"| {0.5 * (fine.low + fine.high):.11f} +- {0.5 * fine.width:.1e} "
                 f"| {row.matrix:.7f} +- {row.matrix_error:.1e} | {row.exaggeration:.0f} "
-                f"| {'yes' if row.is_confirmed else '**no**'} | {time.process_time() - start:.1f} |",
-                flush=True,
+                f"| {'yes' if row.is_confirmed else '**no**'} | {time.process_time() - start:.1f}"
             )
 
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from asperity import kernels as ker
+from asperity.core.tables import table
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import row_matrix
 from asperity.kernels.walls.conditionals import adaptive_rows
@@ -94,32 +95,27 @@ def summary(found: Sequence[Outcome]) -> str:
 
 def by_wall(found: Sequence[Outcome]) -> str:
     """A line a wall: its rows and moments together, the errors reached, and that of the reference moment."""
-    lines = [
-        "| wall | numbers | exceed | cannot be told | median of reported/true | worst row | moment | reference |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
+    lines = []
     for wall in sorted({outcome.wall for outcome in found}):
         some = [outcome for outcome in found if outcome.wall == wall]
         finest = min(outcome.tolerance for outcome in some)
         row = max(one.reported for one in some if one.what == "row" and one.tolerance == finest)
         moment = min((one for one in some if one.what == "moment"), key=lambda one: one.reported, default=None)
         reached = f"{moment.reported:.0e} | {moment.reference:.0e}" if moment else "- | -"
-        lines.append(f"| {wall} | {summary(some)} | {row:.0e} | {reached} |")
-    return "\n".join(lines)
+        lines.append(f"{wall} | {summary(some)} | {row:.0e} | {reached}")
+    heads = "wall | numbers | exceed | cannot be told | median of reported/true | worst row | moment | reference"
+    return table(heads, lines)
 
 
 def by_tolerance(found: Sequence[Outcome]) -> str:
     """A line for each tolerance, rows and moments apart."""
-    lines = [
-        "| what | tolerance | numbers | exceed | cannot be told | median of reported/true |",
-        "|---|---|---|---|---|---|",
-    ]
+    lines = []
     for what in ("row", "moment"):
         some = [outcome for outcome in found if outcome.what == what]
         for tolerance in TOLERANCES:
-            lines.append(f"| {what} | {tolerance:.0e} | {summary([o for o in some if o.tolerance == tolerance])} |")
-        lines.append(f"| {what}, all | | {summary(some)} |")
-    return "\n".join(lines)
+            lines.append(f"{what} | {tolerance:.0e} | {summary([o for o in some if o.tolerance == tolerance])}")
+        lines.append(f"{what}, all |  | {summary(some)}")
+    return table("what | tolerance | numbers | exceed | cannot be told | median of reported/true", lines)
 
 
 def main() -> None:

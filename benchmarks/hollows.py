@@ -7,6 +7,7 @@ interval marching, is compared with the beams of the same hollows in ``tests/tes
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 
 import numpy as np
 from tests.random_hollows import random_hollow, wall_with
@@ -14,6 +15,8 @@ from tests.traced_pairs import chi_square_p
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+
+from .pages import print_table
 
 HOLLOWS, RAYS, CELLS = 50, 1_000_000, 12
 
@@ -23,9 +26,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.hollows", description=__doc__)
     parser.add_argument("--rays", type=int, default=RAYS, help="rays into every hollow")
     rays = parser.parse_args().rays
-    print("| hollow | vertices | graph | unresolved, a bound | mass - 1 | detailed balance | p of chi-square |")
-    print("|" + "---|" * 7)
-    smallest = 1.0
+    p_values: list[float] = []
+    heads = "hollow | vertices | graph | unresolved, a bound | mass - 1 | detailed balance | p of chi-square"
+    print_table(heads, _rows(rays, p_values))
+    print(f"\nSmallest p-value of {HOLLOWS}: {min(p_values):.2g}")
+
+
+def _rows(rays: int, p_values: list[float]) -> Iterator[str]:
     for seed in range(HOLLOWS):
         chain = random_hollow(seed)
         wall = geo.Wall.from_vertices(wall_with(chain))
@@ -33,14 +40,12 @@ def main() -> None:
         kernel = ker.discretise(law, ker.Bins(64))
         balance = float(np.linalg.norm(kernel.symmetric - kernel.symmetric.T))
         p_value = chi_square_p(wall, law, rays, CELLS, np.random.default_rng([seed, 1]))
-        smallest = min(smallest, p_value)
+        p_values.append(p_value)
         graph = "yes" if np.all(np.diff(chain[:, 0]) >= 0.0) else "no"
-        print(
-            f"| {seed} | {len(chain)} | {graph} | {float(law.unresolved):.1e} "
-            f"| {law.isometry_table().mass() - 1.0:.1e} | {balance:.1e} | {p_value:.3f} |",
-            flush=True,
+        yield (
+            f"{seed} | {len(chain)} | {graph} | {float(law.unresolved):.1e} | {law.isometry_table().mass() - 1.0:.1e} "
+            f"| {balance:.1e} | {p_value:.3f}"
         )
-    print(f"\nSmallest p-value of {HOLLOWS}: {smallest:.2g}")
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ import numpy as np
 import sympy as sp
 
 from asperity import InputError, verify
+from asperity.core.tables import table
 
 DIGITS = 50
 # Values that differ in no more than the last quarter of the digits are taken for equal.
@@ -440,7 +441,7 @@ def main(claims: int = 5000, first: int = 0, processes: int = 1) -> list[tuple[i
             found = list(pool.map(run, seeds, chunksize=20))
     else:
         found = [run(seed) for seed in seeds]
-    print(table(found))
+    print(table_of(found))
     for seed, kind, label, answer, _ in found:
         if "FALSE" in answer:
             print(seed, kind, label, answer, Maker(seed).claim())
@@ -450,20 +451,19 @@ def main(claims: int = 5000, first: int = 0, processes: int = 1) -> list[tuple[i
 COLUMNS = ("proved", "refuted", "error", "undecided", "out of time", "FALSE proof", "FALSE refutation", "FALSE error")
 
 
-def table(found: list[tuple[int, str, str, str, float]]) -> str:
+def table_of(found: list[tuple[int, str, str, str, float]]) -> str:
     """Counts by kind, and by what the values say."""
     rows = [(kind, [one for one in found if one[1] == kind]) for kind in sorted({one[1] for one in found})]
     rows += [
         (f"values say: {label}", [one for one in found if one[2] == label]) for label in ("true", "false", "nowhere")
     ]
     rows.append(("all", found))
-    lines = ["| claims about | number | " + " | ".join(COLUMNS) + " | decided |", "|---" * (len(COLUMNS) + 3) + "|"]
+    lines: list[tuple[object, ...]] = []
     for name, ones in rows:
         counts = Counter(one[3] for one in ones)
         decided = sum(counts[answer] for answer in ("proved", "refuted", "error")) / max(len(ones), 1)
-        numbers = " | ".join(str(counts[column]) for column in COLUMNS)
-        lines.append(f"| {name} | {len(ones)} | {numbers} | {100 * decided:.1f} % |")
-    return "\n".join(lines)
+        lines.append((name, len(ones), *(counts[column] for column in COLUMNS), f"{100 * decided:.1f} %"))
+    return table(" | ".join(("claims about", "number", *COLUMNS, "decided")), lines)
 
 
 if __name__ == "__main__":

@@ -30,10 +30,13 @@ import sympy as sp
 from tests.equivalent_mutants import EQUIVALENT, EQUIVALENT_IN_THE_LIBRARY
 
 import asperity
+from asperity.core.tables import table
 from asperity.geometry.disk import disk, rolling
 from asperity.kernels.walls import circular_arc, triangular
 from asperity.ledger import index as ledger
 from asperity.verification import Entry
+
+from .pages import print_table
 
 ROOT = Path(asperity.__file__).parent
 # A formula's own helpers are written here, beside it.
@@ -450,7 +453,7 @@ def noticed(function: LibraryFunction, change: Change) -> str | None:
 
 def table_of(outcomes: list[Outcome], rows: list[Entry]) -> str:
     """One line a row: its mutants, how many its check refused, could not decide or raised on, and what is left."""
-    lines = ["| row | kind | mutants | refuted | undefined | equivalent | accepted |", "|---|---|---|---|---|---|---|"]
+    lines: list[tuple[object, ...]] = []
     totals = [0] * 5
     for entry in rows:
         mine = [outcome for outcome in outcomes if outcome.row == entry.id]
@@ -460,8 +463,8 @@ def table_of(outcomes: list[Outcome], rows: list[Entry]) -> str:
         counts = [len(mine), answers["refuted"], undefined, len(equal)]
         counts.append(len(mine) - sum(counts[1:]))
         totals = [total + count for total, count in zip(totals, counts, strict=True)]
-        lines.append(f"| {entry.id} | {entry.kind} | " + " | ".join(map(str, counts)) + " |")
-    return "\n".join([*lines, "| all | | " + " | ".join(map(str, totals)) + " |"])
+        lines.append((entry.id, entry.kind, *counts))
+    return table("row | kind | mutants | refuted | undefined | equivalent | accepted", [*lines, ("all", "", *totals)])
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -484,19 +487,19 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _print_library(rows: list[Entry]) -> int:
-    left = []
-    print("| function | rows | changes | noticed | equivalent | unnoticed |\n|---|---|---|---|---|---|")
-    for function in library(rows):
-        if not function.rows:
-            continue
+    left: list[str] = []
+
+    def counts(function: LibraryFunction) -> tuple[object, ...]:
         all_changes = changes(function.function)
         unnoticed = [change.label for change in all_changes if noticed(function, change) is None]
-        equal = [label for label in unnoticed if label in EQUIVALENT_IN_THE_LIBRARY]
-        counts = len(function.rows), len(all_changes), len(all_changes) - len(unnoticed), len(equal)
-        print(
-            f"| `{function.name}` | " + " | ".join(map(str, (*counts, len(unnoticed) - len(equal)))) + " |", flush=True
-        )
-        left += [label for label in unnoticed if label not in EQUIVALENT_IN_THE_LIBRARY]
+        worse = [label for label in unnoticed if label not in EQUIVALENT_IN_THE_LIBRARY]
+        left.extend(worse)
+        found = len(all_changes) - len(unnoticed)
+        equal = len(unnoticed) - len(worse)
+        return f"`{function.name}`", len(function.rows), len(all_changes), found, equal, len(worse)
+
+    asked = (counts(function) for function in library(rows) if function.rows)
+    print_table("function | rows | changes | noticed | equivalent | unnoticed", asked)
     for label in left:
         print(f"\nunnoticed: {label}")
     return int(bool(left))

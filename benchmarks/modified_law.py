@@ -9,11 +9,14 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity import geometry as geo
+
+from .pages import print_table
 
 Floats = NDArray[np.float64]
 WALLS = {
@@ -104,26 +107,22 @@ def measured(wall: geo.Wall, disk: geo.Disk, scale: float, n: int, rng: np.rando
     )
 
 
-def main(argv: list[str] | None = None) -> int:
+def main(argv: list[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--states", type=int, default=STATES)
     arguments = parser.parse_args(argv)
     rng = np.random.default_rng(2022)
-    print("| wall | scale | spacing | inside | mean distance inside | of all | displacement/scale |"
-          " defect of the involution | mismatches inside | outside |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    for name, wall in WALLS.items():
-        for scale in SCALES:
-            m = measured(wall, DISK, scale, arguments.states, rng)
-            print(
-                f"| {name} | {scale:.0e} | {m.spacing:.4f} | {m.inside:.4f} "
-                f"| {m.distance:.5f} ± {m.distance_error:.5f} "
-                f"| {m.distance_of_all:.4f} | {m.displacement:.4f} | {m.defect:.1e} | {m.mismatches:.5f} "
-                f"| {m.mismatches_outside:.3f} |",
-                flush=True,
-            )
-    return 0
+    cases = product(WALLS.items(), SCALES)
+    found = ((name, scale, measured(wall, DISK, scale, arguments.states, rng)) for (name, wall), scale in cases)
+    rows = (
+        f"{name} | {scale:.0e} | {m.spacing:.4f} | {m.inside:.4f} | {m.distance:.5f} ± {m.distance_error:.5f} "
+        f"| {m.distance_of_all:.4f} | {m.displacement:.4f} | {m.defect:.1e} | {m.mismatches:.5f} "
+        f"| {m.mismatches_outside:.3f}"
+        for name, scale, m in found
+    )
+    heads = "wall | scale | spacing | inside | mean distance inside | of all | displacement/scale"
+    print_table(f"{heads} | defect of the involution | mismatches inside | outside", rows)
 
 
 if __name__ == "__main__":

@@ -36,6 +36,8 @@ from importlib.util import spec_from_file_location
 from multiprocessing import get_context
 from pathlib import Path
 
+from .pages import print_table
+
 ROOT = Path(__file__).resolve().parent.parent
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
 # The tests that are to see a fault in a module; the quick ones first, since the first failure ends a run.
@@ -99,21 +101,23 @@ def main() -> None:
     unknown = set(options.modules) - set(TESTS)
     if unknown:
         parser.error(f"no tests are listed for {', '.join(sorted(unknown))}")
-    same, found = known_equivalents(), []
-    print("| module | mutants | killed | equivalent | survived | killed of the others |\n" + "|---" * 6 + "|")
+    same = known_equivalents()
+    found: list[Mutant] = []
+
+    def cells(module: str, mutants: list[Mutant]) -> str:
+        alive = [mutant for mutant in mutants if not mutant.killed]
+        left = [mutant for mutant in alive if mutant.change not in same]
+        found.extend(left)
+        killed = len(mutants) - len(alive)
+        share = 100.0 * killed / max(killed + len(left), 1)
+        return f"`{module}` | {len(mutants)} | {killed} | {len(alive) - len(left)} | {len(left)} | {share:.1f} %"
+
     modules = options.modules or list(TESTS)
     with ProcessPoolExecutor(options.jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
         tries = pool.map(partial(mutants_of, share=options.share, seed=options.seed, same=same), modules)
-        for module, mutants in zip(modules, tries, strict=True):
-            alive = [mutant for mutant in mutants if not mutant.killed]
-            left = [mutant for mutant in alive if mutant.change not in same]
-            killed, others = len(mutants) - len(alive), len(mutants) - len(alive) + len(left)
-            print(
-                f"| `{module}` | {len(mutants)} | {killed} | {len(alive) - len(left)} | {len(left)} "
-                f"| {100.0 * killed / max(others, 1):.1f} % |",
-                flush=True,
-            )
-            found += left
+        print_table(
+            "module | mutants | killed | equivalent | survived | killed of the others", map(cells, modules, tries)
+        )
     for mutant in found:
         print(f"\n{mutant.module}:{mutant.line}\n- {mutant.before}\n+ {mutant.after}")
 

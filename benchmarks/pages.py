@@ -1,11 +1,13 @@
-"""The two generated pages: docs/benchmarks.md and docs/stability.md, and the pictures of the first."""
+"""What the scripts write: the pages docs/benchmarks.md and docs/stability.md with pictures, and tables as they grow."""
 
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 from asperity.bench.run import BenchRun
+from asperity.core.tables import table_lines
 
 DOCS = Path(__file__).parents[1] / "docs"
 BENCHMARKS, STABILITY, PICTURES = DOCS / "benchmarks.md", DOCS / "stability.md", DOCS / "benchmark-pictures"
@@ -16,6 +18,12 @@ def write_between_marks(page: Path, text: str) -> None:
     """Put the text where the page's marks are."""
     head, rest = page.read_text(encoding="utf-8").split(BEGIN)
     page.write_text(f"{head}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", encoding="utf-8")
+
+
+def print_table(heads: str, rows: Iterable[str | Iterable[object]]) -> None:
+    """Print a table line by line, each as soon as it is there."""
+    for line in table_lines(heads, rows):
+        print(line, flush=True)
 
 
 def pictures(run: BenchRun, folder: Path) -> list[str]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -25,6 +25,8 @@ from asperity.errors import WallError
 from asperity.geometry.tracing.double_double.arithmetic import EPS_DOUBLE_DOUBLE
 from asperity.geometry.tracing.double_double.rays import LOST
 from asperity.geometry.tracing.refinement import RefinedTrace, refined_trace
+
+from .pages import print_table
 
 Floats = NDArray[np.float64]
 EPS = 2.0**-52
@@ -419,20 +421,22 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=RAYS, help="rays of each kind on all walls together")
     parser.add_argument("--precise", type=int, default=PRECISE_RAYS, help="rays in 50 digits, besides all in dispute")
     options = parser.parse_args()
-    print(
-        "| wall | rays | aimed | lost | flagged | conditioning | wrong | worst error/(eps derivative bounces) | "
-        "in 50 digits | judge wrong |"
-    )
-    print("|" + "---|" * 10)
-    rng = np.random.default_rng(0)
-    rays, precise = options.rays // len(WALLS), options.precise // (2 * len(WALLS))
     failures: list[str] = []
+    heads = "wall | rays | aimed | lost | flagged | conditioning | wrong | worst error/(eps derivative bounces)"
+    print_table(f"{heads} | in 50 digits | judge wrong", _rows(options.rays, options.precise, failures))
+    print("\nRays that are lost or wrong, with the number of a random wall:", *(failures or ["none"]), sep="\n")
+
+
+def _rows(all_rays: int, all_precise: int, failures: list[str]) -> Iterator[str]:
+    """The rows of the table; rays that are lost or wrong are appended to ``failures``."""
+    rng = np.random.default_rng(0)
+    rays, precise = all_rays // len(WALLS), all_precise // (2 * len(WALLS))
     for name, wall in WALLS.items():
         for kind, make in KINDS.items():
             row = _judged(wall, make, rays, precise, twin_trace, rng)
-            _print_row(name, kind, [row])
+            yield _cells(name, kind, [row])
             failures += [f"{name}: x = {x!r}, theta = {theta!r}" for x, theta in row[0].failures]
-    rays, precise = options.rays // POLYGON_WALLS, options.precise // POLYGON_WALLS
+    rays, precise = all_rays // POLYGON_WALLS, all_precise // POLYGON_WALLS
     for name in POLYGONS:
         rows = []
         for number in range(POLYGON_WALLS):
@@ -440,8 +444,7 @@ def main() -> None:
             wall = random_polygon(name, own)
             rows.append(_judged(wall, rays_beside_corners, rays, precise, brute_force, own))
             failures += [f"{name} {number}: x = {x!r}, theta = {theta!r}" for x, theta in rows[-1][0].failures]
-        _print_row(f"{POLYGON_WALLS} random: {name}", "beside corners", rows)
-    print("\nRays that are lost or wrong, with the number of a random wall:", *(failures or ["none"]), sep="\n")
+        yield _cells(f"{POLYGON_WALLS} random: {name}", "beside corners", rows)
 
 
 def _judged(
@@ -455,17 +458,15 @@ def _judged(
     return verdict, len(judged), wrong_twins(wall, judged[:, 0], judged[:, 1], follow)
 
 
-def _print_row(name: str, kind: str, rows: list[tuple[Verdict, int, int]]) -> None:
-    """Print the sums over some walls as a row of the table."""
+def _cells(name: str, kind: str, rows: list[tuple[Verdict, int, int]]) -> str:
+    """The sums over some walls as a row of the table."""
     verdicts = [row[0] for row in rows]
     rays, *others = (sum(getattr(one, count) for one in verdicts) for count in COUNTED)
     lost, flagged, conditioned, wrong = others
     worst = max(one.worst for one in verdicts)
     precise, twins = sum(row[1] for row in rows), sum(row[2] for row in rows)
-    print(
-        f"| {name} | {rays} | {kind} | {lost} | {flagged} | {conditioned} | {wrong} "
-        f"| {worst:.2g} | {precise} | {twins} |",
-        flush=True,
+    return (
+        f"{name} | {rays} | {kind} | {lost} | {flagged} | {conditioned} | {wrong} | {worst:.2g} | {precise} | {twins}"
     )
 
 

@@ -15,6 +15,7 @@ from tests.random_rolled_walls import Rolled, rays, rolled_wall, spiked_path, te
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.core.tables import table
 from asperity.errors import AccuracyError, WallError
 
 WALLS, RAYS, JUDGED, DISKS, SPIKES = 200, 20_000, 40, 2_000, 2_000
@@ -153,12 +154,13 @@ def main() -> None:
         found = compare(one, number, options.rays, JUDGED, DISKS, matrices=True)
         shape = "polygons" if one.wall.is_polygonal else "with curves"
         kinds.setdefault(f"{shape}, {'lowered' if one.drop else 'rolled'}", []).append(found)
-    print("| walls | number | rays | others | judged rays | wrong | disks | others | matrices: worst ratio | unlike |")
-    print("|" + "---|" * 10)
+    rows: list[tuple[object, ...]] = []
     for kind, found in sorted(kinds.items()):
-        sums = [sum(getattr(row, field.name) for row in found) for field in fields(Comparison)[:6]]
+        sums = (sum(getattr(row, field.name) for row in found) for field in fields(Comparison)[:6])
         worst, facts = max(row.matrix for row in found), sum(not row.facts for row in found)
-        print(f"| {kind} | {len(found)} | {' | '.join(map(str, sums))} | {worst:.2g} | {facts} |", flush=True)
+        rows.append((kind, len(found), *sums, f"{worst:.2g}", facts))
+    heads = "walls | number | rays | others | judged rays | wrong | disks | others | matrices: worst ratio | unlike"
+    print(table(heads, rows))
     taken = np.array([(spiked_path(number)[1], is_taken_rightly(number)) for number in range(SPIKES)])
     print(f"\nOf {SPIKES} paths with a spike {int(taken[:, 0].sum())} have a plate, the others a slit; ", end="")
     print(f"{int((~taken[:, 1]).sum())} were taken wrongly.")

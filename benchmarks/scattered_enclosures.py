@@ -12,7 +12,9 @@ means are sums over a few directions must be refused, whatever is made of it.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import starmap
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +24,8 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw
+
+from .pages import print_table
 
 Floats = NDArray[np.float64]
 
@@ -218,22 +222,21 @@ def _overlap(one: spec.Enclosure, other: spec.Enclosure) -> bool:
 
 def main() -> None:
     """Print the table."""
-    print("| laws | number | refused | intervals | without an eigenvalue | indexed | indexed falsely |")
-    print("|---|---|---|---|---|---|---|")
-    for name, cases, tolerance in (
+    sets = (
         ("words and sums, diagonal", map(diagonal_case, range(DIAGONAL)), 1e-8),
         ("HG, teeth, HG", map(teeth_case, range(TEETH)), 1e-8),
         ("HG, teeth, HG, few polynomials", map(teeth_case, range(TEETH)), COARSE),
         ("given basis", map(given_case, range(GIVEN)), 1e-8),
         ("only apply", map(refused_case, range(REFUSED)), 1e-8),
-    ):
+    )
+    counted = "refused", "intervals", "without an eigenvalue", "indexed", "indexed falsely"
+
+    def cells(name: str, cases: Iterable[Case], tolerance: float) -> list[object]:
         rows = [judged(case, tolerance) for case in cases]
         total = sum(rows, Counter())
-        print(
-            f"| {name} | {len(rows)} | {total['refused']} | {total['intervals']} | {total['without an eigenvalue']} "
-            f"| {total['indexed']} | {total['indexed falsely']} |",
-            flush=True,
-        )
+        return [name, len(rows), *(total[what] for what in counted)]
+
+    print_table(" | ".join(("laws", "number", *counted)), starmap(cells, sets))
 
 
 if __name__ == "__main__":

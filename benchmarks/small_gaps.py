@@ -32,6 +32,8 @@ from asperity import spectral as spec
 from asperity.core.checks import Floats
 from asperity.spectral.essential.edge import essential_edge
 
+from .pages import print_table
+
 DIGITS = 50
 # Of the slope to the fourth: what the precise judge allows, and up to which slope it is asked.
 ALLOWED, PRECISE = 200.0, 1.1e-2
@@ -387,18 +389,18 @@ def main() -> None:
     rows = (row for case in cases() for row in held(case))
     if options.random:
         rows = (row for number in range(*options.random) for row in random_rows(number))
-    print("| wall | convention | gap | verdict | edge | judge | by the judge | holds |")
-    print("|---|---|---|---|---|---|---|---|")
-    count = confirmed = 0
-    for row in rows:
-        count, confirmed = count + 1, confirmed + row.is_confirmed
-        print(
-            f"| {row.name} | {row.frame} | {row.found.value:.10g} +- {row.found.error:.1e} | {row.found.verdict} "
+    confirmed: list[bool] = []
+
+    def cells(row: Held) -> str:
+        confirmed.append(row.is_confirmed)
+        return (
+            f"{row.name} | {row.frame} | {row.found.value:.10g} +- {row.found.error:.1e} | {row.found.verdict} "
             f"| {0.5 * sum(row.edge):g} | {row.judge} | {row.low:.10g} to {row.high:.10g} "
-            f"| {'yes' if row.is_confirmed else '**no**'} |",
-            flush=True,
+            f"| {'yes' if row.is_confirmed else '**no**'}"
         )
-    print(f"\n{confirmed} of {count} hold.")
+
+    print_table("wall | convention | gap | verdict | edge | judge | by the judge | holds", map(cells, rows))
+    print(f"\n{sum(confirmed)} of {len(confirmed)} hold.")
 
 
 if __name__ == "__main__":

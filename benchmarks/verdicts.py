@@ -33,6 +33,8 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
 
+from .pages import print_table
+
 Floats = NDArray[np.float64]
 
 POLYGONS, WALLS, TOLERANCE, SHARE = 20, 48, 1e-3, 0.3
@@ -304,26 +306,27 @@ def main() -> None:
     options = parser.parse_args()
     if options.first == 0:
         _print_theorems_and_tolerances()
-    print("\n| law | gap | verdict | judge: 1 - top at degrees 16, 32, 64 | judge's straight rays | refuted |")
-    print("|" + "---|" * 6)
-    verdicts: Counter[str] = Counter()
-    refuted = 0
-    for k, (name, wall) in islice(enumerate(random_walls()), options.first, options.last):
-        rows = rows_of(name, wall, options.tolerance, more=k % 4 == 0)
-        for row in islice(rows, 1 if options.brief else None):
-            verdicts[row.gap.verdict] += 1
-            refuted += bool(row.refutation)
-            gaps = ", ".join(f"{1.0 - top:.4f}" for top in row.reference.tops)
-            kind = row.gap.verdict if row.gap.self_adjoint else f"{row.gap.verdict}, norm"
-            bounds = f"{1.0 - row.edge[1]:.4f} to {1.0 - row.edge[0]:.4f}"
-            print(
-                f"| {row.name} | {row.gap.value:.5f} +- {row.gap.error:.1e} | {kind} "
-                f"| {gaps} +- {row.reference.error:.1e} | {bounds} | {row.refutation or 'no'} |",
-                flush=True,
-            )
-    total = sum(verdicts.values())
+    rows: list[Row] = []
+
+    def cells() -> Iterator[str]:
+        for k, (name, wall) in islice(enumerate(random_walls()), options.first, options.last):
+            found = rows_of(name, wall, options.tolerance, more=k % 4 == 0)
+            for row in islice(found, 1 if options.brief else None):
+                rows.append(row)
+                gaps = ", ".join(f"{1.0 - top:.4f}" for top in row.reference.tops)
+                kind = row.gap.verdict if row.gap.self_adjoint else f"{row.gap.verdict}, norm"
+                bounds = f"{1.0 - row.edge[1]:.4f} to {1.0 - row.edge[0]:.4f}"
+                yield (
+                    f"{row.name} | {row.gap.value:.5f} +- {row.gap.error:.1e} | {kind} "
+                    f"| {gaps} +- {row.reference.error:.1e} | {bounds} | {row.refutation or 'no'}"
+                )
+
+    print()
+    print_table("law | gap | verdict | judge: 1 - top at degrees 16, 32, 64 | judge's straight rays | refuted", cells())
+    verdicts = Counter(row.gap.verdict for row in rows)
     print("\n" + ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common()), end="")
-    print(f"; {verdicts['undecided']} of {total} undecided, {refuted} refuted.")
+    refuted = sum(bool(row.refutation) for row in rows)
+    print(f"; {verdicts['undecided']} of {len(rows)} undecided, {refuted} refuted.")
 
 
 def _print_theorems_and_tolerances() -> None:
@@ -332,10 +335,13 @@ def _print_theorems_and_tolerances() -> None:
     for name, ok in right:
         if not ok:
             print(f"**{name}**")
-    print("\n| law | tolerance asked | error | error reported | holds |\n|" + "---|" * 5)
-    for name, tolerance, wrong, reported in tolerances():
-        holds = "yes" if wrong <= reported + DIGITS_KNOWN else "**no**"
-        print(f"| {name} | {tolerance:.0e} | {wrong:.1e} | {reported:.1e} | {holds} |")
+    rows = (
+        f"{name} | {tolerance:.0e} | {wrong:.1e} | {reported:.1e} "
+        f"| {'yes' if wrong <= reported + DIGITS_KNOWN else '**no**'}"
+        for name, tolerance, wrong, reported in tolerances()
+    )
+    print()
+    print_table("law | tolerance asked | error | error reported | holds", rows)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.tables import table
 from .machine import Machine
 from .order import FittedOrder, fit_order
 from .problem import ROUNDED, WorkMethod, WorkProblem
@@ -98,10 +99,9 @@ class WorkRow:
 def table_of(report: WorkReport) -> str:
     """The table of `WorkReport.table`."""
     front = set(map(id, report.front()))
-    heads = ["method", "budget", *(f"{norm} error" for norm in report.norms), "reported", "seconds", "spread", ""]
-    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
-    lines += [f"| {' | '.join(_cells(report, row, id(row) in front))} |" for row in report.rows]
-    lines.append("")
+    norms = " | ".join(f"{norm} error" for norm in report.norms)
+    heads = f"method | budget | {norms} | reported | seconds | spread | "
+    lines = [table(heads, (_cells(report, row, id(row) in front) for row in report.rows)), ""]
     for name, facts in report.methods.items():
         words = f"- {name}: against {facts.reference} (known to {facts.floor:.1e})"
         fitted = report.order(name)

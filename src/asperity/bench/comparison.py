@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ..core.errors import InputError
+from ..core.tables import table
 from ..spectral import WorkReport, WorkRow
 from .run import BenchRun
 
@@ -79,22 +80,15 @@ class Comparison:
 
     def table(self) -> str:
         """The rows that changed, and the drift of all."""
-        lines = [
-            "| problem | method | budget | time now/before | p | error now/before | |",
-            "|---|---|---|---|---|---|---|",
-        ]
-        for one in self.changes:
-            if one.is_worse or (one.time_ratio < 1.0 / DRIFT and one.p_value < SIGNIFICANT):
-                word = one.status or ("worse" if one.is_worse else "faster")
-                lines.append(
-                    f"| {one.problem} | {one.method} | {one.budget:g} | {one.time_ratio:.2f} | {one.p_value:.3f} "
-                    f"| {one.error_ratio:.2g} | {word} |"
-                )
-        lines += [
-            "",
-            f"{len(self.changes)} rows in both; their times are {self.drift:.2f} of before in the geometric mean.",
-        ]
-        return "\n".join(lines)
+        rows = (
+            f"{one.problem} | {one.method} | {one.budget:g} | {one.time_ratio:.2f} | {one.p_value:.3f} "
+            f"| {one.error_ratio:.2g} | {one.status or ('worse' if one.is_worse else 'faster')}"
+            for one in self.changes
+            if one.is_worse or (one.time_ratio < 1.0 / DRIFT and one.p_value < SIGNIFICANT)
+        )
+        lines = table("problem | method | budget | time now/before | p | error now/before | ", rows)
+        drift = f"their times are {self.drift:.2f} of before in the geometric mean."
+        return f"{lines}\n\n{len(self.changes)} rows in both; {drift}"
 
 
 def compare_runs(before: BenchRun, now: BenchRun) -> Comparison:

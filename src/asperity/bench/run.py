@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import FileExistsRefusal, InputError
+from ..core.tables import table
 from ..spectral import WorkReport, WorkRow
 
 if TYPE_CHECKING:
@@ -34,13 +35,9 @@ class BenchRun:
 
     def summary(self) -> str:
         """One line a problem: what the library chose, how far it got, how far its time is from the best."""
-        lines = [
-            "| problem | chosen | error | reported | seconds | times the best at equal error | at equal known error "
-            "| front |",
-            "|---|---|---|---|---|---|---|---|",
-        ]
-        lines += [_line(report) for report in self.reports]
-        lines += ["", *self._choices(), ""]
+        heads = "problem | chosen | error | reported | seconds"
+        heads += " | times the best at equal error | at equal known error | front"
+        lines = [table(heads, map(_cells, self.reports)), "", *self._choices(), ""]
         agree, differ, unsure = self.orders()
         lines.append(
             f"Declared orders: {len(agree)} agree within 0.15, {len(differ)} differ, {len(unsure)} are not resolved "
@@ -69,11 +66,12 @@ class BenchRun:
 
     def references(self) -> str:
         """What every problem is measured against, and how well that is known, as a table."""
-        lines = ["| problem | reference | known to |", "|---|---|---|"]
-        for report in self.reports:
-            for source, floor in dict.fromkeys((facts.reference, facts.floor) for facts in report.methods.values()):
-                lines.append(f"| {report.problem} | {source} | {floor:.1e} |")
-        return "\n".join(lines)
+        rows = (
+            f"{report.problem} | {source} | {floor:.1e}"
+            for report in self.reports
+            for source, floor in dict.fromkeys((facts.reference, facts.floor) for facts in report.methods.values())
+        )
+        return table("problem | reference | known to", rows)
 
     def orders(self) -> tuple[list[str], list[str], list[str]]:
         """Declared orders that the fits agree with, that they contradict, and that they do not resolve."""
@@ -141,21 +139,20 @@ def _chosen(report: WorkReport) -> list[WorkRow]:
     return [row for row in report.rows if row.method == report.auto]
 
 
-def _line(report: WorkReport) -> str:
+def _cells(report: WorkReport) -> tuple[str, ...]:
+    """One row of the summary."""
     rows = [row for row in _chosen(report) if row.is_done]
     front = ", ".join(dict.fromkeys(row.method for row in report.front()))
     if not rows:
         states = ", ".join(dict.fromkeys(row.status for row in _chosen(report)))
         words = states or ("not run" if report.auto in report.methods else "nothing to choose")
-        return f"| {report.problem} | {words} | - | - | - | - | - | {front} |"
+        return report.problem, words, *"-----", front
     best = min(rows, key=report.error)
     reported = "-" if best.reported is None else f"{best.reported:.1e}"
     ratios = [report.choice(), report.choice(known=True)]
     true, known = ("-" if ratio is None else f"{ratio:.2g}" for ratio in ratios)
-    return (
-        f"| {report.problem} | {best.note} | {report.error(best):.1e} | {reported} | {best.least:.2g} "
-        f"| {true} | {known} | {front} |"
-    )
+    error, seconds = f"{report.error(best):.1e}", f"{best.least:.2g}"
+    return report.problem, best.note, error, reported, seconds, true, known, front
 
 
 def draw_scene(reports: Sequence[WorkReport]) -> Figure:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.checks import Floats
+from ..core.tables import table
 from ..geometry import Trace, trace
 from ..geometry.scene.ablations import without_formulas, without_grid, without_pairs, without_runs
 from ..geometry.scene.scene import Scene, scene_in_one
@@ -75,7 +76,7 @@ class Saving:
         if self.low <= 1.0 <= self.high:
             times += ", noise"
         with_it, without = (f"{time:.2g} {self.unit}" for time in (self.seconds, self.seconds_without))
-        return f"| {self.scene} | {self.what} | {with_it} | {without} | {times} | {same} |"
+        return f"{self.scene} | {self.what} | {with_it} | {without} | {times} | {same}"
 
 
 class WithoutMirror:
@@ -248,11 +249,11 @@ def _rows(wall: Wall | WithoutMirror, tolerance: float) -> tuple[Floats, float, 
 
 def savings_table(quick: bool = False) -> str:
     """All scenes: their plans in words, and a line for everything that can be switched off."""
-    lines = ["| scene | leaves out | time | without that | times | same result |", "|---|---|---|---|---|---|"]
-    for name in standard_names():
-        lines += [one.row() for one in savings_of(name, repeats=QUICK_REPEATS if quick else REPEATS)]
-    lines += ["", "| scene | what the tracer does |", "|---|---|"]
-    return "\n".join([*lines, *(f"| {name} | {plan_words(wall_of(name))} |" for name in standard_names())])
+    repeats = QUICK_REPEATS if quick else REPEATS
+    rows = (one.row() for name in standard_names() for one in savings_of(name, repeats=repeats))
+    plans = ((name, plan_words(wall_of(name))) for name in standard_names())
+    saved = table("scene | leaves out | time | without that | times | same result", rows)
+    return f"{saved}\n\n{table('scene | what the tracer does', plans)}"
 
 
 def plan_words(wall: Wall) -> str:

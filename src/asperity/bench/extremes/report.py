@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
 from ...core.errors import AsperityError, InputError
+from ...core.tables import table
 from ..running.processes import ChildCrashed, ChildProcess, OutOfTime
 from .row import ExtremeRow
 
@@ -29,24 +31,21 @@ class ExtremeReport:
 
     def table(self) -> str:
         """A Markdown table and the number of cases by verdict."""
-        heads = ["case", "reference", "error", "may be", "unit", "share that escaped", "seconds", "verdict", ""]
-        lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
-        for row in self.rows:
-            total = sum(row.counts.values())
-            flagged = ", ".join(
-                f"{number} {status}" for status, number in row.counts.items() if status != "escaped" and number
-            )
-            escaped = (
-                "-" if not total else f"{row.counts['escaped'] / total:.4g}" + (f" ({flagged})" if flagged else "")
-            )
-            error, allowed = (f"{row.error:.2g}", f"{row.allowed:.2g}") if not row.ended else ("-", "-")
-            lines.append(
-                f"| {row.case} | {row.reference} | {error} | {allowed} | {row.unit} | {escaped} | {row.seconds:.2g} "
-                f"| {row.verdict} | {row.note} |"
-            )
-        verdicts = [row.verdict for row in self.rows]
-        numbers = ", ".join(f"{verdicts.count(verdict)} {verdict}" for verdict in dict.fromkeys(verdicts))
-        return "\n".join([*lines, "", f"{len(self.rows)} cases: {numbers}."])
+        heads = "case | reference | error | may be | unit | share that escaped | seconds | verdict | "
+        verdicts = Counter(row.verdict for row in self.rows)
+        numbers = ", ".join(f"{number} {verdict}" for verdict, number in verdicts.items())
+        return f"{table(heads, map(_cells, self.rows))}\n\n{len(self.rows)} cases: {numbers}."
+
+
+def _cells(row: ExtremeRow) -> str:
+    total = sum(row.counts.values())
+    flagged = ", ".join(f"{number} {status}" for status, number in row.counts.items() if status != "escaped" and number)
+    escaped = "-" if not total else f"{row.counts['escaped'] / total:.4g}" + (f" ({flagged})" if flagged else "")
+    errors = "- | -" if row.ended else f"{row.error:.2g} | {row.allowed:.2g}"
+    return (
+        f"{row.case} | {row.reference} | {errors} | {row.unit} | {escaped} | {row.seconds:.2g} | {row.verdict} "
+        f"| {row.note}"
+    )
 
 
 def case_names(quick: bool) -> tuple[str, ...]:
