@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
+from asperity.core.tables import table
 from asperity.spectral import leading_eigenvalues
 
 WELLS, STATES = 30, (10, 333)
@@ -29,29 +29,6 @@ class Solution(NamedTuple):
 Solver = Callable[["csr_array[Any]"], Solution]
 
 
-@dataclass(frozen=True)
-class Metastable:
-    """One solver on one chain.
-
-    Attributes
-    ----------
-    solver : str
-    states : int
-    seconds : float
-        Wall time.
-    wrong : int
-        Of the 30 gaps 1 - lambda, those off by more than a tenth or by 1e-13, whichever is larger; -1 if it failed.
-    claim : str
-        What the solver says of its own answer.
-    """
-
-    solver: str
-    states: int
-    seconds: float
-    wrong: int
-    claim: str
-
-
 def chain(inside: int) -> csr_array[Any]:
     """Hopping at rate 1/4 within wells of ``inside`` states, and at ``RATES`` between them."""
     hop = np.full(WELLS * inside - 1, 0.25)
@@ -66,27 +43,19 @@ def expected_gaps(inside: int) -> np.ndarray[Any, Any]:
     return np.asarray(np.sort(np.linalg.eigvalsh(coarse)) / inside)
 
 
-def measure_metastable(peers: Mapping[str, Solver]) -> list[Metastable]:
-    """Run every solver on every chain."""
-    solvers: dict[str, Solver] = {
-        "asperity.leading_eigenvalues": _ours,
-        "scipy eigsh, shifted": lambda matrix: Solution(eigsh(matrix.tocsc(), WELLS, sigma=1.0 + 1e-9)[0], "none"),
-        **peers,
-    }
-    return [_run(name, solve, inside) for inside in STATES for name, solve in solvers.items()]
-
-
-def _run(name: str, solve: Solver, inside: int) -> Metastable:
+def _row(name: str, solve: Solver, inside: int) -> str:
+    """One solver on one chain; wrong are gaps 1 - lambda off by more than the larger of a tenth and 1e-13."""
     matrix = chain(inside)
     start = time.perf_counter()
     try:
         found = solve(matrix)
     except Exception as reason:  # a peer's failure is a result
-        return Metastable(name, WELLS * inside, time.perf_counter() - start, -1, f"{type(reason).__name__}: {reason}")
+        seconds = time.perf_counter() - start
+        return f"{name} | {WELLS * inside} | {seconds:.2f} | - | {type(reason).__name__}: {reason}"
     seconds = time.perf_counter() - start if found.seconds is None else found.seconds
     gaps, expected = np.sort(1.0 - np.asarray(found.values).real)[:WELLS], expected_gaps(inside)
     wrong = int(np.sum(np.abs(gaps - expected) > np.maximum(0.1 * expected, 1e-13))) + WELLS - len(gaps)
-    return Metastable(name, WELLS * inside, seconds, wrong, found.claim)
+    return f"{name} | {WELLS * inside} | {seconds:.2f} | {wrong} | {found.claim}"
 
 
 def _ours(matrix: csr_array[Any]) -> Solution:
@@ -94,14 +63,16 @@ def _ours(matrix: csr_array[Any]) -> Solution:
     return Solution(found.values, f"{'complete' if found.complete else 'not complete'}, error below {found.error:.1e}")
 
 
-def metastable_table(peers: Mapping[str, Solver] | None = None) -> list[str]:
-    """The table in Markdown, with the peers' answers where these are given."""
-    found = ["| solver | states | seconds | of 30 gaps wrong | what it says |", "|---|---|---|---|---|"]
-    for row in measure_metastable(peers or {}):
-        wrong = "-" if row.wrong < 0 else str(row.wrong)
-        found.append(f"| {row.solver} | {row.states} | {row.seconds:.2f} | {wrong} | {row.claim} |")
-    return found
+def metastable_table(peers: Mapping[str, Solver]) -> str:
+    """Every solver on every chain, in Markdown."""
+    solvers: dict[str, Solver] = {
+        "asperity.leading_eigenvalues": _ours,
+        "scipy eigsh, shifted": lambda matrix: Solution(eigsh(matrix.tocsc(), WELLS, sigma=1.0 + 1e-9)[0], "none"),
+        **peers,
+    }
+    rows = (_row(name, solve, inside) for inside in STATES for name, solve in solvers.items())
+    return table("solver | states | seconds | of 30 gaps wrong | what it says", rows)
 
 
 if __name__ == "__main__":
-    print("\n".join(metastable_table()))
+    print(metastable_table({}))

@@ -16,6 +16,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.running.timing import least_time
+from asperity.core.tables import table
 
 from .metastable import WELLS, Solution, metastable_table
 
@@ -39,12 +40,12 @@ RAYS, REPEATS, ANGLE = 2**17, 3, 0.7
 BINS, GAPS = 256, (0.5, 1e-9)
 
 
-def peer_table(folder: Path) -> str:
+def peer_tables(folder: Path) -> str:
     """Rays and spectra by the peers and by asperity, as Markdown."""
     peers = PeerEnvironment(folder / "environment")
     folder.mkdir(parents=True, exist_ok=True)
     wells = metastable_table({"deeptime": lambda matrix: _deeptime_wells(folder, peers, matrix)})
-    return "\n".join([INTRODUCTION, "", *_tracers(folder, peers), "", *_chains(folder, peers), "", *wells])
+    return "\n\n".join([INTRODUCTION, _tracers(folder, peers), _chains(folder, peers), wells])
 
 
 class PeerEnvironment:
@@ -98,48 +99,45 @@ class PeerEnvironment:
         return done.stdout, _last_line(done.stderr or done.stdout) if done.returncode else ""
 
 
-def _tracers(folder: Path, peers: PeerEnvironment) -> list[str]:
+def _tracers(folder: Path, peers: PeerEnvironment) -> str:
     wall, rng = geo.triangular_teeth(ANGLE), np.random.default_rng(0)
     x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
     traced, seconds = least_time(lambda: geo.trace(wall, x, theta, threads=1), REPEATS)
     rate = RAYS / seconds
     data = folder / "rays.npz"
     np.savez(data, corners=wall.vertices, x=x, theta=theta, out=traced.theta)
-    lines = [
-        "| tracer of triangular teeth | version | precision | million rays/s | asperity is faster by | wrong | lost |",
-        "|---|---|---|---|---|---|---|",
-        f"| asperity, one thread | - | double | {rate / 1e6:.3g} | - | reference "
-        f"| {float(np.mean(~traced.escaped)):.1e} |",
-    ]
+    lost = float(np.mean(~traced.escaped))
+    rows = [f"asperity, one thread | - | double | {rate / 1e6:.3g} | - | reference | {lost:.1e}"]
     for peer, (precision, package) in TRACERS.items():
         found = peers.run(peer, package, data)
         if isinstance(found, str):
-            lines.append(f"| {peer} | - | {precision} | {found} | - | - | - |")
+            rows.append(f"{peer} | - | {precision} | {found} | - | - | -")
         else:
             speed = f"{found['rate'] / 1e6:.3g} | {rate / found['rate']:.3g}"
-            lines.append(
-                f"| {peer} | {found['version']} | {precision} | {speed} | {found['wrong']:.1e} | {found['lost']:.1e} |"
+            rows.append(
+                f"{peer} | {found['version']} | {precision} | {speed} | {found['wrong']:.1e} | {found['lost']:.1e}"
             )
-    return lines
+    heads = "tracer of triangular teeth | version | precision | million rays/s | asperity is faster by | wrong | lost"
+    return table(heads, rows)
 
 
-def _chains(folder: Path, peers: PeerEnvironment) -> list[str]:
-    lines = ["| gap of a chain | version | right | found | relative error | seconds |", "|---|---|---|---|---|---|"]
+def _chains(folder: Path, peers: PeerEnvironment) -> str:
+    rows = []
     for gap in GAPS:
         matrix = ker.discretise(ker.maxwell(gap), ker.Bins(BINS))
         found, seconds = least_time(lambda matrix=matrix: spec.spectrum(matrix, k=2).gap, REPEATS)
-        lines.append(f"| asperity | - | {gap:g} | {found:.6g} | {abs(found / gap - 1.0):.1e} | {seconds:.2g} |")
+        rows.append(f"asperity | - | {gap:g} | {found:.6g} | {abs(found / gap - 1.0):.1e} | {seconds:.2g}")
         data = folder / "chain.npz"
         np.savez(data, matrix=matrix.array, gap=gap)
         for peer, package in CHAINS.items():
             answer = peers.run(peer, package, data)
             if isinstance(answer, str):
-                lines.append(f"| {peer} | - | {gap:g} | {answer} | - | - |")
+                rows.append(f"{peer} | - | {gap:g} | {answer} | - | -")
             else:
                 value = answer["gap"]
                 figures = "none | -" if value is None else f"{value:.6g} | {abs(value / gap - 1.0):.1e}"
-                lines.append(f"| {peer} | {answer['version']} | {gap:g} | {figures} | {answer['seconds']:.2g} |")
-    return lines
+                rows.append(f"{peer} | {answer['version']} | {gap:g} | {figures} | {answer['seconds']:.2g}")
+    return table("gap of a chain | version | right | found | relative error | seconds", rows)
 
 
 def _deeptime_wells(folder: Path, peers: PeerEnvironment, matrix: csr_array[Any]) -> Solution:

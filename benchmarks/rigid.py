@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +11,13 @@ from tests.plain_collision import collide_plainly
 
 from asperity import geometry as geo
 from asperity.bench.running.timing import least_time
+from asperity.core.tables import table
 from asperity.geometry.disk.satellites import Satellites
+
+from .pages import print_table
 
 COLLISIONS, REPEATS = 2**18, 5
 STATES = 10**6
-# What the prototype of this computation reached on one core of a 2-core AVX2 machine, in collisions a second.
-PROTOTYPE = (0.24e6, 0.45e6)
 DISK = geo.Disk(1.0, 0.6)
 TIMED = {
     "triangular teeth, 1.2 radians": geo.triangular_teeth(1.2),
@@ -40,14 +42,13 @@ PLATE_STATES = 200
 
 @dataclass(frozen=True)
 class Speed:
-    """Collisions a second of the true disk, and planar bounces a second of the same run as a measure of the machine."""
+    """Collisions a second of the true disk, by one thread and by two."""
 
     wall: str
     scale: float
     contacts: float
     one_thread: float
     two_threads: float
-    planar_bounces: float
 
 
 @dataclass(frozen=True)
@@ -75,19 +76,13 @@ def measure_rigid(collisions: int = COLLISIONS, repeats: int = REPEATS) -> list[
     """One row a wall and scale; the least time of the repeats counts."""
     rng, rows = np.random.default_rng(0), []
     for what, wall in TIMED.items():
-        x, theta = rng.random(collisions), np.arccos(1 - 2 * rng.random(collisions))
-        bounces = int(geo.trace(wall, x, theta).collisions.sum())
-        _, seconds = least_time(lambda wall=wall, x=x, theta=theta: geo.trace(wall, x, theta, threads=1), repeats)
-        planar = bounces / seconds
         for scale in (1e-2, 1e-4, 1e-6):
             position, velocity = random_states(wall, scale, collisions, rng)
             arguments = (DISK, wall, scale, position, velocity)
-            contacts = float(geo.collide(*arguments).contacts.mean())
-            one, two = (
-                collisions / least_time(lambda a=arguments, k=threads: geo.collide(*a, threads=k), repeats)[1]
-                for threads in (1, 2)
+            (hit, one), (_, two) = (
+                least_time(lambda a=arguments, k=threads: geo.collide(*a, threads=k), repeats) for threads in (1, 2)
             )
-            rows.append(Speed(what, scale, contacts, one, two, planar))
+            rows.append(Speed(what, scale, float(hit.contacts.mean()), collisions / one, collisions / two))
     return rows
 
 
@@ -141,8 +136,8 @@ def floating_plate(thickness: float, tilt: float) -> geo.Wall:
     return geo.Wall([geo.Segment((0.0, -0.9), (1.0, -0.9))], period=1.0, islands=[island])
 
 
-def check_plates(states: int = PLATE_STATES) -> list[str]:
-    """Plates and sharp peaks against the tests' brute force: a table of disks that are lost or wrong."""
+def check_plates(states: int = PLATE_STATES) -> Iterator[str]:
+    """Plates and sharp peaks against the tests' brute force: rows with the disks that are lost or wrong."""
     walls = {f"standing plate, {t:g} thick": standing_plate(t, 0.0) for t in (0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-10)}
     walls |= {f"leaning plate, {t:g} thick": standing_plate(t, 0.04) for t in (0.0, 3e-16, 1e-14)}
     walls |= {
@@ -150,7 +145,6 @@ def check_plates(states: int = PLATE_STATES) -> list[str]:
         for t in (0.0, 3e-16, 1e-13)
         for angle in (0.0, 0.3, 1.2)
     }
-    rows = ["| wall | scale | disks | judged | lost | wrong |", "|---|---|---|---|---|---|"]
     for name, wall in walls.items():
         for scale in (1e-1, 1e-3):
             position, velocity = random_states(wall, scale, states, np.random.default_rng(2))
@@ -161,36 +155,29 @@ def check_plates(states: int = PLATE_STATES) -> list[str]:
             apart = np.abs(expected - out.velocity).max(axis=1) > 1e-6
             wrong = int((judged & out.escaped & (apart | (contacts != out.contacts))).sum())
             lost = int((judged & ~out.escaped).sum())
-            rows.append(f"| {name} | {scale:g} | {states} | {int(judged.sum())} | {lost} | {wrong} |")
-    return rows
+            yield f"{name} | {scale:g} | {states} | {int(judged.sum())} | {lost} | {wrong}"
 
 
-def speed_table() -> list[str]:
-    """The speeds as a table, each beside the prototype's range and the planar tracer's speed in the same run."""
-    rows = [
-        "| true disk | scale | contacts a collision | M collisions/s | two threads | ratio to the prototype "
-        "| planar M bounces/s |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for speed in measure_rigid():
-        low, high = (speed.one_thread / figure for figure in reversed(PROTOTYPE))
-        rows.append(
-            f"| {speed.wall} | {speed.scale:.0e} | {speed.contacts:.2f} | {speed.one_thread / 1e6:.2f} "
-            f"| {speed.two_threads / 1e6:.2f} | {low:.1f} - {high:.1f} | {speed.planar_bounces / 1e6:.1f} |"
-        )
-    return rows
+def speed_table(measured: Iterable[Speed]) -> str:
+    """The speeds as a table."""
+    rows = (
+        f"{speed.wall} | {speed.scale:.0e} | {speed.contacts:.2f} | {speed.one_thread / 1e6:.2f} "
+        f"| {speed.two_threads / 1e6:.2f}"
+        for speed in measured
+    )
+    return table("true disk | scale | contacts a collision | M collisions/s | two threads", rows)
 
 
 def main() -> None:
     """Print the three tables."""
-    print("\n".join(check_plates()), flush=True)
-    print("| wall | scale | states | not settled | median error | worst error | mismatches | energy |")
-    for row in check_involution():
-        print(
-            f"| {row.wall} | {row.scale:.0e} | {row.states} | {row.not_settled} | {row.median:.1e} | {row.worst:.1e} "
-            f"| {row.mismatches} | {row.energy:.1e} |"
-        )
-    print("\n".join(speed_table()))
+    print_table("wall | scale | disks | judged | lost | wrong", check_plates())
+    rows = (
+        f"{row.wall} | {row.scale:.0e} | {row.states} | {row.not_settled} | {row.median:.1e} | {row.worst:.1e} "
+        f"| {row.mismatches} | {row.energy:.1e}"
+        for row in check_involution()
+    )
+    print_table("wall | scale | states | not settled | median error | worst error | mismatches | energy", rows)
+    print(speed_table(measure_rigid()))
 
 
 if __name__ == "__main__":

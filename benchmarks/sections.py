@@ -17,8 +17,8 @@ from asperity.bench.savings import savings_table
 from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_problems
 from asperity.spectral import Machine
 
-from .peers import peer_table
-from .speed_tables import speed_and_goals
+from .peers import peer_tables
+from .speed import speed_and_goals
 
 # Short ladders in any case: there are many random walls, and only the choice is asked for. But enough repeats for a
 # mean of what is random: single nets are off by twice as much, or by half.
@@ -76,7 +76,7 @@ SECTIONS = (
     Section("standard", "The standard set", FULL.total_seconds + MARGIN, _standard),
     Section("random", "Twenty random walls", RANDOM_EFFORT.total_seconds + MARGIN, _random),
     Section("savings", "What the scenes leave out", 100.0, lambda quick, folder: savings_table(quick)),
-    Section("peers", "Peers", 200.0, lambda quick, folder: peer_table(folder / "peers")),
+    Section("peers", "Peers", 200.0, lambda quick, folder: peer_tables(folder / "peers")),
     Section("stability", "", 250.0, _stability),
 )
 

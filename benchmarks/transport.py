@@ -6,12 +6,14 @@ of the difference test in 2,000 runs.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from asperity import kernels as ker
 from asperity.bench.running.timing import least_time
+from asperity.core.tables import table
 from asperity.kernels.distances.transport import grid_wasserstein
 
 REPEATS = 5
@@ -51,7 +53,7 @@ def measure_rows(bins: int = 512, repeats: int = REPEATS) -> RowTimes:
     return RowTimes(bins, seconds, pot_seconds, float(np.abs(ours - pot).max()))
 
 
-def measure_joint(sizes: tuple[int, ...] = (16, 32, 48, 64, 128)) -> list[tuple[int, ker.Distance, float]]:
+def measure_joint(sizes: Iterable[int]) -> list[tuple[int, ker.Distance, float]]:
     """Joint distances of Henyey-Greenstein matrices: size, distance, seconds; from about 64 bins on they are merged."""
     rows = []
     for size in sizes:
@@ -60,7 +62,7 @@ def measure_joint(sizes: tuple[int, ...] = (16, 32, 48, 64, 128)) -> list[tuple[
     return rows
 
 
-def measure_extremes(sizes: tuple[int, ...] = (256, 1024, 4096)) -> list[tuple[int, float, float, float]]:
+def measure_extremes(sizes: Iterable[int]) -> list[tuple[int, float, float, float]]:
     """Cells, distance of the bounds of the least resistance from its value, and seconds."""
     rows = []
     for size in sizes:
@@ -82,34 +84,27 @@ def count_false_alarms(runs: int = ALARM_RUNS) -> int:
     return alarms
 
 
-def transport_table() -> list[str]:
-    """What it takes to compare laws by transport, as a table; the false alarms, which take minutes, are not in it."""
+def transport_table(joint: Iterable[int], cells: Iterable[int]) -> str:
+    """What it takes to compare laws by transport; the false alarms, which take minutes, are not in it."""
     rows = measure_rows()
-    lines = ["| transport | result | seconds | compared with |", "|---|---|---|---|"]
     ratio = f"a loop over POT: {rows.pot_seconds:.2g} s, {rows.ratio:.0f} times; same to {rows.difference:.0e}"
-    lines.append(f"| distances of {rows.bins} rows | exact | {rows.seconds:.2g} | {ratio} |")
-    for size, found, seconds in measure_joint(PAGE_JOINT):
-        lines.append(f"| joint distance on {size} bins | {found.value:.6f} +- {found.error:.1e} | {seconds:.2g} | - |")
-    for size, below, above, seconds in measure_extremes(PAGE_CELLS):
+    lines = [f"distances of {rows.bins} rows | exact | {rows.seconds:.2g} | {ratio}"]
+    for size, found, seconds in measure_joint(joint):
+        lines.append(f"joint distance on {size} bins | {found.value:.6f} +- {found.error:.1e} | {seconds:.2g} | -")
+    for size, below, above, seconds in measure_extremes(cells):
         value = f"bounds -{below:.1e}, +{above:.1e}"
-        lines.append(f"| least resistance on {size} cells | {value} | {seconds:.2g} | its closed form |")
-    return lines
+        lines.append(f"least resistance on {size} cells | {value} | {seconds:.2g} | its closed form")
+    return table("transport | result | seconds | compared with", lines)
 
 
 def main() -> None:
-    """Print all measurements."""
+    """Print the table with more sizes, and the false alarms."""
     from scipy.stats import binomtest
 
-    rows = measure_rows()
-    times = f"{1e3 * rows.seconds:.2f} ms, POT {1e3 * rows.pot_seconds:.0f} ms, {rows.ratio:.0f} times"
-    print(f"rows, {rows.bins} bins: {times}")
-    for size, found, seconds in measure_joint():
-        print(f"joint, {size} bins: {found.value:.6f} +- {found.error:.1e}, {seconds:.2f} s, {found.method}")
-    for size, below, above, seconds in measure_extremes():
-        print(f"least resistance, {size} cells: -{below:.1e} +{above:.1e}, {seconds:.2f} s")
+    print(transport_table((16, 32, 48, 64, 128), (256, 1024, 4096)))
     alarms = count_false_alarms()
     p_value = binomtest(alarms, ALARM_RUNS, LEVEL).pvalue
-    print(f"false alarms: {alarms} of {ALARM_RUNS}, p = {p_value:.2g} for a rate of {LEVEL:g}")
+    print(f"\nFalse alarms: {alarms} of {ALARM_RUNS}, p = {p_value:.2g} for a rate of {LEVEL:g}")
 
 
 if __name__ == "__main__":

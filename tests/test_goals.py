@@ -1,15 +1,12 @@
-"""The table of goals and what it rests on: memory, robustness, and the shares of the time."""
+"""The table of goals and what it rests on: errors in a time, memory, robustness."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
-import pytest
-from benchmarks import goals, memory, profiles, robustness
+from benchmarks import goals, memory, robustness
 
 from asperity import geometry as geo
-from asperity import kernels as ker
+from asperity.estimates import Estimate
 
 
 def test_the_memory_of_an_estimate_does_not_grow_with_its_rays():
@@ -43,15 +40,9 @@ def test_a_ray_that_was_moved_is_wrong_and_no_conditioning_explains_it():
     assert not robustness._explained(wall, traced, x, theta + 1e-9, robustness.twin_trace).any()
 
 
-def test_shares_of_the_time_go_to_the_modules_that_spend_it():
-    def job():
-        ker.discretise(ker.henyey_greenstein(0.5), ker.Legendre(64))
-        return sum(math.sqrt(k) for k in range(1000))
-
-    shares = profiles.time_by_module(job)
-    assert sum(shares.values()) == pytest.approx(1.0)
-    # what numpy does for a module is that module's, and what nobody of the package asked for is outside
-    assert "outside" in shares and any(name.startswith("kernels.") for name in shares)
-    assert all(
-        name == "outside" or name.split(".")[0] in ("asperity", "geometry", "kernels", "spectral") for name in shares
-    )
+def test_a_goal_of_error_and_time_needs_both_and_an_error_that_holds():
+    for found, reported, limit, is_met in ((1.25, 0.3, 9.0, True), (1.25, 0.1, 9.0, False), (1.25, 0.3, 0.0, False)):
+        answer = Estimate(found, reported, "bound", "by hand")
+        goal = goals._in_time("a number", 1.0, lambda answer=answer: answer, 0.5, limit, holds=True)
+        assert goal.is_met == is_met and f"reported {reported:.1e}" in goal.reached
+    assert not goals._in_time("a number", 1.0, lambda: 1.75, 0.5, 9.0).is_met

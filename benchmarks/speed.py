@@ -1,0 +1,156 @@
+"""Speed of the tracers, of a fresh process and of transport, with the goals that rest on it: a part of the page."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+
+from asperity import geometry as geo
+from asperity.bench.running.timing import least_time
+from asperity.core.tables import table
+from asperity.spectral import Machine
+
+from .goals import all_goals, goal_table
+from .memory import measure_memory
+from .rigid import measure_rigid, speed_table
+from .robustness import RAYS as AIMED_RAYS
+from .robustness import measure_robustness
+from .transport import PAGE_CELLS, PAGE_JOINT, transport_table
+
+RAYS, REPEATS = 2**20, 5
+# Floating-point operations that one bounce needs at least, with every piece of the hollow tested once: about 9 for
+# the side of a joint, 24 for an arc, 30 for the hit, the reflection and the way out.
+LINE_FLOPS, ARC_FLOPS, BOUNCE_FLOPS = 9, 24, 30
+WALLS = {
+    "triangular teeth (2 lines)": geo.triangular_teeth(0.7),
+    "focusing arc (1 arc)": geo.focusing_arcs(1.2),
+    "mushroom (6 lines, 1 arc)": geo.mushrooms(0.3, 0.5),
+    "Koch 4 (256 lines)": geo.koch(4),
+}
+# Walls, entry points and angles for which very many hits follow each other. On an arc, 10^9 of them would begin and end
+# within 1e-18 of its tips, which are corners: double precision has room for some 10^6.
+RUNS = {
+    "arc": (geo.focusing_arcs(np.pi / 2), (1e-12, 2e-12), (np.pi / 2 - 1e-6, np.pi / 2 - 0.5e-6)),
+    "channel": (geo.rectangular_teeth(1e6), (0.5, 1.0), (1.9e-3, 2.1e-3)),
+    "wedge": (geo.triangular_teeth(3e-9), (0.0, 1.0), (1.5, 1.6)),
+}
+RUN_RAYS, RUN_LIMIT = 2**14, 2**62
+SCRIPTS = {
+    "python alone": "pass",
+    "numpy": "import numpy",
+    "import asperity": "import asperity",
+    "first trace, warm cache": (
+        "from asperity import geometry as geo; geo.trace(geo.focusing_arcs(1.2), [0.3, 0.4], [1.0, 2.0])"
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Throughput:
+    """Bounces a ray, and bounces a second on one wall: by one thread, by two, and at the floating-point limit."""
+
+    wall: str
+    bounces_per_ray: float
+    one_thread: float
+    two_threads: float
+    flop_limit: float
+
+
+@dataclass(frozen=True)
+class RunTime:
+    """Mean number of hits of a ray, seconds a ray, and the share of the rays that escaped."""
+
+    what: str
+    hits: float
+    seconds: float
+    escaped: float
+
+
+def speed_and_goals(quick: bool) -> str:
+    """The machine, the goals, and the tables."""
+    throughput = measure_throughput(RAYS // 16 if quick else RAYS)
+    runs, start, disks = measure_runs(), measure_start(), measure_rigid()
+    robustness = measure_robustness(AIMED_RAYS // 50 if quick else AIMED_RAYS)
+    goals = all_goals(
+        [(row.wall, row.one_thread, row.two_threads) for row in throughput],
+        [(row.what, row.hits, row.seconds) for row in runs],
+        start, robustness, measure_memory(), min(row.one_thread for row in disks),
+    )  # fmt: skip
+    tables = (
+        _throughput_table(throughput), _runs_table(runs), speed_table(disks), transport_table(PAGE_JOINT, PAGE_CELLS),
+        table("start | seconds", (f"{what} | {least:.2f}" for what, least in start.items())),
+    )  # fmt: skip
+    return "\n\n".join([f"Machine: {Machine.here()}.", "## Goals", goal_table(goals), "## Speed", *tables])
+
+
+def measure_throughput(rays: int) -> list[Throughput]:
+    """The same rays on every wall with one thread and with two."""
+    rng = np.random.default_rng(0)
+    x, theta = rng.random(rays), np.arccos(1 - 2 * rng.random(rays))
+    peak = _peak_flops()
+    rows = []
+    for name, wall in WALLS.items():
+        traced, one = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=1), REPEATS)
+        _, two = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=2), REPEATS)
+        bounces = int(traced.collisions.sum())
+        lines = sum(isinstance(piece, geo.Segment) for piece in wall.pieces)
+        flops = BOUNCE_FLOPS + LINE_FLOPS * lines + ARC_FLOPS * (len(wall.pieces) - lines)
+        rows.append(Throughput(name, bounces / rays, bounces / one, bounces / two, peak / flops))
+    return rows
+
+
+def measure_runs() -> list[RunTime]:
+    """Rays with very many hits in a row: along an arc, in a channel, in a wedge."""
+    rng = np.random.default_rng(0)
+    rows = []
+    for what, (wall, (low, high), (first, last)) in RUNS.items():
+        x, theta = low + (high - low) * rng.random(RUN_RAYS), first + (last - first) * rng.random(RUN_RAYS)
+        traced, seconds = least_time(
+            lambda wall=wall, x=x, theta=theta: geo.trace(wall, x, theta, max_collisions=RUN_LIMIT, threads=1), REPEATS
+        )
+        escaped = float(traced.escaped.mean())
+        rows.append(RunTime(what, float(traced.collisions.mean()), seconds / RUN_RAYS, escaped))
+    return rows
+
+
+def measure_start() -> dict[str, float]:
+    """Seconds of a fresh process for each script, with warm caches."""
+    return {
+        what: least_time(lambda script=script: subprocess.run([sys.executable, "-c", script], check=True), REPEATS)[1]
+        for what, script in SCRIPTS.items()
+    }
+
+
+@njit(fastmath=True)
+def _multiply_add(values, rounds):  # type: ignore[no-untyped-def]
+    for _ in range(rounds):
+        for i in range(values.shape[0]):
+            values[i] = values[i] * 0.999999 + 1e-6
+
+
+def _peak_flops(rounds: int = 200_000) -> float:
+    """Multiply-adds a second of one core on an array that stays in the first-level cache, times two."""
+    values = np.ones(512)
+    _multiply_add(values, 1)
+    _, best = least_time(lambda: _multiply_add(values, rounds), 3)
+    return 2.0 * rounds * len(values) / best
+
+
+def _throughput_table(measured: list[Throughput]) -> str:
+    return table(
+        "wall | bounces a ray | million bounces/s, one thread | two threads | speed-up | share of the flop limit",
+        (
+            f"{row.wall} | {row.bounces_per_ray:.2f} | {row.one_thread / 1e6:.1f} | {row.two_threads / 1e6:.1f} "
+            f"| {row.two_threads / row.one_thread:.2f} | {row.one_thread / row.flop_limit:.3f}"
+            for row in measured
+        ),
+    )
+
+
+def _runs_table(measured: list[RunTime]) -> str:
+    rows = (f"{run.what} | {run.hits:.1e} | {1e6 * run.seconds:.2f} | {run.escaped:.3f}" for run in measured)
+    return table("run of hits in one step | hits a ray | microseconds a ray | share that escaped", rows)
