@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.checks import positive_number
-from ..core.errors import AccuracyError, FileExistsRefusal, InputError
+from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 from ..core.estimates import NORMAL_95, Estimate
 from ..geometry import Disk, Wall, trace
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
@@ -37,6 +38,9 @@ ENCLOSED = 3
 FIRST_SAMPLES, MOST_SAMPLES = 2**20, 2**24
 PICTURES = ("wall.png", "kernel.png", "spectrum.png", "collision.png")
 DATA = ("kernel.npz", "study.json")
+
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -130,14 +134,6 @@ def study_wall(
     rng = rng or np.random.default_rng(0)
     disk = disk or Disk()
     refusals: dict[str, str] = {}
-
-    def gap_of(law: Law, which: str) -> SpectralGap | None:
-        try:
-            return spectral_gap(law, tolerance, rng)
-        except AccuracyError as reason:
-            refusals[which] = str(reason)
-            return None
-
     # silent where standard error is not a terminal, and in the first two seconds
     with tqdm(total=8, desc=name, delay=2, disable=None, leave=False) as progress:
         tracer = check_tracer(wall, rng) if wall.hollows else None
@@ -145,32 +141,16 @@ def study_wall(
         law = WallLaw(wall)
         matrix = _matrix(law, basis, tolerance, rng)
         progress.update()
-        specular_gap = None
-        if law.mirror_symmetric:
-            try:
-                gap, specular_gap = gaps_in_both_conventions(law, tolerance, rng)
-            except AccuracyError as reason:
-                gap = None
-                refusals |= {"gap": str(reason), "specular_gap": str(reason)}
-        else:
-            gap, specular_gap = gap_of(law, "gap"), gap_of(law.in_specular_frame(), "specular_gap")
+        gap, specular_gap = _gaps(law, tolerance, rng, refusals)
         progress.update(2)
-        found = None
-        try:
-            found = _spectrum(law, matrix, gap, tolerance, rng)
-        except AccuracyError as reason:
-            refusals["spectrum"] = str(reason)
+        found = _or_refusal(lambda: _spectrum(law, matrix, gap, tolerance, rng), refusals, "spectrum")
         progress.update()
-        enclosed = None
-        try:
-            enclosed = _enclosures(law, gap, tolerance)
-        except (AccuracyError, InputError) as reason:
-            refusals["enclosures"] = str(reason)
+        enclosed = _or_refusal(lambda: _enclosures(law, gap, tolerance), refusals, "enclosures", reason=AsperityError)
         progress.update()
         collision = CollisionLaw.from_wall(wall, disk)
         collision_matrix = _matrix(collision.law, basis, tolerance, rng)
         progress.update()
-        collision_gap = gap_of(collision.law, "collision_gap")
+        collision_gap = _or_refusal(lambda: spectral_gap(collision.law, tolerance, rng), refusals, "collision_gap")
         progress.update()
         consequences = consequences_of(wall, law, gap, specular_gap, found)
     return Study(
@@ -198,6 +178,29 @@ def prepare_folder(folder: str | Path, *, overwrite: bool) -> Path:
     except OSError as reason:
         raise InputError(f"{target}: cannot write there ({reason.strerror}); choose another folder") from reason
     return target
+
+
+def _or_refusal(
+    job: Callable[[], T], refusals: dict[str, str], *names: str, reason: type[AsperityError] = AccuracyError
+) -> T | None:
+    """What the job returns; None if it raises this error, which is noted under the names."""
+    try:
+        return job()
+    except reason as raised:
+        refusals |= dict.fromkeys(names, str(raised))
+        return None
+
+
+def _gaps(
+    law: WallLaw, tolerance: float, rng: np.random.Generator, refusals: dict[str, str]
+) -> tuple[SpectralGap | None, SpectralGap | None]:
+    """In the paper's convention and in Feres'; of a mirror-symmetric wall from one computation."""
+    if law.mirror_symmetric:
+        both = _or_refusal(lambda: gaps_in_both_conventions(law, tolerance, rng), refusals, "gap", "specular_gap")
+        return both or (None, None)
+    gap = _or_refusal(lambda: spectral_gap(law, tolerance, rng), refusals, "gap")
+    specular = law.in_specular_frame()
+    return gap, _or_refusal(lambda: spectral_gap(specular, tolerance, rng), refusals, "specular_gap")
 
 
 def _spectrum(
