@@ -6,11 +6,13 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 
 import click
 import numpy as np
 
 from asperity import kernels as ker
+from asperity.core.tables import table_lines
 
 from .pages import DOCS, write_between_marks
 
@@ -39,33 +41,33 @@ def laws() -> dict[str, ker.Law]:
     }
 
 
-def table() -> str:
+HEADS = "law | moments | hollows | pieces | defect | could be smaller by | joint distance | s"
+
+
+def rows() -> Iterator[str]:
     """One row a law and number of moments."""
-    lines = [
-        "| law | moments | hollows | pieces | defect | could be smaller by | joint distance | s |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
     for name, law in laws().items():
         extreme = name in ("least resistance", "retroreflection")
         for moments in EXTREME_MOMENTS if extreme else MOMENTS:
             start = time.process_time()
             found = ker.wall_for(law, moments=moments)
             seconds = time.process_time() - start
-            lines.append(
-                f"| {name} | {moments} | {len(found.hollows)} | {len(found.wall.pieces)} | {float(found.defect):.1e} | "
-                f"{float(found.bound):.1e} | {float(found.distance):.4f} ± {found.distance.error:.4f} | {seconds:.1f} |"
+            yield (
+                f"{name} | {moments} | {len(found.hollows)} | {len(found.wall.pieces)} | {float(found.defect):.1e} | "
+                f"{float(found.bound):.1e} | {float(found.distance):.4f} ± {found.distance.error:.4f} | {seconds:.1f}"
             )
-            print(lines[-1], flush=True)
-    return "\n".join(lines)
 
 
 @click.command()
 @click.option("--write", is_flag=True, help="Write the table into the page.")
 def main(write: bool) -> None:
     """Print the table."""
-    text = table()
+    lines = []
+    for line in table_lines(HEADS, rows()):
+        click.echo(line)
+        lines.append(line)
     if write:
-        write_between_marks(PAGE, text)
+        write_between_marks(PAGE, "\n".join(lines))
 
 
 if __name__ == "__main__":
