@@ -117,5 +117,6 @@ def _wait_for(futures: Sequence[Future[Result]], stop: NDArray[np.int64]) -> Non
 
 def usable_processors() -> int:
     """How many processors this process may use: all, unless it is pinned to some, as by a batch system."""
+    # the system's: only some have it
     pinned = hasattr(os, "sched_getaffinity")
     return len(os.sched_getaffinity(0)) if pinned else os.cpu_count() or 1

@@ -226,6 +226,7 @@ class DensityLaw(Law):
         return outgoing.reshape(theta.shape)
 
     def __repr__(self) -> str:
+        # the user's function, which may be any callable
         return f"DensityLaw({getattr(self._function, '__name__', repr(self._function))})"
 
     # ---- construction ----------------------------------------------------------------------------------------

@@ -134,6 +134,7 @@ class InvolutionLaw(Law):
         return np.asarray(function(self._mapped(theta)), dtype=np.float64)
 
     def __repr__(self) -> str:
+        # the user's function, which may be any callable
         return f"InvolutionLaw({getattr(self.map, '__name__', repr(self.map))})"
 
 

@@ -63,6 +63,7 @@ def read(path: str | Path, restored: Callable[[Record, Arrays, Basis], T]) -> T:
     try:
         with source.open("rb") as stream:
             archive = np.load(stream, allow_pickle=False)
+            # numpy's: an archive has files, a single array has none
             if not hasattr(archive, "files") or "record" not in archive.files:
                 raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
             arrays = {name: archive[name] for name in archive.files}

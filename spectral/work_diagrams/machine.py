@@ -101,6 +101,7 @@ def on_few_cores(threads: int) -> Iterator[None]:
 
 def _cores(threads: int) -> list[int]:
     """The last of the cores that are allowed: the first one has the system's interrupts."""
+    # the system's: only some have it
     return sorted(os.sched_getaffinity(0))[-threads:] if hasattr(os, "sched_getaffinity") else []
 
 
