@@ -72,24 +72,24 @@ def random_states(wall: geo.Wall, scale: float, n: int, rng: np.random.Generator
     return position, -DISK.from_angles(np.arccos(1 - 2 * rng.random(n)), np.arccos(1 - 2 * rng.random(n)))
 
 
-def measure_rigid(collisions: int = COLLISIONS, repeats: int = REPEATS) -> list[Speed]:
+def measure_rigid() -> list[Speed]:
     """One row a wall and scale; the least time of the repeats counts."""
     rng, rows = np.random.default_rng(0), []
     for what, wall in TIMED.items():
         for scale in (1e-2, 1e-4, 1e-6):
-            position, velocity = random_states(wall, scale, collisions, rng)
+            position, velocity = random_states(wall, scale, COLLISIONS, rng)
             arguments = (DISK, wall, scale, position, velocity)
             (hit, one), (_, two) = (
-                least_time(lambda a=arguments, k=threads: geo.collide(*a, threads=k), repeats) for threads in (1, 2)
+                least_time(lambda a=arguments, k=threads: geo.collide(*a, threads=k), REPEATS) for threads in (1, 2)
             )
-            rows.append(Speed(what, scale, float(hit.contacts.mean()), collisions / one, collisions / two))
+            rows.append(Speed(what, scale, float(hit.contacts.mean()), COLLISIONS / one, COLLISIONS / two))
     return rows
 
 
-def check_involution(states: int = STATES) -> list[InvolutionCheck]:
+def check_involution() -> list[InvolutionCheck]:
     """Share the states among walls and scales; the conditioning of each is measured by shaking its way back."""
     rng, rows = np.random.default_rng(1), []
-    n = max(1, states // (len(CHECKED) * len(SCALES)))
+    n = STATES // (len(CHECKED) * len(SCALES))
     for what, wall in CHECKED.items():
         for scale in SCALES:
             position, velocity = random_states(wall, scale, n, rng)
@@ -136,7 +136,7 @@ def floating_plate(thickness: float, tilt: float) -> geo.Wall:
     return geo.Wall([geo.Segment((0.0, -0.9), (1.0, -0.9))], period=1.0, islands=[island])
 
 
-def check_plates(states: int = PLATE_STATES) -> Iterator[str]:
+def check_plates() -> Iterator[str]:
     """Plates and sharp peaks against the tests' brute force: rows with the disks that are lost or wrong."""
     walls = {f"standing plate, {t:g} thick": standing_plate(t, 0.0) for t in (0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-10)}
     walls |= {f"leaning plate, {t:g} thick": standing_plate(t, 0.04) for t in (0.0, 3e-16, 1e-14)}
@@ -147,7 +147,7 @@ def check_plates(states: int = PLATE_STATES) -> Iterator[str]:
     }
     for name, wall in walls.items():
         for scale in (1e-1, 1e-3):
-            position, velocity = random_states(wall, scale, states, np.random.default_rng(2))
+            position, velocity = random_states(wall, scale, PLATE_STATES, np.random.default_rng(2))
             out = geo.collide(DISK, wall, scale, position, velocity)
             spacing = Satellites.around(scale, scale * wall.depth).spacing
             _, expected, contacts = collide_plainly(DISK, wall, scale, spacing, position, velocity)
@@ -155,7 +155,7 @@ def check_plates(states: int = PLATE_STATES) -> Iterator[str]:
             apart = np.abs(expected - out.velocity).max(axis=1) > 1e-6
             wrong = int((judged & out.escaped & (apart | (contacts != out.contacts))).sum())
             lost = int((judged & ~out.escaped).sum())
-            yield f"{name} | {scale:g} | {states} | {int(judged.sum())} | {lost} | {wrong}"
+            yield f"{name} | {scale:g} | {PLATE_STATES} | {int(judged.sum())} | {lost} | {wrong}"
 
 
 def speed_table(measured: Iterable[Speed]) -> str:

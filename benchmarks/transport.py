@@ -16,7 +16,7 @@ from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
 from asperity.kernels.distances.transport import grid_wasserstein
 
-REPEATS = 5
+BINS, REPEATS = 512, 5
 # Sizes that the page shows.
 PAGE_JOINT, PAGE_CELLS = (32, 64), (256, 1024)
 ALARM_RUNS, ALARM_PAIRS, ALARM_BINS, LEVEL = 2000, 300, 6, 0.05
@@ -39,18 +39,18 @@ class RowTimes:
         return self.pot_seconds / self.seconds
 
 
-def measure_rows(bins: int = 512, repeats: int = REPEATS) -> RowTimes:
+def measure_rows() -> RowTimes:
     """W_1 of all rows by distribution functions, and by a loop over `ot.wasserstein_1d`."""
     import ot
 
     rng = np.random.default_rng(0)
-    points = np.sort(rng.random(bins)) * np.pi
-    one, other = (rng.dirichlet(np.full(bins, 0.3), bins) for _ in range(2))
-    ours, seconds = least_time(lambda: grid_wasserstein(one, other, points), repeats)
+    points = np.sort(rng.random(BINS)) * np.pi
+    one, other = (rng.dirichlet(np.full(BINS, 0.3), BINS) for _ in range(2))
+    ours, seconds = least_time(lambda: grid_wasserstein(one, other, points), REPEATS)
     pot, pot_seconds = least_time(
-        lambda: [float(ot.wasserstein_1d(points, points, *pair)) for pair in zip(one, other, strict=True)], repeats
+        lambda: [float(ot.wasserstein_1d(points, points, *pair)) for pair in zip(one, other, strict=True)], REPEATS
     )
-    return RowTimes(bins, seconds, pot_seconds, float(np.abs(ours - pot).max()))
+    return RowTimes(BINS, seconds, pot_seconds, float(np.abs(ours - pot).max()))
 
 
 def measure_joint(sizes: Iterable[int]) -> list[tuple[int, ker.Distance, float]]:
@@ -71,10 +71,10 @@ def measure_extremes(sizes: Iterable[int]) -> list[tuple[int, float, float, floa
     return rows
 
 
-def count_false_alarms(runs: int = ALARM_RUNS) -> int:
+def count_false_alarms() -> int:
     """How often, with seeds 0, 1, 2, ..., the test at 5 % tells two samples of one law apart."""
     law, alarms = ker.maxwell(0.4), 0
-    for seed in range(runs):
+    for seed in range(ALARM_RUNS):
         rng = np.random.default_rng(seed)
         pair = []
         for pairs in (ALARM_PAIRS, ALARM_PAIRS * 2 // 3):

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -82,37 +79,6 @@ def test_bad_input_is_refused(study):
         study.order("speed")
     with pytest.raises(InputError, match="against"):
         study.order("drift", "time")
-
-
-EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
-
-
-def load(name):
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_the_example_finds_the_foreshortened_wall_and_both_cases_of_the_dichotomy():
-    found = load("true_disk").main(ratios=(2.0,), scales=(1e-4, 1e-5, 1e-6), samples=(24, 16, 16))
-    case = found["m/J = 2"]
-    assert abs(case["correlation"] - case["foreshortened wall"]) < 5 * case["its error"] + 0.002
-    assert abs(case["correlation"] - case["unforeshortened wall"]) > 0.3
-    sequences = found["dichotomy"]
-    assert sequences["constant sequence, last"] < 0.02
-    assert sequences["alternating sequence, greatest of the last two"] > 0.3
-    assert sequences["alternating sequence, least of the last two"] < 0.03
-
-
-def test_the_pictures_of_the_page_are_drawn(tmp_path):
-    found = load("true_disk_pictures").main(tmp_path, samples=500)
-    assert found["contacts"] == 4 and abs(found["energy gained"]) < 1e-13
-    committed = EXAMPLES.parent / "theory" / "true-disk"
-    page = (EXAMPLES.parent / "theory" / "true-disk.md").read_text(encoding="utf-8")
-    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in committed.iterdir()}
-    for path in committed.iterdir():
-        assert f"true-disk/{path.name}" in page and path.stat().st_size < 150_000
 
 
 def test_the_path_of_a_collision_has_its_contacts_on_the_wall():

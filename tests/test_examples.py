@@ -115,3 +115,24 @@ def test_walls_are_found_for_laws(tmp_path):
     found = load("wall_for_a_law").main(moments=4, picture=tmp_path / "walls.png")
     assert len(found) == 3 and (tmp_path / "walls.png").stat().st_size > 10_000
     assert all(float(one.defect) < 1e-10 for one in found.values())
+
+
+def test_a_true_disk_finds_the_foreshortened_wall_and_both_cases_of_the_dichotomy():
+    found = load("true_disk").main(ratios=(2.0,), scales=(1e-4, 1e-5, 1e-6), samples=(24, 16, 16))
+    case = found["m/J = 2"]
+    assert abs(case["correlation"] - case["foreshortened wall"]) < 5 * case["its error"] + 0.002
+    assert abs(case["correlation"] - case["unforeshortened wall"]) > 0.3
+    sequences = found["dichotomy"]
+    assert sequences["constant sequence, last"] < 0.02
+    assert sequences["alternating sequence, greatest of the last two"] > 0.3
+    assert sequences["alternating sequence, least of the last two"] < 0.03
+
+
+def test_the_pictures_of_the_page_on_true_disks_are_drawn(tmp_path):
+    found = load("true_disk_pictures").main(tmp_path, samples=500)
+    assert found["contacts"] == 4 and abs(found["energy gained"]) < 1e-13
+    committed = EXAMPLES.parent / "theory" / "true-disk"
+    page = (EXAMPLES.parent / "theory" / "true-disk.md").read_text(encoding="utf-8")
+    assert {path.name for path in tmp_path.iterdir()} == {path.name for path in committed.iterdir()}
+    for path in committed.iterdir():
+        assert f"true-disk/{path.name}" in page and path.stat().st_size < 150_000

@@ -25,9 +25,9 @@ def kinetic_norm(w: Floats, m: Floats | float, J: Floats | float) -> Floats:
     return np.asarray(np.sqrt(m * (w[0] ** 2 + w[1] ** 2) + J * w[2] ** 2))
 
 
-def unit_velocities(rng: np.random.Generator, m: Floats | float, J: Floats | float, count: int = TRIALS) -> Floats:
+def unit_velocities(rng: np.random.Generator, m: Floats | float, J: Floats | float) -> Floats:
     """Random velocities (3, n) of kinetic norm 1 with v2 > 0; some graze, some nearly roll."""
-    w = rng.normal(size=(3, count)) * np.exp(rng.uniform(-4, 0, (3, count)))
+    w = rng.normal(size=(3, TRIALS)) * np.exp(rng.uniform(-4, 0, (3, TRIALS)))
     w[1] = np.abs(w[1])
     return w / kinetic_norm(w, m, J)
 
