@@ -358,3 +358,30 @@ def test_orders_that_are_none_are_refused_by_distances_and_tests(order):
         with pytest.raises(InputError, match="order: expected"):
             measure(*pair, order)
     assert ker.difference_test(*pair, 1000.0).p_value > 0.05
+
+
+class KnownByApply(ker.Law):
+    """A law of which nothing but its action is known."""
+
+    reversible = True
+
+    def __init__(self, law):
+        self.law = law
+
+    def _sample(self, theta, rng):
+        return self.law.sample(theta, rng)
+
+    def _apply(self, function, theta):
+        return self.law.apply(function, theta)
+
+
+def test_the_error_of_a_product_counts_that_of_its_later_factors():
+    # the matrix of the later factor is known to its own error only, which refining the incoming angle does not lower
+    teeth, scatter = ker.RectangularTeethLaw(0.8), ker.henyey_greenstein(0.5)
+    exact = ker.distance(scatter @ teeth, ker.lambertian(), tolerance=1e-2)
+    found = ker.distance(scatter @ KnownByApply(teeth), ker.lambertian(), tolerance=1e-2)
+    matrix = ker.discretise(KnownByApply(teeth), ker.Bins(256))
+    assert found.error >= 0.5 * np.pi * float(matrix.error)
+    assert abs(float(found) - float(exact)) <= found.error
+    inside = ker.distance((0.5 * (scatter @ KnownByApply(teeth)) + 0.5 * scatter) @ scatter, scatter, tolerance=1e-2)
+    assert inside.error >= 0.25 * np.pi * float(matrix.error)

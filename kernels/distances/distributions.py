@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from ...core.checks import Floats
@@ -9,6 +11,7 @@ from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.distribution import Distribution
 from ..laws.law import Combination, Composition, Law, Power, SpecularFrame, atoms_of
+from ..matrices.matrix import KernelMatrix
 from .transport import Distributions
 
 
@@ -27,20 +30,40 @@ def on_cells(law: Law) -> Law:
     if isinstance(law, SpecularFrame):
         return SpecularFrame(on_cells(law.law))
     if isinstance(law, Power) and law.exponent:
-        return _OnCells((law.law,) * law.exponent)
-    return _OnCells(law.laws) if isinstance(law, Composition) else law
+        law = Composition((law.law,) * law.exponent)
+    return _OnCells((on_cells(law.laws[0]), *law.laws[1:])) if isinstance(law, Composition) else law
 
 
+def cells_error(law: Law, order: float, sup: bool) -> float:
+    """How far a distance may be off because the later factors of products are known by their matrices only.
+
+    As in `asperity.kernels.distances.resampling.matrices_error`, from the Frobenius errors of the last matrices used.
+    """
+    if isinstance(law, Combination):
+        return sum(weight * cells_error(term, order, sup) for weight, term in law.terms)
+    if isinstance(law, SpecularFrame):
+        return cells_error(law.law, order, sup)
+    if not isinstance(law, _OnCells) or law.last is None:
+        return 0.0
+    error = float(law.last.error) / (float(np.sqrt(law.last.weights.min())) if sup else 1.0)
+    return float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order)) + cells_error(law.laws[0], order, sup)
+
+
+@dataclass(frozen=True, repr=False)
 class _OnCells(Composition):
     """Its first factor exactly; of the others the matrix of their product on the cells between the edges."""
+
+    # the matrix that was used last, for its error
+    last: KernelMatrix | None = field(default=None, compare=False, repr=False)
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         atoms = atoms_of(self, theta, edges)
         if atoms is not None:
             return atoms
         first, *rest = self.laws
-        found = on_cells(first).distribution(theta, edges)
+        found = first.distribution(theta, edges)
         if not rest:
             return found
-        matrix = discretise(rest[0] if len(rest) == 1 else Composition(tuple(rest)), Bins(edges)).array
-        return Distribution.of_cells(np.diff(found.cumulative(edges), axis=1) @ matrix)
+        matrix = discretise(rest[0] if len(rest) == 1 else Composition(tuple(rest)), Bins(edges))
+        object.__setattr__(self, "last", matrix)
+        return Distribution.of_cells(np.diff(found.cumulative(edges), axis=1) @ matrix.array)

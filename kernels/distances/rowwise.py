@@ -11,7 +11,7 @@ from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
 from ..laws.law import ENTRY_POINTS, Law
 from ..matrices.matrix import KernelMatrix, joint_kind
-from .distributions import on_cells, outgoing_distributions
+from .distributions import cells_error, on_cells, outgoing_distributions
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean, wasserstein
 
@@ -60,6 +60,7 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
         steps = np.abs(np.diff(found))
         error = float(steps[-1] if level == 1 else max(steps[-1], MEMORY * steps[-2]))
         error = (SUPREMUM_FACTOR if sup else 1.0) * error + ROUNDING
+        error += sum(cells_error(law, order, sup) for law in (first, second))
         if level >= FEWEST_LEVELS - 1 and error <= tolerance:
             break
     return Estimate(found[-1], error, "estimate", f"Gauss rules on {low.size} panels; difference of two refinements")
