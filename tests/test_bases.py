@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.polynomial import chebyshev, legendre
 
+from asperity import geometry as geo
 from asperity.errors import InputError
 from asperity.kernels import SINE, SINE_SQUARED, Basis, Bins, Legendre, Panels, TensorBasis
 from asperity.kernels.bases.mirror import is_mirror_symmetric, mirror_refinement, reflection_matrix
@@ -187,8 +187,8 @@ def test_equality_is_that_of_the_functions() -> None:
 
 
 def test_panels_for_a_wall_are_graded_to_grazing_and_to_the_critical_angles_of_one_arc() -> None:
-    plain = Panels.for_wall(SimpleNamespace(pieces=("a", "b")))
-    arc = Panels.for_wall(SimpleNamespace(pieces=(SimpleNamespace(is_circular=True, half_span=1.2),)))
+    plain = Panels.for_wall(geo.triangular_teeth(1.0))
+    arc = Panels.for_wall(geo.focusing_arcs(1.2))
     for basis in (plain, arc):
         assert basis.edges[1] < 1e-3
         assert np.pi - basis.edges[-2] < 1e-3
@@ -208,7 +208,7 @@ def test_panels_for_a_wall_are_graded_to_grazing_and_to_the_critical_angles_of_o
         (lambda: Legendre(2.5), "whole number"),
         (lambda: Panels([0.0, np.pi], -1), "degree"),
         (lambda: TensorBasis((Bins(2),)), "two bases"),
-        (lambda: Panels.for_wall(SimpleNamespace(pieces=()), smallest=2.0), "smallest"),
+        (lambda: Panels.for_wall(geo.flat(), smallest=2.0), "smallest"),
     ],
 )
 def test_bad_bases_are_refused_in_one_sentence(make: object, message: str) -> None:
