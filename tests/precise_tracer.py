@@ -15,6 +15,33 @@ from typing import NamedTuple
 import mpmath as mp
 import numpy as np
 
+from asperity.geometry.scene.columns import (
+    BEZIERS_END,
+    CIRCLES_END,
+    CURVATURE,
+    ELLIPSES_END,
+    END_X,
+    END_Y,
+    FIRST_BEZIER,
+    FIRST_CIRCLE,
+    FIRST_ELLIPSE,
+    FIRST_JOINT,
+    JOINTS_END,
+    LEFT,
+    RIGHT,
+    SPAN,
+    START_X,
+    START_Y,
+    STARTS_LINE,
+    STRETCH,
+    X1,
+    X2,
+    X3,
+    Y1,
+    Y2,
+    Y3,
+)
+
 DIGITS = 50
 # Guard digits, and the distance below which a hit is the ray's own start: 50 digits lie between the two.
 GUARD, NEAR = 25, mp.mpf(10) ** -40
@@ -43,9 +70,10 @@ def _line_hits(a, b, p, v):
 
 def _arc(row):
     """Centre and radius in stretched coordinates, whether it focuses, the angle of its middle and half its span."""
-    stretch = mp.mpf(row[12])
-    a, b = (mp.mpf(row[13]), stretch * mp.mpf(row[14])), (mp.mpf(row[15]), stretch * mp.mpf(row[16]))
-    half, focusing = mp.mpf(row[11]) / 2, row[4] > 0
+    stretch = mp.mpf(row[STRETCH])
+    x0, y0, x1, y1 = (mp.mpf(row[column]) for column in (START_X, START_Y, END_X, END_Y))
+    a, b = (x0, stretch * y0), (x1, stretch * y1)
+    half, focusing = mp.mpf(row[SPAN]) / 2, row[CURVATURE] > 0
     chord = mp.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2)
     radius = chord / 2 / mp.sin(half)
     left = (-(b[1] - a[1]) / chord, (b[0] - a[0]) / chord)
@@ -74,9 +102,9 @@ def _arc_hits(arc, p, v):
 
 def _bezier(row):
     """Coefficients of 1, s, s^2, s^3 as points."""
-    c = [(mp.mpf(row[2 * k]), mp.mpf(row[2 * k + 1])) for k in range(4)]
-    top = 2 if row[6] == 0 and row[7] == 0 else 3
-    end = (mp.mpf(row[-4]), mp.mpf(row[-3]))
+    c = [(mp.mpf(row[x]), mp.mpf(row[y])) for x, y in ((START_X, START_Y), (X1, Y1), (X2, Y2), (X3, Y3))]
+    top = 2 if row[X3] == 0 and row[Y3] == 0 else 3
+    end = (mp.mpf(row[END_X]), mp.mpf(row[END_Y]))
     c[top] = tuple(end[i] - mp.fsum(c[k][i] for k in range(top)) for i in (0, 1))
     return c[: top + 1]
 
@@ -143,20 +171,24 @@ def trace_precisely(scene, x, theta, limit=2000):
         base = mp.floor(mp.mpf(x) / mp.mpf(scene.cell)) * mp.mpf(scene.cell)
         p = (mp.mpf(x) - base, mp.mpf(0))
         v = (-mp.cos(mp.mpf(theta)), -mp.sin(mp.mpf(theta)))
-        inside = [h for h in scene.hollows if h[0] < p[0] < h[1]]
+        inside = [h for h in scene.hollows if h[LEFT] < p[0] < h[RIGHT]]
         if not inside:
             return PreciseRay(mp.mpf(x), mp.pi - mp.mpf(theta), 1)
         hollow = inside[0]
-        left, right = mp.mpf(hollow[0]), mp.mpf(hollow[1])
-        starts = np.arange(int(hollow[3]), int(hollow[4]) - 1)
-        starts = starts[scene.joints[starts, 3] > 0]
+        left, right = mp.mpf(hollow[LEFT]), mp.mpf(hollow[RIGHT])
+        starts = np.arange(int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END]) - 1)
+        starts = starts[scene.joints[starts, STARTS_LINE] > 0]
         arcs = [
             _arc(row)
-            for table, k in ((scene.circles, 5), (scene.ellipses, 7))
+            for table, k, end in (
+                (scene.circles, FIRST_CIRCLE, CIRCLES_END),
+                (scene.ellipses, FIRST_ELLIPSE, ELLIPSES_END),
+            )
             if table is not None
-            for row in table[int(hollow[k]) : int(hollow[k + 1])]
+            for row in table[int(hollow[k]) : int(hollow[end])]
         ]
-        curves = [] if scene.beziers is None else [_bezier(r) for r in scene.beziers[int(hollow[9]) : int(hollow[10])]]
+        own = slice(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END]))
+        curves = [] if scene.beziers is None else [_bezier(row) for row in scene.beziers[own]]
         bounces, itinerary, enters = 0, [], True
         while bounces <= limit:
             while True:

@@ -10,6 +10,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.geometry.scene.columns import GRID_COLUMNS, PARTNER, RUN_SINE
 
 EPS = np.finfo(float).eps
 # Counts fit into int64 up to here.
@@ -27,7 +28,7 @@ def step_by_step(wall):
     circles = plain.scene.circles
     if circles is not None:
         circles = circles.copy()
-        circles[:, 10] = 0.0
+        circles[:, RUN_SINE] = 0.0
     plain.__dict__["scene"] = replace(plain.scene, pairs=None, circles=circles, closed=None)
     return plain
 
@@ -140,7 +141,7 @@ def test_only_lines_that_face_each_other_freely_make_runs():
     # a tooth stands between the outer sides of this hollow: only the channels on either side of it make runs
     comb = [(0, 0), (0.1, 0), (0.1, -1), (0.2, -1), (0.2, -0.2), (0.25, -0.2), (0.25, -1), (0.4, -1), (0.4, 0), (1, 0)]
     pairs = geo.Wall.from_vertices(comb).scene.pairs
-    assert sorted(pairs[:, 0].tolist()) == [0.0, 2.0, 4.0, 6.0]
+    assert sorted(pairs[:, PARTNER].tolist()) == [0.0, 2.0, 4.0, 6.0]
 
 
 def test_a_run_stops_at_the_largest_number_of_collisions():
@@ -211,7 +212,7 @@ MANY = {
 def without_grid(wall):
     plain = geo.Wall(wall.pieces, wall.period, wall.islands)
     hollows = plain.scene.hollows.copy()
-    hollows[:, 17] = 0.0
+    hollows[:, GRID_COLUMNS] = 0.0
     plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, grid=None)
     return plain
 

@@ -15,6 +15,7 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
+from ..scene.columns import ARC_COLUMNS, ELLIPSES_END, FIRST_ELLIPSE, LINE_COLUMNS, SIZE
 from ..tracing.threads import new_flag
 
 if TYPE_CHECKING:
@@ -64,11 +65,11 @@ def ground_of(scene: Scene) -> Ground:
     """The tables of a wall; circles and ellipses have the same columns and become one table."""
     from ..tracing.double_double.arcs import refined_arcs
 
-    none = np.empty((0, 0))
+    none = np.empty((0, ARC_COLUMNS))
     circles, ellipses = (none if table is None else table for table in (scene.circles, scene.ellipses))
     hollows = scene.hollows.copy()
-    hollows[:, 7:9] += len(circles)
-    lines = np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines
+    hollows[:, (FIRST_ELLIPSE, ELLIPSES_END)] += len(circles)
+    lines = np.zeros((len(scene.joints), LINE_COLUMNS)) if scene.lines is None else scene.lines
     arcs = [table for table in (circles, ellipses) if len(table)]
     table = np.concatenate(arcs) if arcs else none
     exact_arcs = refined_arcs(table)
@@ -97,5 +98,5 @@ def shares(disk: Disk) -> tuple[float, float]:
 
 def rounding_of_places(scene: Scene, farthest: float) -> float:
     """How far off a satellite may be by rounding: of the wall's size and of its distance from the disk's centre."""
-    size = float(scene.hollows[:, 2].max()) if len(scene.hollows) else 0.0
+    size = float(scene.hollows[:, SIZE].max()) if len(scene.hollows) else 0.0
     return SLACK * (size + scene.cell + farthest)

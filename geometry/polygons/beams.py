@@ -10,6 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, frozen, number_between, whole_number
 from ..tracing.threads import interruptibly
+from .compiled.columns import (
+    PIECE_COSINE,
+    PIECE_HIGH,
+    PIECE_LOW,
+    PIECE_OFFSET,
+    PIECE_SINE,
+    TAG_BOUNCES,
+    TAG_LEAF,
+    TAG_LEFT,
+    TAG_SIGN,
+)
 from .triangulation import triangulated
 
 TOLERANCE = 1e-13
@@ -140,24 +151,24 @@ def beams_of(
     rows, tags = pieces_of(corners, real, whole, used, width)
     if mirror_symmetric:
         rows, tags, rounding = *_with_mirror_images(rows, tags), 2.0 * rounding
-    out = tags[:, 3] == 1
+    out = tags[:, TAG_LEFT] == 1
     kept, rest = rows[out], rows[~out]
-    unresolved = float(_flux(*rest[:, :4].T).sum())
+    unresolved = float(_flux_of(rest).sum())
     return Beams(
-        sign=_fixed(tags[out, 1].astype(np.int8)),
-        offset=frozen(kept[:, 4]),
-        low=frozen(kept[:, 0]),
-        high=frozen(kept[:, 1]),
-        sine=frozen(kept[:, 2]),
-        cosine=frozen(kept[:, 3]),
-        leaf=_fixed(tags[out, 0]),
-        bounces=_fixed(tags[out, 2]),
+        sign=_fixed(tags[out, TAG_SIGN].astype(np.int8)),
+        offset=frozen(kept[:, PIECE_OFFSET]),
+        low=frozen(kept[:, PIECE_LOW]),
+        high=frozen(kept[:, PIECE_HIGH]),
+        sine=frozen(kept[:, PIECE_SINE]),
+        cosine=frozen(kept[:, PIECE_COSINE]),
+        leaf=_fixed(tags[out, TAG_LEAF]),
+        bounces=_fixed(tags[out, TAG_BOUNCES]),
         unresolved=unresolved,
-        unresolved_low=frozen(rest[:, 0]),
-        unresolved_high=frozen(rest[:, 1]),
-        unresolved_sine=frozen(rest[:, 2]),
-        unresolved_cosine=frozen(rest[:, 3]),
-        defect=abs(float(_flux(*rows[:, :4].T).sum()) - 1.0),
+        unresolved_low=frozen(rest[:, PIECE_LOW]),
+        unresolved_high=frozen(rest[:, PIECE_HIGH]),
+        unresolved_sine=frozen(rest[:, PIECE_SINE]),
+        unresolved_cosine=frozen(rest[:, PIECE_COSINE]),
+        defect=abs(float(_flux_of(rows).sum()) - 1.0),
         rounding=float(rounding) / (2.0 * width),
         complete=bool(status == DONE),
     )
@@ -169,12 +180,17 @@ def _flux(low: Floats, high: Floats, sine: Floats, cosine: Floats) -> Floats:
     return np.asarray(half * (sine * np.sin(middle) + cosine * np.cos(middle)))
 
 
+def _flux_of(rows: Floats) -> Floats:
+    """The flux of each row of `pieces_of`."""
+    return _flux(*rows[:, (PIECE_LOW, PIECE_HIGH, PIECE_SINE, PIECE_COSINE)].T)
+
+
 def _with_mirror_images(rows: Floats, tags: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
     """The rows and tags of `pieces_of` with those of the mirror image: both angles replaced by pi minus them."""
     low, high, sine, cosine, offset = rows.T
-    offset = np.where(tags[:, 1] > 0, -offset, 2.0 * np.pi - offset)
+    offset = np.where(tags[:, TAG_SIGN] > 0, -offset, 2.0 * np.pi - offset)
     images, named = np.column_stack([np.pi - high, np.pi - low, sine, -cosine, offset]), tags.copy()
-    named[:, 0] += tags[tags[:, 3] == 1, 0].max(initial=-1) + 1
+    named[:, TAG_LEAF] += tags[tags[:, TAG_LEFT] == 1, TAG_LEAF].max(initial=-1) + 1
     return np.concatenate([rows, images]), np.concatenate([tags, named])
 
 

@@ -6,28 +6,25 @@ from dataclasses import replace
 from typing import TypeVar
 
 from ...core.checks import Floats
+from .columns import FIRST_PAIR, GRID_COLUMNS, PAIRS_END, RUN_SINE
 from .scene import Scene
 
 Table = TypeVar("Table", Floats, Floats | None)
 
-# Columns of the tables, see the head of scene.py: the sine below which a run along an arc is skipped, the frame of a
-# hollow's grid, the range of a line's rows in the table of pairs.
-RUN_COLUMN, GRID_COLUMNS, PAIR_COLUMNS = slice(10, 11), slice(13, 20), slice(5, 7)
-
 
 def without_pairs(scene: Scene) -> Scene:
     """Without channels and wedges: every hit between facing lines is a step."""
-    return replace(scene, pairs=None, lines=_cleared(scene.lines, PAIR_COLUMNS))
+    return replace(scene, pairs=None, lines=_cleared(scene.lines, (FIRST_PAIR, PAIRS_END)))
 
 
 def without_runs(scene: Scene) -> Scene:
     """Without runs along arcs: every hit on an arc that the loop follows is a step."""
-    return replace(scene, circles=_cleared(scene.circles, RUN_COLUMN))
+    return replace(scene, circles=_cleared(scene.circles, (RUN_SINE,)))
 
 
 def without_grid(scene: Scene) -> Scene:
     """Without grids: every line of a hollow is tested."""
-    return replace(scene, hollows=_cleared(scene.hollows, GRID_COLUMNS), grid=None)
+    return replace(scene, hollows=_cleared(scene.hollows, (GRID_COLUMNS,)), grid=None)
 
 
 def without_formulas(scene: Scene) -> Scene:
@@ -35,7 +32,7 @@ def without_formulas(scene: Scene) -> Scene:
     return replace(scene, closed=None)
 
 
-def _cleared(table: Table, columns: slice) -> Table:
+def _cleared(table: Table, columns: tuple[int, ...]) -> Table:
     """A copy with zeros in these columns, of a table that the scene has."""
     if table is None:
         return table

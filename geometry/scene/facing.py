@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
+from .columns import APEX_X, APEX_Y, FAR_X, FAR_Y, GAP, NEAR_X, NEAR_Y, PAIR_ANGLE, PAIR_SINE, PARTNER
 
 # In a wedge wider than this a ray makes ten hits at most; a run is not worth its arctangents there.
 WIDEST_WEDGE = 0.3
@@ -20,7 +21,7 @@ MOST_WORK = 50_000_000
 # Pieces that reach into the part between two lines by this share of the hollow's size touch it within rounding.
 TOUCH_ULPS = 16.0
 
-PairRow = list[float]
+PairRow = dict[int, float]
 
 
 def facing_pairs(
@@ -42,7 +43,8 @@ def facing_pairs(
     Returns
     -------
     list of (int, row)
-        The number of a line and a row of the table ``pairs`` for its partner; both lines of a pair have one.
+        The number of a line and the row of the table ``pairs`` for its partner, by columns; both lines of a pair have
+        one.
     """
     count = len(numbers)
     if count < 2:
@@ -65,8 +67,8 @@ def facing_pairs(
     for i, j in zip(first.tolist(), second.tolist(), strict=True):
         found = _facing(starts[i], ends[i], starts[j], ends[j], hulls, TOUCH_ULPS * EPS * size)
         if found is not None:
-            rows.append((int(numbers[i]), [float(numbers[j]), *found[0]]))
-            rows.append((int(numbers[j]), [float(numbers[i]), *found[1]]))
+            rows.append((int(numbers[i]), {PARTNER: float(numbers[j])} | found[0]))
+            rows.append((int(numbers[j]), {PARTNER: float(numbers[i])} | found[1]))
     return rows
 
 
@@ -108,7 +110,17 @@ def _facing(a0: Floats, a1: Floats, b0: Floats, b1: Floats, hulls: Floats, slack
     if not free.all():
         return None
     return [
-        [*map(float, [*top, *bottom, *u]), gap, sin(beta), beta]
+        {
+            NEAR_X: top[0],
+            NEAR_Y: top[1],
+            FAR_X: bottom[0],
+            FAR_Y: bottom[1],
+            APEX_X: u[0],
+            APEX_Y: u[1],
+            GAP: gap,
+            PAIR_SINE: sin(beta),
+            PAIR_ANGLE: beta,
+        }
         for (top, bottom), u, gap in zip(parts, (u_a, u_b), gaps, strict=True)
     ]
 

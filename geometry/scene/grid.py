@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from .columns import POINT_X, POINT_Y
 
 # Cells a piece: a choice that keeps a cell about as large as a piece; it has not been tuned.
 CELLS_PER_PIECE = 2.0
@@ -82,8 +83,11 @@ def list_entries(starts, ends, low, size, columns, rows, first, places, entries)
     With no entries the lines are only counted: places that begin at 0 become their numbers.
     """
     for k in range(starts.shape[0]):
-        ax, ay = (starts[k, 0] - low[0]) / size[0], (starts[k, 1] - low[1]) / size[1]
-        bx, by = (ends[k, 0] - low[0]) / size[0], (ends[k, 1] - low[1]) / size[1]
+        ax, ay = (
+            (starts[k, POINT_X] - low[POINT_X]) / size[POINT_X],
+            (starts[k, POINT_Y] - low[POINT_Y]) / size[POINT_Y],
+        )
+        bx, by = (ends[k, POINT_X] - low[POINT_X]) / size[POINT_X], (ends[k, POINT_Y] - low[POINT_Y]) / size[POINT_Y]
         left, right = cells_about(min(ax, bx), max(ax, bx), columns)
         bottom, top = cells_about(min(ay, by), max(ay, by), rows)
         for row in range(bottom, top + 1):

@@ -2,23 +2,12 @@
 
 Flat tops have no place in the tables, and a table of a primitive that the wall does not have is None.
 
-Columns. ``hollows``: left, right, size, first joint, joint after the last, then the ranges in ``circles``, ``ellipses``
-and ``beziers`` (two columns each), then the kind of edge at the left and at the right end (0 none, 1 smooth, 2 corner),
-then the frame of the grid over the lines of a hollow that has many: lower left corner (2), size of a cell (2), columns
-(0: no grid), rows, place in ``grid``. ``grid`` (integers): see `grid.grid_of`.
-``joints``: x, y, 1 if a corner, 1 if a segment starts here. ``lines`` (a row a joint): edge vector, left unit normal,
-length, range of its rows in ``pairs``. ``pairs`` (a row for each line of a pair that faces another with nothing in
-between): the partner, the ends of the part that faces it, first the one towards the apex (4), unit vector towards the
-apex, gap at that end, sine of the angle between the lines, that angle. ``circles`` and ``ellipses``: first joint (2),
-unit normal there (2), curvature, chord direction (2), chord length (0 beyond a half angle of pi/4), two unused, sine
-below which a run of hops is skipped (0 never), span, stretch, both joints (4), corner flags (2); all in coordinates
-whose y is multiplied by the stretch, but for the joints.
-``beziers``: coefficients of 1, s, s^2, s^3 (x and y each), both joints (4), corner flags (2).
-``closed``: a row for each hollow, see `closed_forms`.
+The columns of the tables are in `columns`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import asin, cos, hypot, pi, sin
 
@@ -31,7 +20,75 @@ from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
-from .closed_forms import NONE, closed_row, closed_table
+from .closed_forms import closed_row, closed_table
+from .columns import (
+    ARC_COLUMNS,
+    BEZIER_COLUMNS,
+    BEZIERS_END,
+    CELL_HEIGHT,
+    CELL_WIDTH,
+    CHORD_X,
+    CHORD_Y,
+    CIRCLES_END,
+    CORNER_EDGE,
+    CURVATURE,
+    EDGE_X,
+    EDGE_Y,
+    ELLIPSES_END,
+    END_CORNER,
+    END_X,
+    END_Y,
+    FIRST_BEZIER,
+    FIRST_CIRCLE,
+    FIRST_ELLIPSE,
+    FIRST_JOINT,
+    FIRST_PAIR,
+    FORM,
+    FORM_COLUMNS,
+    GRID_COLUMNS,
+    GRID_ROWS,
+    GRID_START,
+    GRID_X,
+    GRID_Y,
+    HOLLOW_COLUMNS,
+    IS_CORNER,
+    JOINT_COLUMNS,
+    JOINT_X,
+    JOINT_Y,
+    JOINTS_END,
+    LEFT,
+    LEFT_EDGE,
+    LENGTH,
+    LINE_COLUMNS,
+    LINE_NORMAL_X,
+    LINE_NORMAL_Y,
+    NO_EDGE,
+    NO_FORM,
+    NORMAL_X,
+    NORMAL_Y,
+    PAIR_COLUMNS,
+    PAIRS_END,
+    RIGHT,
+    RIGHT_EDGE,
+    RUN_SINE,
+    SHORT_CHORD,
+    SIZE,
+    SMOOTH_EDGE,
+    SPAN,
+    START_CORNER,
+    START_X,
+    START_Y,
+    STARTS_LINE,
+    STRETCH,
+    X1,
+    X2,
+    X3,
+    Y1,
+    Y2,
+    Y3,
+    row_of,
+    table_of,
+)
 from .facing import facing_pairs
 
 # Tangents that agree to this angle make a smooth joint: a ray at the joint is then reflected alike by both pieces, up
@@ -76,14 +133,22 @@ def _tangent(piece: Curve, s: float) -> Point:
     return float(x), float(y)
 
 
-def arc_row(arc: Arc, start: Point, end: Point) -> list[float]:
-    """One row of ``circles`` or ``ellipses`` but for its flags."""
+def line_row(start: Point, end: Point) -> Floats:
+    """A row of ``lines``; its pairs are marked later."""
+    x, y = end[0] - start[0], end[1] - start[1]
+    length = hypot(x, y)
+    row = {EDGE_X: x, EDGE_Y: y, LINE_NORMAL_X: -y / length, LINE_NORMAL_Y: x / length, LENGTH: length}
+    return row_of(LINE_COLUMNS, row)
+
+
+def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
+    """A row of ``circles`` or ``ellipses``, whose first columns are given; where runs are allowed is marked later."""
     a, b = arc.semi_axes
     stretch = a / b
     turn = arc.end_angle - arc.start_angle
     # anticlockwise arcs have their centre on the left, the free side: they focus
     sign = 1.0 if turn > 0.0 else -1.0
-    chord = (end[0] - start[0], stretch * (end[1] - start[1]))
+    chord = (ends[END_X] - ends[START_X], stretch * (ends[END_Y] - ends[START_Y]))
     length = hypot(*chord)
     direction = (chord[0] / length, chord[1] / length)
     half = 0.5 * abs(turn)
@@ -98,22 +163,27 @@ def arc_row(arc: Arc, start: Point, end: Point) -> list[float]:
         sign * sin(half) * direction[1] + cos(half) * direction[0],
     )
     short = length if half <= 0.25 * pi else 0.0
-    row = [start[0], start[1], *normal, curvature, *direction, short, 0.0, 0.0, 0.0, 2.0 * half, stretch]
-    return [*row, *start, *end]
+    columns = {
+        NORMAL_X: normal[0], NORMAL_Y: normal[1], CURVATURE: curvature, CHORD_X: direction[0], CHORD_Y: direction[1],
+        SHORT_CHORD: short, SPAN: 2.0 * half, STRETCH: stretch,
+    }  # fmt: skip
+    return row_of(ARC_COLUMNS, {**ends, **columns})
 
 
-def bezier_row(curve: Bezier, start: Point, end: Point) -> list[float]:
-    """One row of ``beziers`` but for its flags."""
+def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
+    """A row of ``beziers``, whose first columns are given."""
     inner = list(curve.control_points[1:-1])
+    start, end = (ends[START_X], ends[START_Y]), (ends[END_X], ends[END_Y])
     points = np.array([start, *inner, end], dtype=np.float64)
     if len(points) == 3:
-        a0, a1, a2 = points[0], 2.0 * (points[1] - points[0]), points[0] - 2.0 * points[1] + points[2]
+        a1, a2 = 2.0 * (points[1] - points[0]), points[0] - 2.0 * points[1] + points[2]
         a3 = np.zeros(2)
     else:
-        a0, a1 = points[0], 3.0 * (points[1] - points[0])
+        a1 = 3.0 * (points[1] - points[0])
         a2 = 3.0 * (points[0] - 2.0 * points[1] + points[2])
         a3 = points[3] - points[0] + 3.0 * (points[1] - points[2])
-    return [*a0, *a1, *a2, *a3, *start, *end]
+    columns = {X1: a1[0], Y1: a1[1], X2: a2[0], Y2: a2[1], X3: a3[0], Y3: a3[1]}
+    return row_of(BEZIER_COLUMNS, {**ends, **columns})
 
 
 @dataclass(frozen=True)
@@ -150,14 +220,20 @@ def scene_of(wall: Cell) -> Scene:
                 places[hollow.first : hollow.last + 1],
                 corners[hollow.first : hollow.last + 1],
             )
-            tables.add_hollow(hollow.left, hollow.right, [chain], edges=(1 + chain.corners[0], 1 + chain.corners[-1]))
+            tables.add_hollow(
+                hollow.left, hollow.right, [chain], edges=(_edge(chain.corners[0]), _edge(chain.corners[-1]))
+            )
     else:
         chains = [_Chain(list(wall.pieces), places, corners)]
         for island, island_places in zip(wall.islands, wall.island_vertices, strict=True):
             loop = [(float(x), float(y)) for x, y in island_places]
             chains.append(_Chain(list(island), loop, corners_of(list(island))))
-        tables.add_hollow(0.0, wall.period, chains, edges=(0, 0))
+        tables.add_hollow(0.0, wall.period, chains, edges=(NO_EDGE, NO_EDGE))
     return tables.scene(wall.period, not wall.closes)
+
+
+def _edge(is_corner: bool) -> float:
+    return CORNER_EDGE if is_corner else SMOOTH_EDGE
 
 
 def scene_in_one(wall: Cell) -> Scene:
@@ -165,7 +241,7 @@ def scene_in_one(wall: Cell) -> Scene:
     tables = _Tables()
     places = [(float(x), float(y)) for x, y in wall.vertices]
     chain = _Chain(list(wall.pieces), places, corners_of(list(wall.pieces)))
-    tables.add_hollow(0.0, wall.period, [chain], edges=(2, 2))
+    tables.add_hollow(0.0, wall.period, [chain], edges=(CORNER_EDGE, CORNER_EDGE))
     return tables.scene(wall.period, False)
 
 
@@ -199,19 +275,19 @@ class _Tables:
     """The tables while they grow."""
 
     def __init__(self) -> None:
-        self.hollows: list[list[float]] = []
-        self.joints: list[list[float]] = []
-        self.lines: list[list[float]] = []
-        self.circles: list[list[float]] = []
-        self.ellipses: list[list[float]] = []
-        self.beziers: list[list[float]] = []
-        self.pairs: list[list[float]] = []
+        self.hollows: list[Floats] = []
+        self.joints: list[Floats] = []
+        self.lines: list[Floats] = []
+        self.circles: list[Floats] = []
+        self.ellipses: list[Floats] = []
+        self.beziers: list[Floats] = []
+        self.pairs: list[Floats] = []
         self.grids: list[NDArray[np.int64]] = []
-        self.closed: list[list[float]] = []
+        self.closed: list[Floats] = []
 
-    def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[int, int]) -> None:
+    def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[float, float]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
-        is_closed = len(chains) == 1 and edges != (0, 0)
+        is_closed = len(chains) == 1 and edges != (NO_EDGE, NO_EDGE)
         chains = [chain.without_long_arcs() for chain in chains]
         before = self._sizes()
         for chain in chains:
@@ -220,14 +296,17 @@ class _Tables:
         joints = np.array([place for chain in chains for place in chain.places])
         size = float(np.max(np.ptp(joints, axis=0))) if len(joints) else right - left
         size = max(size, right - left)
-        ranges = [value for pair in zip(before, after, strict=True) for value in pair]
-        self.hollows.append([left, right, size, *map(float, ranges), *map(float, edges), *[0.0] * 7])
+        row = {LEFT: left, RIGHT: right, SIZE: size, LEFT_EDGE: edges[0], RIGHT_EDGE: edges[1]}
+        row |= dict(zip((FIRST_JOINT, FIRST_CIRCLE, FIRST_ELLIPSE, FIRST_BEZIER), before, strict=True))
+        row |= dict(zip((JOINTS_END, CIRCLES_END, ELLIPSES_END, BEZIERS_END), after, strict=True))
+        self.hollows.append(row_of(HOLLOW_COLUMNS, row))
         self._mark_runs(before[1], after[1], chains)
         inside = bool(np.all((left <= joints[:, 0]) & (joints[:, 0] <= right)))
-        if inside or edges != (0, 0):
+        if inside or edges != (NO_EDGE, NO_EDGE):
             self._mark_pairs(before[0], chains, size)
         self._add_grid(before[0])
-        self.closed.append(closed_row(chains[0].pieces, chains[0].places, size) if is_closed else [NONE])
+        form = closed_row(chains[0].pieces, chains[0].places, size) if is_closed else None
+        self.closed.append(row_of(FORM_COLUMNS, {FORM: NO_FORM}) if form is None else form)
 
     def _sizes(self) -> tuple[int, int, int, int]:
         return len(self.joints), len(self.circles), len(self.ellipses), len(self.beziers)
@@ -235,18 +314,23 @@ class _Tables:
     def _add_chain(self, chain: _Chain) -> None:
         for i, piece in enumerate(chain.pieces):
             start, end = chain.places[i], chain.places[i + 1]
-            flags = [float(chain.corners[i]), float(chain.corners[i + 1])]
             is_line = isinstance(piece, Segment)
-            self.joints.append([*start, flags[0], float(is_line)])
-            edge = (end[0] - start[0], end[1] - start[1])
-            length = hypot(*edge)
-            self.lines.append([*edge, -edge[1] / length, edge[0] / length, length, 0.0, 0.0] if is_line else [0.0] * 7)
+            self._add_joint(start, chain.corners[i], is_line)
+            self.lines.append(line_row(start, end) if is_line else np.zeros(LINE_COLUMNS))
+            ends = {
+                START_X: start[0], START_Y: start[1], END_X: end[0], END_Y: end[1],
+                START_CORNER: chain.corners[i], END_CORNER: chain.corners[i + 1],
+            }  # fmt: skip
             if isinstance(piece, Arc):
-                (self.circles if piece.is_circular else self.ellipses).append(arc_row(piece, start, end) + flags)
+                (self.circles if piece.is_circular else self.ellipses).append(arc_row(piece, ends))
             elif isinstance(piece, Bezier):
-                self.beziers.append(bezier_row(piece, start, end) + flags)
-        self.joints.append([*chain.places[-1], float(chain.corners[-1]), 0.0])
-        self.lines.append([0.0] * 7)
+                self.beziers.append(bezier_row(piece, ends))
+        self._add_joint(chain.places[-1], chain.corners[-1], False)
+        self.lines.append(np.zeros(LINE_COLUMNS))
+
+    def _add_joint(self, place: Point, is_corner: bool, starts_line: bool) -> None:
+        row = {JOINT_X: place[0], JOINT_Y: place[1], IS_CORNER: is_corner, STARTS_LINE: starts_line}
+        self.joints.append(row_of(JOINT_COLUMNS, row))
 
     def _mark_runs(self, first: int, last: int, chains: list[_Chain]) -> None:
         """Allow runs on the focusing circles whose circular segment no other piece of the hollow enters."""
@@ -258,26 +342,34 @@ class _Tables:
         ends = [np.array([chain.places[-1]]) for chain in chains]
         points = np.concatenate(outlines + ends)
         for row in self.circles[first:last]:
-            half = 0.5 * row[11]
-            own = abs(np.hypot(points[:, 0] - row[0] - row[2] / row[4], points[:, 1] - row[1] - row[3] / row[4]))
-            height = (points[:, 1] - row[1]) * row[5] - (points[:, 0] - row[0]) * row[6]
-            slack = 1e-12 * self.hollows[-1][2]
-            foreign = (height < -slack) & (np.abs(own - 1.0 / abs(row[4])) > slack)
-            if row[4] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
-                row[10] = sin(half / RUN_HOPS)
+            half, radius = 0.5 * row[SPAN], 1.0 / abs(row[CURVATURE])
+            x, y = points[:, 0] - row[START_X], points[:, 1] - row[START_Y]
+            own = abs(
+                np.hypot(
+                    points[:, 0] - row[START_X] - row[NORMAL_X] / row[CURVATURE],
+                    points[:, 1] - row[START_Y] - row[NORMAL_Y] / row[CURVATURE],
+                )
+            )
+            height = y * row[CHORD_X] - x * row[CHORD_Y]
+            slack = 1e-12 * self.hollows[-1][SIZE]
+            foreign = (height < -slack) & (np.abs(own - radius) > slack)
+            if row[CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
+                row[RUN_SINE] = sin(half / RUN_HOPS)
 
     def _add_grid(self, first: int) -> None:
         """Lay a grid over the lines of the last hollow, which start at the joint ``first``, if they are many."""
         joints = np.array(self.joints[first:], dtype=np.float64)
-        is_line = joints[:, 3] > 0.0
+        is_line = joints[:, STARTS_LINE] > 0.0
         if is_line.sum() < GRID_LINES:
             return
         from .grid import grid_of
 
-        ends = np.roll(joints[:, :2], -1, axis=0)
-        ends[~is_line] = joints[~is_line, :2]
-        frame, table = grid_of(np.ascontiguousarray(joints[:, :2]), ends, first, sum(map(len, self.grids)))
-        self.hollows[-1][-7:] = frame
+        starts = np.ascontiguousarray(joints[:, [JOINT_X, JOINT_Y]])
+        ends = np.roll(starts, -1, axis=0)
+        ends[~is_line] = starts[~is_line]
+        frame, table = grid_of(starts, ends, first, sum(map(len, self.grids)))
+        columns = [GRID_X, GRID_Y, CELL_WIDTH, CELL_HEIGHT, GRID_COLUMNS, GRID_ROWS, GRID_START]
+        self.hollows[-1][columns] = frame
         self.grids.append(table)
 
     def _mark_pairs(self, first: int, chains: list[_Chain], size: float) -> None:
@@ -300,19 +392,18 @@ class _Tables:
             np.array(hulls, dtype=np.float64).reshape(-1, 4, 2),
             size,
         )
-        for line, row in sorted(rows):
-            if self.lines[line][6] == 0.0:
-                self.lines[line][5] = self.lines[line][6] = float(len(self.pairs))
-            self.pairs.append(row)
-            self.lines[line][6] += 1.0
+        for line, row in sorted(rows, key=lambda pair: (pair[0], *pair[1].values())):
+            if self.lines[line][PAIRS_END] == 0.0:
+                self.lines[line][[FIRST_PAIR, PAIRS_END]] = len(self.pairs)
+            self.pairs.append(row_of(PAIR_COLUMNS, row))
+            self.lines[line][PAIRS_END] += 1.0
 
     def scene(self, cell: float, is_open: bool) -> Scene:
-        joints = np.array(self.joints, dtype=np.float64).reshape(-1, 4)
-        lines = np.array(self.lines, dtype=np.float64).reshape(-1, 7)
+        joints, lines = table_of(self.joints, JOINT_COLUMNS), table_of(self.lines, LINE_COLUMNS)
         return Scene(
-            hollows=np.array(self.hollows, dtype=np.float64).reshape(-1, 20),
+            hollows=table_of(self.hollows, HOLLOW_COLUMNS),
             joints=joints,
-            lines=lines if joints[:, 3].any() else None,
+            lines=lines if joints[:, STARTS_LINE].any() else None,
             circles=_table(self.circles),
             ellipses=_table(self.ellipses),
             beziers=_table(self.beziers),
@@ -324,5 +415,5 @@ class _Tables:
         )
 
 
-def _table(rows: list[list[float]]) -> Floats | None:
-    return np.array(rows, dtype=np.float64) if rows else None
+def _table(rows: list[Floats]) -> Floats | None:
+    return np.array(rows) if rows else None

@@ -10,6 +10,23 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
+from ..scene.columns import (
+    ARC_COLUMNS,
+    BEZIER_COLUMNS,
+    CURVATURE,
+    END_Y,
+    JOINT_Y,
+    LINE_COLUMNS,
+    PAIR_COLUMNS,
+    SIZE,
+    SPAN,
+    START_Y,
+    STARTS_LINE,
+    STRETCH,
+    Y1,
+    Y2,
+    Y3,
+)
 from ..scene.tolerances import JOINT_ULPS
 
 if TYPE_CHECKING:
@@ -53,16 +70,17 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     from .double_double.rays import refined_rays
 
     count = len(x)
-    circles = _rows(scene.circles, 19)
-    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, 19)]))
+    circles = _rows(scene.circles, ARC_COLUMNS)
+    arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, ARC_COLUMNS)]))
     result = RefinedTrace(
         np.empty((count, 2)), np.empty((count, 2)), np.empty(count, np.int64), np.empty(count, np.uint8),
         np.empty(count), np.empty(count),
     )  # fmt: skip
     refined_rays(
         np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64),
-        scene.hollows, scene.joints, _rows(scene.lines, 7), _rows(scene.pairs, 10), arcs, len(circles),
-        np.zeros((1, 14)) if scene.beziers is None else scene.beziers, _free_bands(scene),
+        scene.hollows, scene.joints, _rows(scene.lines, LINE_COLUMNS), _rows(scene.pairs, PAIR_COLUMNS),
+        arcs, len(circles),
+        np.zeros((1, BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers, _free_bands(scene),
         scene.is_open, scene.cell, max_collisions, REFINED_FLIGHTS,
         result.x, result.theta, result.collisions, result.status, result.amplification, result.rounding,
     )  # fmt: skip
@@ -117,17 +135,19 @@ def _free_bands(scene: Scene) -> Floats:
     """The heights (low, high) of an open wall, shape (n, 2), at which no piece lies; none where rays stay in a cell."""
     if not scene.is_open:
         return np.empty((0, 2))
-    lines = np.flatnonzero(scene.joints[:, 3] > 0.0)
-    heights = [np.column_stack([scene.joints[lines, 1], scene.joints[lines + 1, 1]])]
-    for arcs in (_rows(scene.circles, 19), _rows(scene.ellipses, 19)):
+    lines = np.flatnonzero(scene.joints[:, STARTS_LINE] > 0.0)
+    heights = [np.column_stack([scene.joints[lines, JOINT_Y], scene.joints[lines + 1, JOINT_Y]])]
+    for arcs in (_rows(scene.circles, ARC_COLUMNS), _rows(scene.ellipses, ARC_COLUMNS)):
         # no point of an arc is further from both ends than half of its length
-        half = 0.5 * arcs[:, 11] / np.abs(arcs[:, 4]) / arcs[:, 12]
+        half = 0.5 * arcs[:, SPAN] / np.abs(arcs[:, CURVATURE]) / arcs[:, STRETCH]
         heights.append(
-            np.column_stack([np.minimum(*arcs[:, (14, 16)].T) - half, np.maximum(*arcs[:, (14, 16)].T) + half])
+            np.column_stack(
+                [np.minimum(*arcs[:, (START_Y, END_Y)].T) - half, np.maximum(*arcs[:, (START_Y, END_Y)].T) + half]
+            )
         )
-    c0, c1, c2, c3 = _rows(scene.beziers, 14)[:, 1:8:2].T
+    c0, c1, c2, c3 = _rows(scene.beziers, BEZIER_COLUMNS)[:, (START_Y, Y1, Y2, Y3)].T
     heights.append(np.column_stack([c0, c0 + c1 / 3, c0 + (2 * c1 + c2) / 3, c0 + c1 + c2 + c3]))
-    slack = JOINT_ULPS * EPS * float(scene.hollows[0, 2])
+    slack = JOINT_ULPS * EPS * float(scene.hollows[0, SIZE])
     extents = sorted((float(row.min()) - slack, float(row.max()) + slack) for part in heights for row in part)
     bands, top = [], extents[0][1]
     for low, high in extents:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_array, finite_number, instance, number_between, whole_number
+from ..scene.columns import LEFT, RIGHT
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
 
@@ -255,7 +256,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     if wall.origin != (0.0, 0.0):
         entry = float(entries(wall, np.array([place]), np.array([incoming]))[0])
     base = np.floor(entry / scene.cell) * scene.cell
-    left, right = scene.hollows[:, 0], scene.hollows[:, 1]
+    left, right = scene.hollows[:, LEFT], scene.hollows[:, RIGHT]
     inside = np.flatnonzero((left < entry - base) & (entry - base < right) | scene.is_open)
     if len(inside) == 0:
         # a flat top: entry, hit and exit are one point

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...geometry.scene.columns import ARC_COLUMNS, BEZIER_COLUMNS, LEFT, LINE_COLUMNS, PAIR_COLUMNS, RIGHT, RUN_SINE
 
 if TYPE_CHECKING:
     from ...geometry.scene.scene import Scene
@@ -66,23 +67,25 @@ class HollowRows:
     @property
     def width(self) -> float:
         """That of the opening."""
-        left, right = self.scene.hollows[self.hollow, :2]
+        left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]]
         return float(right - left)
 
     @cached_property
     def _bounds(self) -> tuple[Any, ...]:
+        from ...geometry.itineraries.compiled.changes import Limits
+
         scene = self.scene
         # empty tables instead of absent ones, so that one compiled version serves all walls: compiling takes 20 s
         tables = (
             scene.joints,
-            np.zeros((len(scene.joints), 7)) if scene.lines is None else scene.lines,
+            np.zeros((len(scene.joints), LINE_COLUMNS)) if scene.lines is None else scene.lines,
             *(
                 np.zeros((0, columns)) if table is None else table
                 for columns, table in (
-                    (19, scene.circles),
-                    (19, scene.ellipses),
-                    (14, scene.beziers),
-                    (10, scene.pairs),
+                    (ARC_COLUMNS, scene.circles),
+                    (ARC_COLUMNS, scene.ellipses),
+                    (BEZIER_COLUMNS, scene.beziers),
+                    (PAIR_COLUMNS, scene.pairs),
                 )
             ),
             # so many lines that they have a grid are rare enough for a version of their own
@@ -90,9 +93,9 @@ class HollowRows:
         )
         period = scene.cell if scene.is_open else None
         has_channels = scene.pairs is not None
-        has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, 10] > 0.0)))
+        has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
-        limits = most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_flights
+        limits = Limits(most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_flights)
         return scene.hollows[self.hollow], tables, period, limits, self.edges
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Row], set[float]]:
@@ -148,7 +151,7 @@ class HollowRows:
 
         k = int(np.searchsorted(self._theta, angle))
         known = [self._pieces[near] for near in self._theta[max(0, k - 1) : k + 2].tolist()]
-        left, right = self.scene.hollows[self.hollow, :2].tolist()
+        left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]].tolist()
         places = [first_places(angle, left, right, least), *(wide_middles(row.low, row.high, least) for row in known)]
         if angle in self._pieces:
             # its own changes are known already, up to the gaps that were left

@@ -32,6 +32,32 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from ...scene.columns import (
+    CIRCLES_END,
+    CURVATURE,
+    EDGE_X,
+    EDGE_Y,
+    ELLIPSES_END,
+    FIRST_CIRCLE,
+    FIRST_ELLIPSE,
+    FIRST_JOINT,
+    IS_CORNER,
+    JOINT_X,
+    JOINT_Y,
+    JOINTS_END,
+    LEFT,
+    LENGTH,
+    LINE_NORMAL_X,
+    LINE_NORMAL_Y,
+    NORMAL_X,
+    NORMAL_Y,
+    RIGHT,
+    SIZE,
+    START_X,
+    START_Y,
+    STARTS_LINE,
+    STRETCH,
+)
 from ...tracing.compiled.arcs import on_arc
 from ...tracing.compiled.nearby import LINE, NO_PIECE, SIDE
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, near_end
@@ -74,6 +100,15 @@ class Motion(NamedTuple):
     fastest: float
 
 
+class State(NamedTuple):
+    """Displacement of a satellite since the start of a flight, and the sine and cosine of its angle."""
+
+    dx: float
+    dy: float
+    sine: float
+    cosine: float
+
+
 @inlined
 def flight(v1, v2, omega, scale):
     """The flight of a disk of radius 1/scale."""
@@ -102,12 +137,8 @@ def satellite_after(t, turned, turn, motion):
     sine, cosine = turn
     sin_d, versed_d = turned
     d_sine, fall = cosine * sin_d - sine * versed_d, sine * sin_d + cosine * versed_d
-    return (
-        motion.v1 * t + d_sine * motion.radius,
-        motion.v2 * t + fall * motion.radius,
-        sine + d_sine,
-        cosine - fall,
-    )
+    dx, dy = motion.v1 * t + d_sine * motion.radius, motion.v2 * t + fall * motion.radius
+    return State(dx, dy, sine + d_sine, cosine - fall)
 
 
 @inlined
@@ -202,10 +233,11 @@ def next_root(sign, leaving, line, conic, t, end, turned, turn, motion, patience
 @inlined
 def where_on_line(joints, lines, j, x, y, slack):
     """How a point of the line through segment j lies to the segment: inside, and within the slack of a corner."""
-    along = (x - joints[j, 0]) * lines[j, 0] + (y - joints[j, 1]) * lines[j, 1]
-    length = lines[j, 4]
+    along = (x - joints[j, JOINT_X]) * lines[j, EDGE_X] + (y - joints[j, JOINT_Y]) * lines[j, EDGE_Y]
+    length = lines[j, LENGTH]
     from_start, from_end = along / length, length - along / length
-    corner = (from_start <= slack and joints[j, 2] > 0.0) or (from_end <= slack and joints[j + 1, 2] > 0.0)
+    at_start, at_end = joints[j, IS_CORNER] > 0.0, joints[j + 1, IS_CORNER] > 0.0
+    corner = (from_start <= slack and at_start) or (from_end <= slack and at_end)
     return from_start >= -slack and from_end >= -slack, corner
 
 
@@ -235,8 +267,8 @@ def first_on_piece(kind, index, own_kind, own_index, x, y, t, end, turned, turn,
     stretch, patience = 1.0, np.inf
     leaving = own and t == 0.0
     if kind == LINE:
-        g1, g2 = lines[index, 2], lines[index, 3]
-        level = 0.0 if own else g1 * (x - joints[index, 0]) + g2 * (y - joints[index, 1])
+        g1, g2 = lines[index, LINE_NORMAL_X], lines[index, LINE_NORMAL_Y]
+        level = 0.0 if own else g1 * (x - joints[index, JOINT_X]) + g2 * (y - joints[index, JOINT_Y])
         line = towards_line(level, g1, g2, turn, motion)
         here, rate, bend = line_after(line, t, turned, motion)
         if t == 0.0 and own_kind != NO_PIECE and not own and abs(here) <= slack:
@@ -248,10 +280,10 @@ def first_on_piece(kind, index, own_kind, own_index, x, y, t, end, turned, turn,
         if lowest > slack and (here > slack or (leaving and rate > 0.0)):
             return np.inf, satellite_after(t, turned, turn, motion), CLEAR
     else:
-        curvature, stretch = arcs[index, 4], arcs[index, 12]
-        rx, ry = x - arcs[index, 0], stretch * (y - arcs[index, 1])
-        g1, g2 = arcs[index, 2] - curvature * rx, arcs[index, 3] - curvature * ry
-        level = 0.0 if own else 0.5 * ((arcs[index, 2] + g1) * rx + (arcs[index, 3] + g2) * ry)
+        curvature, stretch = arcs[index, CURVATURE], arcs[index, STRETCH]
+        rx, ry = x - arcs[index, START_X], stretch * (y - arcs[index, START_Y])
+        g1, g2 = arcs[index, NORMAL_X] - curvature * rx, arcs[index, NORMAL_Y] - curvature * ry
+        level = 0.0 if own else 0.5 * ((arcs[index, NORMAL_X] + g1) * rx + (arcs[index, NORMAL_Y] + g2) * ry)
         conic = (level, g1, g2, curvature, stretch)
         here, rate, _, _, _ = conic_after(conic, t, turned, turn, motion)
         if t == 0.0 and own_kind != NO_PIECE and not own and abs(here) <= slack * max(1.0, stretch):
@@ -272,7 +304,7 @@ def first_on_piece(kind, index, own_kind, own_index, x, y, t, end, turned, turn,
         if code == BOUNCE_LIMIT:
             return t, state, code
         if sign > 0.0:
-            px, py = x + state[0], y + state[1]
+            px, py = x + state.dx, y + state.dy
             # at a shallow incidence a rounding error across the piece is a longer way along it
             if kind == LINE:
                 _, inward, _ = line_after(line, t, turned, motion)
@@ -281,7 +313,7 @@ def first_on_piece(kind, index, own_kind, own_index, x, y, t, end, turned, turn,
             else:
                 _, inward, _, _, _ = conic_after(conic, t, turned, turn, motion)
                 wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
-                ax, ay = px - arcs[index, 0], stretch * (py - arcs[index, 1])
+                ax, ay = px - arcs[index, START_X], stretch * (py - arcs[index, START_Y])
                 inside = on_arc(arcs[index], ax, ay, wide * max(1.0, stretch))
                 corner = near_end(arcs[index], px, py, wide)
             if inside:
@@ -302,12 +334,13 @@ def first_in_hollow(h, own_kind, own_index, came_from, x, y, t, end, turned, tur
     in through the left or the right one.
     """
     hollows, joints = ground.hollows, ground.joints
-    kind, index, code, size = NO_PIECE, -1, CLEAR, hollows[h, 2]
+    kind, index, code, size = NO_PIECE, -1, CLEAR, hollows[h, SIZE]
     where = satellite_after(t, turned, turn, motion)
-    for part in (3, 5, 7):
-        tried = LINE if part == 3 else ARC
-        for k in range(int(hollows[h, part]), int(hollows[h, part + 1])):
-            if tried == ARC or joints[k, 3] > 0.0:
+    ranges = (FIRST_JOINT, JOINTS_END), (FIRST_CIRCLE, CIRCLES_END), (FIRST_ELLIPSE, ELLIPSES_END)
+    for first, end_of_range in ranges:
+        tried = LINE if first == FIRST_JOINT else ARC
+        for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
+            if tried == ARC or joints[k, STARTS_LINE] > 0.0:
                 hit, place, unclear = first_on_piece(
                     tried, k, own_kind, own_index, x, y, t, end, turned, turn, motion, size, slack, ground
                 )
@@ -315,7 +348,7 @@ def first_in_hollow(h, own_kind, own_index, came_from, x, y, t, end, turned, tur
                     end, kind, index, code, where = hit, tried, k, unclear, place
     if ground.is_open:
         for side in (-1, 1):
-            edge = hollows[h, 0] if side < 0 else hollows[h, 1]
+            edge = hollows[h, LEFT] if side < 0 else hollows[h, RIGHT]
             line = towards_line(side * (edge - x), -float(side), 0.0, turn, motion)
             hit, then, unclear = next_root(
                 1.0, came_from == side, line, None, t, end, turned, turn, motion, np.inf, slack

@@ -7,12 +7,34 @@ are in units of the wall, see `contact`.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from ...scene.columns import (
+    CORNER_EDGE,
+    CURVATURE,
+    EDGE_X,
+    EDGE_Y,
+    JOINT_X,
+    JOINT_Y,
+    LEFT,
+    LEFT_EDGE,
+    LENGTH,
+    LINE_NORMAL_X,
+    LINE_NORMAL_Y,
+    NORMAL_X,
+    NORMAL_Y,
+    RIGHT,
+    RIGHT_EDGE,
+    START_X,
+    START_Y,
+    STRETCH,
+)
 from ...tracing.compiled.interruption import is_raised
 from ...tracing.compiled.nearby import LINE, NO_PIECE, SIDE
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
+from .columns import ALPHA, OMEGA, V1, V2, X1
 from .contact import (
     CLEAR,
     NO,
@@ -40,20 +62,44 @@ CELLS_A_LOOK = 1024
 FOREVER = 1e30
 
 
+class Place(NamedTuple):
+    """Where a satellite touches the wall: kind and number of the piece, and the hollow, -1 on the tops."""
+
+    kind: int
+    piece: int
+    hollow: int
+
+
+class Below(NamedTuple):
+    """A satellite that is below the tops: its number, its hollow (-1: there is none), and its cell's left end."""
+
+    number: int
+    hollow: int
+    base: float
+
+
+class Touch(NamedTuple):
+    """Where a satellite is when it touches the wall, and the sine and cosine of its angle then."""
+
+    x: float
+    y: float
+    turn: tuple[float, float]
+
+
 @inlined
 def hollow_at(hollows, place):
     """The hollow over which a place of the cell lies, or -1 over a flat top."""
     h = last_hollow(place, hollows)
-    return h if h >= 0 and place < hollows[h, 1] else -1
+    return h if h >= 0 and place < hollows[h, RIGHT] else -1
 
 
 @inlined
 def near_edge(hollows, place, slack):
     """Whether a place at height 0 is within the slack of an end of a hollow that is a corner."""
     for h in range(hollows.shape[0]):
-        if abs(place - hollows[h, 0]) <= slack and hollows[h, 11] > 1.0:
+        if abs(place - hollows[h, LEFT]) <= slack and hollows[h, LEFT_EDGE] == CORNER_EDGE:
             return True
-        if abs(place - hollows[h, 1]) <= slack and hollows[h, 12] > 1.0:
+        if abs(place - hollows[h, RIGHT]) <= slack and hollows[h, RIGHT_EDGE] == CORNER_EDGE:
             return True
     return False
 
@@ -114,7 +160,7 @@ def first_contact(own_kind, own_index, h, base, x, y, t, end, turn, motion, slac
         )
         if kind != SIDE or code == BOUNCE_LIMIT:
             return t, kind, index, h, base, state, code
-        if y + state[1] > 0.0 and motion.v2 + motion.omega * state[2] > 0.0:
+        if y + state.dy > 0.0 and motion.v2 + motion.omega * state.sine > 0.0:
             return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
         turned = turning(motion.spin * t)
         base += index * ground.cell
@@ -128,23 +174,22 @@ def surface(kind, index, x, y, ground):
     """The point (x, y) put back on the piece that it hit, and the unit normal there, towards the free side."""
     joints, lines, arcs = ground.joints, ground.lines, ground.arcs
     if kind == LINE:
-        n1, n2 = lines[index, 2], lines[index, 3]
-        share = ((x - joints[index, 0]) * lines[index, 0] + (y - joints[index, 1]) * lines[index, 1]) / (
-            lines[index, 4] * lines[index, 4]
-        )
+        n1, n2 = lines[index, LINE_NORMAL_X], lines[index, LINE_NORMAL_Y]
+        ex, ey, length = lines[index, EDGE_X], lines[index, EDGE_Y], lines[index, LENGTH]
+        share = ((x - joints[index, JOINT_X]) * ex + (y - joints[index, JOINT_Y]) * ey) / (length * length)
         near = index if share <= 0.5 else index + 1
         if near != index:
             share -= 1.0
-        return joints[near, 0] + share * lines[index, 0], joints[near, 1] + share * lines[index, 1], n1, n2
-    curvature, stretch = arcs[index, 4], arcs[index, 12]
-    qx, qy = x - arcs[index, 0], stretch * (y - arcs[index, 1])
-    n1, n2 = arcs[index, 2] - curvature * qx, arcs[index, 3] - curvature * qy
-    f = 0.5 * ((arcs[index, 2] + n1) * qx + (arcs[index, 3] + n2) * qy)
+        return joints[near, JOINT_X] + share * ex, joints[near, JOINT_Y] + share * ey, n1, n2
+    curvature, stretch = arcs[index, CURVATURE], arcs[index, STRETCH]
+    qx, qy = x - arcs[index, START_X], stretch * (y - arcs[index, START_Y])
+    n1, n2 = arcs[index, NORMAL_X] - curvature * qx, arcs[index, NORMAL_Y] - curvature * qy
+    f = 0.5 * ((arcs[index, NORMAL_X] + n1) * qx + (arcs[index, NORMAL_Y] + n2) * qy)
     qx -= f * n1
     qy -= f * n2
-    n1, n2 = arcs[index, 2] - curvature * qx, stretch * (arcs[index, 3] - curvature * qy)
+    n1, n2 = arcs[index, NORMAL_X] - curvature * qx, stretch * (arcs[index, NORMAL_Y] - curvature * qy)
     norm = 1.0 / math.sqrt(n1 * n1 + n2 * n2)
-    return arcs[index, 0] + qx, arcs[index, 1] + qy / stretch, n1 * norm, n2 * norm
+    return arcs[index, START_X] + qx, arcs[index, START_Y] + qy / stretch, n1 * norm, n2 * norm
 
 
 @inlined
@@ -196,9 +241,9 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
     reach, slack, rate = ring.reach, ring.slack, abs(motion.spin)
     passed = out_of_reach_after(angle, motion, ring)
     time, kind, index, hollow, base, state, code = first_contact(
-        own[0], own[1], own[2], 0.0, x, y, 0.0, min(end, passed), turn, motion, slack, ground
+        own.kind, own.piece, own.hollow, 0.0, x, y, 0.0, min(end, passed), turn, motion, slack, ground
     )
-    hit, chosen, touched = (kind, index, hollow), 0, (x + state[0], y + state[1], state[2], state[3])
+    hit, chosen, touched = Place(kind, index, hollow), 0, Touch(x + state.dx, y + state.dy, (state.sine, state.cosine))
     time = min(time, end)
     # the others in the order in which they come within reach of the wall
     step = -1 if motion.spin > 0.0 else 1
@@ -214,20 +259,21 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
             break
         if j != 0 and lowest_until(time, other, away, height, motion) <= 2.0 * slack:
             # two contacts are at one time if the disk falls less than the slack between them
-            tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if hit[0] != NO_PIECE else 0.0
+            tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if hit.kind != NO_PIECE else 0.0
             until = min(time + tie, out_of_reach_after(other, motion, ring))
             start = beyond / rate if beyond > 0.0 else 0.0
             x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
+            sine_other, _ = turn_other
             # the path bends upward, so that it stays above its first tangent
-            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * turn_other[0]) * until < 0.0:
-                inside, left = (below[1], below[2]) if j == below[0] else (NOTHING, 0.0)
+            if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * sine_other) * until < 0.0:
+                inside, left = (below.hollow, below.base) if j == below.number else (NOTHING, 0.0)
                 t, kind, index, hollow, left, state, unclear = first_contact(
                     ZERO, NOTHING, inside, left, x_other, y_other, start, until, turn_other, motion, slack, ground
                 )
-                tied = hit[0] != NO_PIECE and abs(t - time) <= tie
+                tied = hit.kind != NO_PIECE and abs(t - time) <= tie
                 if t < time:
-                    time, hit, base, code, chosen = t, (kind, index, hollow), left, unclear, j
-                    touched = (x_other + state[0], y_other + state[1], state[2], state[3])
+                    time, hit, base, code, chosen = t, Place(kind, index, hollow), left, unclear, j
+                    touched = Touch(x_other + state.dx, y_other + state.dy, (state.sine, state.cosine))
                 if tied:
                     code = CORNER
         j += step
@@ -244,16 +290,16 @@ def left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, rin
     tops beside the one that touches.
     """
     if ground.is_open:
-        return ZERO, NOTHING, 0.0
+        return Below(ZERO, NOTHING, 0.0)
     later = angle + motion.spin * time + chosen * ring.spacing
     for side in (-1, 1):
         if abs(later + side * ring.spacing) <= ring.reach:
-            _, height, _ = satellite_at(touched[0], touched[1], (touched[2], touched[3]), side, ring)
+            _, height, _ = satellite_at(touched.x, touched.y, touched.turn, side, ring)
             if height <= 0.0:
                 j = chosen + side
-                if j == 0 and own[2] >= 0:
-                    return j, own[2], 0.0
-                if j == below[0] and below[1] >= 0:
+                if j == 0 and own.hollow >= 0:
+                    return Below(j, own.hollow, 0.0)
+                if j == below.number and below.hollow >= 0:
                     return below
                 other = angle + j * ring.spacing
                 x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
@@ -265,17 +311,18 @@ def left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, rin
                     x_other, y_other, start, time, turning(motion.spin * start), turn_other, motion, ring.slack, ground
                 )
                 if t < time:
-                    return j, h, base
-    return ZERO, NOTHING, 0.0
+                    return Below(j, h, base)
+    return Below(ZERO, NOTHING, 0.0)
 
 
 @inlined
 def reflect(v1, v2, omega, n1, n2, turn, disk):
     """Velocities after an impulse along the wall's normal n at a satellite: specular in the kinetic metric."""
     mass, inertia = disk
+    sine, cosine = turn
     by_mass, by_inertia = 1.0 / mass, 1.0 / inertia
-    arm = n1 * turn[1] + n2 * turn[0]
-    inward = (v1 + omega * turn[1]) * n1 + (v2 + omega * turn[0]) * n2
+    arm = n1 * cosine + n2 * sine
+    inward = (v1 + omega * cosine) * n1 + (v2 + omega * sine) * n2
     impulse = -2.0 * inward / (by_mass + arm * arm * by_inertia)
     v1 += impulse * n1 * by_mass
     v2 += impulse * n2 * by_mass
@@ -297,7 +344,7 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, ground):
     travel, turned, passed, contacts, two = 0.0, 0.0, 0.0, 0, False
     sine, versed = turning(angle)
     x, y, height = place + sine / scale, versed / scale, 0.0
-    own, below = (ZERO, NOTHING, NOTHING), (ZERO, NOTHING, 0.0)
+    own, below = Place(ZERO, NOTHING, NOTHING), Below(ZERO, NOTHING, 0.0)
     while not is_raised(ground.stop):
         turn, motion = (sine, 1.0 - versed), flight(v1, v2, omega, scale)
         # by then it is back, or would be lower than it can be
@@ -317,19 +364,19 @@ def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, ground):
         passed += time
         if code != CLEAR:
             return travel, turned, passed, v1, v2, omega, contacts, two, code
-        if hit[0] == NO_PIECE:
+        if hit.kind == NO_PIECE:
             return travel, turned, passed, v1, v2, omega, contacts, two, ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
         if contacts >= limit:
             return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
-        number, hollow, left = left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, ring, ground)
-        below = (number - chosen, hollow, left - base)
+        left = left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, ring, ground)
+        below = Below(left.number - chosen, left.hollow, left.base - base)
         two = two or (contacts > 0 and chosen != 0)
         contacts += 1
         angle += chosen * spacing + motion.spin * time
         sine, versed = turning(angle)
-        own, x, y, n1, n2 = hit, touched[0] - base, 0.0, 0.0, 1.0
-        if hit[0] != TOP:
-            x, y, n1, n2 = surface(hit[0], hit[1], x, touched[1], ground)
+        own, x, y, n1, n2 = hit, touched.x - base, 0.0, 0.0, 1.0
+        if hit.kind != TOP:
+            x, y, n1, n2 = surface(hit.kind, hit.piece, x, touched.y, ground)
         height = y - versed / scale
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (sine, 1.0 - versed), disk)
     return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
@@ -346,15 +393,23 @@ def collide_disks(
     for i in range(position.shape[0]):
         if is_raised(ground.stop):
             break
-        norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
-        place = (position[i, 0] - math.floor(position[i, 0] / width) * width) / scale
-        angle = position[i, 1] - spacing * round(position[i, 1] / spacing)
+        norm = math.sqrt(mass * (velocity[i, V1] ** 2 + velocity[i, V2] ** 2) + inertia * velocity[i, OMEGA] ** 2)
+        place = (position[i, X1] - math.floor(position[i, X1] / width) * width) / scale
+        angle = position[i, ALPHA] - spacing * round(position[i, ALPHA] / spacing)
         travel, turned, time, v1, v2, omega, contacts[i], two_satellites[i], status[i] = collide_disk(
-            place, angle, velocity[i, 0] / norm, velocity[i, 1] / norm, velocity[i, 2] / norm, disk, ring, limit, ground
+            place,
+            angle,
+            velocity[i, V1] / norm,
+            velocity[i, V2] / norm,
+            velocity[i, OMEGA] / norm,
+            disk,
+            ring,
+            limit,
+            ground,
         )
-        out_position[i, 0] = position[i, 0] + scale * travel
-        out_position[i, 1] = position[i, 1] + turned
-        out_velocity[i, 0], out_velocity[i, 1], out_velocity[i, 2] = norm * v1, norm * v2, norm * omega
+        out_position[i, X1] = position[i, X1] + scale * travel
+        out_position[i, ALPHA] = position[i, ALPHA] + turned
+        out_velocity[i, V1], out_velocity[i, V2], out_velocity[i, OMEGA] = norm * v1, norm * v2, norm * omega
         times[i] = scale * time / norm
 
 
@@ -367,7 +422,7 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, ground):
     """
     travel, turned, passed, contacts = 0.0, 0.0, 0.0, 0
     x, y = place, 0.0
-    own = (ZERO, NOTHING, NOTHING)
+    own = Place(ZERO, NOTHING, NOTHING)
     while not is_raised(ground.stop):
         motion = flight(v1 + omega, v2, 0.0, 1.0)
         end = FOREVER
@@ -376,7 +431,7 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, ground):
         elif v2 < 0.0:
             end = min(2.0 * (y + deepest + ground.cell) / -v2, FOREVER)
         time, kind, index, hollow, base, state, code = first_contact(
-            own[0], own[1], own[2], 0.0, x, y, 0.0, end, (0.0, 1.0), motion, slack, ground
+            own.kind, own.piece, own.hollow, 0.0, x, y, 0.0, end, (0.0, 1.0), motion, slack, ground
         )
         time = min(time, end)
         travel += v1 * time
@@ -390,7 +445,7 @@ def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, ground):
         if code != CLEAR:
             return travel, turned, passed, v1, v2, omega, contacts, code
         contacts += 1
-        own, x, y, n1, n2 = (kind, index, hollow), x + state[0] - base, y + state[1], 0.0, 1.0
+        own, x, y, n1, n2 = Place(kind, index, hollow), x + state.dx - base, y + state.dy, 0.0, 1.0
         if kind == TOP:
             y = 0.0
         else:
@@ -408,13 +463,13 @@ def roll_disks(
     for i in range(position.shape[0]):
         if is_raised(ground.stop):
             break
-        norm = math.sqrt(mass * (velocity[i, 0] ** 2 + velocity[i, 1] ** 2) + inertia * velocity[i, 2] ** 2)
-        place = (position[i, 0] + position[i, 1]) / scale
+        norm = math.sqrt(mass * (velocity[i, V1] ** 2 + velocity[i, V2] ** 2) + inertia * velocity[i, OMEGA] ** 2)
+        place = (position[i, X1] + position[i, ALPHA]) / scale
         travel, turned, time, v1, v2, omega, contacts[i], status[i] = roll_disk(
-            place - math.floor(place / ground.cell) * ground.cell, velocity[i, 0] / norm, velocity[i, 1] / norm,
-            velocity[i, 2] / norm, disk, deepest, slack, limit, ground,
+            place - math.floor(place / ground.cell) * ground.cell, velocity[i, V1] / norm, velocity[i, V2] / norm,
+            velocity[i, OMEGA] / norm, disk, deepest, slack, limit, ground,
         )  # fmt: skip
-        out_position[i, 0] = position[i, 0] + scale * travel
-        out_position[i, 1] = position[i, 1] + scale * turned
-        out_velocity[i, 0], out_velocity[i, 1], out_velocity[i, 2] = norm * v1, norm * v2, norm * omega
+        out_position[i, X1] = position[i, X1] + scale * travel
+        out_position[i, ALPHA] = position[i, ALPHA] + scale * turned
+        out_velocity[i, V1], out_velocity[i, V2], out_velocity[i, OMEGA] = norm * v1, norm * v2, norm * omega
         times[i] = scale * time / norm

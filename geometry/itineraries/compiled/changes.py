@@ -3,22 +3,21 @@
 For one incoming angle the map x -> theta' is analytic between changes of the itinerary. A row is a chain of samples,
 each with the label of its itinerary; gaps between samples of different labels are halved, all of them once a round.
 
-What stays the same along a row travels in two tuples. ``task``: incoming angle, hollow, tables of the wall, period
-(None if closed), limits (see `probe` and `is_spent`), outgoing angles at which cells begin, degree of the functions
-that the row is for, and an array of two uint64 for the hash of a ray and the flights spent on the row. ``chain``:
-place, outgoing angle, label and successor (-1: none) of every sample, in the order in which they were found, and two
-lists for gaps, each named by the sample on its left.
+What stays the same along a row travels in two named tuples, `Task` and `Chain`.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
+from ....core.checks import Floats
 from ....core.rounding import EPS
+from ...scene.columns import LEFT, RIGHT
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, trace_ray
 
 # Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers
@@ -36,10 +35,51 @@ WORST_SHARE = 0.1
 FIRST_LABEL = np.uint64(4)
 
 
+# The two counters of a row.
+HASH, FLIGHTS = 0, 1
+
+
+class Limits(NamedTuple):
+    """Limits of a row: collisions of a ray, how many of them count as flights at most, and flights of the row.
+
+    Runs cost one flight, whatever their length. So does every cell of an open wall that a ray passes.
+    """
+
+    collisions: int
+    collisions_that_count: int
+    flights: int
+
+
+class Task(NamedTuple):
+    """A row: incoming angle, hollow, tables of the wall, its period (None if closed), limits, outgoing angles at which
+    cells begin, degree of the functions that the row is for, and the counters: hash of a ray, flights spent.
+    """
+
+    theta: float
+    hollow: Floats
+    tables: Any
+    period: Any
+    limits: Limits
+    edges: Floats
+    degree: int
+    counters: NDArray[np.uint64]
+
+
+class Chain(NamedTuple):
+    """Samples in the order in which they were found, and two lists for gaps, each named by the sample on its left."""
+
+    places: Floats
+    angles: Floats
+    labels: NDArray[np.uint64]
+    successors: NDArray[np.int64]
+    gaps: NDArray[np.int64]
+    fresh: NDArray[np.int64]
+
+
 @inner
 def empty_chain():
-    """Room for the samples of one row."""
-    return (
+    """Room for the samples of one row; the last one has the successor -1."""
+    return Chain(
         np.empty(MOST_SAMPLES),
         np.empty(MOST_SAMPLES),
         np.empty(MOST_SAMPLES, np.uint64),
@@ -51,16 +91,27 @@ def empty_chain():
 
 @inner
 def probe(x, task):
-    """Outgoing angle of one ray and the label of its itinerary and of the cell that it goes to.
-
-    The first of the limits is that of collisions, the second how many of them count as flights at most: runs cost one
-    flight, whatever their length. So does every cell of an open wall that the ray passes.
-    """
-    theta, hollow, (joints, lines, circles, ellipses, beziers, pairs, grid), period, limits, edges, _, code = task
+    """Outgoing angle of one ray and the label of its itinerary and of the cell that it goes to."""
+    theta, hollow, limits, edges, counters = task.theta, task.hollow, task.limits, task.edges, task.counters
+    joints, lines, circles, ellipses, beziers, pairs, grid = task.tables
     last, vx, vy, bounces, status = trace_ray(
-        x, theta, hollow, joints, lines, circles, ellipses, beziers, period, limits[0], None, code, pairs, grid
+        x,
+        theta,
+        hollow,
+        joints,
+        lines,
+        circles,
+        ellipses,
+        beziers,
+        task.period,
+        limits.collisions,
+        None,
+        counters,
+        pairs,
+        grid,
     )
-    code[1] += np.uint64(1 + min(bounces, limits[1]) + np.int64(abs(last - x) / (hollow[1] - hollow[0])))
+    counted = min(bounces, limits.collisions_that_count)
+    counters[FLIGHTS] += np.uint64(1 + counted + np.int64(abs(last - x) / (hollow[RIGHT] - hollow[LEFT])))
     if status != ESCAPED:
         return theta, np.uint64(status)
     # a ray along y = 0 within rounding
@@ -74,13 +125,13 @@ def probe(x, task):
             cell = middle + 1
         else:
             high = middle
-    return out, HASH_FACTOR * (code[0] + np.uint64(16)) + np.uint64(cell)
+    return out, HASH_FACTOR * (counters[HASH] + np.uint64(16)) + np.uint64(cell)
 
 
 @inner
 def is_spent(task):
-    """Whether the row has taken as many flights as it may: the third of the limits."""
-    return task[7][1] >= np.uint64(task[4][2])
+    """Whether the row has taken as many flights as it may."""
+    return task.counters[FLIGHTS] >= np.uint64(task.limits.flights)
 
 
 @inner
@@ -98,8 +149,8 @@ def undecided(before, task, chain):
     """What the gap after a sample may contribute to a row's error."""
     xs, outs, _, follow, _, _ = chain
     after = follow[before]
-    width, whole = xs[after] - xs[before], task[1][1] - task[1][0]
-    return 0.5 * width * (spread(outs[before], outs[after], task[6]) + math.sqrt(width / whole))
+    width, whole = xs[after] - xs[before], task.hollow[RIGHT] - task.hollow[LEFT]
+    return 0.5 * width * (spread(outs[before], outs[after], task.degree) + math.sqrt(width / whole))
 
 
 @inner
@@ -162,7 +213,7 @@ def sample_row(places, task, chain, goal):
     The last one is that with the largest place, not the one that was found last.
     """
     xs, outs, labels, follow, gaps, _ = chain
-    left, right = task[1][0], task[1][1]
+    left, right = task.hollow[LEFT], task.hollow[RIGHT]
     count, gap_count = np.int64(0), np.int64(0)
     for x in places:
         if x <= left or x >= right or (count > 0 and x <= xs[count - 1]):

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from ....core.rounding import EPS
+from ...scene.columns import LEFT, RIGHT
 from .changes import FIRST_LABEL, inner, is_spent, probe
 
 ORDERS = (4, 7, 12, 20, 32)
@@ -47,7 +48,7 @@ def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, stric
     """
     places, weights, starts = rules
     node, mass = nodes
-    degree = task[6]
+    degree = task.degree
     width = high - low
     old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
     k = max(degree, 1)
@@ -89,9 +90,10 @@ def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, fi
 
     Returns the number of nodes in all, the error, a place where a ray has another label (nan: none), and the rays.
     """
-    whole = task[1][1] - task[1][0]
+    whole = task.hollow[RIGHT] - task.hollow[LEFT]
     low_stack, high_stack = np.empty(MOST_HALVINGS + 2), np.empty(MOST_HALVINGS + 2)
     low_stack[0], high_stack[0] = ends
+    node, mass = nodes
     depth, error, rays = np.int64(1), 0.0, np.int64(0)
     while depth > 0:
         depth -= 1
@@ -109,7 +111,7 @@ def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, fi
             depth += 2
             continue
         if used == 0:
-            nodes[0][filled], nodes[1][filled] = out, high - low
+            node[filled], mass[filled] = out, high - low
             used = 1
         filled += used
         error += miss

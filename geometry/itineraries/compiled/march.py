@@ -11,8 +11,21 @@ import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS
+from ...scene.columns import LEFT, RIGHT, SIZE
 from ...tracing.compiled.growing import longer
-from .changes import FIRST_LABEL, MOST_SAMPLES, add_change, empty_chain, inner, is_spent, sample_row, spread, undecided
+from .changes import (
+    FIRST_LABEL,
+    FLIGHTS,
+    MOST_SAMPLES,
+    Task,
+    add_change,
+    empty_chain,
+    inner,
+    is_spent,
+    sample_row,
+    spread,
+    undecided,
+)
 from .gauss import MOST_NODES, SPARE, integrate_piece
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
@@ -55,10 +68,11 @@ def march_row(task, goal, rules, least, places, chain, nodes, pieces):
     """
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
-    hollow, degree, code = task[1], task[6], task[7]
-    left, right = hollow[0], hollow[1]
+    lows, highs, names = pieces
+    hollow, degree = task.hollow, task.degree
+    left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
-    code[1] = np.uint64(0)
+    task.counters[FLIGHTS] = np.uint64(0)
     count, last = sample_row(places, task, chain, GAP_SHARE * goal)
     rays = np.int64(0)
     # the margins count with the first and the last sample
@@ -86,7 +100,7 @@ def march_row(task, goal, rules, least, places, chain, nodes, pieces):
             if labels[i] < FIRST_LABEL:
                 lost += xs[j] - xs[i]
                 error += 2.0 * (xs[j] - xs[i])
-        pieces[0][number], pieces[1][number], pieces[2][number] = xs[i], xs[j], labels[i]
+        lows[number], highs[number], names[number] = xs[i], xs[j], labels[i]
         number += 1
         following = follow[j]
         if following >= 0:
@@ -98,7 +112,7 @@ def march_row(task, goal, rules, least, places, chain, nodes, pieces):
             else:
                 mass[filled - 1] += width
                 error += width
-            error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[2] * spread(outs[j], outs[following], degree)
+            error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], degree)
         i = following
     return filled, error, lost, number, rays + count
 
@@ -139,32 +153,36 @@ def march_rows(thetas, tolerances, scene, degree, rules, least, seeds, seed_star
     labels of the pieces; and the error, the width lost and the numbers of rays and of flights of each row.
     """
     hollow, tables, period, limits, edges = scene
-    whole = hollow[1] - hollow[0]
-    chain, code = empty_chain(), np.zeros(2, np.uint64)
+    whole = hollow[RIGHT] - hollow[LEFT]
+    chain, counters = empty_chain(), np.zeros(2, np.uint64)
     nodes = np.empty(MOST_NODES + SPARE), np.empty(MOST_NODES + SPARE)
+    angles, masses = nodes
     pieces = room_for_pieces(MOST_SAMPLES)
+    lows, highs, labels = pieces
     n = thetas.shape[0]
     node_starts, piece_starts = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
     errors, lost, rays, flights = np.empty(n), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
-    all_nodes = np.empty(1024), np.empty(1024)
-    all_pieces = room_for_pieces(1024)
+    all_angles, all_masses = np.empty(1024), np.empty(1024)
+    all_lows, all_highs, all_labels = room_for_pieces(1024)
     previous = np.empty(0)
     for k in range(n):
-        task = (thetas[k], hollow, tables, period, limits, edges, degree, code)
+        task = Task(thetas[k], hollow, tables, period, limits, edges, degree, counters)
         goal = tolerances[k] * whole
         places = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
         filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, least, places, chain, nodes, pieces)
-        flights[k] = np.int64(code[1])
-        previous = wide_middles(pieces[0][:number], pieces[1][:number], goal)
+        flights[k] = np.int64(counters[FLIGHTS])
+        previous = wide_middles(lows[:number], highs[:number], goal)
         begin, end = node_starts[k], node_starts[k] + filled
-        if end > all_nodes[0].shape[0]:
-            all_nodes = longer(all_nodes[0], 2 * end), longer(all_nodes[1], 2 * end)
-        all_nodes[0][begin:end], all_nodes[1][begin:end] = nodes[0][:filled], nodes[1][:filled]
+        if end > all_angles.shape[0]:
+            all_angles, all_masses = longer(all_angles, 2 * end), longer(all_masses, 2 * end)
+        all_angles[begin:end], all_masses[begin:end] = angles[:filled], masses[:filled]
         node_starts[k + 1] = end
         begin, end = piece_starts[k], piece_starts[k] + number
-        if end > all_pieces[0].shape[0]:
-            all_pieces = longer(all_pieces[0], 2 * end), longer(all_pieces[1], 2 * end), longer(all_pieces[2], 2 * end)
-        all_pieces[0][begin:end], all_pieces[1][begin:end] = pieces[0][:number], pieces[1][:number]
-        all_pieces[2][begin:end] = pieces[2][:number]
+        if end > all_lows.shape[0]:
+            all_lows, all_highs = longer(all_lows, 2 * end), longer(all_highs, 2 * end)
+            all_labels = longer(all_labels, 2 * end)
+        all_lows[begin:end], all_highs[begin:end] = lows[:number], highs[:number]
+        all_labels[begin:end] = labels[:number]
         piece_starts[k + 1] = end
-    return all_nodes, node_starts, all_pieces, piece_starts, errors, lost, rays, flights
+    nodes, pieces = (all_angles, all_masses), (all_lows, all_highs, all_labels)
+    return nodes, node_starts, pieces, piece_starts, errors, lost, rays, flights

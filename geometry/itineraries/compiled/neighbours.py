@@ -6,7 +6,8 @@ import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS
-from .changes import inner, probe
+from ...scene.columns import LEFT, RIGHT
+from .changes import FLIGHTS, Task, inner, probe
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 # Near its end a piece is as wide as the distance to it or its square root; so many places, at most its last width away
@@ -19,6 +20,13 @@ MOST_STEPS = 80
 SAME_ANGLE = 1e-11
 
 
+@inner
+def label_at(x, task):
+    """The label of one ray."""
+    _, label = probe(x, task)
+    return label
+
+
 @_compile
 def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree):
     """Places in rows where a ray has another label than the piece that it belongs to: pieces of a neighbour say where.
@@ -28,14 +36,14 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree)
     """
     hollow, tables, period, limits, edges = scene
     lows, highs, labels = pieces
-    code = np.zeros(2, np.uint64)
+    counters = np.zeros(2, np.uint64)
     rows, places = [0 for _ in range(0)], [0.0 for _ in range(0)]
     rays = 0
     for k in range(thetas.shape[0] - 1):
         if not linked[k]:
             continue
         for here, there in ((k, k + 1), (k + 1, k)):
-            task = (thetas[there], hollow, tables, period, limits, edges, degree, code)
+            task = Task(thetas[there], hollow, tables, period, limits, edges, degree, counters)
             m, end = starts[there], starts[there + 1]
             for p in range(starts[here], starts[here + 1]):
                 if highs[p] - lows[p] <= least_widths[there]:
@@ -46,25 +54,25 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree)
                 # what lies in the gaps is in the row's error
                 if labels[m] != labels[p] and lows[m] < x < highs[m]:
                     rays += 1
-                    if probe(x, task)[1] != labels[m]:
+                    if label_at(x, task) != labels[m]:
                         rows.append(there)
                         places.append(x)
-    return np.array(rows, dtype=np.int64), np.array(places), rays, np.int64(code[1])
+    return np.array(rows, dtype=np.int64), np.array(places), rays, np.int64(counters[FLIGHTS])
 
 
 @inner
 def edge_from(x, step, label, task):
     """An end of the piece around x, seen in the direction of ``step``: to a small share of its distance."""
-    left, right = task[1][0], task[1][1]
+    left, right = task.hollow[LEFT], task.hollow[RIGHT]
     inside, outside = x, x + step
-    while left < outside < right and probe(outside, task)[1] == label:
+    while left < outside < right and label_at(outside, task) == label:
         inside = outside
         step *= 2.0
         outside = inside + step
     outside = min(max(outside, left), right)
     for _ in range(EDGE_STEPS):
         middle = 0.5 * (inside + outside)
-        if probe(middle, task)[1] == label:
+        if label_at(middle, task) == label:
             inside = middle
         else:
             outside = middle
@@ -78,20 +86,20 @@ def find_critical(label, present, absent, low, high, drift, scene, degree):
     ``drift`` is how fast its middle moves, as far as known.
     """
     hollow, tables, period, limits, edges = scene
-    left, right = hollow[0], hollow[1]
-    code = np.zeros(2, np.uint64)
+    left, right = hollow[LEFT], hollow[RIGHT]
+    counters = np.zeros(2, np.uint64)
     for _ in range(MOST_STEPS):
         if abs(present - absent) <= SAME_ANGLE:
             break
         angle = 0.5 * (present + absent)
-        task = (angle, hollow, tables, period, limits, edges, degree, code)
+        task = Task(angle, hollow, tables, period, limits, edges, degree, counters)
         width, before = high - low, 0.5 * (low + high)
         centre = before + drift * (angle - present)
         found = np.nan
         for n in range(PLACES_TRIED):
             # from the middle outwards, to either side in turn
             x = centre + width * (1.0 - 2.0 * (n % 2)) * ((n + 1) // 2) / (PLACES_TRIED // 2)
-            if left < x < right and probe(x, task)[1] == label:
+            if left < x < right and label_at(x, task) == label:
                 found = x
                 break
         if np.isnan(found):

@@ -1,70 +1,55 @@
 """The tables of the compiled loop that splits beams, and the heap that holds the largest beam on top.
 
-A slot of the tables is one beam:
-
-* ``corners[slot, i]``: p, s, c of vertex i, counterclockwise in (theta, p), then the X, Y whose functional vanishes on
-  the edge to vertex i + 1.
-* ``whole[slot]``: number of vertices, the triangle's edge by which the beam comes in, sign, bounces, 1 for a leaf.
-* ``real[slot]``: flux, then the unfolding isometry V -> R V + T: turn (high, low), T_x (high, low), T_y (high, low),
-  and the rounding errors of T_x and T_y.
+A slot of ``corners``, ``whole`` and ``real`` is one beam.
 """
 
 from __future__ import annotations
 
-from numba import njit
+# corners[slot, i]: vertex i of the beam's polygon, a line, counterclockwise in (theta, p).
+LINE_P = 0  # its height over the origin times sin(theta)
+LINE_S = 1  # sin(theta)
+LINE_C = 2  # cos(theta)
+CUT_X = 3  # the unfolded point whose functional vanishes on the edge to vertex i + 1
+CUT_Y = 4
+VERTEX_COLUMNS = 5
 
-COUNT, EDGE, SIGN, BOUNCES, LEAF = 0, 1, 2, 3, 4
-FLUX, TURN, TURN_LOW, T_X, T_X_LOW, T_Y, T_Y_LOW, ERROR_X, ERROR_Y = 0, 1, 2, 3, 4, 5, 6, 7, 8
+# whole[slot], integers.
+COUNT = 0  # number of vertices
+EDGE = 1  # the triangle's edge by which the beam comes in
+SIGN = 2  # 1 or -1: orientation of the unfolding isometry
+BOUNCES = 3
+LEAF = 4  # 1 for a beam that has left
+WHOLE_COLUMNS = 5
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+# real[slot]: the flux, then the unfolding isometry V -> R V + T in two parts each, and the rounding errors of T.
+FLUX = 0
+TURN = 1  # angle of R, radians
+TURN_LOW = 2
+T_X = 3
+T_X_LOW = 4
+T_Y = 5
+T_Y_LOW = 6
+ERROR_X = 7
+ERROR_Y = 8
+REAL_COLUMNS = 9
 
+# wall_lines: a row for each edge of the hollow.
+WALL_NORMAL_X = 0  # unit normal
+WALL_NORMAL_Y = 1
+WALL_DISTANCE = 2  # of the line from the origin, along the normal
+WALL_COLUMNS = 3
 
-@_compile
-def push(heap, size, real, slot):
-    """Put a beam on the heap; returns its new size."""
-    i = size
-    heap[i] = slot
-    while i > 0:
-        parent = (i - 1) // 2
-        if real[heap[parent], FLUX] >= real[heap[i], FLUX]:
-            break
-        heap[parent], heap[i] = heap[i], heap[parent]
-        i = parent
-    return size + 1
+# The rows of `pieces_of`: an interval of theta (radians), the probability times sin(theta), the offset of theta'.
+PIECE_LOW = 0
+PIECE_HIGH = 1
+PIECE_SINE = 2  # factor of sin(theta)
+PIECE_COSINE = 3  # factor of cos(theta)
+PIECE_OFFSET = 4  # radians
+PIECE_COLUMNS = 5
 
-
-@_compile
-def pop(heap, size, real):
-    """Take the beam of most flux off the heap; returns it and the new size."""
-    top = heap[0]
-    size -= 1
-    heap[0] = heap[size]
-    i = 0
-    while True:
-        child = 2 * i + 1
-        if child >= size:
-            break
-        if child + 1 < size and real[heap[child + 1], FLUX] > real[heap[child], FLUX]:
-            child += 1
-        if real[heap[i], FLUX] >= real[heap[child], FLUX]:
-            break
-        heap[i], heap[child] = heap[child], heap[i]
-        i = child
-    return top, size
-
-
-@_compile
-def copied(slot, real, whole, new):
-    """Copy a beam's numbers, but for its polygon, to a new slot."""
-    for k in range(real.shape[1]):
-        real[new, k] = real[slot, k]
-    for k in range(whole.shape[1]):
-        whole[new, k] = whole[slot, k]
-
-
-@_compile
-def put(polygon, count, corners, slot):
-    """Write a polygon into the tables."""
-    for j in range(count):
-        for k in range(5):
-            corners[slot, j, k] = polygon[j, k]
+# Its tags, integers.
+TAG_LEAF = 0  # number of the leaf
+TAG_SIGN = 1
+TAG_BOUNCES = 2
+TAG_LEFT = 3  # 1 for rays that have left the hollow
+TAG_COLUMNS = 4

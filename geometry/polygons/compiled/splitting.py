@@ -21,23 +21,43 @@ from .codes import FIRST_WALL, OPENING
 from .columns import (
     BOUNCES,
     COUNT,
+    CUT_X,
+    CUT_Y,
     EDGE,
     ERROR_X,
     ERROR_Y,
     FLUX,
     LEAF,
+    LINE_C,
+    LINE_P,
+    LINE_S,
+    PIECE_COLUMNS,
+    PIECE_COSINE,
+    PIECE_HIGH,
+    PIECE_LOW,
+    PIECE_OFFSET,
+    PIECE_SINE,
+    REAL_COLUMNS,
     SIGN,
     T_X,
     T_X_LOW,
     T_Y,
     T_Y_LOW,
+    TAG_BOUNCES,
+    TAG_COLUMNS,
+    TAG_LEAF,
+    TAG_LEFT,
+    TAG_SIGN,
     TURN,
     TURN_LOW,
-    copied,
-    pop,
-    push,
-    put,
+    VERTEX_COLUMNS,
+    WALL_COLUMNS,
+    WALL_DISTANCE,
+    WALL_NORMAL_X,
+    WALL_NORMAL_Y,
+    WHOLE_COLUMNS,
 )
+from .heap import copied, pop, push, put
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 # f is a sum of five products of numbers with one to three rounding errors each; every term is counted in `f`'s size.
@@ -72,11 +92,11 @@ def offset_of(sign, turn, turn_low, middle):
 @_compile
 def wall_lines(x, y, turn_high):
     """The lines of a hollow's walls, one a row: unit normal and distance from the origin, from the nearer end."""
-    lines = np.empty((turn_high.shape[0], 3))
+    lines = np.empty((turn_high.shape[0], WALL_COLUMNS))
     for e in range(turn_high.shape[0]):
-        lines[e, 0], lines[e, 1] = -math.sin(turn_high[e]), math.cos(turn_high[e])
+        lines[e, WALL_NORMAL_X], lines[e, WALL_NORMAL_Y] = -math.sin(turn_high[e]), math.cos(turn_high[e])
         k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
-        lines[e, 2] = lines[e, 0] * x[k] + lines[e, 1] * y[k]
+        lines[e, WALL_DISTANCE] = lines[e, WALL_NORMAL_X] * x[k] + lines[e, WALL_NORMAL_Y] * y[k]
     return lines
 
 
@@ -87,12 +107,12 @@ def polygon_flux(polygon, count):
     That of a triangle is -det(a, b, c) sqrt(2 / product of 1 + cos over the three differences of angle).
     """
     total = 0.0
-    p, s, c = polygon[0, 0], polygon[0, 1], polygon[0, 2]
+    p, s, c = polygon[0, LINE_P], polygon[0, LINE_S], polygon[0, LINE_C]
     for i in range(1, count - 1):
-        here_s, here_c = polygon[i, 1], polygon[i, 2]
-        next_s, next_c = polygon[i + 1, 1], polygon[i + 1, 2]
-        bp, bs, bc = polygon[i, 0] - p, here_s - s, here_c - c
-        cp, cs, cc = polygon[i + 1, 0] - p, next_s - s, next_c - c
+        here_s, here_c = polygon[i, LINE_S], polygon[i, LINE_C]
+        next_s, next_c = polygon[i + 1, LINE_S], polygon[i + 1, LINE_C]
+        bp, bs, bc = polygon[i, LINE_P] - p, here_s - s, here_c - c
+        cp, cs, cc = polygon[i + 1, LINE_P] - p, next_s - s, next_c - c
         det = p * (bs * cc - bc * cs) - s * (bp * cc - bc * cp) + c * (bp * cs - bs * cp)
         product = (1.0 + s * here_s + c * here_c) * (1.0 + here_s * next_s + here_c * next_c)
         total -= det * math.sqrt(2.0 / (product * (1.0 + s * next_s + c * next_c)))
@@ -107,22 +127,22 @@ def clip(polygon, count, values, wanted, edge_x, edge_y, out):
         j = i + 1 if i + 1 < count else 0
         here, there = wanted * values[i], wanted * values[j]
         if here >= 0.0:
-            for k in range(5):
+            for k in range(VERTEX_COLUMNS):
                 out[size, k] = polygon[i, k]
             if here == 0.0 and there < 0.0:
-                out[size, 3], out[size, 4] = edge_x, edge_y
+                out[size, CUT_X], out[size, CUT_Y] = edge_x, edge_y
             size += 1
         if (here > 0.0 and there < 0.0) or (here < 0.0 and there > 0.0):
             near, far = abs(there), abs(here)
-            p = near * polygon[i, 0] + far * polygon[j, 0]
-            s = near * polygon[i, 1] + far * polygon[j, 1]
-            c = near * polygon[i, 2] + far * polygon[j, 2]
+            p = near * polygon[i, LINE_P] + far * polygon[j, LINE_P]
+            s = near * polygon[i, LINE_S] + far * polygon[j, LINE_S]
+            c = near * polygon[i, LINE_C] + far * polygon[j, LINE_C]
             scale = 1.0 / math.sqrt(s * s + c * c)
-            out[size, 0], out[size, 1], out[size, 2] = p * scale, s * scale, c * scale
+            out[size, LINE_P], out[size, LINE_S], out[size, LINE_C] = p * scale, s * scale, c * scale
             if here > 0.0:
-                out[size, 3], out[size, 4] = edge_x, edge_y
+                out[size, CUT_X], out[size, CUT_Y] = edge_x, edge_y
             else:
-                out[size, 3], out[size, 4] = polygon[i, 3], polygon[i, 4]
+                out[size, CUT_X], out[size, CUT_Y] = polygon[i, CUT_X], polygon[i, CUT_Y]
             size += 1
     return size
 
@@ -165,24 +185,24 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
     Returns the tables, the number of slots, the rounding bound (flux) and the number of splits.
     """
     width = x[x.shape[0] - 1]
-    distance = wall_lines(x, y, turn_high)[:, 2]
+    distance = wall_lines(x, y, turn_high)[:, WALL_DISTANCE]
     room, wide = 1024, 12
-    corners = np.empty((room, wide, 5))
-    real = np.zeros((room, 9))
-    whole = np.zeros((room, 5), np.int64)
+    corners = np.empty((room, wide, VERTEX_COLUMNS))
+    real = np.zeros((room, REAL_COLUMNS))
+    whole = np.zeros((room, WHOLE_COLUMNS), np.int64)
     heap = np.empty(room, np.int64)
     used, queue = 0, 0
     for half in range(halves):
         polygon = corners[half]
         for i in range(3):
-            for k in range(5):
+            for k in range(VERTEX_COLUMNS):
                 polygon[i, k] = 0.0
         if half == 0:
-            polygon[0, 2], polygon[1, 1], polygon[2, 1] = 1.0, 1.0, 1.0
-            polygon[2, 0], polygon[2, 3] = width, width
+            polygon[0, LINE_C], polygon[1, LINE_S], polygon[2, LINE_S] = 1.0, 1.0, 1.0
+            polygon[2, LINE_P], polygon[2, CUT_X] = width, width
         else:
-            polygon[0, 1], polygon[1, 2], polygon[2, 1] = 1.0, -1.0, 1.0
-            polygon[2, 0], polygon[1, 3] = width, width
+            polygon[0, LINE_S], polygon[1, LINE_C], polygon[2, LINE_S] = 1.0, -1.0, 1.0
+            polygon[2, LINE_P], polygon[1, CUT_X] = width, width
         whole[half, COUNT], whole[half, EDGE], whole[half, SIGN] = 3, entrance, 1
         real[half, FLUX] = polygon_flux(polygon, 3)
         queue = push(heap, queue, real, half)
@@ -191,7 +211,7 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
     open_flux = total
     rounding = 0.0
     values = np.empty(wide)
-    first, second = np.empty((wide, 5)), np.empty((wide, 5))
+    first, second = np.empty((wide, VERTEX_COLUMNS)), np.empty((wide, VERTEX_COLUMNS))
     splits, steps = 0, 0
     status = DONE
     slot = -1
@@ -229,7 +249,7 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
         positive, negative = False, False
         low_i, high_i = 0, 0
         for i in range(count):
-            p, s, c = polygon[i, 0], polygon[i, 1], polygon[i, 2]
+            p, s, c = polygon[i, LINE_P], polygon[i, LINE_S], polygon[i, LINE_C]
             value = vx * s - vy * c - p
             slack = size_x * s + size_y * abs(c) + FUNCTIONAL_ULPS * EPS * p
             if abs(value) <= slack:
@@ -240,13 +260,13 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
             values[i] = value
             positive = positive or value > 0.0
             negative = negative or value < 0.0
-            if c * polygon[low_i, 1] > s * polygon[low_i, 2]:
+            if c * polygon[low_i, LINE_S] > s * polygon[low_i, LINE_C]:
                 low_i = i
-            if c * polygon[high_i, 1] < s * polygon[high_i, 2]:
+            if c * polygon[high_i, LINE_S] < s * polygon[high_i, LINE_C]:
                 high_i = i
         if doubtful and not (positive and negative):
             # what lies beyond the line, by at most `doubt` in p, over at most the beam's range of angles
-            spread = polygon[high_i, 1] * polygon[low_i, 2] - polygon[high_i, 2] * polygon[low_i, 1]
+            spread = polygon[high_i, LINE_S] * polygon[low_i, LINE_C] - polygon[high_i, LINE_C] * polygon[low_i, LINE_S]
             rounding += 0.5 * math.pi * doubt * abs(spread)
         # the side of the triangle between its apex and the vertex of the edge that lies left of the beam, or right
         left_side, right_side = (side + 1) % 3, (side + 2) % 3
@@ -275,16 +295,21 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
             corners = larger(corners, room, wide)
             polygon = corners[slot]
             values = longer(values, wide)
-            first, second = np.empty((wide, 5)), np.empty((wide, 5))
+            first, second = np.empty((wide, VERTEX_COLUMNS)), np.empty((wide, VERTEX_COLUMNS))
         count_first = clip(polygon, count, values, 1.0, vx, vy, first)
         count_second = clip(polygon, count, values, -1.0, vx, vy, second)
         for i in range(count_first):
-            if first[i, 3] == vx and first[i, 4] == vy:
+            if first[i, CUT_X] == vx and first[i, CUT_Y] == vy:
                 # the line that divides is misplaced by at most `doubt` in p over the cut's range of angles
                 j = i + 1 if i + 1 < count_first else 0
-                s, c = max(first[i, 1], first[j, 1]), max(abs(first[i, 2]), abs(first[j, 2]))
-                doubt = size_x * s + size_y * c + FUNCTIONAL_ULPS * EPS * max(first[i, 0], first[j, 0])
-                rounding += 0.5 * math.pi * doubt * abs(first[i, 1] * first[j, 2] - first[i, 2] * first[j, 1])
+                s, c = max(first[i, LINE_S], first[j, LINE_S]), max(abs(first[i, LINE_C]), abs(first[j, LINE_C]))
+                doubt = size_x * s + size_y * c + FUNCTIONAL_ULPS * EPS * max(first[i, LINE_P], first[j, LINE_P])
+                rounding += (
+                    0.5
+                    * math.pi
+                    * doubt
+                    * abs(first[i, LINE_S] * first[j, LINE_C] - first[i, LINE_C] * first[j, LINE_S])
+                )
         new = used
         used += 1
         copied(slot, real, whole, new)
@@ -313,15 +338,15 @@ def pieces_of(corners, real, whole, used, width):
     most = 0
     for slot in range(used):
         most += whole[slot, COUNT]
-    rows = np.empty((most, 5))
-    tags = np.empty((most, 4), np.int64)
+    rows = np.empty((most, PIECE_COLUMNS))
+    tags = np.empty((most, TAG_COLUMNS), np.int64)
     size, leaf = 0, 0
     angle = np.empty(corners.shape[1])
     for slot in range(used):
         count = whole[slot, COUNT]
         polygon = corners[slot]
         for i in range(count):
-            angle[i] = math.atan2(polygon[i, 1], polygon[i, 2])
+            angle[i] = math.atan2(polygon[i, LINE_S], polygon[i, LINE_C])
         cuts = np.sort(angle[:count])
         sign = float(whole[slot, SIGN])
         middle = 0.5 * (cuts[0] + cuts[count - 1])
@@ -342,12 +367,16 @@ def pieces_of(corners, real, whole, used, width):
                     upper = i
             if lower < 0 or upper < 0:
                 continue
-            rows[size, 0], rows[size, 1] = cuts[k], cuts[k + 1]
-            rows[size, 2] = (polygon[upper, 3] - polygon[lower, 3]) / width
-            rows[size, 3] = (polygon[lower, 4] - polygon[upper, 4]) / width
-            rows[size, 4] = offset
-            tags[size, 0] = leaf
-            tags[size, 1], tags[size, 2], tags[size, 3] = whole[slot, SIGN], whole[slot, BOUNCES], whole[slot, LEAF]
+            rows[size, PIECE_LOW], rows[size, PIECE_HIGH] = cuts[k], cuts[k + 1]
+            rows[size, PIECE_SINE] = (polygon[upper, CUT_X] - polygon[lower, CUT_X]) / width
+            rows[size, PIECE_COSINE] = (polygon[lower, CUT_Y] - polygon[upper, CUT_Y]) / width
+            rows[size, PIECE_OFFSET] = offset
+            tags[size, TAG_LEAF] = leaf
+            tags[size, TAG_SIGN], tags[size, TAG_BOUNCES], tags[size, TAG_LEFT] = (
+                whole[slot, SIGN],
+                whole[slot, BOUNCES],
+                whole[slot, LEAF],
+            )
             size += 1
         if whole[slot, LEAF] == 1:
             leaf += 1

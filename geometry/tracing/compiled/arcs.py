@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS
+from ...scene.columns import CHORD_X, CHORD_Y, CURVATURE, NORMAL_X, NORMAL_Y, SHORT_CHORD, START_X, START_Y
 from ...scene.tolerances import TANGENT_ULPS
 
 _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -26,16 +27,16 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
     The height, in coordinates where the arc is a circle, is about the distance in front of the arc of a ray that comes
     from there and meets it close by, and inf where the ray goes to the far side of a focusing arc.
     """
-    rx, ry = px - arc[0], stretch * (py - arc[1])
+    rx, ry = px - arc[START_X], stretch * (py - arc[START_Y])
     wy = stretch * vy
-    curvature = arc[4]
-    b = arc[2] * vx + arc[3] * wy - curvature * (rx * vx + ry * wy)
+    curvature = arc[CURVATURE]
+    b = arc[NORMAL_X] * vx + arc[NORMAL_Y] * wy - curvature * (rx * vx + ry * wy)
     speed2 = vx * vx + wy * wy
     if own:
         if curvature <= 0.0 or b <= 0.0:
             return np.inf, 0, np.inf
         return 2.0 * b / (curvature * speed2), 0, np.inf
-    f = arc[2] * rx + arc[3] * ry - 0.5 * curvature * (rx * rx + ry * ry)
+    f = arc[NORMAL_X] * rx + arc[NORMAL_Y] * ry - 0.5 * curvature * (rx * rx + ry * ry)
     d = b * b + 2.0 * curvature * speed2 * f
     tangent = 0
     if curvature < 0.0 and b < 0.0 and abs(d) <= TANGENT_ULPS * EPS * b * b:
@@ -54,31 +55,31 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
 @_compile
 def on_arc(arc, qx, qy, slack):
     """Whether the point q on the full circle, measured from the first joint, belongs to the arc."""
-    if arc[7] > 0.0:
+    if arc[SHORT_CHORD] > 0.0:
         # up to a half angle of pi/4 the position along the chord decides, on the arc's own side of the circle
-        along = qx * arc[5] + qy * arc[6]
-        nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
-        facing = ny * arc[5] - nx * arc[6]
-        return -slack <= along <= arc[7] + slack and facing > 0.0
+        along = qx * arc[CHORD_X] + qy * arc[CHORD_Y]
+        nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
+        facing = ny * arc[CHORD_X] - nx * arc[CHORD_Y]
+        return -slack <= along <= arc[SHORT_CHORD] + slack and facing > 0.0
     # beyond it the side of the chord decides; the arc bulges away from its free side exactly if it is focusing
-    height = qy * arc[5] - qx * arc[6]
-    return height <= slack if arc[4] > 0.0 else height >= -slack
+    height = qy * arc[CHORD_X] - qx * arc[CHORD_Y]
+    return height <= slack if arc[CURVATURE] > 0.0 else height >= -slack
 
 
 @_compile
 def arc_reflect(arc, t, px, py, vx, vy, stretch):
     """Position on the arc after the time t and the velocity reflected there."""
-    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
-    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
-    f = arc[2] * qx + arc[3] * qy - 0.5 * arc[4] * (qx * qx + qy * qy)
+    qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
+    nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
+    f = arc[NORMAL_X] * qx + arc[NORMAL_Y] * qy - 0.5 * arc[CURVATURE] * (qx * qx + qy * qy)
     # one Newton step on F puts the point back on the arc
     qx -= f * nx
     qy -= f * ny
-    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
+    nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, stretch * (arc[NORMAL_Y] - arc[CURVATURE] * qy)
     scale = 1.0 / math.sqrt(nx * nx + ny * ny)
     nx *= scale
     ny *= scale
-    px, py = arc[0] + qx, arc[1] + qy / stretch
+    px, py = arc[START_X] + qx, arc[START_Y] + qy / stretch
     w = 2.0 * (vx * nx + vy * ny)
     return px, py, vx - w * nx, vy - w * ny
 
@@ -86,6 +87,6 @@ def arc_reflect(arc, t, px, py, vx, vy, stretch):
 @_compile
 def arc_incidence(arc, t, px, py, vx, vy, stretch):
     """Sine of the angle between the velocity and the arc that it meets after the time t."""
-    qx, qy = px + t * vx - arc[0], stretch * (py + t * vy - arc[1])
-    nx, ny = arc[2] - arc[4] * qx, stretch * (arc[3] - arc[4] * qy)
+    qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
+    nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, stretch * (arc[NORMAL_Y] - arc[CURVATURE] * qy)
     return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)

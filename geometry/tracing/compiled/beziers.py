@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS
+from ...scene.columns import END_X, END_Y, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
 from ...scene.tolerances import JOINT_ULPS, NEARBY, TANGENT_ULPS
 from ..double_double.beziers import curve_size
 
@@ -54,12 +55,12 @@ def contact_time(curve, bend, s, px, py, vx, vy):
     ``bend`` is the second derivative of g there. Of the two hits that merge at s the front one came first exactly if
     the curve runs along the ray where g has a minimum, or against it where g has a maximum.
     """
-    tx = (3.0 * curve[6] * s + 2.0 * curve[4]) * s + curve[2]
-    ty = (3.0 * curve[7] * s + 2.0 * curve[5]) * s + curve[3]
+    tx = (3.0 * curve[X3] * s + 2.0 * curve[X2]) * s + curve[X1]
+    ty = (3.0 * curve[Y3] * s + 2.0 * curve[Y2]) * s + curve[Y1]
     if not 0.0 < s < 1.0 or bend * (tx * vx + ty * vy) <= 0.0:
         return np.inf
-    dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
-    dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
+    dx = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], s) - px
+    dy = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s) - py
     return dx * vx + dy * vy
 
 
@@ -72,10 +73,10 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
     """
     share_slack = JOINT_ULPS * EPS
     # b(s) - p in the power basis; columns 0-7 hold x and y coefficients of 1, s, s^2, s^3
-    a0 = (curve[0] - px) * vy - (curve[1] - py) * vx
-    a1 = curve[2] * vy - curve[3] * vx
-    a2 = curve[4] * vy - curve[5] * vx
-    a3 = curve[6] * vy - curve[7] * vx
+    a0 = (curve[START_X] - px) * vy - (curve[START_Y] - py) * vx
+    a1 = curve[X1] * vy - curve[Y1] * vx
+    a2 = curve[X2] * vy - curve[Y2] * vx
+    a3 = curve[X3] * vy - curve[Y3] * vx
     if own_s >= 0.0:
         # divide out the ray's own start: g(s) = (s - own) (b2 sigma^2 + b1 sigma + b0), sigma = s - own
         b0 = (3.0 * a3 * own_s + 2.0 * a2) * own_s + a1
@@ -99,15 +100,14 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
             if -share_slack <= s <= 1.0 + share_slack:
                 s = min(max(s, 0.0), 1.0)
                 slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
-                dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
-                dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
+                dx = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], s) - px
+                dy = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s) - py
                 t = dx * vx + dy * vy
                 if slope <= 0.0 and 0.0 < t < best_t:
                     best_t, best_s = t, s
         return best_t, best_s, 0, -1.0
-    n = curve.shape[0]
     # g is a sum of products of numbers of this size
-    spread = max(abs(vx), abs(vy)) * (abs(curve[0] - px) + abs(curve[1] - py) + curve_size(curve))
+    spread = max(abs(vx), abs(vy)) * (abs(curve[START_X] - px) + abs(curve[START_Y] - py) + curve_size(curve))
     # split [0, 1] at the critical points of g; it can fall through zero once on each part
     c1, c2 = 2.0, 2.0
     disc = a2 * a2 - 3.0 * a3 * a1
@@ -131,7 +131,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
         touched, touches = touches, False
         if high == 1.0:
             # the joint itself, so that the next piece sees the same number
-            value_high = (curve[n - 4] - px) * vy - (curve[n - 3] - py) * vx
+            value_high = (curve[END_X] - px) * vy - (curve[END_Y] - py) * vx
         else:
             value_high = bezier_value(a0, a1, a2, a3, high)
             if abs(value_high) <= TANGENT_ULPS * EPS * spread:
@@ -142,14 +142,14 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
         # the root beside a contact is the contact itself, within rounding
         if value_low >= 0.0 >= value_high and value_low > value_high and not touched and not touches:
             s = falling_root(a0, a1, a2, a3, low, high)
-            dx = bezier_value(curve[0], curve[2], curve[4], curve[6], s) - px
-            dy = bezier_value(curve[1], curve[3], curve[5], curve[7], s) - py
+            dx = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], s) - px
+            dy = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s) - py
             t = dx * vx + dy * vy
             if t < best_t:
                 # the height in front of the curve is t times the sine of incidence, g' / |b'|
                 fall = -((3.0 * a3 * s + 2.0 * a2) * s + a1)
-                tx = (3.0 * curve[6] * s + 2.0 * curve[4]) * s + curve[2]
-                ty = (3.0 * curve[7] * s + 2.0 * curve[5]) * s + curve[3]
+                tx = (3.0 * curve[X3] * s + 2.0 * curve[X2]) * s + curve[X1]
+                ty = (3.0 * curve[Y3] * s + 2.0 * curve[Y2]) * s + curve[Y1]
                 reach = slack * math.sqrt(tx * tx + ty * ty)
                 if abs(t) <= NEARBY * spread and abs(t) * fall <= reach:
                     near_s = s
@@ -167,9 +167,9 @@ def bend_number(curve, s):
     side has one front hit that moves continuously with the ray.
     """
     # the curvature has the sign of b' x b'', which is a quadratic in s for a cubic b
-    c0 = 2.0 * (curve[2] * curve[5] - curve[3] * curve[4])
-    c1 = 6.0 * (curve[2] * curve[7] - curve[3] * curve[6])
-    c2 = 6.0 * (curve[4] * curve[7] - curve[5] * curve[6])
+    c0 = 2.0 * (curve[X1] * curve[Y2] - curve[Y1] * curve[X2])
+    c1 = 6.0 * (curve[X1] * curve[Y3] - curve[Y1] * curve[X3])
+    c2 = 6.0 * (curve[X2] * curve[Y3] - curve[Y2] * curve[X3])
     disc = c1 * c1 - 4.0 * c2 * c0
     if disc <= 0.0:
         return 0

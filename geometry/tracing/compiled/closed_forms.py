@@ -13,7 +13,28 @@ import math
 import numpy as np
 from numba import njit
 
-from ...scene.closed_forms import CHAIN_COLUMNS, FAN, FAN_COLUMN, NONE
+from ...scene.columns import (
+    BOWL_X,
+    BOWL_Y,
+    CHAIN,
+    COPIES,
+    DOUBT,
+    FAN,
+    FAN_X,
+    FAN_Y,
+    FORM,
+    FORM_LEFT,
+    FORM_RIGHT,
+    HALF_ANGLE,
+    LEFT,
+    LINK_COLUMNS,
+    LINK_CONSTANT,
+    LINK_X,
+    LINK_Y,
+    NO_FORM,
+    RADIUS,
+    RIGHT,
+)
 from .rays import FLAT_TOP, TOP_CORNER, opening_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 
@@ -38,8 +59,8 @@ def cross_bowl(form, place, angle, hits, moment, incidence):
     all terms positive, and the same with cosines; a hop advances by 2 d, to the left where d is acute, else by
     2 (pi - d) to the right, and the rest is counting. The angular momentum about the centre gives the exit.
     """
-    left, right, doubt = form[1], form[2], form[3]
-    middle, height, radius, half = form[4], form[5], form[6], form[7]
+    left, right, doubt = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT]
+    middle, height, radius, half = form[BOWL_X], form[BOWL_Y], form[RADIUS], form[HALF_ANGLE]
     width = right - left
     for i in range(place.shape[0]):
         theta = angle[i]
@@ -82,9 +103,9 @@ def cross_fan(form, place, angle, hits, vx, vy, turn):
     The sign of ``turn``, the moment of the apex about the ray, tells which line is met first. The number of hits is
     that of the unfolded ends of the opening, one after the other, that lie on the other side of the ray than the apex.
     """
-    left, right, doubt, apex_x, apex_y = form[1], form[2], form[3], form[4], form[5]
-    copies = int(form[6])
-    mirrored = CHAIN_COLUMNS * (copies + 2)
+    left, right, doubt, apex_x, apex_y = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT], form[FAN_X], form[FAN_Y]
+    copies = int(form[COPIES])
+    mirrored = LINK_COLUMNS * (copies + 2)
     for i in range(place.shape[0]):
         sine, cosine = sine_cosine(angle[i])
         vx[i], vy[i] = -cosine, -sine
@@ -93,9 +114,9 @@ def cross_fan(form, place, angle, hits, vx, vy, turn):
     for i in range(place.shape[0]):
         hits[i] = 1.0
     for k in range(2, copies + 1):
-        first = FAN_COLUMN + CHAIN_COLUMNS * k
-        x0, y0 = form[first], form[first + 1]
-        x1, y1 = form[first + mirrored], form[first + mirrored + 1]
+        first = CHAIN + LINK_COLUMNS * k
+        x0, y0 = form[first + LINK_X], form[first + LINK_Y]
+        x1, y1 = form[first + mirrored + LINK_X], form[first + mirrored + LINK_Y]
         before, now = k - 1.0, float(k)
         for i in range(place.shape[0]):
             x, y = (x0, y0) if turn[i] > 0.0 else (x1, y1)
@@ -103,17 +124,17 @@ def cross_fan(form, place, angle, hits, vx, vy, turn):
             hits[i] = now if beyond and hits[i] == before else hits[i]
     for i in range(place.shape[0]):
         count = int(hits[i])
-        last = FAN_COLUMN + CHAIN_COLUMNS * count + (0 if turn[i] > 0.0 else mirrored)
-        following = last + CHAIN_COLUMNS
-        inside = (form[last] - place[i]) * vy[i] - form[last + 1] * vx[i]
-        outside = (form[following] - place[i]) * vy[i] - form[following + 1] * vx[i]
+        last = CHAIN + LINK_COLUMNS * count + (0 if turn[i] > 0.0 else mirrored)
+        following = last + LINK_COLUMNS
+        inside = (form[last + LINK_X] - place[i]) * vy[i] - form[last + LINK_Y] * vx[i]
+        outside = (form[following + LINK_X] - place[i]) * vy[i] - form[following + LINK_Y] * vx[i]
         odd = count % 2 == 1
         goes_right = odd == (turn[i] > 0.0)
         share = inside / (inside - outside)
         near, far = (right, left) if goes_right else (left, right)
         exit = near + share * (far - near)
         incoming = angle[i]
-        angle[i] = form[last + 2] + (-incoming if odd else incoming)
+        angle[i] = form[last + LINK_CONSTANT] + (-incoming if odd else incoming)
         # how closely the ray's line passes the apex, the ends of the opening where it enters, and where it leaves
         west, east = (left - place[i]) * vy[i], (place[i] - right) * vy[i]
         closest = min(min(abs(turn[i]), min(west, east)), min(abs(inside), abs(outside)))
@@ -125,7 +146,7 @@ def cross_fan(form, place, angle, hits, vx, vy, turn):
 def cross(form, place, angle, hits, room):
     """Take rays of one hollow through it."""
     count = place.shape[0]
-    if form[0] == FAN:
+    if form[FORM] == FAN:
         cross_fan(form, place, angle, hits, room[0, :count], room[1, :count], room[2, :count])
     else:
         cross_bowl(form, place, angle, hits, room[0, :count], room[1, :count])
@@ -144,7 +165,7 @@ def trace_closed(x, theta, hollows, closed, cell, limit, out_x, out_theta, bounc
     rays, others, met = np.empty(RAYS, np.int64), np.empty(RAYS, np.int64), np.empty(RAYS, np.int64)
     # the rays of a hollow in a block are a list: the first one, and for each the next one, numbers from 0 in the block
     heads = np.full(hollows.shape[0], -1)
-    whole = hollows.shape[0] == 1 and hollows[0, 0] == 0.0 and hollows[0, 1] == cell
+    whole = hollows.shape[0] == 1 and hollows[0, LEFT] == 0.0 and hollows[0, RIGHT] == cell
     for first in range(0, x.shape[0], RAYS):
         count = min(RAYS, x.shape[0] - first)
         starts = x[first : first + count]
@@ -168,7 +189,7 @@ def trace_closed(x, theta, hollows, closed, cell, limit, out_x, out_theta, bounc
             h = opening_at(x[i] - cell_of(x[i], cell), hollows)
             if h == FLAT_TOP:
                 out_x[i], out_theta[i], bounces[i], status[i] = x[i], mirrored(theta[i]), 1, ESCAPED
-            elif h == TOP_CORNER or closed[h, 0] == NONE:
+            elif h == TOP_CORNER or closed[h, FORM] == NO_FORM:
                 status[i] = UNDECIDED
             else:
                 if heads[h] < 0:

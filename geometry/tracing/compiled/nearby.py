@@ -8,6 +8,25 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ...scene.columns import (
+    BEZIERS_END,
+    CIRCLES_END,
+    EDGE_X,
+    EDGE_Y,
+    ELLIPSES_END,
+    FIRST_BEZIER,
+    FIRST_CIRCLE,
+    FIRST_ELLIPSE,
+    FIRST_JOINT,
+    JOINT_X,
+    JOINT_Y,
+    JOINTS_END,
+    LENGTH,
+    START_X,
+    START_Y,
+    STARTS_LINE,
+    STRETCH,
+)
 from ..double_double.arcs import refined_arcs
 from ..double_double.sides import ARC, in_front, line_in_front_of_line
 from ..double_double.sides import BEZIER as CURVE
@@ -33,8 +52,8 @@ def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
         # from the nearer joint, and negative to say so, so that both ends keep their digits
         share = min(c_after / (c_before - c_after), -LEAST_SHARE)
         near = j + 1
-    hx = joints[near, 0] + share * lines[j, 0]
-    hy = joints[near, 1] + share * lines[j, 1]
+    hx = joints[near, JOINT_X] + share * lines[j, EDGE_X]
+    hy = joints[near, JOINT_Y] + share * lines[j, EDGE_Y]
     return (hx - px) * vx + (hy - py) * vy, share
 
 
@@ -87,13 +106,13 @@ def starts_in_front(
 @_compile
 def arc_nearby(arc, px, py, vx, vy, slack, close):
     """Flight time to an arc that is met close by, else inf; its tangency; and whether it is ahead for certain."""
-    stretch = arc[12]
+    stretch = arc[STRETCH]
     wide = slack * max(1.0, stretch)
     t, touch, height = arc_time(arc, False, px, py, vx, vy, stretch)
     if abs(t) > close or height < -wide:
         return np.inf, 0, False
     t = max(t, 0.0)
-    if not on_arc(arc, px + t * vx - arc[0], stretch * (py + t * vy - arc[1]), wide):
+    if not on_arc(arc, px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y]), wide):
         return np.inf, 0, False
     return t, touch, height > wide
 
@@ -110,14 +129,14 @@ def hit_nearby(
     """
     time, found, number, place, doubt = np.inf, NO_PIECE, -1, 0.0, 0
     if lines is not None:
-        for j in range(int(hollow[3]), int(hollow[4]) - 1):
-            if joints[j, 3] <= 0.0 or (own_kind == LINE and own_index == j):
+        for j in range(int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END]) - 1):
+            if joints[j, STARTS_LINE] <= 0.0 or (own_kind == LINE and own_index == j):
                 continue
-            c_before = (joints[j, 0] - px) * vy - (joints[j, 1] - py) * vx
-            c_after = (joints[j + 1, 0] - px) * vy - (joints[j + 1, 1] - py) * vx
+            c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
+            c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
             if c_before >= 0.0 >= c_after and c_before > c_after:
                 t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
-                height, reach = t * (c_before - c_after), slack * lines[j, 4]
+                height, reach = t * (c_before - c_after), slack * lines[j, LENGTH]
                 if abs(t) > close or t >= time or height < -reach:
                     continue
                 if height > reach or starts_in_front(
@@ -127,7 +146,7 @@ def hit_nearby(
                     time, found, number, place = max(t, 0.0), LINE, j, share
                     doubt = DOUBTFUL if height <= reach and own_kind not in (LID, SIDE) else 0
     if circles is not None:
-        for k in range(int(hollow[5]), int(hollow[6])):
+        for k in range(int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])):
             if own_kind == CIRCLE and own_index == k:
                 continue
             t, touch, is_clear = arc_nearby(circles[k], px, py, vx, vy, slack, close)
@@ -138,7 +157,7 @@ def hit_nearby(
                 time, found, number, place = t, CIRCLE, k, 0.0
                 doubt = touch if is_clear or own_kind in (LID, SIDE) else DOUBTFUL
     if ellipses is not None:
-        for k in range(int(hollow[7]), int(hollow[8])):
+        for k in range(int(hollow[FIRST_ELLIPSE]), int(hollow[ELLIPSES_END])):
             if own_kind == ELLIPSE and own_index == k:
                 continue
             t, touch, is_clear = arc_nearby(ellipses[k], px, py, vx, vy, slack, close)
@@ -149,9 +168,9 @@ def hit_nearby(
                 time, found, number, place = t, ELLIPSE, k, 0.0
                 doubt = touch if is_clear or own_kind in (LID, SIDE) else DOUBTFUL
     if beziers is not None:
-        for k in range(int(hollow[9]), int(hollow[10])):
+        for k in range(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])):
             own = own_s if own_kind == BEZIER and own_index == k else -1.0
-            s = bezier_hit(beziers[k], own, px, py, vx, vy, slack)[3]
+            _, _, _, s = bezier_hit(beziers[k], own, px, py, vx, vy, slack)
             if s >= 0.0 and time > 0.0 and starts_in_front(
                 own_kind, own_index, own_s, BEZIER, k, s, joints, circles, ellipses, beziers,
                 px, py, vx, vy, flown, slack,

@@ -21,6 +21,58 @@ import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS
+from ...scene.columns import (
+    BEZIERS_END,
+    CELL_HEIGHT,
+    CELL_WIDTH,
+    CIRCLES_END,
+    CORNER_EDGE,
+    EDGE_X,
+    EDGE_Y,
+    ELLIPSES_END,
+    END_CORNER,
+    END_X,
+    END_Y,
+    FIRST_BEZIER,
+    FIRST_CIRCLE,
+    FIRST_ELLIPSE,
+    FIRST_JOINT,
+    FIRST_PAIR,
+    GRID_COLUMNS,
+    GRID_ROWS,
+    GRID_START,
+    GRID_X,
+    GRID_Y,
+    IS_CORNER,
+    JOINT_X,
+    JOINT_Y,
+    JOINTS_END,
+    LEFT,
+    LEFT_EDGE,
+    LENGTH,
+    LINE_NORMAL_X,
+    LINE_NORMAL_Y,
+    NO_EDGE,
+    PAIRS_END,
+    PARTNER,
+    POINT_X,
+    POINT_Y,
+    RIGHT,
+    RIGHT_EDGE,
+    RUN_SINE,
+    SIZE,
+    START_CORNER,
+    START_X,
+    START_Y,
+    STARTS_LINE,
+    STRETCH,
+    X1,
+    X2,
+    X3,
+    Y1,
+    Y2,
+    Y3,
+)
 from ...scene.tolerances import JOINT_ULPS, NEARBY
 from .arcs import arc_incidence, arc_reflect, arc_time, on_arc
 from .beziers import bend_number, bezier_hit, bezier_value
@@ -47,7 +99,7 @@ def last_hollow(place, hollows):
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if hollows[middle, 0] <= place:
+        if hollows[middle, LEFT] <= place:
             low = middle + 1
         else:
             high = middle
@@ -58,10 +110,11 @@ def last_hollow(place, hollows):
 def opening_at(place, hollows):
     """Number of the hollow that opens at a place of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
     h = last_hollow(place, hollows)
-    if h < 0 or place >= hollows[h, 1] or (place == hollows[h, 0] and hollows[h, 11] > 0.0):
+    if h < 0 or place >= hollows[h, RIGHT] or (place == hollows[h, LEFT] and hollows[h, LEFT_EDGE] != NO_EDGE):
         # a flat top, or an edge of it; the edges between two hollows are corners
         edge = h >= 0 and (
-            (place == hollows[h, 0] and hollows[h, 11] > 1.0) or (place == hollows[h, 1] and hollows[h, 12] > 1.0)
+            (place == hollows[h, LEFT] and hollows[h, LEFT_EDGE] == CORNER_EDGE)
+            or (place == hollows[h, RIGHT] and hollows[h, RIGHT_EDGE] == CORNER_EDGE)
         )
         return TOP_CORNER if edge else FLAT_TOP
     return h
@@ -76,14 +129,13 @@ def corner_ahead(dx, dy, vx, vy, slack, bounces):
 
 
 @_compile
-def near_end(piece, px, py, slack):
-    """Whether a hit is within rounding of a joint that is a corner; both tables keep the ends in their last columns."""
-    n = piece.shape[0]
-    x, y = px - piece[n - 6], py - piece[n - 5]
-    if piece[n - 2] > 0.0 and x * x + y * y <= slack * slack:
+def near_end(curve, px, py, slack):
+    """Whether a hit of a curve is within rounding of an end that is a corner."""
+    x, y = px - curve[START_X], py - curve[START_Y]
+    if curve[START_CORNER] > 0.0 and x * x + y * y <= slack * slack:
         return True
-    x, y = px - piece[n - 4], py - piece[n - 3]
-    return piece[n - 1] > 0.0 and x * x + y * y <= slack * slack
+    x, y = px - curve[END_X], py - curve[END_Y]
+    return curve[END_CORNER] > 0.0 and x * x + y * y <= slack * slack
 
 
 @_compile
@@ -95,30 +147,30 @@ def walk(grid, hollow, joints, lines, own, px, py, vx, vy, slack, close, bounces
     nearly touch, so the walk's own rounding leaves
     out no line that the ray can meet; the signs at the joints are the same numbers in every cell.
     """
-    columns, rows, base = int(hollow[17]), int(hollow[18]), int(hollow[19])
-    x, y = (px - hollow[13]) / hollow[15], (py - hollow[14]) / hollow[16]
+    columns, rows, base = int(hollow[GRID_COLUMNS]), int(hollow[GRID_ROWS]), int(hollow[GRID_START])
+    x, y = (px - hollow[GRID_X]) / hollow[CELL_WIDTH], (py - hollow[GRID_Y]) / hollow[CELL_HEIGHT]
     column, row = min(max(int(x), 0), columns - 1), min(max(int(y), 0), rows - 1)
     right, up = 1 if vx > 0.0 else -1, 1 if vy > 0.0 else -1
-    step_x = hollow[15] / abs(vx) if vx != 0.0 else np.inf
-    step_y = hollow[16] / abs(vy) if vy != 0.0 else np.inf
-    leave_x = ((column + 1 if vx > 0.0 else column) - x) * (hollow[15] / vx) if vx != 0.0 else np.inf
-    leave_y = ((row + 1 if vy > 0.0 else row) - y) * (hollow[16] / vy) if vy != 0.0 else np.inf
+    step_x = hollow[CELL_WIDTH] / abs(vx) if vx != 0.0 else np.inf
+    step_y = hollow[CELL_HEIGHT] / abs(vy) if vy != 0.0 else np.inf
+    leave_x = ((column + 1 if vx > 0.0 else column) - x) * (hollow[CELL_WIDTH] / vx) if vx != 0.0 else np.inf
+    leave_y = ((row + 1 if vy > 0.0 else row) - y) * (hollow[CELL_HEIGHT] / vy) if vy != 0.0 else np.inf
     best, found, best_share = np.inf, -1, 0.0
     corner_time, nearby = np.inf, False
     while True:
         cell = base + row * columns + column
         for entry in range(grid[cell], grid[cell + 1]):
             j = grid[entry]
-            dx, dy = joints[j, 0] - px, joints[j, 1] - py
+            dx, dy = joints[j, JOINT_X] - px, joints[j, JOINT_Y] - py
             c_before = dx * vy - dy * vx
-            if abs(c_before) <= slack and joints[j, 2] > 0.0:
+            if abs(c_before) <= slack and joints[j, IS_CORNER] > 0.0:
                 corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
-            if joints[j, 3] <= 0.0:
+            if joints[j, STARTS_LINE] <= 0.0:
                 # a joint between curves, listed for its corner
                 continue
-            dx, dy = joints[j + 1, 0] - px, joints[j + 1, 1] - py
+            dx, dy = joints[j + 1, JOINT_X] - px, joints[j + 1, JOINT_Y] - py
             c_after = dx * vy - dy * vx
-            if abs(c_after) <= slack and joints[j + 1, 2] > 0.0:
+            if abs(c_after) <= slack and joints[j + 1, IS_CORNER] > 0.0:
                 corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
             if c_before >= 0.0 >= c_after and c_before > c_after and j != own:
                 t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
@@ -155,11 +207,11 @@ def trace_ray(
     sides passed. ``pairs`` is None, or the table of the channels and wedges in which runs are skipped. ``grid``
     is None, or the table of cells of the hollows that have many lines.
     """
-    left, right, size = hollow[0], hollow[1], hollow[2]
-    joint_low, joint_high = int(hollow[3]), int(hollow[4])
-    circle_low, circle_high = int(hollow[5]), int(hollow[6])
-    ellipse_low, ellipse_high = int(hollow[7]), int(hollow[8])
-    bezier_low, bezier_high = int(hollow[9]), int(hollow[10])
+    left, right, size = hollow[LEFT], hollow[RIGHT], hollow[SIZE]
+    joint_low, joint_high = int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])
+    circle_low, circle_high = int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])
+    ellipse_low, ellipse_high = int(hollow[FIRST_ELLIPSE]), int(hollow[ELLIPSES_END])
+    bezier_low, bezier_high = int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])
     slack, close = JOINT_ULPS * EPS * size, NEARBY * size
     sine, cosine = sine_cosine(theta)
     px, py, vx, vy = x, 0.0, -cosine, -sine
@@ -168,7 +220,7 @@ def trace_ray(
     own_kind, own_index, own_s, flown = LID, -1, -1.0, 0.0
     third = -1
     if path is not None:
-        path[0, 0], path[0, 1] = px, py
+        path[0, POINT_X], path[0, POINT_Y] = px, py
     if itinerary is not None:
         itinerary[0] = np.uint64(0)
     while True:
@@ -184,17 +236,17 @@ def trace_ray(
                 if abs(t) <= close and not own:
                     nearby = True
                 elif 0.0 <= t < time:
-                    if on_arc(circles[k], px + t * vx - circles[k, 0], py + t * vy - circles[k, 1], slack):
+                    if on_arc(circles[k], px + t * vx - circles[k, START_X], py + t * vy - circles[k, START_Y], slack):
                         time, kind, index, tangent = t, CIRCLE, k, touch
         if ellipses is not None:
             for k in range(ellipse_low, ellipse_high):
                 own = own_kind == ELLIPSE and own_index == k
-                stretch = ellipses[k, 12]
+                stretch = ellipses[k, STRETCH]
                 t, touch, _ = arc_time(ellipses[k], own, px, py, vx, vy, stretch)
                 if abs(t) <= close and not own:
                     nearby = True
                 elif 0.0 <= t < time:
-                    qx, qy = px + t * vx - ellipses[k, 0], stretch * (py + t * vy - ellipses[k, 1])
+                    qx, qy = px + t * vx - ellipses[k, START_X], stretch * (py + t * vy - ellipses[k, START_Y])
                     if on_arc(ellipses[k], qx, qy, slack * max(1.0, stretch)):
                         time, kind, index, tangent = t, ELLIPSE, k, touch
         if beziers is not None:
@@ -208,19 +260,19 @@ def trace_ray(
         # segments, by the signs of the joints: of all of them, or of those in the cells that the ray passes
         walking = False
         if grid is not None:
-            walking = hollow[17] > 0.0
+            walking = hollow[GRID_COLUMNS] > 0.0
         if not walking:
-            dx, dy = joints[joint_low, 0] - px, joints[joint_low, 1] - py
+            dx, dy = joints[joint_low, JOINT_X] - px, joints[joint_low, JOINT_Y] - py
             c_before = dx * vy - dy * vx
-            if abs(c_before) <= slack and joints[joint_low, 2] > 0.0:
+            if abs(c_before) <= slack and joints[joint_low, IS_CORNER] > 0.0:
                 corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
             for j in range(joint_low + 1, joint_high):
-                dx, dy = joints[j, 0] - px, joints[j, 1] - py
+                dx, dy = joints[j, JOINT_X] - px, joints[j, JOINT_Y] - py
                 c_after = dx * vy - dy * vx
-                if abs(c_after) <= slack and joints[j, 2] > 0.0:
+                if abs(c_after) <= slack and joints[j, IS_CORNER] > 0.0:
                     corner_time = min(corner_time, corner_ahead(dx, dy, vx, vy, slack, bounces))
                 if lines is not None:
-                    if c_before >= 0.0 >= c_after and c_before > c_after and joints[j - 1, 3] > 0.0:
+                    if c_before >= 0.0 >= c_after and c_before > c_after and joints[j - 1, STARTS_LINE] > 0.0:
                         if own_kind != LINE or own_index != j - 1:
                             t, share = line_time(joints, lines, j - 1, c_before, c_after, px, py, vx, vy)
                             if t > close:
@@ -269,16 +321,16 @@ def trace_ray(
             # at a shallow incidence a corner that the ray meets within the slack lies far beyond the hit
             sine = abs(vy)
             if lines is not None and kind == LINE:
-                sine = abs(vx * lines[index, 2] + vy * lines[index, 3])
+                sine = abs(vx * lines[index, LINE_NORMAL_X] + vy * lines[index, LINE_NORMAL_Y])
             if circles is not None and kind == CIRCLE:
                 sine = arc_incidence(circles[index], time, px, py, vx, vy, 1.0)
             if ellipses is not None and kind == ELLIPSE:
-                sine = arc_incidence(ellipses[index], time, px, py, vx, vy, ellipses[index, 12])
+                sine = arc_incidence(ellipses[index], time, px, py, vx, vy, ellipses[index, STRETCH])
             if kind != BEZIER and kind != SIDE and (corner_time - time) * sine <= 2.0 * slack:
                 return shift + px, vx, vy, bounces, CORNER
         if kind == LID:
             if path is not None:
-                path[bounces + 1, 0], path[bounces + 1, 1] = shift + px + time * vx, 0.0
+                path[bounces + 1, POINT_X], path[bounces + 1, POINT_Y] = shift + px + time * vx, 0.0
             return shift + px + time * vx, vx, vy, bounces, ESCAPED
         if tangent != 0:
             return shift + px, vx, vy, bounces, GRAZING
@@ -293,7 +345,7 @@ def trace_ray(
         if period is not None:
             if kind == SIDE:
                 # the ends of the wall are one point of it, and a ray passes a side above them
-                py = max(py + time * vy, joints[joint_low, 1])
+                py = max(py + time * vy, joints[joint_low, JOINT_Y])
                 px = left if vx > 0.0 else right
                 shift += (right - left) if vx > 0.0 else (left - right)
                 own_kind, own_index, own_s = SIDE, -1, -1.0
@@ -303,22 +355,30 @@ def trace_ray(
 
         if lines is not None and kind == LINE:
             near = index if hit_s >= 0.0 else index + 1
-            px = joints[near, 0] + hit_s * lines[index, 0]
-            py = joints[near, 1] + hit_s * lines[index, 1]
+            px = joints[near, JOINT_X] + hit_s * lines[index, EDGE_X]
+            py = joints[near, JOINT_Y] + hit_s * lines[index, EDGE_Y]
             # a first hit below an end of the opening is as exact as the ray, at the smallest distance from that corner
-            room = LEAST_SHARE * lines[index, 4] if bounces == 0 and joints[near, 1] == 0.0 else slack
-            if abs(hit_s) * lines[index, 4] <= room and joints[near, 2] > 0.0:
+            room = LEAST_SHARE * lines[index, LENGTH] if bounces == 0 and joints[near, JOINT_Y] == 0.0 else slack
+            if abs(hit_s) * lines[index, LENGTH] <= room and joints[near, IS_CORNER] > 0.0:
                 return shift + px, vx, vy, bounces, CORNER
-            w = 2.0 * (vx * lines[index, 2] + vy * lines[index, 3])
-            vx -= w * lines[index, 2]
-            vy -= w * lines[index, 3]
+            w = 2.0 * (vx * lines[index, LINE_NORMAL_X] + vy * lines[index, LINE_NORMAL_Y])
+            vx -= w * lines[index, LINE_NORMAL_X]
+            vy -= w * lines[index, LINE_NORMAL_Y]
             if pairs is not None:
                 # the ray came from this line, to that one, and back
-                if third == index and own_kind == LINE and path is None and lines[index, 6] > 0.0:
-                    for row in range(int(lines[index, 5]), int(lines[index, 6])):
-                        if pairs[row, 0] == own_index:
+                if third == index and own_kind == LINE and path is None and lines[index, PAIRS_END] > 0.0:
+                    for row in range(int(lines[index, FIRST_PAIR]), int(lines[index, PAIRS_END])):
+                        if pairs[row, PARTNER] == own_index:
                             px, py, vx, vy, hits = skip_crossings(
-                                pairs[row], lines[index, 2], lines[index, 3], px, py, vx, vy, slack, limit - bounces - 1
+                                pairs[row],
+                                lines[index, LINE_NORMAL_X],
+                                lines[index, LINE_NORMAL_Y],
+                                px,
+                                py,
+                                vx,
+                                vy,
+                                slack,
+                                limit - bounces - 1,
                             )
                             bounces += hits
                             if itinerary is not None:
@@ -328,24 +388,24 @@ def trace_ray(
             if near_end(circles[index], px, py, slack):
                 return shift + px, vx, vy, bounces, CORNER
             vx, vy = nvx, nvy
-            if circles[index, 10] > 0.0 and path is None:
+            if circles[index, RUN_SINE] > 0.0 and path is None:
                 px, py, vx, vy, hops = skip_hops(circles[index], px, py, vx, vy, limit - bounces - 1)
                 bounces += hops
                 if itinerary is not None:
                     itinerary[0] = HASH_FACTOR * itinerary[0] + np.uint64(hops)
         if ellipses is not None and kind == ELLIPSE:
-            px, py, nvx, nvy = arc_reflect(ellipses[index], time, px, py, vx, vy, ellipses[index, 12])
+            px, py, nvx, nvy = arc_reflect(ellipses[index], time, px, py, vx, vy, ellipses[index, STRETCH])
             if near_end(ellipses[index], px, py, slack):
                 return shift + px, vx, vy, bounces, CORNER
             vx, vy = nvx, nvy
         if beziers is not None and kind == BEZIER:
             curve = beziers[index]
-            px = bezier_value(curve[0], curve[2], curve[4], curve[6], hit_s)
-            py = bezier_value(curve[1], curve[3], curve[5], curve[7], hit_s)
+            px = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], hit_s)
+            py = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], hit_s)
             if near_end(curve, px, py, slack):
                 return shift + px, vx, vy, bounces, CORNER
-            tx = (3.0 * curve[6] * hit_s + 2.0 * curve[4]) * hit_s + curve[2]
-            ty = (3.0 * curve[7] * hit_s + 2.0 * curve[5]) * hit_s + curve[3]
+            tx = (3.0 * curve[X3] * hit_s + 2.0 * curve[X2]) * hit_s + curve[X1]
+            ty = (3.0 * curve[Y3] * hit_s + 2.0 * curve[Y2]) * hit_s + curve[Y1]
             scale = 1.0 / math.sqrt(tx * tx + ty * ty)
             w = 2.0 * scale * scale * (vy * tx - vx * ty)
             vx += w * ty
@@ -361,7 +421,7 @@ def trace_ray(
         vy *= scale
         bounces += 1
         if path is not None:
-            path[bounces, 0], path[bounces, 1] = px + shift, py
+            path[bounces, POINT_X], path[bounces, POINT_Y] = px + shift, py
 
 
 @_compile

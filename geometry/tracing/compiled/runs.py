@@ -11,6 +11,25 @@ import math
 import numpy as np
 from numba import njit
 
+from ...scene.columns import (
+    APEX_X,
+    APEX_Y,
+    CURVATURE,
+    FAR_X,
+    FAR_Y,
+    GAP,
+    NEAR_X,
+    NEAR_Y,
+    NORMAL_X,
+    NORMAL_Y,
+    PAIR_ANGLE,
+    PAIR_SINE,
+    RUN_SINE,
+    SPAN,
+    START_X,
+    START_Y,
+)
+
 # A run costs an arctangent and three sines or so; the number of hits from which it pays is a guess, not tuned.
 SHORTEST_RUN = 4.0
 # The number of hits left carries some eight rounding errors of itself; the last two are left to the ordinary loop.
@@ -25,19 +44,19 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 @_compile
 def skip_hops(arc, px, py, vx, vy, most):
     """Carry a ray along a circular arc by all whole hops of its run, at most ``most``."""
-    qx, qy = px - arc[0], py - arc[1]
-    nx, ny = arc[2] - arc[4] * qx, arc[3] - arc[4] * qy
+    qx, qy = px - arc[START_X], py - arc[START_Y]
+    nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
     sine = vx * nx + vy * ny
     # the tangent in the direction of travel has the free side, and so the normal n, on its left
     cosine = vx * ny - vy * nx
-    if sine <= 0.0 or sine > arc[10]:
+    if sine <= 0.0 or sine > arc[RUN_SINE]:
         return px, py, vx, vy, 0
     hop = 2.0 * math.atan2(sine, abs(cosine))
     # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
-    phi = 2.0 * math.atan2(qx * arc[2] + qy * arc[3], qx * arc[3] - qy * arc[2])
+    phi = 2.0 * math.atan2(qx * arc[NORMAL_X] + qy * arc[NORMAL_Y], qx * arc[NORMAL_Y] - qy * arc[NORMAL_X])
     if phi < 0.0:
         phi += 2.0 * math.pi
-    room = arc[11] - phi if cosine > 0.0 else phi
+    room = arc[SPAN] - phi if cosine > 0.0 else phi
     count = room / hop
     if count < 1.0 or most < 1:
         return px, py, vx, vy, 0
@@ -45,11 +64,11 @@ def skip_hops(arc, px, py, vx, vy, most):
     turn = hops * hop if cosine > 0.0 else -hops * hop
     phi += turn
     half = 0.5 * phi
-    chord = 2.0 * math.sin(half) / arc[4]
+    chord = 2.0 * math.sin(half) / arc[CURVATURE]
     along, inward = chord * math.cos(half), chord * math.sin(half)
-    qx, qy = along * arc[3] + inward * arc[2], -along * arc[2] + inward * arc[3]
+    qx, qy = along * arc[NORMAL_Y] + inward * arc[NORMAL_X], -along * arc[NORMAL_X] + inward * arc[NORMAL_Y]
     c, s = math.cos(turn), math.sin(turn)
-    return arc[0] + qx, arc[1] + qy, c * vx - s * vy, s * vx + c * vy, hops
+    return arc[START_X] + qx, arc[START_Y] + qy, c * vx - s * vy, s * vx + c * vy, hops
 
 
 @_compile
@@ -65,11 +84,11 @@ def skip_crossings(pair, nx, ny, px, py, vx, vy, slack, most):
     further towards the apex and its angle is alpha + k beta; for beta = 0, s_k = g k cot(alpha). All terms keep
     their digits down to beta = 0, because the distance g / sin(beta) of the apex enters by its inverse only.
     """
-    ux, uy, sine, beta = pair[5], pair[6], pair[8], pair[9]
+    ux, uy, sine, beta = pair[APEX_X], pair[APEX_Y], pair[PAIR_SINE], pair[PAIR_ANGLE]
     along, away = vx * ux + vy * uy, vx * nx + vy * ny
-    ahead = (pair[1] - px) * ux + (pair[2] - py) * uy
-    behind = (px - pair[3]) * ux + (py - pair[4]) * uy
-    gap = pair[7] + ahead * sine
+    ahead = (pair[NEAR_X] - px) * ux + (pair[NEAR_Y] - py) * uy
+    behind = (px - pair[FAR_X]) * ux + (py - pair[FAR_Y]) * uy
+    gap = pair[GAP] + ahead * sine
     ahead -= END_SLACKS * slack
     behind -= END_SLACKS * slack
     if not (ahead > 0.0 and behind > 0.0 and away > 0.0 and gap > 0.0):

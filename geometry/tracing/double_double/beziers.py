@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numba import njit
 
+from ...scene.columns import END_X, END_Y, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
 from ...scene.tolerances import NEARBY
 from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, square_root, subtract, wide
 
@@ -53,12 +54,11 @@ def falling_root(a0, a1, a2, a3, low, high):
 @_compile
 def bezier_coefficients(curve):
     """The coefficients in x and in y; the highest one takes the curve to its end joint exactly."""
-    n = curve.shape[0]
-    ax0, ax1, ax2, ax3 = wide(curve[0]), wide(curve[2]), wide(curve[4]), wide(curve[6])
-    ay0, ay1, ay2, ay3 = wide(curve[1]), wide(curve[3]), wide(curve[5]), wide(curve[7])
-    rest_x = subtract(subtract(wide(curve[n - 4]), ax0), ax1)
-    rest_y = subtract(subtract(wide(curve[n - 3]), ay0), ay1)
-    if curve[6] == 0.0 and curve[7] == 0.0:
+    ax0, ax1, ax2, ax3 = wide(curve[START_X]), wide(curve[X1]), wide(curve[X2]), wide(curve[X3])
+    ay0, ay1, ay2, ay3 = wide(curve[START_Y]), wide(curve[Y1]), wide(curve[Y2]), wide(curve[Y3])
+    rest_x = subtract(subtract(wide(curve[END_X]), ax0), ax1)
+    rest_y = subtract(subtract(wide(curve[END_Y]), ay0), ay1)
+    if curve[X3] == 0.0 and curve[Y3] == 0.0:
         ax2, ay2 = rest_x, rest_y
     else:
         ax3, ay3 = subtract(rest_x, ax2), subtract(rest_y, ay2)
@@ -72,7 +72,6 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
     The fourth value is the parameter of a hit within the slack of the start, which is not among the others, or -1.
     """
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
-    n = curve.shape[0]
     a0 = cross(subtract(ax0, px), subtract(ay0, py), vx, vy)
     a1, a2, a3 = cross(ax1, ay1, vx, vy), cross(ax2, ay2, vx, vy), cross(ax3, ay3, vx, vy)
     best_t, best_s, undecided = (np.inf, 0.0), (0.0, 0.0), np.inf
@@ -99,7 +98,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
                 if cubic_slope(a1, a2, a3, s)[0] <= 0.0 and 0.0 < t[0] < best_t[0]:
                     best_t, best_s = t, s
         return best_t, best_s, undecided, near_s
-    size = abs(curve[0] - px[0]) + abs(curve[1] - py[0]) + curve_size(curve)
+    size = abs(curve[START_X] - px[0]) + abs(curve[START_Y] - py[0]) + curve_size(curve)
     # the critical points of g are needed as doubles only: g there changes in second order
     c1, c2 = 2.0, 2.0
     disc = subtract(multiply(a2, a2), multiply((3.0, 0.0), multiply(a3, a1)))
@@ -120,7 +119,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
                 continue
             high = 1.0
         if high == 1.0:
-            value_high = cross(subtract(wide(curve[n - 4]), px), subtract(wide(curve[n - 3]), py), vx, vy)
+            value_high = cross(subtract(wide(curve[END_X]), px), subtract(wide(curve[END_Y]), py), vx, vy)
         else:
             value_high = cubic(a0, a1, a2, a3, (high, 0.0))
             if abs(value_high[0]) <= error:
@@ -160,4 +159,4 @@ def bezier_place(curve, s):
 @_compile
 def curve_size(curve):
     """A bound of a Bezier piece's extent: the sum of its coefficients but the constant ones."""
-    return abs(curve[2]) + abs(curve[3]) + abs(curve[4]) + abs(curve[5]) + abs(curve[6]) + abs(curve[7])
+    return abs(curve[X1]) + abs(curve[Y1]) + abs(curve[X2]) + abs(curve[Y2]) + abs(curve[X3]) + abs(curve[Y3])

@@ -28,6 +28,38 @@ import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS
+from ...scene.columns import (
+    BAND_HIGH,
+    BAND_LOW,
+    BEZIERS_END,
+    CIRCLES_END,
+    CORNER_EDGE,
+    ELLIPSES_END,
+    FAR_Y,
+    FIRST_BEZIER,
+    FIRST_CIRCLE,
+    FIRST_ELLIPSE,
+    FIRST_JOINT,
+    FIRST_PAIR,
+    HIGH,
+    IS_CORNER,
+    JOINT_X,
+    JOINT_Y,
+    JOINTS_END,
+    LEFT,
+    LEFT_EDGE,
+    LENGTH,
+    LOW,
+    NEAR_Y,
+    NO_EDGE,
+    PAIRS_END,
+    PARTNER,
+    RIGHT,
+    RIGHT_EDGE,
+    SIZE,
+    STARTS_LINE,
+    WIDE_STRETCH,
+)
 from ...scene.tolerances import JOINT_ULPS
 from .arcs import arc_hit, arc_place
 from .arithmetic import (
@@ -47,7 +79,7 @@ from .arithmetic import (
     wide,
 )
 from .beziers import bezier_hit, bezier_place
-from .sides import in_front, orientation
+from .sides import in_front, line_ends, orientation
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, LOST, UNSETTLED = 0, 1, 2, 3, 4, 5
 NO_PIECE, LID, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
@@ -65,14 +97,14 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 def crossings(joints, lines, pairs, index, other, py, vx, vy, most):
     """Hits, an even number, between a vertical side and one that faces it; the way along y, and the flight time."""
     way, flight = (0.0, 0.0), 0.0
-    if joints[index, 0] != joints[index + 1, 0] or joints[other, 0] != joints[other + 1, 0]:
+    if joints[index, JOINT_X] != joints[index + 1, JOINT_X] or joints[other, JOINT_X] != joints[other + 1, JOINT_X]:
         return 0, way, flight
-    for row in range(int(lines[index, 5]), int(lines[index, 6])):
-        if pairs[row, 0] == other:
-            gap = two_sum(joints[other, 0], -joints[index, 0])
+    for row in range(int(lines[index, FIRST_PAIR]), int(lines[index, PAIRS_END])):
+        if pairs[row, PARTNER] == other:
+            gap = two_sum(joints[other, JOINT_X], -joints[index, JOINT_X])
             time = divide(gap, vx)
             step = multiply(time, vy)
-            low, high = min(pairs[row, 2], pairs[row, 4]), max(pairs[row, 2], pairs[row, 4])
+            low, high = min(pairs[row, NEAR_Y], pairs[row, FAR_Y]), max(pairs[row, NEAR_Y], pairs[row, FAR_Y])
             room = high - py[0] if step[0] > 0.0 else py[0] - low
             count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
             if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
@@ -92,7 +124,7 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
     if vx[0] == 0.0 or vy[0] == 0.0:
         return 0.0, (0.0, 0.0)
     for row in range(bands.shape[0]):
-        low, high = bands[row, 0], bands[row, 1]
+        low, high = bands[row, BAND_LOW], bands[row, BAND_HIGH]
         if low < py[0] < high:
             behind, room = py[0] - low, min(high, 0.0) - py[0]
             if vy[0] < 0.0:
@@ -135,8 +167,8 @@ def meets(
 @_compile
 def is_beside(joints, index, corner):
     """Whether a corner lies on a line or on its free side: a ray that meets the line does not meet one behind it."""
-    x0, y0, x1, y1 = joints[index, 0], joints[index, 1], joints[index + 1, 0], joints[index + 1, 1]
-    return orientation(x0, y0, x1, y1, joints[corner, 0], joints[corner, 1]) >= 0.0
+    x0, y0, x1, y1 = line_ends(joints, index)
+    return orientation(x0, y0, x1, y1, joints[corner, JOINT_X], joints[corner, JOINT_Y]) >= 0.0
 
 
 @_compile
@@ -149,19 +181,20 @@ def refined_ray(
     ``bands`` are those of `free_cells`.
     The amplification is the norm of the map's derivative in the units (cell, radian).
     """
-    left, right = hollow[0], hollow[1]
-    joint_low, joint_high = int(hollow[3]), int(hollow[4])
-    circle_low, circle_high = int(hollow[5]), int(hollow[6])
-    ellipse_low, ellipse_high = first_ellipse + int(hollow[7]), first_ellipse + int(hollow[8])
-    bezier_low, bezier_high = int(hollow[9]), int(hollow[10])
-    scale = cell + hollow[2]
-    slack = JOINT_ULPS * EPS * hollow[2]
+    left, right = hollow[LEFT], hollow[RIGHT]
+    joint_low, joint_high = int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])
+    circle_low, circle_high = int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])
+    ellipse_low, ellipse_high = first_ellipse + int(hollow[FIRST_ELLIPSE]), first_ellipse + int(hollow[ELLIPSES_END])
+    bezier_low, bezier_high = int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])
+    scale = cell + hollow[SIZE]
+    slack = JOINT_ULPS * EPS * hollow[SIZE]
     px, py = place, (0.0, 0.0)
     sine, cosine = sine_cosine(theta)
     vx, vy = negate(cosine), negate(sine)
     # Jacobi fields of a displacement (j1, a1) and of a turn (j2, a2); displacements as shares of the scale
     j1, a1, j2, a2 = 1.0, 0.0, 0.0, 1.0
-    half_ulp = math.ldexp(1.0, math.frexp(theta)[1] - 54)
+    _, exponent = math.frexp(theta)
+    half_ulp = math.ldexp(1.0, exponent - 54)
     norm = 1.0
     # the sum of M M^T, with entries for displacement and turn, and how many errors there are
     c_jj, c_ja, c_aa, errors = 1.0, 0.0, 1.0, 1.0
@@ -179,23 +212,23 @@ def refined_ray(
 
         before = (0.0, 0.0)
         for j in range(joint_low, joint_high):
-            dx, dy = subtract(wide(joints[j, 0]), px), subtract(wide(joints[j, 1]), py)
+            dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
             after = cross(dx, dy, vx, vy)
-            if joints[j, 2] > 0.0:
+            if joints[j, IS_CORNER] > 0.0:
                 ahead = dot(dx, dy, vx, vy)[0]
                 width = WIDTH_MARGIN * half_ulp * abs(scale * j2 + ahead * a2) + (1.0 + ahead / scale) * error
                 if abs(after[0]) <= width and 0.0 < ahead < corner_time:
                     corner_time = ahead
-            starts_here = j > joint_low and joints[j - 1, 3] > 0.0
+            starts_here = j > joint_low and joints[j - 1, STARTS_LINE] > 0.0
             if starts_here and before[0] >= 0.0 >= after[0] and before[0] > after[0]:
                 if own_kind != LINE or own_index != j - 1:
                     share = divide(before, subtract(before, after))
-                    hx = two_sum(joints[j, 0], -joints[j - 1, 0])
-                    hy = two_sum(joints[j, 1], -joints[j - 1, 1])
-                    dx = subtract(add(wide(joints[j - 1, 0]), multiply(share, hx)), px)
-                    dy = subtract(add(wide(joints[j - 1, 1]), multiply(share, hy)), py)
+                    hx = two_sum(joints[j, JOINT_X], -joints[j - 1, JOINT_X])
+                    hy = two_sum(joints[j, JOINT_Y], -joints[j - 1, JOINT_Y])
+                    dx = subtract(add(wide(joints[j - 1, JOINT_X]), multiply(share, hx)), px)
+                    dy = subtract(add(wide(joints[j - 1, JOINT_Y]), multiply(share, hy)), py)
                     t = dot(dx, dy, vx, vy)
-                    height = t[0] * (before[0] - after[0]) / lines[j - 1, 4]
+                    height = t[0] * (before[0] - after[0]) / lines[j - 1, LENGTH]
                     if earlier(t, time) and meets(
                         t, height, joints, arcs, beziers, own_kind, own_index, own_s, LINE, j - 1, own_s,
                         px, py, vx, vy, flown, slack, error,
@@ -206,11 +239,12 @@ def refined_ray(
         for table in range(2):
             low, high = (circle_low, circle_high) if table == 0 else (ellipse_low, ellipse_high)
             for k in range(low, high):
+                widest = max(1.0, arcs[k, WIDE_STRETCH])
                 t, undecided, height = arc_hit(arcs[k], own_kind == ARC and own_index == k, px, py, vx, vy, error)
                 graze_time = min(graze_time, undecided)
                 if earlier(t, time) and meets(
                     t, height, joints, arcs, beziers, own_kind, own_index, own_s, ARC, k, own_s,
-                    px, py, vx, vy, flown, slack * max(1.0, arcs[k, 15]), error * max(1.0, arcs[k, 15]),
+                    px, py, vx, vy, flown, slack * widest, error * widest,
                 ):  # fmt: skip
                     time, kind, index = t, ARC, k
         for k in range(bezier_low, bezier_high):
@@ -251,12 +285,12 @@ def refined_ray(
         nx, ny, bent = (0.0, 0.0), (0.0, 0.0), 0.0
         qx, qy = px, py
         if kind == LINE:
-            ex = two_sum(joints[index + 1, 0], -joints[index, 0])
-            ey = two_sum(joints[index + 1, 1], -joints[index, 1])
+            ex = two_sum(joints[index + 1, JOINT_X], -joints[index, JOINT_X])
+            ey = two_sum(joints[index + 1, JOINT_Y], -joints[index, JOINT_Y])
             size = square_root(dot(ex, ey, ex, ey))
             nx, ny = negate(divide(ey, size)), divide(ex, size)
-            qx = add(wide(joints[index, 0]), multiply(edge_share, ex))
-            qy = add(wide(joints[index, 1]), multiply(edge_share, ey))
+            qx = add(wide(joints[index, JOINT_X]), multiply(edge_share, ex))
+            qy = add(wide(joints[index, JOINT_Y]), multiply(edge_share, ey))
         elif kind == ARC:
             qx, qy, nx, ny, bent = arc_place(arcs[index], time, px, py, vx, vy)
         elif kind == BEZIER:
@@ -268,8 +302,8 @@ def refined_ray(
         incidence = abs(approach[0])
         # a corner at the end of what is hit is as far away as the hit up to the width over the sine of incidence
         for j in range(joint_low, joint_high if corner_time < np.inf else joint_low):
-            if joints[j, 2] > 0.0:
-                dx, dy = subtract(wide(joints[j, 0]), px), subtract(wide(joints[j, 1]), py)
+            if joints[j, IS_CORNER] > 0.0:
+                dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
                 ahead = dot(dx, dy, vx, vy)[0]
                 width = WIDTH_MARGIN * half_ulp * abs(scale * j2 + ahead * a2) + (1.0 + ahead / scale) * error
                 met = 0.0 < ahead and (ahead - time[0]) * incidence <= 2.0 * width
@@ -289,7 +323,7 @@ def refined_ray(
             return px, (0.0, 0.0), bounces, BOUNCE_LIMIT, norm, local
         if kind == SIDE:
             # the ends of the wall are one point of it, and a ray passes a side above them
-            end = wide(joints[joint_low, 1])
+            end = wide(joints[joint_low, JOINT_Y])
             py = end if subtract(qy, end)[0] < 0.0 else qy
             px = wide(left if vx[0] > 0.0 else right)
             spread = WIDTH_MARGIN * half_ulp * abs(a2) + error / scale
@@ -348,28 +382,30 @@ def refined_rays(
         low, high = 0, hollows.shape[0]
         while low < high:
             middle = (low + high) // 2
-            if subtract(place, wide(hollows[middle, 0]))[0] >= 0.0:
+            if subtract(place, wide(hollows[middle, LEFT]))[0] >= 0.0:
                 low = middle + 1
             else:
                 high = middle
         h = low - 1
         amplification[i], rounding[i] = 1.0, LOCAL_ERROR
-        at_left = h >= 0 and subtract(place, wide(hollows[h, 0]))[0] == 0.0 and hollows[h, 11] > 0.0
-        to_right = subtract(place, wide(hollows[h, 1]))[0] if h >= 0 else 1.0
+        at_left = h >= 0 and subtract(place, wide(hollows[h, LEFT]))[0] == 0.0 and hollows[h, LEFT_EDGE] != NO_EDGE
+        to_right = subtract(place, wide(hollows[h, RIGHT]))[0] if h >= 0 else 1.0
         if h < 0 or to_right >= 0.0 or at_left:
-            edge = (at_left and hollows[h, 11] > 1.0) or (h >= 0 and to_right == 0.0 and hollows[h, 12] > 1.0)
-            out_x[i, 0], out_x[i, 1] = x[i], 0.0
+            edge = (at_left and hollows[h, LEFT_EDGE] == CORNER_EDGE) or (
+                h >= 0 and to_right == 0.0 and hollows[h, RIGHT_EDGE] == CORNER_EDGE
+            )
+            out_x[i, HIGH], out_x[i, LOW] = x[i], 0.0
             mirrored = two_sum(math.pi, -theta[i])
             mirrored = add(mirrored, (1.2246467991473532e-16, 0.0))
-            out_theta[i, 0], out_theta[i, 1] = mirrored
+            out_theta[i, HIGH], out_theta[i, LOW] = mirrored
             bounces[i], status[i] = 1, ESCAPED
             if edge:
-                out_theta[i, 0], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
+                out_theta[i, HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
         end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
             place, theta[i], hollows[h], joints, lines, pairs, arcs, first_ellipse, beziers, bands, is_open, cell,
             limit, most_flights,
         )  # fmt: skip
         end = add(base, end)
-        out_x[i, 0], out_x[i, 1] = end
-        out_theta[i, 0], out_theta[i, 1] = angle
+        out_x[i, HIGH], out_x[i, LOW] = end
+        out_theta[i, HIGH], out_theta[i, LOW] = angle

@@ -23,6 +23,7 @@ import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS, UNIT_ROUNDOFF
+from ...scene.columns import END_X, END_Y, JOINT_X, JOINT_Y, START_X, START_Y
 from .arcs import arc_height
 from .arithmetic import add, divide, dot, multiply, negate, square_root, subtract, two_product, two_sum, wide
 from .beziers import bezier_coefficients, bezier_place, cubic, cubic_slope
@@ -67,13 +68,19 @@ def orientation(ax, ay, bx, by, cx, cy):
 
 
 @_compile
+def line_ends(joints, index):
+    """-> (x0, y0, x1, y1): the joints of the line that starts at joint ``index``."""
+    return joints[index, JOINT_X], joints[index, JOINT_Y], joints[index + 1, JOINT_X], joints[index + 1, JOINT_Y]
+
+
+@_compile
 def line_height(joints, index, px, py):
     """Distance of a place from a line, on whose left the free side is, and the unit normal there."""
-    ex = two_sum(joints[index + 1, 0], -joints[index, 0])
-    ey = two_sum(joints[index + 1, 1], -joints[index, 1])
+    x0, y0, x1, y1 = line_ends(joints, index)
+    ex, ey = two_sum(x1, -x0), two_sum(y1, -y0)
     size = square_root(dot(ex, ey, ex, ey))
     nx, ny = negate(divide(ey, size)), divide(ex, size)
-    return dot(subtract(px, wide(joints[index, 0])), subtract(py, wide(joints[index, 1])), nx, ny), nx, ny
+    return dot(subtract(px, wide(x0)), subtract(py, wide(y0)), nx, ny), nx, ny
 
 
 @_compile
@@ -83,15 +90,15 @@ def height_over_line(joints, own, other, px, py, blur):
     The two may meet between the ends of the own one, where the other stands on it. Then the double-double place
     decides, which is known to ``blur`` along the own line, and the distance is the largest that it may have.
     """
-    ax, ay, bx, by = joints[other, 0], joints[other, 1], joints[other + 1, 0], joints[other + 1, 1]
-    first = orientation(ax, ay, bx, by, joints[own, 0], joints[own, 1])
-    last = orientation(ax, ay, bx, by, joints[own + 1, 0], joints[own + 1, 1])
+    ax, ay, bx, by = line_ends(joints, other)
+    x0, y0, x1, y1 = line_ends(joints, own)
+    first, last = orientation(ax, ay, bx, by, x0, y0), orientation(ax, ay, bx, by, x1, y1)
     if first * last >= 0.0:
         return first + last
     height, nx, ny = line_height(joints, own, px, py)
     px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
     height, _, _ = line_height(joints, other, px, py)
-    length = math.hypot(joints[own + 1, 0] - joints[own, 0], joints[own + 1, 1] - joints[own, 1])
+    length = math.hypot(x1 - x0, y1 - y0)
     return math.hypot(bx - ax, by - ay) * height[0] + blur * abs(last - first) / length
 
 
@@ -133,9 +140,10 @@ def line_in_front_of_line(joints, own, other, px, py, vx, vy, flown, slack, blur
     """`in_front` for two segments."""
     if height_over_line(joints, own, other, px, py, blur) <= 0.0:
         return False
-    ex, ey = joints[own + 1, 0] - joints[own, 0], joints[own + 1, 1] - joints[own, 1]
+    x0, y0, x1, y1 = line_ends(joints, own)
+    ex, ey = x1 - x0, y1 - y0
     w = 2.0 * (vy * ex - vx * ey) / (ex * ex + ey * ey)
-    x0, y0, x1, y1 = joints[other, 0], joints[other, 1], joints[other + 1, 0], joints[other + 1, 1]
+    x0, y0, x1, y1 = line_ends(joints, other)
     length = math.hypot(x1 - x0, y1 - y0)
     mx, my = (y0 - y1) / length, (x1 - x0) / length
     return not came_through(x0, y0, x1, y1, mx, my, px[0], py[0], vx + w * ey, vy - w * ex, flown, slack)
@@ -155,12 +163,11 @@ def in_front_at(
     if height[0] + blur * abs(mx[0] * ny[0] - my[0] * nx[0]) <= CURVE_NOISE * slack:
         return False
     if kind == LINE:
-        x0, y0, x1, y1 = joints[index, 0], joints[index, 1], joints[index + 1, 0], joints[index + 1, 1]
+        x0, y0, x1, y1 = line_ends(joints, index)
     elif kind == ARC:
-        x0, y0, x1, y1 = arc[0], arc[1], arc[16], arc[17]
+        x0, y0, x1, y1 = arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]
     else:
-        n = curve.shape[0]
-        x0, y0, x1, y1 = curve[0], curve[1], curve[n - 4], curve[n - 3]
+        x0, y0, x1, y1 = curve[START_X], curve[START_Y], curve[END_X], curve[END_Y]
     w = 2.0 * (vx * nx[0] + vy * ny[0])
     vx, vy = vx - w * nx[0], vy - w * ny[0]
     return not came_through(x0, y0, x1, y1, mx[0], my[0], px[0], py[0], vx, vy, flown, slack)

@@ -1,0 +1,60 @@
+"""The heap of the compiled loop that splits beams, with the largest beam on top, and copies of beams. Loads numba."""
+
+from __future__ import annotations
+
+from numba import njit
+
+from .columns import FLUX, VERTEX_COLUMNS
+
+_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def push(heap, size, real, slot):
+    """Put a beam on the heap; returns its new size."""
+    i = size
+    heap[i] = slot
+    while i > 0:
+        parent = (i - 1) // 2
+        if real[heap[parent], FLUX] >= real[heap[i], FLUX]:
+            break
+        heap[parent], heap[i] = heap[i], heap[parent]
+        i = parent
+    return size + 1
+
+
+@_compile
+def pop(heap, size, real):
+    """Take the beam of most flux off the heap; returns it and the new size."""
+    top = heap[0]
+    size -= 1
+    heap[0] = heap[size]
+    i = 0
+    while True:
+        child = 2 * i + 1
+        if child >= size:
+            break
+        if child + 1 < size and real[heap[child + 1], FLUX] > real[heap[child], FLUX]:
+            child += 1
+        if real[heap[i], FLUX] >= real[heap[child], FLUX]:
+            break
+        heap[i], heap[child] = heap[child], heap[i]
+        i = child
+    return top, size
+
+
+@_compile
+def copied(slot, real, whole, new):
+    """Copy a beam's numbers, but for its polygon, to a new slot."""
+    for k in range(real.shape[1]):
+        real[new, k] = real[slot, k]
+    for k in range(whole.shape[1]):
+        whole[new, k] = whole[slot, k]
+
+
+@_compile
+def put(polygon, count, corners, slot):
+    """Write a polygon into the tables."""
+    for j in range(count):
+        for k in range(VERTEX_COLUMNS):
+            corners[slot, j, k] = polygon[j, k]
