@@ -406,7 +406,8 @@ def library(entries: list[Entry]) -> list[LibraryFunction]:
         ):
             for function in vars(owner).values():
                 here = isinstance(function, FunctionType) and function.__code__.co_filename == module.__file__
-                if here and function.__name__ != "__post_init__":
+                # the code of one that calls super() cannot be exchanged
+                if here and not function.__closure__ and function.__name__ != "__post_init__":
                     functions[f"{module.__name__.rpartition('.')[2]}.{function.__qualname__}"] = function
     callers: dict[str, list[Entry]] = {name: [] for name in functions}
     for entry in entries:
