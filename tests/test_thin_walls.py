@@ -13,7 +13,7 @@ from benchmarks.robustness import COLLISIONS, POLYGONS, brute_force, judge, rand
 
 from asperity import geometry as geo
 from asperity.geometry.polygons.predicates import ExactPoints
-from asperity.geometry.tracing.compiled.nearby import line_time
+from asperity.geometry.tracing.compiled.lines import line_time
 from asperity.geometry.tracing.double_double.sides import orientation
 from asperity.geometry.tracing.refinement import refined_trace
 from precise_tracer import trace_precisely

@@ -99,7 +99,7 @@ def collide(
     -----
     Positions are kept in units of the wall, relative to its cell, so that nothing is lost at small scales except what
     the rounding of x1 and alpha themselves means there. The first contact is found by steps that provably pass no root
-    (see `compiled/contact`). Cost: .2 to .5 microseconds a contact on a wall of few pieces; every piece of a hollow is
+    (see `compiled.contact`). Cost: .2 to .5 microseconds a contact on a wall of few pieces; every piece of a hollow is
     tested.
 
     Source: Rudzis 2022, sections 1.3.1 to 1.3.5, and Proposition 3.2 with the angle alpha + j rho (eq. 3.26 prints

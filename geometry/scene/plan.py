@@ -17,7 +17,7 @@ class TracePlan:
     Attributes
     ----------
     primitives : tuple of str
-        What the loop is compiled for, of "lines", "circles", "ellipses" and "beziers".
+        What the wall has, of "lines", "circles", "ellipses" and "beziers".
     hollows : int
         Openings that are traced separately, each against its own pieces only; 1 for an open wall.
     pieces_traced, pieces_left_out : int

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import asin, cos, hypot, pi, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -186,6 +188,36 @@ def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
     return row_of(BEZIER_COLUMNS, {**ends, **columns})
 
 
+class Tables(NamedTuple):
+    """The tables of a scene as compiled loops take them: those of absent pieces are empty."""
+
+    hollows: Floats
+    joints: Floats
+    lines: Floats
+    circles: Floats
+    ellipses: Floats
+    beziers: Floats
+    pairs: Floats
+    grid: NDArray[np.int64]
+    cell: float
+    is_open: bool
+
+
+# Tables without rows: all tables have these types.
+NO_TABLES = Tables(
+    np.empty((0, HOLLOW_COLUMNS)),
+    np.empty((0, JOINT_COLUMNS)),
+    np.empty((0, LINE_COLUMNS)),
+    np.empty((0, ARC_COLUMNS)),
+    np.empty((0, ARC_COLUMNS)),
+    np.empty((0, BEZIER_COLUMNS)),
+    np.empty((0, PAIR_COLUMNS)),
+    np.empty(0, np.int64),
+    1.0,
+    False,
+)
+
+
 @dataclass(frozen=True)
 class Scene:
     """The tables of one wall; see the head of this file."""
@@ -202,9 +234,27 @@ class Scene:
     is_open: bool
     closed: Floats | None = None
 
+    @cached_property
+    def tables(self) -> Tables:
+        """The same for compiled loops, of which one version serves all walls."""
+        return Tables(
+            hollows=_filled(self.hollows, HOLLOW_COLUMNS),
+            joints=_filled(self.joints, JOINT_COLUMNS),
+            lines=np.zeros((len(self.joints), LINE_COLUMNS))
+            if self.lines is None
+            else _filled(self.lines, LINE_COLUMNS),
+            circles=_filled(self.circles, ARC_COLUMNS),
+            ellipses=_filled(self.ellipses, ARC_COLUMNS),
+            beziers=_filled(self.beziers, BEZIER_COLUMNS),
+            pairs=_filled(self.pairs, PAIR_COLUMNS),
+            grid=np.empty(0, np.int64) if self.grid is None else self.grid,
+            cell=float(self.cell),
+            is_open=bool(self.is_open),
+        )
+
     @property
     def primitives(self) -> tuple[str, ...]:
-        """Names of the primitives that the loop is compiled for."""
+        """Names of the primitives that the wall has."""
         return tuple(name for name in ("lines", "circles", "ellipses", "beziers") if getattr(self, name) is not None)
 
 
@@ -413,6 +463,10 @@ class _Tables:
             is_open=is_open,
             closed=closed_table(self.closed),
         )
+
+
+def _filled(table: Floats | None, columns: int) -> Floats:
+    return np.empty((0, columns)) if table is None else np.require(table, np.float64, ["C", "A", "W"])
 
 
 def _table(rows: list[Floats]) -> Floats | None:

@@ -28,6 +28,7 @@ from ..scene.columns import (
     Y3,
 )
 from ..scene.tolerances import JOINT_ULPS
+from .double_double.records import WideResults, WideTables
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -72,19 +73,19 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
     count = len(x)
     circles = _rows(scene.circles, ARC_COLUMNS)
     arcs = refined_arcs(np.concatenate([circles, _rows(scene.ellipses, ARC_COLUMNS)]))
-    result = RefinedTrace(
+    lines, pairs = _rows(scene.lines, LINE_COLUMNS), _rows(scene.pairs, PAIR_COLUMNS)
+    beziers = np.zeros((1, BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
+    tables = WideTables(
+        scene.hollows, scene.joints, lines, pairs, arcs, len(circles), beziers, _free_bands(scene),
+        scene.cell, scene.is_open,
+    )  # fmt: skip
+    results = WideResults(
         np.empty((count, 2)), np.empty((count, 2)), np.empty(count, np.int64), np.empty(count, np.uint8),
         np.empty(count), np.empty(count),
     )  # fmt: skip
-    refined_rays(
-        np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64),
-        scene.hollows, scene.joints, _rows(scene.lines, LINE_COLUMNS), _rows(scene.pairs, PAIR_COLUMNS),
-        arcs, len(circles),
-        np.zeros((1, BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers, _free_bands(scene),
-        scene.is_open, scene.cell, max_collisions, REFINED_FLIGHTS,
-        result.x, result.theta, result.collisions, result.status, result.amplification, result.rounding,
-    )  # fmt: skip
-    return result
+    starts, angles = np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64)
+    refined_rays(starts, angles, tables, max_collisions, REFINED_FLIGHTS, results)
+    return RefinedTrace(*results)
 
 
 def retrace(

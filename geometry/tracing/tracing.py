@@ -144,7 +144,7 @@ def trace(
     -----
     Cost: 10 to 20 ns a bounce where ``wall.plan()`` counts closed forms, else some 70 ns on a wall of few pieces, and
     below 1 us on one of 10^5 lines (a grid). The first call of a process loads the compiled loop (about a second); the
-    first on a machine compiles it for the primitives that the wall has (some seconds, then cached).
+    first on a machine compiles it, once for all walls (some ten seconds, then cached).
 
     Examples
     --------
@@ -194,12 +194,12 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) ->
     """A function of x, theta and the four arrays to fill: closed forms where the scene has some, else the loop."""
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
-        from .compiled.rays import trace_rays
+        from .compiled.rays import nearby_address, trace_rays
+        from .compiled.records import NOT_WANTED, Results
 
-        trace_rays(
-            x, theta, scene.hollows, scene.joints, scene.lines, scene.circles, scene.ellipses, scene.beziers,
-            scene.pairs, scene.grid, scene.cell if scene.is_open else None, scene.cell, max_collisions, stop, *results,
-        )  # fmt: skip
+        out_x, out_theta, collisions, status = results
+        wanted = Results(out_x, out_theta, collisions, status, *NOT_WANTED)
+        trace_rays(x, theta, scene.tables, max_collisions, stop, wanted, nearby_address())
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.closed_forms import UNDECIDED, trace_closed
@@ -245,7 +245,8 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     >>> geo.trajectory(geo.flat(), 0.5, pi / 2).tolist()
     [[0.5, 0.0], [0.5, 0.0], [0.5, 0.0]]
     """
-    from .compiled.rays import trace_ray
+    from .compiled.rays import nearby_address, trace_rays
+    from .compiled.records import results_for
 
     _check_wall(wall)
     place = finite_number("x", x)
@@ -262,14 +263,11 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         # a flat top: entry, hit and exit are one point
         points = np.array([[entry, 0.0]] * 3)
     else:
-        path = np.full((limit + 2, 2), np.nan)
-        interruptibly(
-            lambda: trace_ray(
-                entry - base, incoming, scene.hollows[inside[0]], scene.joints, scene.lines, scene.circles,
-                scene.ellipses, scene.beziers, scene.cell if scene.is_open else None, limit, path, None,
-            )
-        )  # fmt: skip
-        points = path[np.isfinite(path[:, 0])]
+        results = results_for(1, path=limit + 2)
+        start, angle = np.array([entry - base]), np.array([incoming])
+        stop = new_flag()
+        interruptibly(lambda: trace_rays(start, angle, scene.tables, limit, stop, results, nearby_address()))
+        points = results.path[np.isfinite(results.path[:, 0])]
         points[:, 0] += base
     return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, place, incoming, limit)
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...geometry.scene.columns import ARC_COLUMNS, BEZIER_COLUMNS, LEFT, LINE_COLUMNS, PAIR_COLUMNS, RIGHT, RUN_SINE
+from ...geometry.scene.columns import LEFT, RIGHT, RUN_SINE
 
 if TYPE_CHECKING:
+    from ...geometry.itineraries.compiled.changes import Setting
     from ...geometry.scene.scene import Scene
 
 # Collisions after which a ray counts as lost, and those that count as flights where runs of them are done in one.
@@ -70,33 +70,17 @@ class HollowRows:
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]]
         return float(right - left)
 
-    @cached_property
-    def _bounds(self) -> tuple[Any, ...]:
-        from ...geometry.itineraries.compiled.changes import Limits
+    @property
+    def _setting(self) -> Setting:
+        """Made anew for each call, because an interrupted one goes on with its own."""
+        from ...geometry.itineraries.compiled.changes import Limits, setting_of
 
         scene = self.scene
-        # empty tables instead of absent ones, so that one compiled version serves all walls: compiling takes 20 s
-        tables = (
-            scene.joints,
-            np.zeros((len(scene.joints), LINE_COLUMNS)) if scene.lines is None else scene.lines,
-            *(
-                np.zeros((0, columns)) if table is None else table
-                for columns, table in (
-                    (ARC_COLUMNS, scene.circles),
-                    (ARC_COLUMNS, scene.ellipses),
-                    (BEZIER_COLUMNS, scene.beziers),
-                    (PAIR_COLUMNS, scene.pairs),
-                )
-            ),
-            # so many lines that they have a grid are rare enough for a version of their own
-            scene.grid,
-        )
-        period = scene.cell if scene.is_open else None
         has_channels = scene.pairs is not None
         has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
         limits = Limits(most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_flights)
-        return scene.hollows[self.hollow], tables, period, limits, self.edges
+        return setting_of(scene, self.hollow, limits, self.edges)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Row], set[float]]:
         """Rows at angles that increase, and those angles of earlier calls whose rows are now known to be wrong."""
@@ -122,7 +106,7 @@ class HollowRows:
         ]
         found = interruptibly(
             lambda: march_rows(
-                theta, tolerances, self._bounds, self.degree, gauss_tables(), self.least_level,
+                theta, tolerances, self._setting, self.degree, gauss_tables(), self.least_level,
                 np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
             )
         )  # fmt: skip
@@ -172,7 +156,9 @@ class HollowRows:
         pieces = tuple(np.concatenate([row[part] for row in rows]) for part in range(3))
         starts = np.cumsum([0, *(len(row.low) for row in rows)])
         least = np.array([row.width_that_matters for row in rows])
-        found = interruptibly(lambda: find_overlooked(angles, least, pieces, starts, linked, self._bounds, self.degree))
+        found = interruptibly(
+            lambda: find_overlooked(angles, least, pieces, starts, linked, self._setting, self.degree)
+        )
         owner, places, rays, flights = found
         self.rays, self.flights = self.rays + rays, self.flights + flights
         for angle, x in zip(angles[owner].tolist(), places.tolist(), strict=True):
@@ -223,6 +209,6 @@ class HollowRows:
                 there = self._pieces[beyond]
                 middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
                 drift = (0.5 * (low + high) - middle) / (present - beyond)
-        angle = float(find_critical(np.uint64(label), present, absent, low, high, drift, self._bounds, self.degree))
+        angle = float(find_critical(np.uint64(label), present, absent, low, high, drift, self._setting, self.degree))
         self._critical[key] = angle
         return angle

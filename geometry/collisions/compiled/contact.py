@@ -1,6 +1,6 @@
 """The position of a satellite of the flying disk, and its first contact with a piece of the wall: compiled.
 
-A satellite meets a line or an upright conic where F = 0, with F as given at the end.
+A satellite meets a line or an upright conic where F = 0, see below.
 
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
 bounds the third one. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is a
@@ -8,8 +8,8 @@ safe step; where the parabola has none, F has none. The steps converge quadratic
 of F are visited in their order, in both directions, until one lies on the piece.
 
 **No face is met from behind.** A satellite that leaves one piece within rounding of another one has F = 0 there, too.
-Whether it lies in front of that one is decided by the pieces' exact joints, see `double_double/sides`: not of the other
-face of a plate without thickness, nor of the other side of a sharp peak.
+Whether it lies in front of that one is decided by the pieces' own places, see `sides`: not of the other face of
+a plate without thickness, nor of the other side of a sharp peak.
 
 Lengths are in units of the wall, so the disk's radius is 1/scale and the wall's tops are at height 0. In the time t a
 disk with velocities (v1, v2) and spin omega moves a satellite at the angle a from the lowest point by
@@ -27,10 +27,9 @@ circles and ellipses in one table ``arcs``.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ...scene.columns import (
     CIRCLES_END,
@@ -58,18 +57,14 @@ from ...scene.columns import (
     STARTS_LINE,
     STRETCH,
 )
-from ...tracing.compiled.arcs import on_arc
-from ...tracing.compiled.nearby import LINE, NO_PIECE, SIDE
-from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, near_end
+from ...tracing.compiled.arcs import near_end, on_arc
+from ...tracing.compiled.options import compiled, inlined
+from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
+from ...tracing.compiled.records import LINE, NO_PIECE, SIDE
 from ...tracing.double_double.sides import ARC as CURVED
-from ...tracing.double_double.sides import in_front_at
+from ...tracing.double_double.sides import LINE as STRAIGHT
+from ...tracing.double_double.sides import Arrival, Face, in_front_at
 
-# Arrays belong to the caller for the whole run. To count references to them, an atomic operation at each function that
-# takes one, took a quarter of the time: these functions are compiled without numba's run time, and allocate nothing.
-OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
-compiled = njit(**OPTIONS)
-# an array that is passed costs ten arguments: small functions are inlined
-inlined = njit(**OPTIONS, forceinline=True)
 # The series of `turning` are cut after the tenth power: below this angle the rest is less than 3e-18 of the sum.
 SMALL_TURN = 0.1
 S3, S5, S7, S9 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362880.0
@@ -245,13 +240,12 @@ def where_on_line(joints, lines, j, x, y, slack):
 def is_in_front(own_kind, own_index, kind, index, x, y, slack, ground):
     """Whether a satellite at (x, y) on one piece lies in front of another one, which is within the slack of it."""
     own_arc, arc = own_index if own_kind == ARC else 0, index if kind == ARC else 0
-    row, other = ground.exact_arcs[own_arc], ground.exact_arcs[arc]
     # there are no Bezier pieces, and no flight: a face that it came through in that is not looked for
-    return in_front_at(
-        ground.joints, CURVED if own_kind == ARC else LINE, own_index, row, row, (0.0, 0.0),
-        CURVED if kind == ARC else LINE, index, other, other, (0.0, 0.0),
-        (x, 0.0), (y, 0.0), 0.0, 0.0, 0.0, slack, slack,
-    )  # fmt: skip
+    row, other, nowhere = ground.exact_arcs[own_arc], ground.exact_arcs[arc], (0.0, 0.0)
+    own = Face(CURVED if own_kind == ARC else STRAIGHT, own_index, row, row, nowhere)
+    piece = Face(CURVED if kind == ARC else STRAIGHT, index, other, other, nowhere)
+    arrival = Arrival(0.0, slack, slack)
+    return in_front_at(ground.joints, piece, own, (x, 0.0), (y, 0.0), 0.0, 0.0, arrival)
 
 
 @inlined

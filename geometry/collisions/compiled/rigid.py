@@ -32,8 +32,9 @@ from ...scene.columns import (
     STRETCH,
 )
 from ...tracing.compiled.interruption import is_raised
-from ...tracing.compiled.nearby import LINE, NO_PIECE, SIDE
+from ...tracing.compiled.options import compiled, inlined
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
+from ...tracing.compiled.records import LINE, NO_PIECE, SIDE
 from .columns import ALPHA, OMEGA, V1, V2, X1
 from .contact import (
     CLEAR,
@@ -41,10 +42,8 @@ from .contact import (
     NOTHING,
     WIDEST_SLACK,
     ZERO,
-    compiled,
     first_in_hollow,
     flight,
-    inlined,
     next_root,
     satellite_after,
     towards_line,

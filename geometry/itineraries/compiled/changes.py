@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
-from ...scene.columns import LEFT, RIGHT
-from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, trace_ray
+from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
+from ...scene.scene import Scene, Tables
+from ...tracing.compiled.pointers import call_at
+from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, nearby_address, trace_rays_address
+from ...tracing.compiled.records import Results, results_for
 
 # Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers
 # are born as such, np.int64(0): for a bare 0 type inference compiles what it is passed to once more.
@@ -35,8 +38,8 @@ WORST_SHARE = 0.1
 FIRST_LABEL = np.uint64(4)
 
 
-# The two counters of a row.
-HASH, FLIGHTS = 0, 1
+# Rays that are traced in one call.
+BLOCK = 32
 
 
 class Limits(NamedTuple):
@@ -50,19 +53,39 @@ class Limits(NamedTuple):
     flights: int
 
 
-class Task(NamedTuple):
-    """A row: incoming angle, hollow, tables of the wall, its period (None if closed), limits, outgoing angles at which
-    cells begin, degree of the functions that the row is for, and the counters: hash of a ray, flights spent.
+class Tracer(NamedTuple):
+    """How rays are traced: the addresses of `trace_rays` and `hit_nearby`, and room for a block of rays.
+
+    All angles of a block are that of the row. Nothing raises ``stop``.
     """
 
-    theta: float
+    address: int
+    nearby: int
+    angles: Floats
+    results: Results
+    places: Floats
+    stop: NDArray[np.int64]
+
+
+class Setting(NamedTuple):
+    """What all rows of a hollow have in common: its row, the tables of the wall, limits, and outgoing angles at which
+    cells begin, and how rays are traced.
+    """
+
     hollow: Floats
-    tables: Any
-    period: Any
+    tables: Tables
     limits: Limits
     edges: Floats
+    tracer: Tracer
+
+
+class Task(NamedTuple):
+    """A row: the setting, incoming angle, degree of the functions that the row is for, and flights spent."""
+
+    setting: Setting
+    theta: float
     degree: int
-    counters: NDArray[np.uint64]
+    flights: NDArray[np.int64]
 
 
 class Chain(NamedTuple):
@@ -74,6 +97,15 @@ class Chain(NamedTuple):
     successors: NDArray[np.int64]
     gaps: NDArray[np.int64]
     fresh: NDArray[np.int64]
+
+
+def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats) -> Setting:
+    """The setting of the rows of a hollow, by its number. It belongs to one thread at a time."""
+    results, angles, stop = results_for(BLOCK, BLOCK, BLOCK), np.empty(BLOCK), np.zeros(1, np.int64)
+    address = trace_rays_address()
+    tracer = Tracer(address, nearby_address(), angles, results, np.empty(BLOCK), stop)
+    tables = scene.tables
+    return Setting(tables.hollows[hollow], tables, limits, np.require(edges, np.float64, ["C", "A", "W"]), tracer)
 
 
 @inner
@@ -90,32 +122,36 @@ def empty_chain():
 
 
 @inner
-def probe(x, task):
-    """Outgoing angle of one ray and the label of its itinerary and of the cell that it goes to."""
-    theta, hollow, limits, edges, counters = task.theta, task.hollow, task.limits, task.edges, task.counters
-    joints, lines, circles, ellipses, beziers, pairs, grid = task.tables
-    last, vx, vy, bounces, status = trace_ray(
-        x,
-        theta,
-        hollow,
-        joints,
-        lines,
-        circles,
-        ellipses,
-        beziers,
-        task.period,
-        limits.collisions,
-        None,
-        counters,
-        pairs,
-        grid,
-    )
-    counted = min(bounces, limits.collisions_that_count)
-    counters[FLIGHTS] += np.uint64(1 + counted + np.int64(abs(last - x) / (hollow[RIGHT] - hollow[LEFT])))
-    if status != ESCAPED:
-        return theta, np.uint64(status)
+def task_of(setting, theta, degree, flights):
+    """-> Task: a row at an angle."""
+    setting.tracer.angles[:] = theta
+    return Task(setting, theta, degree, flights)
+
+
+@inner
+def trace_block(places, task):
+    """Trace rays, no more than `BLOCK`, into the results of the tracer."""
+    setting = task.setting
+    tracer = setting.tracer
+    rays = places, tracer.angles[: places.shape[0]]
+    limit = setting.limits.collisions
+    call_at(tracer.address, None, (*rays, setting.tables, limit, tracer.stop, tracer.results, tracer.nearby))
+
+
+@inner
+def outcome(k, x, task):
+    """-> (angle, label): the outgoing angle of ray k of the block, which entered at x, and its label.
+
+    The label is that of its itinerary and of the cell that it goes to. Its flights are added to those of the row.
+    """
+    hollow, limits, edges = task.setting.hollow, task.setting.limits, task.setting.edges
+    results = task.setting.tracer.results
+    cells = np.int64(abs(results.x[k] - x) / (hollow[RIGHT] - hollow[LEFT]))
+    task.flights[0] += 1 + min(results.collisions[k], limits.collisions_that_count) + cells
+    if results.status[k] != ESCAPED:
+        return task.theta, np.uint64(results.status[k])
     # a ray along y = 0 within rounding
-    out = min(max(math.atan2(vy, vx), 0.0), math.pi)
+    out = min(max(math.atan2(results.velocity[k, POINT_Y], results.velocity[k, POINT_X]), 0.0), math.pi)
     cell = np.int64(0)
     # np.searchsorted would take as long to compile as all of this file
     high = edges.shape[0]
@@ -125,13 +161,22 @@ def probe(x, task):
             cell = middle + 1
         else:
             high = middle
-    return out, HASH_FACTOR * (counters[HASH] + np.uint64(16)) + np.uint64(cell)
+    return out, HASH_FACTOR * (results.itinerary[k] + np.uint64(16)) + np.uint64(cell)
+
+
+@inner
+def probe(x, task):
+    """-> (angle, label): `outcome` of one ray."""
+    places = task.setting.tracer.places[:1]
+    places[0] = x
+    trace_block(places, task)
+    return outcome(np.int64(0), x, task)
 
 
 @inner
 def is_spent(task):
     """Whether the row has taken as many flights as it may."""
-    return task.counters[FLIGHTS] >= np.uint64(task.limits.flights)
+    return task.flights[0] >= task.setting.limits.flights
 
 
 @inner
@@ -149,7 +194,7 @@ def undecided(before, task, chain):
     """What the gap after a sample may contribute to a row's error."""
     xs, outs, _, follow, _, _ = chain
     after = follow[before]
-    width, whole = xs[after] - xs[before], task.hollow[RIGHT] - task.hollow[LEFT]
+    width, whole = xs[after] - xs[before], task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
     return 0.5 * width * (spread(outs[before], outs[after], task.degree) + math.sqrt(width / whole))
 
 
@@ -213,18 +258,22 @@ def sample_row(places, task, chain, goal):
     The last one is that with the largest place, not the one that was found last.
     """
     xs, outs, labels, follow, gaps, _ = chain
-    left, right = task.hollow[LEFT], task.hollow[RIGHT]
+    left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
     count, gap_count = np.int64(0), np.int64(0)
     for x in places:
         if x <= left or x >= right or (count > 0 and x <= xs[count - 1]):
             continue
         xs[count] = x
-        outs[count], labels[count] = probe(x, task)
         follow[count] = count + 1
-        if count > 0 and labels[count] != labels[count - 1]:
-            gaps[gap_count] = count - 1
-            gap_count += 1
         count += 1
+    for first in range(0, count, BLOCK):
+        end = min(first + BLOCK, count)
+        trace_block(xs[first:end], task)
+        for k in range(first, end):
+            outs[k], labels[k] = outcome(k - first, xs[k], task)
+            if k > 0 and labels[k] != labels[k - 1]:
+                gaps[gap_count] = k - 1
+                gap_count += 1
     last = count - 1
     follow[last] = -1
     return halve_gaps(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last

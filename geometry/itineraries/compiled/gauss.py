@@ -12,7 +12,7 @@ import numpy as np
 
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from .changes import FIRST_LABEL, inner, is_spent, probe
+from .changes import FIRST_LABEL, inner, is_spent, outcome, trace_block
 
 ORDERS = (4, 7, 12, 20, 32)
 # Nodes of one row at most.
@@ -59,9 +59,13 @@ def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, stric
         if last - first > MOST_NODES - filled - 2 or is_spent(task):
             break
         new0, new1, new2 = 0.0, 0.0, 0.0
+        block = task.setting.tracer.places[: last - first]
         for n in range(first, last):
-            x = low + width * places[n]
-            out, here = probe(x, task)
+            block[n - first] = low + width * places[n]
+        trace_block(block, task)
+        for n in range(first, last):
+            x = block[n - first]
+            out, here = outcome(n - first, x, task)
             rays += 1
             if strict and here != label:
                 return used, error, x, rays
@@ -90,7 +94,7 @@ def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, fi
 
     Returns the number of nodes in all, the error, a place where a ray has another label (nan: none), and the rays.
     """
-    whole = task.hollow[RIGHT] - task.hollow[LEFT]
+    whole = task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
     low_stack, high_stack = np.empty(MOST_HALVINGS + 2), np.empty(MOST_HALVINGS + 2)
     low_stack[0], high_stack[0] = ends
     node, mass = nodes

@@ -15,15 +15,14 @@ from ...scene.columns import LEFT, RIGHT, SIZE
 from ...tracing.compiled.growing import longer
 from .changes import (
     FIRST_LABEL,
-    FLIGHTS,
     MOST_SAMPLES,
-    Task,
     add_change,
     empty_chain,
     inner,
     is_spent,
     sample_row,
     spread,
+    task_of,
     undecided,
 )
 from .gauss import MOST_NODES, SPARE, integrate_piece
@@ -69,10 +68,10 @@ def march_row(task, goal, rules, least, places, chain, nodes, pieces):
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
     lows, highs, names = pieces
-    hollow, degree = task.hollow, task.degree
+    hollow, degree = task.setting.hollow, task.degree
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
-    task.counters[FLIGHTS] = np.uint64(0)
+    task.flights[0] = 0
     count, last = sample_row(places, task, chain, GAP_SHARE * goal)
     rays = np.int64(0)
     # the margins count with the first and the last sample
@@ -144,17 +143,17 @@ def wide_middles(lows, highs, least):
 
 
 @_compile
-def march_rows(thetas, tolerances, scene, degree, rules, least, seeds, seed_starts):
+def march_rows(thetas, tolerances, setting, degree, rules, least, seeds, seed_starts):
     """Rows at increasing angles.
 
-    ``scene``: hollow, tables, period, limits, edges of cells. A row starts from its seeds, which increase, and from the
+    A row starts from its seeds, which increase, and from the
     middles of the pieces of the row before, so that a narrow piece is followed until it vanishes. Returns outgoing
     angles and masses, one row after the other, and where each row starts; the same of first places, last places and
     labels of the pieces; and the error, the width lost and the numbers of rays and of flights of each row.
     """
-    hollow, tables, period, limits, edges = scene
+    hollow = setting.hollow
     whole = hollow[RIGHT] - hollow[LEFT]
-    chain, counters = empty_chain(), np.zeros(2, np.uint64)
+    chain, spent = empty_chain(), np.zeros(1, np.int64)
     nodes = np.empty(MOST_NODES + SPARE), np.empty(MOST_NODES + SPARE)
     angles, masses = nodes
     pieces = room_for_pieces(MOST_SAMPLES)
@@ -166,11 +165,11 @@ def march_rows(thetas, tolerances, scene, degree, rules, least, seeds, seed_star
     all_lows, all_highs, all_labels = room_for_pieces(1024)
     previous = np.empty(0)
     for k in range(n):
-        task = Task(thetas[k], hollow, tables, period, limits, edges, degree, counters)
+        task = task_of(setting, thetas[k], degree, spent)
         goal = tolerances[k] * whole
         places = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
         filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, least, places, chain, nodes, pieces)
-        flights[k] = np.int64(counters[FLIGHTS])
+        flights[k] = spent[0]
         previous = wide_middles(lows[:number], highs[:number], goal)
         begin, end = node_starts[k], node_starts[k] + filled
         if end > all_angles.shape[0]:

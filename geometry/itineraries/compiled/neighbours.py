@@ -7,7 +7,7 @@ from numba import njit
 
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from .changes import FLIGHTS, Task, inner, probe
+from .changes import inner, probe, task_of
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 # Near its end a piece is as wide as the distance to it or its square root; so many places, at most its last width away
@@ -28,22 +28,21 @@ def label_at(x, task):
 
 
 @_compile
-def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree):
+def find_overlooked(thetas, least_widths, pieces, starts, linked, setting, degree):
     """Places in rows where a ray has another label than the piece that it belongs to: pieces of a neighbour say where.
 
     Rows ``k`` and ``k + 1`` are compared where ``linked[k]``. Pieces of the one no wider than the other's
     ``least_widths`` do not count. Returns the numbers of the rows, the places, and the numbers of rays and flights.
     """
-    hollow, tables, period, limits, edges = scene
     lows, highs, labels = pieces
-    counters = np.zeros(2, np.uint64)
+    spent = np.zeros(1, np.int64)
     rows, places = [0 for _ in range(0)], [0.0 for _ in range(0)]
     rays = 0
     for k in range(thetas.shape[0] - 1):
         if not linked[k]:
             continue
         for here, there in ((k, k + 1), (k + 1, k)):
-            task = Task(thetas[there], hollow, tables, period, limits, edges, degree, counters)
+            task = task_of(setting, thetas[there], degree, spent)
             m, end = starts[there], starts[there + 1]
             for p in range(starts[here], starts[here + 1]):
                 if highs[p] - lows[p] <= least_widths[there]:
@@ -57,13 +56,13 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, scene, degree)
                     if label_at(x, task) != labels[m]:
                         rows.append(there)
                         places.append(x)
-    return np.array(rows, dtype=np.int64), np.array(places), rays, np.int64(counters[FLIGHTS])
+    return np.array(rows, dtype=np.int64), np.array(places), rays, spent[0]
 
 
 @inner
 def edge_from(x, step, label, task):
     """An end of the piece around x, seen in the direction of ``step``: to a small share of its distance."""
-    left, right = task.hollow[LEFT], task.hollow[RIGHT]
+    left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
     inside, outside = x, x + step
     while left < outside < right and label_at(outside, task) == label:
         inside = outside
@@ -80,19 +79,19 @@ def edge_from(x, step, label, task):
 
 
 @_compile
-def find_critical(label, present, absent, low, high, drift, scene, degree):
+def find_critical(label, present, absent, low, high, drift, setting, degree):
     """The angle between ``present`` and ``absent`` where the piece ends that is [low, high] at the former.
 
     ``drift`` is how fast its middle moves, as far as known.
     """
-    hollow, tables, period, limits, edges = scene
+    hollow = setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
-    counters = np.zeros(2, np.uint64)
+    spent = np.zeros(1, np.int64)
     for _ in range(MOST_STEPS):
         if abs(present - absent) <= SAME_ANGLE:
             break
         angle = 0.5 * (present + absent)
-        task = Task(angle, hollow, tables, period, limits, edges, degree, counters)
+        task = task_of(setting, angle, degree, spent)
         width, before = high - low, 0.5 * (low + high)
         centre = before + drift * (angle - present)
         found = np.nan

@@ -3,7 +3,7 @@
 A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0 with r measured from its first joint and n0 the unit normal there,
 towards the free side; kappa > 0 is focusing. Its one front root is (B + sqrt(D)) / (kappa |v|^2), and
 2 B / (kappa |v|^2) where the ray starts on the arc itself. An elliptic arc is the same in stretched coordinates. The
-columns of the tables are explained in `scene/scene`.
+columns of the tables are in `columns`.
 """
 
 from __future__ import annotations
@@ -11,21 +11,33 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from ....core.rounding import EPS
-from ...scene.columns import CHORD_X, CHORD_Y, CURVATURE, NORMAL_X, NORMAL_Y, SHORT_CHORD, START_X, START_Y
+from ...scene.columns import (
+    CHORD_X,
+    CHORD_Y,
+    CURVATURE,
+    END_CORNER,
+    END_X,
+    END_Y,
+    NORMAL_X,
+    NORMAL_Y,
+    SHORT_CHORD,
+    START_CORNER,
+    START_X,
+    START_Y,
+)
 from ...scene.tolerances import TANGENT_ULPS
+from .options import inlined
 
-_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
-
-@_compile
+@inlined
 def arc_time(arc, own, px, py, vx, vy, stretch):
-    """Flight time to the front of one arc, or inf; 1 where the ray is tangent within rounding; and its height.
+    """-> (t, tangent, height): flight time to the front of the arc, inf if there is no hit.
 
-    The height, in coordinates where the arc is a circle, is about the distance in front of the arc of a ray that comes
-    from there and meets it close by, and inf where the ray goes to the far side of a focusing arc.
+    ``tangent`` is 1 where hit and miss are not told apart. The height, in coordinates where the arc is a circle, is
+    about the distance in front of the arc of a ray that comes from there and meets it close by, and inf where the ray
+    goes to the far side of a focusing arc.
     """
     rx, ry = px - arc[START_X], stretch * (py - arc[START_Y])
     wy = stretch * vy
@@ -52,9 +64,9 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
     return 2.0 * f / (root - b), tangent, f
 
 
-@_compile
+@inlined
 def on_arc(arc, qx, qy, slack):
-    """Whether the point q on the full circle, measured from the first joint, belongs to the arc."""
+    """-> bool: whether the point q on the full circle, measured from the first joint, belongs to the arc."""
     if arc[SHORT_CHORD] > 0.0:
         # up to a half angle of pi/4 the position along the chord decides, on the arc's own side of the circle
         along = qx * arc[CHORD_X] + qy * arc[CHORD_Y]
@@ -66,9 +78,26 @@ def on_arc(arc, qx, qy, slack):
     return height <= slack if arc[CURVATURE] > 0.0 else height >= -slack
 
 
-@_compile
+@inlined
+def on_arc_after(arc, t, px, py, vx, vy, stretch, slack):
+    """-> bool: whether the point after the time t, on the full circle, belongs to the arc."""
+    qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
+    return on_arc(arc, qx, qy, slack * max(1.0, stretch))
+
+
+@inlined
+def near_end(curve, px, py, slack):
+    """-> bool: whether a hit of a curve is within rounding of an end that is a corner."""
+    x, y = px - curve[START_X], py - curve[START_Y]
+    if curve[START_CORNER] > 0.0 and x * x + y * y <= slack * slack:
+        return True
+    x, y = px - curve[END_X], py - curve[END_Y]
+    return curve[END_CORNER] > 0.0 and x * x + y * y <= slack * slack
+
+
+@inlined
 def arc_reflect(arc, t, px, py, vx, vy, stretch):
-    """Position on the arc after the time t and the velocity reflected there."""
+    """-> (px, py, vx, vy): position on the arc after the time t and the velocity reflected there."""
     qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
     f = arc[NORMAL_X] * qx + arc[NORMAL_Y] * qy - 0.5 * arc[CURVATURE] * (qx * qx + qy * qy)
@@ -84,9 +113,9 @@ def arc_reflect(arc, t, px, py, vx, vy, stretch):
     return px, py, vx - w * nx, vy - w * ny
 
 
-@_compile
+@inlined
 def arc_incidence(arc, t, px, py, vx, vy, stretch):
-    """Sine of the angle between the velocity and the arc that it meets after the time t."""
+    """-> float: sine of the angle between the velocity and the arc that it meets after the time t."""
     qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, stretch * (arc[NORMAL_Y] - arc[CURVATURE] * qy)
     return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)

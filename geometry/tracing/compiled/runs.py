@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from ...scene.columns import (
     APEX_X,
@@ -29,21 +28,20 @@ from ...scene.columns import (
     START_X,
     START_Y,
 )
+from .options import compiled
 
 # A run costs an arctangent and three sines or so; the number of hits from which it pays is a guess, not tuned.
 SHORTEST_RUN = 4.0
 # The number of hits left carries some eight rounding errors of itself; the last two are left to the ordinary loop.
 COUNT_ROUNDING = 1.0 - 16.0 * 2.0**-52
 LAST_HITS = 2.0
-# Ends of the facing parts, and the pieces beyond them, are known to JOINT_ULPS, once for each of the two.
+# Ends of the facing parts, and the pieces beyond them, are known to JOINT_ULPS of `rays`, once for each of the two.
 END_SLACKS = 2.0
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
 
-
-@_compile
+@compiled
 def skip_hops(arc, px, py, vx, vy, most):
-    """Carry a ray along a circular arc by all whole hops of its run, at most ``most``."""
+    """-> (px, py, vx, vy, hops): carry a ray along a circular arc by all whole hops of its run, at most ``most``."""
     qx, qy = px - arc[START_X], py - arc[START_Y]
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
     sine = vx * nx + vy * ny
@@ -71,11 +69,12 @@ def skip_hops(arc, px, py, vx, vy, most):
     return arc[START_X] + qx, arc[START_Y] + qy, c * vx - s * vy, s * vx + c * vy, hops
 
 
-@_compile
+@compiled
 def skip_crossings(pair, nx, ny, px, py, vx, vy, slack, most):
-    """Carry a ray that has just left a line for the line facing it by an even number of hits, at most ``most``.
+    """-> (px, py, vx, vy, hits): carry a ray that has just left a line for the facing one, by hits of an even number.
 
-    ``pair`` is a row of the table ``pairs`` of `scene/scene`, (nx, ny) the unit normal of the line. With beta the angle
+    They are ``most`` at most.
+    ``pair`` is a row of the table of that name (see `scene`), (nx, ny) the unit normal of the line. With beta the angle
     between the lines, g the gap at the ray and alpha the angle of its velocity with the direction u of the apex, the
     unfolded lines are a fan: hit k lies
 

@@ -97,7 +97,7 @@ def wide_arc(arc):
 
 @_compile
 def arc_hit(arc, own, px, py, vx, vy, error):
-    """Flight time to the front of one arc, inf if none; time of a contact that is undecided, or inf; and the height.
+    """-> (t, undecided, height): time to the front of one arc, or inf; time of an undecided contact, or inf.
 
     The height is that of `arc_time` in `compiled/arcs`. ``error`` bounds the transversal error of the ray there.
     """
@@ -160,7 +160,7 @@ def on_arc(arc, qx, qy, slack):
 
 @_compile
 def arc_height(arc, px, py):
-    """Distance of a place close to an arc from it, positive on its free side, and the unit normal there."""
+    """-> (height, nx, ny): distance of a place close to an arc, positive on its free side; unit normal."""
     n0x, n0y, curvature, stretch = wide_arc(arc)
     qx, qy = subtract(px, wide(arc[START_X])), multiply(stretch, subtract(py, wide(arc[START_Y])))
     nx = subtract(n0x, multiply(curvature, qx))
@@ -173,7 +173,7 @@ def arc_height(arc, px, py):
 
 @_compile
 def arc_place(arc, t, px, py, vx, vy):
-    """Position on the arc after the time t, unit normal there, and the curvature of the arc there (a double)."""
+    """-> (x, y, nx, ny, bent): place on the arc after the time t, unit normal, and curvature (a double)."""
     n0x, n0y, curvature, stretch = wide_arc(arc)
     qx = subtract(add(px, multiply(t, vx)), wide(arc[START_X]))
     qy = multiply(stretch, subtract(add(py, multiply(t, vy)), wide(arc[START_Y])))

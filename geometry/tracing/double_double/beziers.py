@@ -53,7 +53,7 @@ def falling_root(a0, a1, a2, a3, low, high):
 
 @_compile
 def bezier_coefficients(curve):
-    """The coefficients in x and in y; the highest one takes the curve to its end joint exactly."""
+    """-> (ax0, ay0, ..., ay3): the coefficients; the highest one takes the curve to its end joint exactly."""
     ax0, ax1, ax2, ax3 = wide(curve[START_X]), wide(curve[X1]), wide(curve[X2]), wide(curve[X3])
     ay0, ay1, ay2, ay3 = wide(curve[START_Y]), wide(curve[Y1]), wide(curve[Y2]), wide(curve[Y3])
     rest_x = subtract(subtract(wide(curve[END_X]), ax0), ax1)
@@ -66,40 +66,48 @@ def bezier_coefficients(curve):
 
 
 @_compile
-def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
-    """First front hit of one Bezier piece: time (inf if none), parameter, time of an undecided contact (or inf).
+def bezier_time(coefficients, s, px, py, vx, vy):
+    """-> double-double: the way along the ray to the point s of a curve."""
+    ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
+    dx, dy = subtract(cubic(ax0, ax1, ax2, ax3, s), px), subtract(cubic(ay0, ay1, ay2, ay3, s), py)
+    return dot(dx, dy, vx, vy)
 
-    The fourth value is the parameter of a hit within the slack of the start, which is not among the others, or -1.
+
+@_compile
+def hit_from_own(coefficients, g, own_s, px, py, vx, vy):
+    """-> (t, s): first front hit of the Bezier piece that the ray has just left at ``own_s``; inf if none.
+
+    ``g`` are the coefficients of g, whose root at the start is divided out.
     """
-    ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
-    a0 = cross(subtract(ax0, px), subtract(ay0, py), vx, vy)
-    a1, a2, a3 = cross(ax1, ay1, vx, vy), cross(ax2, ay2, vx, vy), cross(ax3, ay3, vx, vy)
-    best_t, best_s, undecided = (np.inf, 0.0), (0.0, 0.0), np.inf
-    near_s = (-1.0, 0.0)
-    if own_s[0] >= 0.0:
-        b0 = cubic_slope(a1, a2, a3, own_s)
-        b1 = add(multiply(multiply((3.0, 0.0), a3), own_s), a2)
-        product = multiply(a3, b0)
-        disc = subtract(multiply(b1, b1), (4.0 * product[0], 4.0 * product[1]))
-        if disc[0] < 0.0:
-            return best_t, best_s, undecided, near_s
-        root = square_root(disc)
-        q = add(b1, root if b1[0] >= 0.0 else negate(root))
-        q = (-0.5 * q[0], -0.5 * q[1])
-        for which in range(2):
-            bottom, top = (a3, q) if which == 0 else (q, b0)
-            if bottom[0] == 0.0:
-                continue
-            s = add(own_s, divide(top, bottom))
-            if s[0] >= -LOCAL_ERROR and subtract(s, (1.0, 0.0))[0] <= LOCAL_ERROR:
-                dx = subtract(cubic(ax0, ax1, ax2, ax3, s), px)
-                dy = subtract(cubic(ay0, ay1, ay2, ay3, s), py)
-                t = dot(dx, dy, vx, vy)
-                if cubic_slope(a1, a2, a3, s)[0] <= 0.0 and 0.0 < t[0] < best_t[0]:
-                    best_t, best_s = t, s
-        return best_t, best_s, undecided, near_s
-    size = abs(curve[START_X] - px[0]) + abs(curve[START_Y] - py[0]) + curve_size(curve)
-    # the critical points of g are needed as doubles only: g there changes in second order
+    _, a1, a2, a3 = g
+    best_t, best_s = (np.inf, 0.0), (0.0, 0.0)
+    b0 = cubic_slope(a1, a2, a3, own_s)
+    b1 = add(multiply(multiply((3.0, 0.0), a3), own_s), a2)
+    product = multiply(a3, b0)
+    disc = subtract(multiply(b1, b1), (4.0 * product[0], 4.0 * product[1]))
+    if disc[0] < 0.0:
+        return best_t, best_s
+    root = square_root(disc)
+    q = add(b1, root if b1[0] >= 0.0 else negate(root))
+    q = (-0.5 * q[0], -0.5 * q[1])
+    for which in range(2):
+        bottom, top = (a3, q) if which == 0 else (q, b0)
+        if bottom[0] == 0.0:
+            continue
+        s = add(own_s, divide(top, bottom))
+        if s[0] >= -LOCAL_ERROR and subtract(s, (1.0, 0.0))[0] <= LOCAL_ERROR:
+            t = bezier_time(coefficients, s, px, py, vx, vy)
+            if cubic_slope(a1, a2, a3, s)[0] <= 0.0 and 0.0 < t[0] < best_t[0]:
+                best_t, best_s = t, s
+    return best_t, best_s
+
+
+@_compile
+def extrema(a1, a2, a3):
+    """-> (c1, c2): where the cubic g has its extrema, in increasing order; beyond 1 if it has none.
+
+    They are needed as doubles only: g there changes in second order.
+    """
     c1, c2 = 2.0, 2.0
     disc = subtract(multiply(a2, a2), multiply((3.0, 0.0), multiply(a3, a1)))
     if disc[0] > 0.0:
@@ -111,6 +119,36 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
             c2 = divide(a1, q)[0]
         if c1 > c2:
             c1, c2 = c2, c1
+    return c1, c2
+
+
+@_compile
+def is_close_by(coefficients, s, t, vx, vy, size, slack):
+    """-> bool: whether a hit at s after the time t is within the slack of the ray's start, before or behind it."""
+    _, _, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
+    tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
+    reach = slack * math.hypot(tx[0], ty[0])
+    return abs(t[0]) <= NEARBY * size and abs(t[0] * cross(tx, ty, vx, vy)[0]) <= reach
+
+
+@_compile
+def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
+    """-> (t, s, undecided, near_s): time to the first front hit of one Bezier piece, inf if none, and parameter.
+
+    ``undecided`` is the time of a contact that is undecided, or inf; ``near_s`` is the parameter of a hit within the
+    slack of the start, which is not among the others, or -1. ``error`` bounds the transversal error of the ray.
+    """
+    coefficients = bezier_coefficients(curve)
+    ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
+    a0 = cross(subtract(ax0, px), subtract(ay0, py), vx, vy)
+    a1, a2, a3 = cross(ax1, ay1, vx, vy), cross(ax2, ay2, vx, vy), cross(ax3, ay3, vx, vy)
+    best_t, best_s, undecided = (np.inf, 0.0), (0.0, 0.0), np.inf
+    near_s = (-1.0, 0.0)
+    if own_s[0] >= 0.0:
+        best_t, best_s = hit_from_own(coefficients, (a0, a1, a2, a3), own_s, px, py, vx, vy)
+        return best_t, best_s, undecided, near_s
+    size = abs(curve[START_X] - px[0]) + abs(curve[START_Y] - py[0]) + curve_size(curve)
+    c1, c2 = extrema(a1, a2, a3)
     low, value_low = 0.0, a0
     for part in range(3):
         high = 1.0 if part == 2 else (c1 if part == 0 else c2)
@@ -123,20 +161,14 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
         else:
             value_high = cubic(a0, a1, a2, a3, (high, 0.0))
             if abs(value_high[0]) <= error:
-                dx = subtract(cubic(ax0, ax1, ax2, ax3, (high, 0.0)), px)
-                dy = subtract(cubic(ay0, ay1, ay2, ay3, (high, 0.0)), py)
-                contact = dot(dx, dy, vx, vy)[0]
+                contact = bezier_time(coefficients, (high, 0.0), px, py, vx, vy)[0]
                 if 0.0 < contact < undecided:
                     undecided = contact
         if value_low[0] >= 0.0 >= value_high[0] and value_low[0] > value_high[0]:
             s = falling_root(a0, a1, a2, a3, low, high)
-            dx = subtract(cubic(ax0, ax1, ax2, ax3, s), px)
-            dy = subtract(cubic(ay0, ay1, ay2, ay3, s), py)
-            t = dot(dx, dy, vx, vy)
+            t = bezier_time(coefficients, s, px, py, vx, vy)
             if t[0] < best_t[0]:
-                tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
-                reach = slack * math.hypot(tx[0], ty[0])
-                if abs(t[0]) <= NEARBY * size and abs(t[0] * cross(tx, ty, vx, vy)[0]) <= reach:
+                if is_close_by(coefficients, s, t, vx, vy, size, slack):
                     near_s = s
                 elif t[0] > 0.0:
                     best_t, best_s = t, s
@@ -146,7 +178,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
 
 @_compile
 def bezier_place(curve, s):
-    """Position at the parameter s, unit normal there, and the curvature there (a double, positive where focusing)."""
+    """-> (x, y, nx, ny, bent): place and unit normal at s, and the curvature (a double, positive where focusing)."""
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
     tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
     size = square_root(dot(tx, ty, tx, ty))

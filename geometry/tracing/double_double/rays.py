@@ -1,6 +1,6 @@
 """The compiled tracer in double-double arithmetic, for the few rays that double precision does not decide.
 
-Only `refinement` imports this file, because it loads numba. The formulas are those of `compiled/rays`, one for one;
+Only `refinement` imports this file, because it loads numba. The formulas are those of `compiled.rays`, one for one;
 those of curves are in `arcs` and `beziers`. What is exact is the wall: its joints are the doubles of the tables,
 segments join them, a circular arc goes through both of its joints and subtends the double in its table (elliptic arcs
 in stretched coordinates), and a Bezier piece has the coefficients of its table but the highest, which takes it to its
@@ -79,10 +79,13 @@ from .arithmetic import (
     wide,
 )
 from .beziers import bezier_hit, bezier_place
-from .sides import in_front, line_ends, orientation
+from .records import Sizes, WideHit, WideOwn, WideScope
+from .sides import Arrival, Face, in_front, line_ends, orientation
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, LOST, UNSETTLED = 0, 1, 2, 3, 4, 5
 NO_PIECE, LID, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
+# pi - math.pi
+PI_REST = 1.2246467991473532e-16
 # The first-order estimate of the width is trusted to this share.
 WIDTH_MARGIN = 1.0 + 2.0**-20
 # Where the accumulated rounding exceeds this share of the cell, nothing is settled.
@@ -94,8 +97,9 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 
 @_compile
-def crossings(joints, lines, pairs, index, other, py, vx, vy, most):
-    """Hits, an even number, between a vertical side and one that faces it; the way along y, and the flight time."""
+def crossings(tables, index, other, py, vx, vy, most):
+    """-> (hits, way, flight): an even number of hits between two facing vertical sides; way along y, and time."""
+    joints, lines, pairs = tables.joints, tables.lines, tables.pairs
     way, flight = (0.0, 0.0), 0.0
     if joints[index, JOINT_X] != joints[index + 1, JOINT_X] or joints[other, JOINT_X] != joints[other + 1, JOINT_X]:
         return 0, way, flight
@@ -116,7 +120,7 @@ def crossings(joints, lines, pairs, index, other, py, vx, vy, most):
 
 @_compile
 def free_cells(bands, py, vx, vy, cell, width, spread):
-    """How many cells a ray that enters one passes without coming near a piece, and the way along y in each.
+    """-> (cells, way): how many cells a ray passes without coming near a piece, and the way along y in each.
 
     ``bands`` are the heights (low, high) at which no piece lies. The ray's width is at most ``width`` plus ``spread``
     times the flight. The last cells before the end of a band are left over.
@@ -139,238 +143,342 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
 
 @_compile
 def earlier(t, time):
-    """Whether t < time, which may be (inf, 0): differences of infinities are not numbers."""
+    """-> bool: whether t < time, which may be (inf, 0): differences of infinities are not numbers."""
     return t[0] < np.inf and (time[0] == np.inf or subtract(t, time)[0] < 0.0)
 
 
 @_compile
-def meets(
-    t, height, joints, arcs, beziers, own_kind, own_index, own_s, kind, index, s, px, py, vx, vy, flown, slack, error
-):  # fmt: skip
-    """Whether a ray meets a piece after the time t; ``height`` is that of its start in front of the piece.
+def face_of(tables, kind, number, s):
+    """-> Face: a piece as `in_front` takes it."""
+    arc, curve = tables.arcs[number if kind == ARC else 0], tables.beziers[number if kind == BEZIER else 0]
+    return Face(kind, number, arc, curve, s)
 
-    Within the slack of double precision the pieces' own places decide, so that both tracers go the same way.
+
+@_compile
+def meets(tables, hit, own, px, py, vx, vy, height, errors):
+    """-> bool: whether a ray meets a piece that it hits; ``height`` is that of its start in front of the piece.
+
+    ``errors`` are the slack of double precision, within which the pieces' own places decide, so that both tracers go
+    the same way, and the error of the ray.
     """
-    if height > slack or own_kind in (LID, SIDE):
+    slack, error = errors
+    if height > slack or own.kind in (LID, SIDE):
         return height >= -error
     if height < -slack:
         return False
-    return in_front(
-        joints,
-        own_kind, own_index, arcs[own_index if own_kind == ARC else 0], beziers[own_index if own_kind == BEZIER else 0],
-        own_s,
-        kind, index, arcs[index if kind == ARC else 0], beziers[index if kind == BEZIER else 0], s,
-        px, py, vx[0], vy[0], flown, slack, error,
-    )  # fmt: skip
+    piece, start = face_of(tables, hit.kind, hit.number, hit.s), face_of(tables, own.kind, own.number, own.s)
+    return in_front(tables.joints, piece, start, px, py, vx[0], vy[0], Arrival(own.flown, slack, error))
 
 
 @_compile
 def is_beside(joints, index, corner):
-    """Whether a corner lies on a line or on its free side: a ray that meets the line does not meet one behind it."""
+    """-> bool: whether a corner lies on a line or on its free side: a ray that meets the line meets none behind it."""
     x0, y0, x1, y1 = line_ends(joints, index)
     return orientation(x0, y0, x1, y1, joints[corner, JOINT_X], joints[corner, JOINT_Y]) >= 0.0
 
 
 @_compile
-def refined_ray(
-    place, theta, hollow, joints, lines, pairs, arcs, first_ellipse, beziers, bands, is_open, cell, limit, most_flights
-):  # fmt: skip
-    """Follow one ray; returns x and angle (double-doubles), bounces, status, amplification and rounding error.
-
-    ``place`` is a double-double in the hollow, ``arcs`` holds the circles, then the ellipses, of `refined_arcs`, and
-    ``bands`` are those of `free_cells`.
-    The amplification is the norm of the map's derivative in the units (cell, radian).
-    """
-    left, right = hollow[LEFT], hollow[RIGHT]
-    joint_low, joint_high = int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])
-    circle_low, circle_high = int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])
-    ellipse_low, ellipse_high = first_ellipse + int(hollow[FIRST_ELLIPSE]), first_ellipse + int(hollow[ELLIPSES_END])
-    bezier_low, bezier_high = int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])
-    scale = cell + hollow[SIZE]
-    slack = JOINT_ULPS * EPS * hollow[SIZE]
-    px, py = place, (0.0, 0.0)
-    sine, cosine = sine_cosine(theta)
-    vx, vy = negate(cosine), negate(sine)
-    # Jacobi fields of a displacement (j1, a1) and of a turn (j2, a2); displacements as shares of the scale
-    j1, a1, j2, a2 = 1.0, 0.0, 0.0, 1.0
-    _, exponent = math.frexp(theta)
-    half_ulp = math.ldexp(1.0, exponent - 54)
-    norm = 1.0
-    # the sum of M M^T, with entries for displacement and turn, and how many errors there are
-    c_jj, c_ja, c_aa, errors = 1.0, 0.0, 1.0, 1.0
-    wraps, bounces, steps = 0, 0, 0
-    own_kind, own_index, own_s, flown = LID, -1, (-1.0, 0.0), 0.0
-    while True:
-        # bound on the transversal error of the ray: on the segment, at a distance of up to one scale
-        local = LOCAL_ERROR * math.sqrt(errors * (c_jj + c_aa))
-        if not local <= LARGEST_ERROR:
-            return px, (0.0, 0.0), bounces, UNSETTLED, norm, local
-        error = 2.0 * scale * local
-        kind, index, hit_s, edge_share = NO_PIECE, -1, (0.0, 0.0), (0.0, 0.0)
-        time = (np.inf, 0.0)
-        corner_time, graze_time = np.inf, np.inf
-
-        before = (0.0, 0.0)
-        for j in range(joint_low, joint_high):
-            dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
-            after = cross(dx, dy, vx, vy)
-            if joints[j, IS_CORNER] > 0.0:
-                ahead = dot(dx, dy, vx, vy)[0]
-                width = WIDTH_MARGIN * half_ulp * abs(scale * j2 + ahead * a2) + (1.0 + ahead / scale) * error
-                if abs(after[0]) <= width and 0.0 < ahead < corner_time:
-                    corner_time = ahead
-            starts_here = j > joint_low and joints[j - 1, STARTS_LINE] > 0.0
-            if starts_here and before[0] >= 0.0 >= after[0] and before[0] > after[0]:
-                if own_kind != LINE or own_index != j - 1:
-                    share = divide(before, subtract(before, after))
-                    hx = two_sum(joints[j, JOINT_X], -joints[j - 1, JOINT_X])
-                    hy = two_sum(joints[j, JOINT_Y], -joints[j - 1, JOINT_Y])
-                    dx = subtract(add(wide(joints[j - 1, JOINT_X]), multiply(share, hx)), px)
-                    dy = subtract(add(wide(joints[j - 1, JOINT_Y]), multiply(share, hy)), py)
-                    t = dot(dx, dy, vx, vy)
-                    height = t[0] * (before[0] - after[0]) / lines[j - 1, LENGTH]
-                    if earlier(t, time) and meets(
-                        t, height, joints, arcs, beziers, own_kind, own_index, own_s, LINE, j - 1, own_s,
-                        px, py, vx, vy, flown, slack, error,
-                    ):  # fmt: skip
-                        time, kind, index, edge_share = t, LINE, j - 1, share
-            before = after
-
-        for table in range(2):
-            low, high = (circle_low, circle_high) if table == 0 else (ellipse_low, ellipse_high)
-            for k in range(low, high):
-                widest = max(1.0, arcs[k, WIDE_STRETCH])
-                t, undecided, height = arc_hit(arcs[k], own_kind == ARC and own_index == k, px, py, vx, vy, error)
-                graze_time = min(graze_time, undecided)
-                if earlier(t, time) and meets(
-                    t, height, joints, arcs, beziers, own_kind, own_index, own_s, ARC, k, own_s,
-                    px, py, vx, vy, flown, slack * widest, error * widest,
-                ):  # fmt: skip
-                    time, kind, index = t, ARC, k
-        for k in range(bezier_low, bezier_high):
-            start_s = own_s if own_kind == BEZIER and own_index == k else (-1.0, 0.0)
-            t, s, undecided, near_s = bezier_hit(beziers[k], start_s, px, py, vx, vy, slack, error)
-            graze_time = min(graze_time, undecided)
-            if earlier(t, time):
-                time, kind, index, hit_s = t, BEZIER, k, s
-            if near_s[0] >= 0.0 and meets(
-                (0.0, 0.0), 0.0, joints, arcs, beziers, own_kind, own_index, own_s, BEZIER, k, near_s,
-                px, py, vx, vy, flown, slack, error,
-            ):  # fmt: skip
-                time, kind, index, hit_s = (0.0, 0.0), BEZIER, k, near_s
-
-        # a piece that lies in the opening or in a side within rounding is met before them
-        if vy[0] > 0.0 and own_kind != LID and py[0] + time[0] * vy[0] > slack:
-            t = divide(negate(py), vy)
-            inside = is_open
-            if not is_open:
-                c_right = add(multiply(subtract(wide(right), px), vy), multiply(py, vx))
-                c_left = add(multiply(subtract(wide(left), px), vy), multiply(py, vx))
-                inside = c_right[0] >= 0.0 >= c_left[0]
-            if inside:
-                time, kind = t, LID
-        if is_open and vx[0] != 0.0:
-            t = divide(subtract(wide(right if vx[0] > 0.0 else left), px), vx)
-            beyond = abs(vx[0]) * (time[0] - t[0])
-            if beyond > slack or (kind == LID and earlier(t, time)):
-                time, kind = t, SIDE
-
-        steps += 1
-        if time[0] < 0.0:
-            time = (0.0, 0.0)
-        if graze_time < np.inf and graze_time <= time[0] + error:
-            return px, (0.0, 0.0), bounces, GRAZING, norm, local
-        if kind == NO_PIECE:
-            return px, (0.0, 0.0), bounces, CORNER if corner_time < np.inf else LOST, norm, local
-        nx, ny, bent = (0.0, 0.0), (0.0, 0.0), 0.0
-        qx, qy = px, py
-        if kind == LINE:
-            ex = two_sum(joints[index + 1, JOINT_X], -joints[index, JOINT_X])
-            ey = two_sum(joints[index + 1, JOINT_Y], -joints[index, JOINT_Y])
-            size = square_root(dot(ex, ey, ex, ey))
-            nx, ny = negate(divide(ey, size)), divide(ex, size)
-            qx = add(wide(joints[index, JOINT_X]), multiply(edge_share, ex))
-            qy = add(wide(joints[index, JOINT_Y]), multiply(edge_share, ey))
-        elif kind == ARC:
-            qx, qy, nx, ny, bent = arc_place(arcs[index], time, px, py, vx, vy)
-        elif kind == BEZIER:
-            qx, qy, nx, ny, bent = bezier_place(beziers[index], hit_s)
-        else:
-            nx, ny = (0.0, 0.0) if kind == LID else (1.0, 0.0), (1.0, 0.0) if kind == LID else (0.0, 0.0)
-            qx, qy = add(px, multiply(time, vx)), add(py, multiply(time, vy))
-        approach = dot(vx, vy, nx, ny)
-        incidence = abs(approach[0])
-        # a corner at the end of what is hit is as far away as the hit up to the width over the sine of incidence
-        for j in range(joint_low, joint_high if corner_time < np.inf else joint_low):
-            if joints[j, IS_CORNER] > 0.0:
-                dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
-                ahead = dot(dx, dy, vx, vy)[0]
-                width = WIDTH_MARGIN * half_ulp * abs(scale * j2 + ahead * a2) + (1.0 + ahead / scale) * error
-                met = 0.0 < ahead and (ahead - time[0]) * incidence <= 2.0 * width
-                if met and abs(cross(dx, dy, vx, vy)[0]) <= width:
-                    if kind != LINE or is_beside(joints, index, j):
-                        return px, (0.0, 0.0), bounces, CORNER, norm, local
-        flight = time[0] / scale
-        j1 += flight * a1
-        j2 += flight * a2
-        c_jj += flight * (2.0 * c_ja + flight * c_aa)
-        c_ja += flight * c_aa
-        if kind == LID:
-            x = add(qx, two_product(float(wraps), right - left))
-            norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
-            return x, direction_angle(vx, vy), bounces, ESCAPED, norm, local
-        if (bounces >= limit and kind != SIDE) or steps >= most_flights:
-            return px, (0.0, 0.0), bounces, BOUNCE_LIMIT, norm, local
-        if kind == SIDE:
-            # the ends of the wall are one point of it, and a ray passes a side above them
-            end = wide(joints[joint_low, JOINT_Y])
-            py = end if subtract(qy, end)[0] < 0.0 else qy
-            px = wide(left if vx[0] > 0.0 else right)
-            spread = WIDTH_MARGIN * half_ulp * abs(a2) + error / scale
-            cells, step = free_cells(bands, py, vx, vy, cell, WIDTH_MARGIN * half_ulp * scale * abs(j2) + error, spread)
-            py = add(py, multiply((cells, 0.0), step))
-            wraps += (1 if vx[0] > 0.0 else -1) * (1 + np.int64(cells))
-            flight = cells * cell / abs(vx[0]) / scale
-            j1 += flight * a1
-            j2 += flight * a2
-            c_jj += flight * (2.0 * c_ja + flight * c_aa)
-            c_ja += flight * c_aa
-        else:
-            flown = time[0]
-            px, py = qx, qy
-            twice = (2.0 * approach[0], 2.0 * approach[1])
-            vx, vy = subtract(vx, multiply(twice, nx)), subtract(vy, multiply(twice, ny))
-            speed2 = dot(vx, vy, vx, vy)
-            factor = subtract((1.5, 0.0), (0.5 * speed2[0], 0.5 * speed2[1]))
-            vx, vy = multiply(factor, vx), multiply(factor, vy)
-            if incidence == 0.0:
-                return px, (0.0, 0.0), bounces, GRAZING, norm, local
-            power = 2.0 * bent * scale / incidence
-            a1 -= power * j1
-            a2 -= power * j2
-            c_aa += power * (power * c_jj - 2.0 * c_ja)
-            c_ja -= power * c_jj
-            bounces += 1
-            if kind == LINE and own_kind == LINE:
-                hits, way, flight = crossings(joints, lines, pairs, index, own_index, py, vx, vy, limit - bounces)
-                bounces += hits
-                py = add(py, way)
-                flight /= scale
-                j1 += flight * a1
-                j2 += flight * a2
-                c_jj += flight * (2.0 * c_ja + flight * c_aa)
-                c_ja += flight * c_aa
-        norm = math.sqrt(j1 * j1 + a1 * a1 + j2 * j2 + a2 * a2)
-        c_jj, c_aa, errors = c_jj + 1.0, c_aa + 1.0, errors + 1.0
-        own_kind, own_index, own_s = kind, index, hit_s if kind == BEZIER else (-1.0, 0.0)
+def local_error(sizes):
+    """-> float: bound on the rounding error of the ray, as a share of the scale."""
+    return LOCAL_ERROR * math.sqrt(sizes.errors * (sizes.c_jj + sizes.c_aa))
 
 
 @_compile
-def refined_rays(
-    x, theta, hollows, joints, lines, pairs, arcs, first_ellipse, beziers, bands, is_open, cell, limit, most_flights,
-    out_x, out_theta, bounces, status, amplification, rounding,
-):  # fmt: skip
-    """Trace rays; fills the output arrays, ``out_x`` and ``out_theta`` (n, 2) with double-doubles."""
+def error_of(scope, sizes):
+    """-> float: bound on the transversal error of the ray: on the segment, at a distance of up to one scale."""
+    return 2.0 * scope.scale * local_error(sizes)
+
+
+@_compile
+def amplification_of(sizes):
+    """-> float: norm of the derivative of the map."""
+    return math.sqrt(sizes.j1 * sizes.j1 + sizes.a1 * sizes.a1 + sizes.j2 * sizes.j2 + sizes.a2 * sizes.a2)
+
+
+@_compile
+def after_flight(sizes, flight):
+    """-> Sizes: those of a ray after a flight, whose time is a share of the scale."""
+    j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
+    c_jj += flight * (2.0 * c_ja + flight * c_aa)
+    return Sizes(j1 + flight * a1, a1, j2 + flight * a2, a2, c_jj, c_ja + flight * c_aa, c_aa, errors, half_ulp)
+
+
+@_compile
+def after_reflection(sizes, power):
+    """-> Sizes: those of a ray after a reflection; the power of a straight piece is 0."""
+    j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
+    c_aa += power * (power * c_jj - 2.0 * c_ja)
+    return Sizes(j1, a1 - power * j1, j2, a2 - power * j2, c_jj, c_ja - power * c_jj, c_aa, errors, half_ulp)
+
+
+@_compile
+def with_new_error(sizes):
+    """-> Sizes: those of a ray that makes one more local error."""
+    j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
+    return Sizes(j1, a1, j2, a2, c_jj + 1.0, c_ja, c_aa + 1.0, errors + 1.0, half_ulp)
+
+
+@_compile
+def width_at(scope, sizes, ahead, error):
+    """-> float: width of the ray, and its error, after the flight ``ahead``."""
+    turned = sizes.half_ulp * abs(scope.scale * sizes.j2 + ahead * sizes.a2)
+    return WIDTH_MARGIN * turned + (1.0 + ahead / scope.scale) * error
+
+
+@_compile
+def nearest_line(scope, own, sizes, px, py, vx, vy):
+    """-> (WideHit, corner): the first line that is hit, and the time to the first corner in the ray's width, or inf."""
+    tables, error = scope.tables, error_of(scope, sizes)
+    joints = tables.joints
+    first, end = scope.joints
+    nearest, corner = WideHit((np.inf, 0.0), NO_PIECE, -1, (0.0, 0.0)), np.inf
+    before = (0.0, 0.0)
+    for j in range(first, end):
+        dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
+        after = cross(dx, dy, vx, vy)
+        if joints[j, IS_CORNER] > 0.0:
+            ahead = dot(dx, dy, vx, vy)[0]
+            if abs(after[0]) <= width_at(scope, sizes, ahead, error) and 0.0 < ahead < corner:
+                corner = ahead
+        starts_here = j > first and joints[j - 1, STARTS_LINE] > 0.0
+        is_own = own.kind == LINE and own.number == j - 1
+        if starts_here and not is_own and before[0] >= 0.0 >= after[0] and before[0] > after[0]:
+            share = divide(before, subtract(before, after))
+            x0, y0, x1, y1 = line_ends(joints, j - 1)
+            dx = subtract(add(wide(x0), multiply(share, two_sum(x1, -x0))), px)
+            dy = subtract(add(wide(y0), multiply(share, two_sum(y1, -y0))), py)
+            t = dot(dx, dy, vx, vy)
+            height = t[0] * (before[0] - after[0]) / tables.lines[j - 1, LENGTH]
+            hit = WideHit(t, LINE, j - 1, share)
+            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, height, (scope.slack, error)):
+                nearest = hit
+        before = after
+    return nearest, corner
+
+
+@_compile
+def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
+    """-> (WideHit, graze): the first curve that is hit before ``nearest``, or that; time of an undecided contact."""
+    tables, slack = scope.tables, scope.slack
+    graze = np.inf
+    for low, high in (scope.circles, scope.ellipses):
+        for k in range(low, high):
+            widest = max(1.0, tables.arcs[k, WIDE_STRETCH])
+            is_own = own.kind == ARC and own.number == k
+            t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
+            graze = min(graze, undecided)
+            hit, errors = WideHit(t, ARC, k, own.s), (slack * widest, error * widest)
+            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, height, errors):
+                nearest = hit
+    low, high = scope.beziers
+    for k in range(low, high):
+        own_s = own.s if own.kind == BEZIER and own.number == k else (-1.0, 0.0)
+        t, s, undecided, near_s = bezier_hit(tables.beziers[k], own_s, px, py, vx, vy, slack, error)
+        graze = min(graze, undecided)
+        if earlier(t, nearest.time):
+            nearest = WideHit(t, BEZIER, k, s)
+        if near_s[0] >= 0.0:
+            hit = WideHit((0.0, 0.0), BEZIER, k, near_s)
+            if meets(tables, hit, own, px, py, vx, vy, 0.0, (slack, error)):
+                nearest = hit
+    return nearest, graze
+
+
+@_compile
+def way_out(scope, own, hit, px, py, vx, vy):
+    """-> WideHit: the opening or a side of an open wall, if met before the hit, or that.
+
+    A piece that lies in the opening or in a side within rounding is met before them.
+    """
+    left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
+    time, kind = hit.time, hit.kind
+    if vy[0] > 0.0 and own.kind != LID and py[0] + time[0] * vy[0] > slack:
+        t = divide(negate(py), vy)
+        inside = is_open
+        if not is_open:
+            c_right = add(multiply(subtract(wide(right), px), vy), multiply(py, vx))
+            c_left = add(multiply(subtract(wide(left), px), vy), multiply(py, vx))
+            inside = c_right[0] >= 0.0 >= c_left[0]
+        if inside:
+            time, kind = t, LID
+    if is_open and vx[0] != 0.0:
+        t = divide(subtract(wide(right if vx[0] > 0.0 else left), px), vx)
+        beyond = abs(vx[0]) * (time[0] - t[0])
+        if beyond > slack or (kind == LID and earlier(t, time)):
+            time, kind = t, SIDE
+    if time[0] < 0.0:
+        time = (0.0, 0.0)
+    return WideHit(time, kind, hit.number, hit.s)
+
+
+@_compile
+def place_of(tables, hit, px, py, vx, vy):
+    """-> (qx, qy, nx, ny, bent): where a flight ends, the unit normal there, and the curvature, a double."""
+    if hit.kind == LINE:
+        x0, y0, x1, y1 = line_ends(tables.joints, hit.number)
+        ex, ey = two_sum(x1, -x0), two_sum(y1, -y0)
+        size = square_root(dot(ex, ey, ex, ey))
+        nx, ny = negate(divide(ey, size)), divide(ex, size)
+        return add(wide(x0), multiply(hit.s, ex)), add(wide(y0), multiply(hit.s, ey)), nx, ny, 0.0
+    if hit.kind == ARC:
+        return arc_place(tables.arcs[hit.number], hit.time, px, py, vx, vy)
+    if hit.kind == BEZIER:
+        return bezier_place(tables.beziers[hit.number], hit.s)
+    nx, ny = (0.0, 0.0) if hit.kind == LID else (1.0, 0.0), (1.0, 0.0) if hit.kind == LID else (0.0, 0.0)
+    return add(px, multiply(hit.time, vx)), add(py, multiply(hit.time, vy)), nx, ny, 0.0
+
+
+@_compile
+def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
+    """-> bool: whether a corner in the ray's width is met with what is hit.
+
+    At the end of what is hit it is as far away as the hit up to the width over the sine of incidence.
+    """
+    joints, error = scope.tables.joints, error_of(scope, sizes)
+    first, end = scope.joints
+    for j in range(first, end):
+        if joints[j, IS_CORNER] > 0.0:
+            dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
+            ahead = dot(dx, dy, vx, vy)[0]
+            width = width_at(scope, sizes, ahead, error)
+            met = 0.0 < ahead and (ahead - hit.time[0]) * incidence <= 2.0 * width
+            if met and abs(cross(dx, dy, vx, vy)[0]) <= width:
+                if hit.kind != LINE or is_beside(joints, hit.number, j):
+                    return True
+    return False
+
+
+@_compile
+def pass_cells(scope, sizes, py, vx, vy, error):
+    """-> (py, cells, Sizes): the ray after it has passed a side and all cells in which it comes near no piece.
+
+    ``error`` is that of the flight up to the side.
+    """
+    cell, scale = scope.tables.cell, scope.scale
+    # the ends of the wall are one point of it, and a ray passes a side above them
+    end = wide(scope.tables.joints[scope.joints[0], JOINT_Y])
+    py = end if subtract(py, end)[0] < 0.0 else py
+    spread = WIDTH_MARGIN * sizes.half_ulp * abs(sizes.a2) + error / scale
+    width = WIDTH_MARGIN * sizes.half_ulp * scale * abs(sizes.j2) + error
+    cells, step = free_cells(scope.tables.bands, py, vx, vy, cell, width, spread)
+    return add(py, multiply((cells, 0.0), step)), cells, after_flight(sizes, cells * cell / abs(vx[0]) / scale)
+
+
+@_compile
+def reflected(vx, vy, nx, ny, approach):
+    """-> (vx, vy): the velocity reflected, with one Newton step on its length."""
+    twice = (2.0 * approach[0], 2.0 * approach[1])
+    vx, vy = subtract(vx, multiply(twice, nx)), subtract(vy, multiply(twice, ny))
+    speed2 = dot(vx, vy, vx, vy)
+    factor = subtract((1.5, 0.0), (0.5 * speed2[0], 0.5 * speed2[1]))
+    return multiply(factor, vx), multiply(factor, vy)
+
+
+@_compile
+def refined_ray(scope, place, theta, limit, most_flights):
+    """-> (x, angle, bounces, status, amplification, rounding): follow one ray; x and angle are double-doubles.
+
+    ``place`` is a double-double in the hollow. The amplification is the norm of the map's derivative in the units
+    (cell, radian).
+    """
+    tables, scale = scope.tables, scope.scale
+    px, py = place, (0.0, 0.0)
+    sine, cosine = sine_cosine(theta)
+    vx, vy = negate(cosine), negate(sine)
+    _, exponent = math.frexp(theta)
+    sizes = Sizes(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, math.ldexp(1.0, exponent - 54))
+    norm, nowhere = 1.0, (0.0, 0.0)
+    wraps, bounces, steps = 0, 0, 0
+    own = WideOwn(LID, -1, (-1.0, 0.0), 0.0)
+    while True:
+        local = local_error(sizes)
+        if not local <= LARGEST_ERROR:
+            return px, nowhere, bounces, UNSETTLED, norm, local
+        error = error_of(scope, sizes)
+        hit, corner = nearest_line(scope, own, sizes, px, py, vx, vy)
+        hit, graze = nearest_curve(scope, own, hit, px, py, vx, vy, error)
+        hit = way_out(scope, own, hit, px, py, vx, vy)
+        steps += 1
+        if graze < np.inf and graze <= hit.time[0] + error:
+            return px, nowhere, bounces, GRAZING, norm, local
+        if hit.kind == NO_PIECE:
+            return px, nowhere, bounces, CORNER if corner < np.inf else LOST, norm, local
+        qx, qy, nx, ny, bent = place_of(tables, hit, px, py, vx, vy)
+        approach = dot(vx, vy, nx, ny)
+        incidence = abs(approach[0])
+        if corner < np.inf and meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
+            return px, nowhere, bounces, CORNER, norm, local
+        sizes = after_flight(sizes, hit.time[0] / scale)
+        if hit.kind == LID:
+            x = add(qx, two_product(float(wraps), scope.right - scope.left))
+            return x, direction_angle(vx, vy), bounces, ESCAPED, amplification_of(sizes), local
+        if (bounces >= limit and hit.kind != SIDE) or steps >= most_flights:
+            return px, nowhere, bounces, BOUNCE_LIMIT, norm, local
+        flown = own.flown
+        if hit.kind == SIDE:
+            px = wide(scope.left if vx[0] > 0.0 else scope.right)
+            py, cells, sizes = pass_cells(scope, sizes, qy, vx, vy, error)
+            wraps += (1 if vx[0] > 0.0 else -1) * (1 + np.int64(cells))
+        else:
+            flown = hit.time[0]
+            px, py = qx, qy
+            vx, vy = reflected(vx, vy, nx, ny, approach)
+            if incidence == 0.0:
+                return px, nowhere, bounces, GRAZING, norm, local
+            sizes = after_reflection(sizes, 2.0 * bent * scale / incidence)
+            bounces += 1
+            if hit.kind == LINE and own.kind == LINE:
+                hits, way, flight = crossings(tables, hit.number, own.number, py, vx, vy, limit - bounces)
+                bounces += hits
+                py = add(py, way)
+                sizes = after_flight(sizes, flight / scale)
+        norm = amplification_of(sizes)
+        sizes = with_new_error(sizes)
+        own = WideOwn(hit.kind, hit.number, hit.s if hit.kind == BEZIER else (-1.0, 0.0), flown)
+
+
+@_compile
+def wide_scope(tables, h):
+    """-> WideScope: the hollow number h."""
+    hollow, ellipse = tables.hollows[h], tables.first_ellipse
+    return WideScope(
+        tables,
+        hollow[LEFT],
+        hollow[RIGHT],
+        tables.cell + hollow[SIZE],
+        JOINT_ULPS * EPS * hollow[SIZE],
+        (int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])),
+        (int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])),
+        (ellipse + int(hollow[FIRST_ELLIPSE]), ellipse + int(hollow[ELLIPSES_END])),
+        (int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])),
+    )
+
+
+@_compile
+def hollow_at(hollows, place):
+    """-> (h, is_edge): the hollow that opens at a double-double place, or -1; whether that is a corner of the tops."""
+    low, high = 0, hollows.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if subtract(place, wide(hollows[middle, LEFT]))[0] >= 0.0:
+            low = middle + 1
+        else:
+            high = middle
+    h = low - 1
+    at_left = h >= 0 and subtract(place, wide(hollows[h, LEFT]))[0] == 0.0 and hollows[h, LEFT_EDGE] != NO_EDGE
+    to_right = subtract(place, wide(hollows[h, RIGHT]))[0] if h >= 0 else 1.0
+    if h < 0 or to_right >= 0.0 or at_left:
+        is_left = at_left and hollows[h, LEFT_EDGE] == CORNER_EDGE
+        is_right = h >= 0 and to_right == 0.0 and hollows[h, RIGHT_EDGE] == CORNER_EDGE
+        return -1, is_left or is_right
+    return h, False
+
+
+@_compile
+def refined_rays(x, theta, tables, limit, most_flights, results):
+    """Trace rays; fills the results with double-doubles."""
+    out_x, out_theta, bounces, status, amplification, rounding = results
+    cell = tables.cell
     for i in range(x.shape[0]):
         turns = math.floor(x[i] / cell)
         base = two_product(turns, cell)
@@ -379,33 +487,19 @@ def refined_rays(
             turns -= 1.0
             base = two_product(turns, cell)
             place = subtract(wide(x[i]), base)
-        low, high = 0, hollows.shape[0]
-        while low < high:
-            middle = (low + high) // 2
-            if subtract(place, wide(hollows[middle, LEFT]))[0] >= 0.0:
-                low = middle + 1
-            else:
-                high = middle
-        h = low - 1
-        amplification[i], rounding[i] = 1.0, LOCAL_ERROR
-        at_left = h >= 0 and subtract(place, wide(hollows[h, LEFT]))[0] == 0.0 and hollows[h, LEFT_EDGE] != NO_EDGE
-        to_right = subtract(place, wide(hollows[h, RIGHT]))[0] if h >= 0 else 1.0
-        if h < 0 or to_right >= 0.0 or at_left:
-            edge = (at_left and hollows[h, LEFT_EDGE] == CORNER_EDGE) or (
-                h >= 0 and to_right == 0.0 and hollows[h, RIGHT_EDGE] == CORNER_EDGE
-            )
+        h, is_edge = hollow_at(tables.hollows, place)
+        if h < 0:
+            amplification[i], rounding[i] = 1.0, LOCAL_ERROR
             out_x[i, HIGH], out_x[i, LOW] = x[i], 0.0
             mirrored = two_sum(math.pi, -theta[i])
-            mirrored = add(mirrored, (1.2246467991473532e-16, 0.0))
-            out_theta[i, HIGH], out_theta[i, LOW] = mirrored
+            out_theta[i, HIGH], out_theta[i, LOW] = add(mirrored, (PI_REST, 0.0))
             bounces[i], status[i] = 1, ESCAPED
-            if edge:
+            if is_edge:
                 out_theta[i, HIGH], bounces[i], status[i] = theta[i] - math.pi, 0, CORNER
             continue
+        scope = wide_scope(tables, h)
         end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
-            place, theta[i], hollows[h], joints, lines, pairs, arcs, first_ellipse, beziers, bands, is_open, cell,
-            limit, most_flights,
-        )  # fmt: skip
-        end = add(base, end)
-        out_x[i, HIGH], out_x[i, LOW] = end
+            scope, place, theta[i], limit, most_flights
+        )
+        out_x[i, HIGH], out_x[i, LOW] = add(base, end)
         out_theta[i, HIGH], out_theta[i, LOW] = angle

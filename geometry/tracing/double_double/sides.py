@@ -18,10 +18,12 @@ hold it back on its way out.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from ....core.checks import Floats
 from ....core.rounding import EPS, UNIT_ROUNDOFF
 from ...scene.columns import END_X, END_Y, JOINT_X, JOINT_Y, START_X, START_Y
 from .arcs import arc_height
@@ -39,6 +41,31 @@ BEHIND_SLACKS = 4.0
 STEPS = 2
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+class Face(NamedTuple):
+    """A piece: its kind, the row of a line, an arc as a row of `refined_arcs`, a Bezier piece and a parameter on it.
+
+    What does not belong to the kind has no meaning.
+    """
+
+    kind: int
+    number: int
+    arc: Floats
+    curve: Floats
+    s: tuple[float, float]
+
+
+class Arrival(NamedTuple):
+    """How a ray came to its start: the length of that flight, and how exactly the place is known.
+
+    ``slack`` is the distance within which pieces are nearby; ``blur`` is the error of the place along the own piece.
+    Where that decides, as where one piece stands on the other, the ray counts as one in front.
+    """
+
+    flown: float
+    slack: float
+    blur: float
 
 
 @_compile
@@ -115,79 +142,72 @@ def bezier_height(curve, s, px, py):
 
 
 @_compile
-def height_over(kind, joints, index, arc, curve, s, px, py):
-    """Distance of a double-double place from a piece, positive on its free side, and the unit normal there."""
-    if kind == LINE:
-        return line_height(joints, index, px, py)
-    if kind == ARC:
-        return arc_height(arc, px, py)
-    return bezier_height(curve, s, px, py)
+def height_over(joints, face, px, py):
+    """-> (height, nx, ny): distance of a place from a piece, positive on its free side, and the unit normal."""
+    if face.kind == LINE:
+        return line_height(joints, face.number, px, py)
+    if face.kind == ARC:
+        return arc_height(face.arc, px, py)
+    return bezier_height(face.curve, face.s, px, py)
 
 
 @_compile
-def came_through(x0, y0, x1, y1, mx, my, px, py, vx, vy, flown, slack):
-    """Whether a ray's last flight, which ended at p with the velocity v, crossed a piece from behind.
+def ends_of(joints, face):
+    """-> (x0, y0, x1, y1): the ends of a piece."""
+    if face.kind == LINE:
+        return line_ends(joints, face.number)
+    curve = face.arc if face.kind == ARC else face.curve
+    return curve[START_X], curve[START_Y], curve[END_X], curve[END_Y]
 
-    The piece has the ends (x0, y0) and (x1, y1), and its normal next to p is (mx, my).
+
+@_compile
+def came_through(ends, mx, my, px, py, vx, vy, arrival):
+    """-> bool: whether a ray's last flight, which ended at p with the velocity v, crossed a piece from behind.
+
+    The piece has these ends, and its normal next to p is (mx, my).
     """
-    if flown * (vx * mx + vy * my) <= BEHIND_SLACKS * slack:
+    x0, y0, x1, y1 = ends
+    if arrival.flown * (vx * mx + vy * my) <= BEHIND_SLACKS * arrival.slack:
         return False
     return (x0 - px) * vy - (y0 - py) * vx <= 0.0 <= (x1 - px) * vy - (y1 - py) * vx
 
 
 @_compile
-def line_in_front_of_line(joints, own, other, px, py, vx, vy, flown, slack, blur):
-    """`in_front` for two segments."""
-    if height_over_line(joints, own, other, px, py, blur) <= 0.0:
+def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
+    """-> bool: `in_front` for two lines, by their rows."""
+    if height_over_line(joints, own, line, px, py, arrival.blur) <= 0.0:
         return False
     x0, y0, x1, y1 = line_ends(joints, own)
     ex, ey = x1 - x0, y1 - y0
     w = 2.0 * (vy * ex - vx * ey) / (ex * ex + ey * ey)
-    x0, y0, x1, y1 = line_ends(joints, other)
+    ends = line_ends(joints, line)
+    x0, y0, x1, y1 = ends
     length = math.hypot(x1 - x0, y1 - y0)
     mx, my = (y0 - y1) / length, (x1 - x0) / length
-    return not came_through(x0, y0, x1, y1, mx, my, px[0], py[0], vx + w * ey, vy - w * ex, flown, slack)
+    return not came_through(ends, mx, my, px[0], py[0], vx + w * ey, vy - w * ex, arrival)
 
 
 @_compile
-def in_front_at(
-    joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack,
-    blur,
-):  # fmt: skip
-    """`in_front` by the heights of the place, whatever the pieces are."""
+def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
+    """-> bool: `in_front` by the heights of the place, whatever the pieces are."""
     nx, ny = px, py
     for _ in range(STEPS):
-        height, nx, ny = height_over(own_kind, joints, own_index, own_arc, own_curve, own_s, px, py)
+        height, nx, ny = height_over(joints, own, px, py)
         px, py = subtract(px, multiply(height, nx)), subtract(py, multiply(height, ny))
-    height, mx, my = height_over(kind, joints, index, arc, curve, s, px, py)
-    if height[0] + blur * abs(mx[0] * ny[0] - my[0] * nx[0]) <= CURVE_NOISE * slack:
+    height, mx, my = height_over(joints, piece, px, py)
+    if height[0] + arrival.blur * abs(mx[0] * ny[0] - my[0] * nx[0]) <= CURVE_NOISE * arrival.slack:
         return False
-    if kind == LINE:
-        x0, y0, x1, y1 = line_ends(joints, index)
-    elif kind == ARC:
-        x0, y0, x1, y1 = arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]
-    else:
-        x0, y0, x1, y1 = curve[START_X], curve[START_Y], curve[END_X], curve[END_Y]
     w = 2.0 * (vx * nx[0] + vy * ny[0])
     vx, vy = vx - w * nx[0], vy - w * ny[0]
-    return not came_through(x0, y0, x1, y1, mx[0], my[0], px[0], py[0], vx, vy, flown, slack)
+    return not came_through(ends_of(joints, piece), mx[0], my[0], px[0], py[0], vx, vy, arrival)
 
 
 @_compile
-def in_front(
-    joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown, slack,
-    blur,
-):  # fmt: skip
-    """Whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
+def in_front(joints, piece, own, px, py, vx, vy, arrival):
+    """-> bool: whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
 
-    Each piece is given by its kind, the number of a line, the row of an arc in the table of `refined_arcs`, the row of
-    a Bezier piece and the parameter there. ``px``, ``py`` (double-doubles) is the place, within rounding of the own
-    piece; ``flown`` the length of the flight that ended there; ``blur`` the error of the place along the own piece.
-    Where that decides, as where one piece stands on the other, the ray counts as one in front.
+    ``px``, ``py`` (double-doubles) is the place, within rounding of the own piece.
     """
-    if own_kind == LINE and kind == LINE:
-        return line_in_front_of_line(joints, own_index, index, px, py, vx, vy, flown, slack, blur)
-    return in_front_at(
-        joints, own_kind, own_index, own_arc, own_curve, own_s, kind, index, arc, curve, s, px, py, vx, vy, flown,
-        slack, blur,
-    )  # fmt: skip
+    if own.kind == LINE and piece.kind == LINE:
+        return line_in_front_of_line(joints, piece.number, own.number, px, py, vx, vy, arrival)
+    return in_front_at(joints, piece, own, px, py, vx, vy, arrival)

@@ -94,22 +94,16 @@ def _cases(quick: bool) -> dict[str, Callable[[], ExtremeRow]]:
 
 
 def _load() -> None:
-    """What is loaded, and on a new machine compiled, before the first case: the loops for every kind of wall."""
+    """What is loaded, and on a new machine compiled, before the first case: loops that serve all walls."""
     import numpy as np
 
     from ... import geometry as geo
     from ...geometry.tracing.refinement import refined_trace
     from ..quantities.collision import DISK
     from .disks import WALL
-    from .walls import extreme_walls
 
-    seen = set()
-    for name, build in extreme_walls().items():
-        # of the Koch curves the one in small has the same kinds of tables
-        wall = geo.koch(4) if "Koch" in name else build()
-        kind = (*wall.scene.primitives, wall.scene.is_open, wall.scene.pairs is None, wall.scene.grid is None)
-        if kind not in seen:
-            seen.add(kind)
-            geo.trace(wall, [0.45, 0.55], [1.0, 2.0])
-            refined_trace(wall.scene, np.array([0.5]), np.array([1.0]))
+    # a hollow in closed form, and one with a grid
+    for wall in (geo.triangular_teeth(0.7), geo.koch(4)):
+        geo.trace(wall, [0.45, 0.55], [1.0, 2.0])
+        refined_trace(wall.scene, np.array([0.5]), np.array([1.0]))
     geo.collide(DISK, WALL, 0.1, [[0.0, 0.0]], [[0.1, -1.0, 0.1]])

@@ -1,0 +1,143 @@
+"""Where a ray meets the lines of a hollow: compiled, and taken in by the loop of `rays`. Loads numba.
+
+The side of a ray on which a joint V lies is the sign of c = (V - p) x v. A line is hit from its free side exactly if c
+goes from >= 0 at its start to <= 0 at its end. Neighbours share the number c, so that no ray slips between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...scene.columns import (
+    CELL_HEIGHT,
+    CELL_WIDTH,
+    EDGE_X,
+    EDGE_Y,
+    GRID_COLUMNS,
+    GRID_ROWS,
+    GRID_START,
+    GRID_X,
+    GRID_Y,
+    IS_CORNER,
+    JOINT_X,
+    JOINT_Y,
+    STARTS_LINE,
+)
+from ...scene.tolerances import NEARBY_SLACKS
+from .options import inlined
+from .records import LINE
+
+# The share from a line's end is negative even where the ray meets that end: it is at least the smallest of doubles.
+LEAST_SHARE = 5e-324
+
+
+@inlined
+def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
+    """-> (t, share): flight time to the line that starts at joint j, and the share of it there, negative from its end.
+
+    ``c_before`` and ``c_after`` are the numbers c of its joints.
+    """
+    share = c_before / (c_before - c_after)
+    near = j
+    if share > 0.5:
+        # from the nearer joint, and negative to say so, so that both ends keep their digits
+        share = min(c_after / (c_before - c_after), -LEAST_SHARE)
+        near = j + 1
+    hx = joints[near, JOINT_X] + share * lines[j, EDGE_X]
+    hy = joints[near, JOINT_Y] + share * lines[j, EDGE_Y]
+    return (hx - px) * vx + (hy - py) * vy, share
+
+
+@inlined
+def joint_side(joints, j, own, px, py, vx, vy, slack):
+    """-> (c, t): the side of joint j, and the time to it where it is a corner that the ray meets, else inf."""
+    dx, dy = joints[j, JOINT_X] - px, joints[j, JOINT_Y] - py
+    c = dx * vy - dy * vx
+    if abs(c) <= slack and joints[j, IS_CORNER] > 0.0:
+        ahead = dx * vx + dy * vy
+        # the corners of the opening are left behind for certain, however shallow the ray comes
+        if (own.bounces > 0 or dy != 0.0) and ahead > slack:
+            return c, ahead
+    return c, np.inf
+
+
+@inlined
+def nearest_line(scope, own, px, py, vx, vy, time):
+    """-> (t, line, share, corner, nearby): the first line before ``time``, and the time to the first corner; or inf.
+
+    ``nearby`` says that a line is met so close that the start's rounding may count; see `nearby`.
+    """
+    tables, slack = scope.tables, scope.slack
+    joints, lines = tables.joints, tables.lines
+    close = NEARBY_SLACKS * slack
+    best, found, best_share, nearby = np.inf, -1, 0.0, False
+    first, end = scope.joints
+    c_before, corner_time = joint_side(joints, first, own, px, py, vx, vy, slack)
+    for j in range(first, end - 1):
+        c_after, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
+        corner_time = min(corner_time, ahead)
+        if c_before >= 0.0 >= c_after and c_before > c_after and joints[j, STARTS_LINE] > 0.0:
+            is_own = own.kind == LINE and own.number == j
+            if not is_own:
+                t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
+                if t > close:
+                    if t < min(best, time):
+                        best, found, best_share = t, j, share
+                elif t >= -close:
+                    nearby = True
+        c_before = c_after
+    return best, found, best_share, corner_time, nearby
+
+
+@inlined
+def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
+    """-> (t, line, share, corner, nearby) as `nearest_line`, from the lines in the cells that the ray passes.
+
+    Lines are listed in every cell that they nearly touch, so the walk's own rounding leaves out no line that the ray
+    can meet; the signs at the joints are the same numbers in every cell.
+    """
+    hollow, slack, grid = scope.hollow, scope.slack, scope.tables.grid
+    joints, lines = scope.tables.joints, scope.tables.lines
+    close = NEARBY_SLACKS * slack
+    columns, rows, base = int(hollow[GRID_COLUMNS]), int(hollow[GRID_ROWS]), int(hollow[GRID_START])
+    x, y = (px - hollow[GRID_X]) / hollow[CELL_WIDTH], (py - hollow[GRID_Y]) / hollow[CELL_HEIGHT]
+    column, row = min(max(int(x), 0), columns - 1), min(max(int(y), 0), rows - 1)
+    right, up = 1 if vx > 0.0 else -1, 1 if vy > 0.0 else -1
+    step_x = hollow[CELL_WIDTH] / abs(vx) if vx != 0.0 else np.inf
+    step_y = hollow[CELL_HEIGHT] / abs(vy) if vy != 0.0 else np.inf
+    leave_x = ((column + 1 if vx > 0.0 else column) - x) * (hollow[CELL_WIDTH] / vx) if vx != 0.0 else np.inf
+    leave_y = ((row + 1 if vy > 0.0 else row) - y) * (hollow[CELL_HEIGHT] / vy) if vy != 0.0 else np.inf
+    best, found, best_share = np.inf, -1, 0.0
+    corner_time, nearby = np.inf, False
+    while True:
+        cell = base + row * columns + column
+        for entry in range(grid[cell], grid[cell + 1]):
+            j = grid[entry]
+            c_before, ahead = joint_side(joints, j, own, px, py, vx, vy, slack)
+            corner_time = min(corner_time, ahead)
+            if joints[j, STARTS_LINE] <= 0.0:
+                # a joint between curves, listed for its corner
+                continue
+            c_after, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
+            corner_time = min(corner_time, ahead)
+            if c_before >= 0.0 >= c_after and c_before > c_after and (own.kind != LINE or j != own.number):
+                t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
+                # of two lines at one distance the first in the order of the wall is hit, as without a grid
+                if t > close:
+                    if t < best or (t == best and j < found):
+                        best, found, best_share = t, j, share
+                elif t >= -close:
+                    nearby = True
+        if min(leave_x, leave_y) > min(best, time) + 2.0 * slack:
+            break
+        if leave_x < leave_y:
+            column += right
+            leave_x += step_x
+            if column < 0 or column >= columns:
+                break
+        else:
+            row += up
+            leave_y += step_y
+            if row < 0 or row >= rows:
+                break
+    return best, found, best_share, corner_time, nearby
