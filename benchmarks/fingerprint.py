@@ -128,7 +128,7 @@ def _collisions(wall: geo.Wall) -> Call:
         rng = np.random.default_rng(2)
         velocity = rng.normal(size=(COLLISIONS, 3))
         velocity[:, 1] = -np.abs(velocity[:, 1]) - 0.1
-        return geo.collide(geo.Disk(1.0, 0.5), wall, 1e-3, rng.random(COLLISIONS), velocity)
+        return geo.collide(geo.Disk(1.0, 0.5), wall, 1e-3, rng.random((COLLISIONS, 2)), velocity)
 
     return run
 

@@ -1,8 +1,11 @@
 """Compiled functions name the columns of tables: read from the syntax trees of the sources."""
 
 import ast
+import re
 from collections import defaultdict
 from pathlib import Path
+
+import pytest
 
 import asperity
 from asperity.geometry.polygons.compiled import columns as beam_columns
@@ -66,6 +69,18 @@ def test_no_compiled_function_has_a_literal_column():
 def test_a_literal_column_is_seen():
     [function] = ast.parse("def f(table, row, pair, n):\n    return table[n, 3] + row[2] + row[n - 6] + pair[1]").body
     assert sorted(literal_columns(function)) == ["row[2]", "row[n - 6]", "table[n, 3]"]
+
+
+def test_the_page_on_primitives_names_files_that_exist():
+    root = Path(__file__).resolve().parent.parent
+    page = root / "docs" / "theory" / "add-a-primitive.md"
+    if not page.exists():
+        pytest.skip("no documentation beside the tests")
+    named = re.findall(r"`((?:geometry|tests)/[\w./-]*)`", page.read_text(encoding="utf-8"))
+    assert len(named) > 15
+    assert [name for name in named if not (root / name).exists()] == []
+    assert "theory/add-a-primitive" in (root / "docs" / "index.md").read_text(encoding="utf-8")
+    assert "docs/theory/add-a-primitive.md" in (root / "CONTRIBUTING.md").read_text(encoding="utf-8")
 
 
 def test_every_column_has_a_comment():

@@ -9,7 +9,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, flight, next_root
+from asperity.geometry.collisions.compiled.contact import ROOT_STEPS, Path, Span, flight, next_root
 from asperity.geometry.disk.satellites import Satellites
 from plain_collision import collide_plainly
 
@@ -162,10 +162,11 @@ def test_the_two_sides_of_a_sharp_peak_are_told_apart_next_to_its_tip():
 
 def test_a_root_that_is_too_many_steps_away_is_not_called_none():
     motion = flight(0.0, -1.0, 0.0, 0.1)
-    arguments = (1.0, False, None, (3.0 * ROOT_STEPS, 0.0, 1.0, 0.0, 1.0), 0.0, 1e9, (0.0, 0.0), (0.0, 1.0), motion)
-    near, _, found = next_root(*arguments, 1.0, 1e-15)
+    span, path = Span(0.0, 1e9, (0.0, 0.0)), Path(0.0, 0.0, (0.0, 1.0), motion, 1e-15)
+    arguments = (1.0, False, None, (3.0 * ROOT_STEPS, 0.0, 1.0, 0.0, 1.0), span, path)
+    near, _, found = next_root(*arguments, 1.0)
     assert near == ROOT_STEPS and found == geo.Status.BOUNCE_LIMIT
-    at, _, found = next_root(*arguments, 10.0, 1e-15)
+    at, _, found = next_root(*arguments, 10.0)
     assert at == pytest.approx(3.0 * ROOT_STEPS) and found == geo.Status.ESCAPED
 
 

@@ -13,6 +13,7 @@ from benchmarks.robustness import COLLISIONS, POLYGONS, brute_force, judge, rand
 
 from asperity import geometry as geo
 from asperity.geometry.polygons.predicates import ExactPoints
+from asperity.geometry.scene.scene import NO_TABLES
 from asperity.geometry.tracing.compiled.lines import line_time
 from asperity.geometry.tracing.double_double.sides import orientation
 from asperity.geometry.tracing.refinement import refined_trace
@@ -52,7 +53,8 @@ def test_rays_that_were_lost_or_wrong(kind, number, x, theta):
 
 def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
     joints, lines = np.array([[0.0, -1.0], [2.0, -1.0]]), np.array([[2.0, 0.0]])
-    time, share = line_time(joints, lines, 0, 2.0, 0.0, 2.0, 0.0, 0.0, -1.0)
+    tables = NO_TABLES._replace(joints=joints, lines=lines)
+    time, share = line_time(tables, 0, (2.0, 0.0), 2.0, 0.0, 0.0, -1.0)
     assert time == 1.0 and share < 0.0
 
 

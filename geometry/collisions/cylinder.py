@@ -15,7 +15,7 @@ from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS, Outcomes
 from ..walls.wall import Wall
 from .configuration_space import ConfigurationSpace
-from .records import ground_of, rounding_of_places, shares
+from .records import Rolling, ground_of, results_for, rounding_of_places, shares
 from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops
 
 # Newton's method on a convex function halves its error at worst, and squares it soon.
@@ -105,22 +105,17 @@ def collide_cylinder(
     whole_number("max_contacts", max_contacts, 1)
     start = at_the_tops(wall, eps, at, moving)
     n = len(at)
-    out_position, out_velocity, time = np.empty_like(at), np.empty_like(moving), np.empty(n)
-    contacts, status = np.empty(n, np.int64), np.empty(n, np.uint8)
-    results = (out_position, out_velocity, time, contacts, status)
-    ground, masses, slack = ground_of(wall.scene), shares(disk), rounding_of_places(wall.scene, 0.0)
+    results, ground, masses = results_for(n), ground_of(wall.scene), shares(disk)
+    rolling = Rolling(eps, wall.cell.depth, rounding_of_places(wall.scene, 0.0))
 
     def run(part: slice) -> None:
-        roll_disks(
-            start[part], moving[part], masses, eps, wall.cell.depth, slack, max_contacts, ground,
-            *(array[part] for array in results),
-        )  # fmt: skip
+        roll_disks(start[part], moving[part], masses, rolling, max_contacts, ground, results.part(part))
 
     in_blocks(run, n, threads, stop=ground.stop)
-    from_the_tops(wall, eps, at, start, moving, out_position, out_velocity, time, status)
+    from_the_tops(wall, eps, at, start, moving, results)
     for array in results:
         array.setflags(write=False)
-    return CylinderCollision(*results)
+    return CylinderCollision(results.position, results.velocity, results.time, results.contacts, results.status)
 
 
 @dataclass(frozen=True)

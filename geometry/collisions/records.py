@@ -61,6 +61,40 @@ class Ring(NamedTuple):
     half_cosine: float
 
 
+class Rolling(NamedTuple):
+    """A disk on the cylinder: the scale of the wall, its depth, and how far off the contact may be by rounding."""
+
+    scale: float
+    deepest: float
+    slack: float
+
+
+class DiskResults(NamedTuple):
+    """The arrays that the compiled collision fills, with a row for each disk; see `RigidCollision`."""
+
+    position: Floats
+    velocity: Floats
+    time: Floats
+    contacts: NDArray[np.int64]
+    two_satellites: NDArray[np.bool_]
+    status: NDArray[np.uint8]
+
+    def part(self, block: slice) -> DiskResults:
+        """Those of some disks."""
+        return DiskResults(
+            self.position[block], self.velocity[block], self.time[block],
+            self.contacts[block], self.two_satellites[block], self.status[block],
+        )  # fmt: skip
+
+
+def results_for(count: int) -> DiskResults:
+    """Room for so many disks."""
+    return DiskResults(
+        np.empty((count, 2)), np.empty((count, 3)), np.empty(count),
+        np.empty(count, np.int64), np.empty(count, np.bool_), np.empty(count, np.uint8),
+    )  # fmt: skip
+
+
 def ground_of(scene: Scene) -> Ground:
     """The tables of a wall; circles and ellipses have the same columns and become one table."""
     from ..tracing.double_double.arcs import refined_arcs

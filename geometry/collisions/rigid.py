@@ -15,7 +15,7 @@ from ..disk.satellites import Satellites
 from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS, Outcomes, Status
 from ..walls.wall import Wall
-from .records import ground_of, ring_of, shares
+from .records import DiskResults, ground_of, results_for, ring_of, shares
 
 
 @dataclass(frozen=True)
@@ -123,18 +123,14 @@ def collide(
     whole_number("max_contacts", max_contacts, 1)
     start = at_the_tops(wall, eps, at, moving)
     n = len(at)
-    out_position, out_velocity, time = np.empty_like(at), np.empty_like(moving), np.empty(n)
-    contacts, two, status = np.empty(n, np.int64), np.empty(n, np.bool_), np.empty(n, np.uint8)
-    results = (out_position, out_velocity, time, contacts, two, status)
+    results = results_for(n)
     ground, masses = ground_of(wall.scene), shares(disk)
 
     def run(part: slice) -> None:
-        collide_disks(
-            start[part], moving[part], masses, ring, max_contacts, ground, *(array[part] for array in results)
-        )
+        collide_disks(start[part], moving[part], masses, ring, max_contacts, ground, results.part(part))
 
     in_blocks(run, n, threads, stop=ground.stop)
-    from_the_tops(wall, eps, at, start, moving, out_position, out_velocity, time, status)
+    from_the_tops(wall, eps, at, start, moving, results)
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)
@@ -151,19 +147,18 @@ def at_the_tops(wall: Wall, scale: float, position: Floats, velocity: Floats) ->
 
 
 def from_the_tops(
-    wall: Wall, scale: float, position: Floats, start: Floats, velocity: Floats,
-    out_position: Floats, out_velocity: Floats, time: Floats, status: NDArray[np.uint8],
-) -> None:  # fmt: skip
+    wall: Wall, scale: float, position: Floats, start: Floats, velocity: Floats, results: DiskResults
+) -> None:
     """Turn places and times that began at ``start`` into those of disks that begin and end at x2 = 0."""
     level = scale * wall.origin[1]
     if wall.origin == (0.0, 0.0):
         return
     down = level / velocity[:, 1]
     up = np.zeros_like(down)
-    np.divide(-level, out_velocity[:, 1], out=up, where=status == Status.ESCAPED)
-    out_position += position - start + down[:, np.newaxis] * velocity[:, [0, 2]]
-    out_position += up[:, np.newaxis] * out_velocity[:, [0, 2]]
-    time += down + up
+    np.divide(-level, results.velocity[:, 1], out=up, where=results.status == Status.ESCAPED)
+    results.position[:] += position - start + down[:, np.newaxis] * velocity[:, [0, 2]]
+    results.position[:] += up[:, np.newaxis] * results.velocity[:, [0, 2]]
+    results.time[:] += down + up
 
 
 def check_kinds(disk: Disk, wall: Wall) -> None:

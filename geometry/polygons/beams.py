@@ -146,7 +146,7 @@ def beams_of(
     width = triangulation.width
     halves = 1 if mirror_symmetric else 2
     corners, real, whole, used, rounding, _, status = interruptibly(
-        lambda: split_beams(*triangulation.tables, tolerance, max_beams * halves // 2, halves)
+        lambda: split_beams(triangulation.tables, tolerance, max_beams * halves // 2, halves)
     )
     rows, tags = pieces_of(corners, real, whole, used, width)
     if mirror_symmetric:

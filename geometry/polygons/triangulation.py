@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import pairwise
 from math import frexp, ldexp
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,18 @@ from .predicates import ExactPoints
 Integers = NDArray[np.int64]
 # Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 2^-51.
 PARALLEL = 32.0 * UNIT_ROUNDOFF
+
+
+class Mesh(NamedTuple):
+    """A triangulation as compiled loops take it: coordinates of the vertices, and the arrays of `Triangulation`."""
+
+    x: Floats
+    y: Floats
+    triangles: Integers
+    beyond: Integers
+    turn_high: Floats
+    turn_low: Floats
+    entrance: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +72,10 @@ class Triangulation:
         return float(self.vertices[-1, 0])
 
     @property
-    def tables(self) -> tuple[Floats, Floats, Integers, Integers, Floats, Floats, int]:
-        """What the compiled loops take: x, y, corners, beyond, turn_high, turn_low, entrance."""
+    def tables(self) -> Mesh:
+        """What the compiled loops take."""
         x, y = np.ascontiguousarray(self.vertices.T)
-        return x, y, self.corners, self.beyond, self.turn_high, self.turn_low, self.entrance
+        return Mesh(x, y, self.corners, self.beyond, self.turn_high, self.turn_low, self.entrance)
 
 
 def triangulated(hollow_vertices: ArrayLike) -> Triangulation:

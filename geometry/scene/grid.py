@@ -48,13 +48,13 @@ def grid_of(starts: Floats, ends: Floats, first: int, base: int) -> tuple[list[f
         columns, rows = max(1, ceil(spread[0] / side)), max(1, ceil(spread[1] / side))
         size = spread / np.array([columns, rows])
         counts, nothing = np.zeros(columns * rows + 1, dtype=np.int64), np.empty(0, dtype=np.int64)
-        list_entries(starts, ends, low, size, columns, rows, first, counts, nothing)
+        list_entries(starts, ends, (low, size, columns, rows), first, counts, nothing)
         if counts.sum() <= MOST_ENTRIES * len(starts) or cells <= 16.0:
             break
         cells *= 0.25
     offsets = np.cumsum(np.concatenate([[0], counts[:-1]]))
     entries = np.zeros(int(offsets[-1]), dtype=np.int64)
-    list_entries(starts, ends, low, size, columns, rows, first, offsets[:-1].copy(), entries)
+    list_entries(starts, ends, (low, size, columns, rows), first, offsets[:-1].copy(), entries)
     frame = [float(low[0]), float(low[1]), float(size[0]), float(size[1]), float(columns), float(rows), float(base)]
     return frame, np.concatenate([offsets + (base + len(offsets)), entries])
 
@@ -77,11 +77,13 @@ def cells_about(low, high, count):
 
 
 @njit(cache=True, nogil=True)
-def list_entries(starts, ends, low, size, columns, rows, first, places, entries):
+def list_entries(starts, ends, frame, first, places, entries):
     """List the lines of every cell in ``entries``, from the cell's place on; move the place behind them.
 
-    With no entries the lines are only counted: places that begin at 0 become their numbers.
+    ``frame`` is the lower left corner, the size of a cell, columns and rows. With no entries the lines are only
+    counted: places that begin at 0 become their numbers.
     """
+    low, size, columns, rows = frame
     for k in range(starts.shape[0]):
         ax, ay = (
             (starts[k, POINT_X] - low[POINT_X]) / size[POINT_X],

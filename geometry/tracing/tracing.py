@@ -204,7 +204,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) ->
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.closed_forms import UNDECIDED, trace_closed
 
-        trace_closed(x, theta, scene.hollows, scene.closed, scene.cell, max_collisions, *results)
+        trace_closed(x, theta, scene.hollows, scene.closed, scene.cell, max_collisions, results)
         rest = np.flatnonzero(results[-1] == UNDECIDED)
         if len(rest):
             followed = tuple(np.empty(len(rest), result.dtype) for result in results)

@@ -106,7 +106,7 @@ class HollowRows:
         ]
         found = interruptibly(
             lambda: march_rows(
-                theta, tolerances, self._setting, self.degree, gauss_tables(), self.least_level,
+                theta, tolerances, self._setting, self.degree, gauss_tables(self.least_level),
                 np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
             )
         )  # fmt: skip

@@ -104,6 +104,45 @@ class State(NamedTuple):
     cosine: float
 
 
+class Place(NamedTuple):
+    """Where a satellite touches the wall: kind and number of the piece, and the hollow, -1 on the tops."""
+
+    kind: int
+    piece: int
+    hollow: int
+
+
+class Path(NamedTuple):
+    """A satellite during a flight: where it starts, sine and cosine of its angle there, the flight, and the slack.
+
+    By rounding it may be off by the slack.
+    """
+
+    x: float
+    y: float
+    turn: tuple[float, float]
+    motion: Motion
+    slack: float
+
+
+class Span(NamedTuple):
+    """A part [t, end) of a flight, and the `turning` until t."""
+
+    t: float
+    end: float
+    turned: tuple[float, float]
+
+
+class Touch(NamedTuple):
+    """A contact: time (inf for none), kind and number of the piece, state of the satellite, and code."""
+
+    time: float
+    kind: int
+    piece: int
+    state: State
+    code: int
+
+
 @inlined
 def flight(v1, v2, omega, scale):
     """The flight of a disk of radius 1/scale."""
@@ -181,14 +220,16 @@ def safe_step(f, f1, c):
 
 
 @compiled
-def next_root(sign, leaving, line, conic, t, end, turned, turn, motion, patience, slack):
-    """First time in [t, end) at which sign F falls through 0 (inf if none), the turning until then, and a code.
+def next_root(sign, leaving, line, conic, span, path, patience):
+    """-> (t, turned, code): first time in the span at which sign F falls through 0, inf if none; turning until then.
 
     F is that of a ``line``, see `towards_line`, or of a ``conic`` (f, g1, g2, curvature, stretch); the other one is
-    None. ``turned`` is the `turning` until t. ``leaving`` says that F(t) = 0 to rounding, a root that is not to be
-    found again, and ``patience`` is the longest time for which the bounds are worth having. Where the steps run out the
-    time is the last one up to which there is no root, and the code `BOUNCE_LIMIT`.
+    None. ``leaving`` says that F is 0 to rounding at the start of the span, a root that is not to be found again, and
+    ``patience`` is the longest time for which the bounds are worth having. Where the steps run out the time is the last
+    one up to which there is no root, and the code `BOUNCE_LIMIT`.
     """
+    t, end, turned = span
+    turn, motion, slack = path.turn, path.motion, path.slack
     third, growth = motion.spin * motion.spin * abs(motion.omega), 0.0
     for number in range(ROOT_STEPS):
         if conic is not None:
@@ -237,79 +278,108 @@ def where_on_line(joints, lines, j, x, y, slack):
 
 
 @compiled
-def is_in_front(own_kind, own_index, kind, index, x, y, slack, ground):
-    """Whether a satellite at (x, y) on one piece lies in front of another one, which is within the slack of it."""
-    own_arc, arc = own_index if own_kind == ARC else 0, index if kind == ARC else 0
+def is_in_front(kind, number, own, x, y, slack, ground):
+    """-> bool: whether a satellite at (x, y) on one piece lies in front of another one, within the slack of it."""
+    own_arc, arc = own.piece if own.kind == ARC else 0, number if kind == ARC else 0
     # there are no Bezier pieces, and no flight: a face that it came through in that is not looked for
     row, other, nowhere = ground.exact_arcs[own_arc], ground.exact_arcs[arc], (0.0, 0.0)
-    own = Face(CURVED if own_kind == ARC else STRAIGHT, own_index, row, row, nowhere)
-    piece = Face(CURVED if kind == ARC else STRAIGHT, index, other, other, nowhere)
+    start = Face(CURVED if own.kind == ARC else STRAIGHT, own.piece, row, row, nowhere)
+    piece = Face(CURVED if kind == ARC else STRAIGHT, number, other, other, nowhere)
     arrival = Arrival(0.0, slack, slack)
-    return in_front_at(ground.joints, piece, own, (x, 0.0), (y, 0.0), 0.0, 0.0, arrival)
+    return in_front_at(ground.joints, piece, start, (x, 0.0), (y, 0.0), 0.0, 0.0, arrival)
 
 
 @inlined
-def first_on_piece(kind, index, own_kind, own_index, x, y, t, end, turned, turn, motion, size, slack, ground):
-    """First contact in [t, end) of one satellite with the front of one piece, its state there, and a code.
+def line_form(number, is_own, path, ground):
+    """-> line: F of a line along a flight, see `towards_line`."""
+    joints, lines = ground.joints, ground.lines
+    g1, g2 = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
+    level = 0.0 if is_own else g1 * (path.x - joints[number, JOINT_X]) + g2 * (path.y - joints[number, JOINT_Y])
+    return towards_line(level, g1, g2, path.turn, path.motion)
 
-    (x, y) is where the satellite was at the start of the flight, on the piece ``own_kind``, ``own_index`` if any.
-    ``turned`` is its `turning` until t, and its state is what `satellite_after` gives.
+
+@inlined
+def conic_form(number, is_own, path, ground):
+    """-> conic: F of an arc along a flight, (f, g1, g2, curvature, stretch)."""
+    arcs = ground.arcs
+    curvature, stretch = arcs[number, CURVATURE], arcs[number, STRETCH]
+    rx, ry = path.x - arcs[number, START_X], stretch * (path.y - arcs[number, START_Y])
+    g1, g2 = arcs[number, NORMAL_X] - curvature * rx, arcs[number, NORMAL_Y] - curvature * ry
+    level = 0.0 if is_own else 0.5 * ((arcs[number, NORMAL_X] + g1) * rx + (arcs[number, NORMAL_Y] + g2) * ry)
+    return level, g1, g2, curvature, stretch
+
+
+@inlined
+def stays_in_front(line, span, leaving, motion, slack):
+    """-> bool: whether a line is certainly not met in the span."""
+    here, rate, bend = line_after(line, span.t, span.turned, motion)
+    ahead = span.end - span.t
+    # F lies above a parabola that is not convex, and so above the lower one of its ends
+    doubt = motion.spin * motion.spin * abs(motion.omega) * ahead
+    lowest = here + (rate + 0.5 * min(bend - doubt, 0.0) * ahead) * ahead
+    return lowest > slack and (here > slack or (leaving and rate > 0.0))
+
+
+@inlined
+def where_on_piece(kind, number, path, state, inward, ground):
+    """-> (inside, corner): how a point on the line or the conic of a piece lies to the piece; see `where_on_line`.
+
+    At a shallow incidence a rounding error across the piece is a longer way along it.
     """
-    own = own_kind == kind and own_index == index
-    joints, lines, arcs = ground.joints, ground.lines, ground.arcs
-    line, conic = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0)
-    stretch, patience = 1.0, np.inf
-    leaving = own and t == 0.0
+    x, y = path.x + state.dx, path.y + state.dy
+    wide = path.slack * max(1.0, min(path.motion.fastest / abs(inward), WIDEST_SLACK))
     if kind == LINE:
-        g1, g2 = lines[index, LINE_NORMAL_X], lines[index, LINE_NORMAL_Y]
-        level = 0.0 if own else g1 * (x - joints[index, JOINT_X]) + g2 * (y - joints[index, JOINT_Y])
-        line = towards_line(level, g1, g2, turn, motion)
-        here, rate, bend = line_after(line, t, turned, motion)
-        if t == 0.0 and own_kind != NO_PIECE and not own and abs(here) <= slack:
-            leaving = not is_in_front(own_kind, own_index, kind, index, x, y, slack, ground)
-        ahead = end - t
-        # F lies above a parabola that is not convex, and so above the lower one of its ends
-        doubt = motion.spin * motion.spin * abs(motion.omega) * ahead
-        lowest = here + (rate + 0.5 * min(bend - doubt, 0.0) * ahead) * ahead
-        if lowest > slack and (here > slack or (leaving and rate > 0.0)):
-            return np.inf, satellite_after(t, turned, turn, motion), CLEAR
+        return where_on_line(ground.joints, ground.lines, number, x, y, wide)
+    arc, stretch = ground.arcs[number], ground.arcs[number, STRETCH]
+    inside = on_arc(arc, x - arc[START_X], stretch * (y - arc[START_Y]), wide * max(1.0, stretch))
+    return inside, near_end(arc, x, y, wide)
+
+
+@inlined
+def first_on_piece(kind, number, own, path, span, size, ground):
+    """-> (t, state, code): first contact in the span of one satellite with the front of one piece, inf if none.
+
+    ``own`` is the piece on which the flight starts, if any.
+    """
+    t, end, turned = span
+    motion, slack = path.motion, path.slack
+    is_own = own.kind == kind and own.piece == number
+    line, conic, patience = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf
+    if kind == LINE:
+        line = line_form(number, is_own, path, ground)
+        here, rate, _ = line_after(line, t, turned, motion)
+        reach = slack
     else:
-        curvature, stretch = arcs[index, CURVATURE], arcs[index, STRETCH]
-        rx, ry = x - arcs[index, START_X], stretch * (y - arcs[index, START_Y])
-        g1, g2 = arcs[index, NORMAL_X] - curvature * rx, arcs[index, NORMAL_Y] - curvature * ry
-        level = 0.0 if own else 0.5 * ((arcs[index, NORMAL_X] + g1) * rx + (arcs[index, NORMAL_Y] + g2) * ry)
-        conic = (level, g1, g2, curvature, stretch)
-        here, rate, _, _, _ = conic_after(conic, t, turned, turn, motion)
-        if t == 0.0 and own_kind != NO_PIECE and not own and abs(here) <= slack * max(1.0, stretch):
-            leaving = not is_in_front(own_kind, own_index, kind, index, x, y, slack * max(1.0, stretch), ground)
+        conic = conic_form(number, is_own, path, ground)
+        here, rate, _, _, _ = conic_after(conic, t, turned, path.turn, motion)
+        reach = slack * max(1.0, ground.arcs[number, STRETCH])
         patience = 2.0 * size / motion.fastest
+    leaving = is_own and t == 0.0
+    if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
+        leaving = not is_in_front(kind, number, own, path.x, path.y, reach, ground)
+    if kind == LINE and stays_in_front(line, span, leaving, motion, slack):
+        return np.inf, satellite_after(t, turned, path.turn, motion), CLEAR
     sign = 1.0 if here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
     if leaving:
         # to the front, or, from the back of a face, away from it
-        sign = 1.0 if own or rate > 0.0 else -1.0
+        sign = 1.0 if is_own or rate > 0.0 else -1.0
     while True:
+        rest = Span(t, end, turned)
         if kind == LINE:
-            t, turned, code = next_root(sign, leaving, line, None, t, end, turned, turn, motion, patience, slack)
+            t, turned, code = next_root(sign, leaving, line, None, rest, path, patience)
         else:
-            t, turned, code = next_root(sign, leaving, None, conic, t, end, turned, turn, motion, patience, slack)
-        state, inward = satellite_after(t, turned, turn, motion), 0.0
+            t, turned, code = next_root(sign, leaving, None, conic, rest, path, patience)
+        state, inward = satellite_after(t, turned, path.turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR
         if code == BOUNCE_LIMIT:
             return t, state, code
         if sign > 0.0:
-            px, py = x + state.dx, y + state.dy
-            # at a shallow incidence a rounding error across the piece is a longer way along it
             if kind == LINE:
                 _, inward, _ = line_after(line, t, turned, motion)
-                wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
-                inside, corner = where_on_line(joints, lines, index, px, py, wide)
             else:
-                _, inward, _, _, _ = conic_after(conic, t, turned, turn, motion)
-                wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
-                ax, ay = px - arcs[index, START_X], stretch * (py - arcs[index, START_Y])
-                inside = on_arc(arcs[index], ax, ay, wide * max(1.0, stretch))
-                corner = near_end(arcs[index], px, py, wide)
+                _, inward, _, _, _ = conic_after(conic, t, turned, path.turn, motion)
+            inside, corner = where_on_piece(kind, number, path, state, inward, ground)
             if inside:
                 return t, state, CORNER if corner else code
         if code == GRAZING:
@@ -321,33 +391,32 @@ def first_on_piece(kind, index, own_kind, own_index, x, y, t, end, turned, turn,
 
 
 @inlined
-def first_in_hollow(h, own_kind, own_index, came_from, x, y, t, end, turned, turn, motion, slack, ground):
-    """First contact of one satellite with the pieces of the hollow h: time (inf), kind, index, state and code.
+def first_in_hollow(h, own, came_from, path, span, ground):
+    """-> Touch: the first contact of one satellite with the pieces of the hollow h.
 
     For an open wall the sides of the cell count as pieces; ``came_from`` is -1 or 1 for a satellite that has just come
     in through the left or the right one.
     """
-    hollows, joints = ground.hollows, ground.joints
-    kind, index, code, size = NO_PIECE, -1, CLEAR, hollows[h, SIZE]
-    where = satellite_after(t, turned, turn, motion)
+    hollows, joints, motion = ground.hollows, ground.joints, path.motion
+    t, end, turned = span
+    kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, SIZE]
+    where = satellite_after(t, turned, path.turn, motion)
     ranges = (FIRST_JOINT, JOINTS_END), (FIRST_CIRCLE, CIRCLES_END), (FIRST_ELLIPSE, ELLIPSES_END)
     for first, end_of_range in ranges:
         tried = LINE if first == FIRST_JOINT else ARC
         for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
             if tried == ARC or joints[k, STARTS_LINE] > 0.0:
-                hit, place, unclear = first_on_piece(
-                    tried, k, own_kind, own_index, x, y, t, end, turned, turn, motion, size, slack, ground
-                )
+                rest = Span(t, end, turned)
+                hit, place, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
                 if hit < end:
-                    end, kind, index, code, where = hit, tried, k, unclear, place
+                    end, kind, number, code, where = hit, tried, k, unclear, place
     if ground.is_open:
         for side in (-1, 1):
             edge = hollows[h, LEFT] if side < 0 else hollows[h, RIGHT]
-            line = towards_line(side * (edge - x), -float(side), 0.0, turn, motion)
-            hit, then, unclear = next_root(
-                1.0, came_from == side, line, None, t, end, turned, turn, motion, np.inf, slack
-            )
+            line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
+            rest = Span(t, end, turned)
+            hit, then, unclear = next_root(1.0, came_from == side, line, None, rest, path, np.inf)
             if hit < end:
-                end, kind, index, code = hit, SIDE, side, unclear
-                where = satellite_after(hit, then, turn, motion)
-    return end if kind != NO_PIECE else np.inf, kind, index, where, code
+                end, kind, number, code = hit, SIDE, side, unclear
+                where = satellite_after(hit, then, path.turn, motion)
+    return Touch(end if kind != NO_PIECE else np.inf, kind, number, where, code)

@@ -42,6 +42,10 @@ from .contact import (
     NOTHING,
     WIDEST_SLACK,
     ZERO,
+    Path,
+    Place,
+    Span,
+    Touch,
     first_in_hollow,
     flight,
     next_root,
@@ -61,14 +65,6 @@ CELLS_A_LOOK = 1024
 FOREVER = 1e30
 
 
-class Place(NamedTuple):
-    """Where a satellite touches the wall: kind and number of the piece, and the hollow, -1 on the tops."""
-
-    kind: int
-    piece: int
-    hollow: int
-
-
 class Below(NamedTuple):
     """A satellite that is below the tops: its number, its hollow (-1: there is none), and its cell's left end."""
 
@@ -77,9 +73,10 @@ class Below(NamedTuple):
     base: float
 
 
-class Touch(NamedTuple):
-    """Where a satellite is when it touches the wall, and the sine and cosine of its angle then."""
+class Chosen(NamedTuple):
+    """A satellite that touches the wall: its number, where it is then, and the sine and cosine of its angle."""
 
+    number: int
     x: float
     y: float
     turn: tuple[float, float]
@@ -104,16 +101,17 @@ def near_edge(hollows, place, slack):
 
 
 @compiled
-def dive(x, y, t, end, turned, turn, motion, slack, ground):
-    """When and where a satellite comes below the tops in [t, end).
+def descent(path, span, ground):
+    """-> (t, turned, h, base, code): when and where a satellite comes below the tops in the span, inf if it does not.
 
-    Returns the time (inf if it does not), the turning until then, hollow (-1 where it meets a flat top), its cell's
-    left end and code.
+    With the turning until then, the hollow (-1 where it meets a flat top) and its cell's left end.
     """
+    x, y, turn, motion, slack = path
+    t, end, turned = span
     dx, dy, sine, _ = satellite_after(t, turned, turn, motion)
     if y + dy > 0.0:
         lid = towards_line(y, 0.0, 1.0, turn, motion)
-        t, turned, code = next_root(1.0, NO, lid, None, t, end, turned, turn, motion, np.inf, slack)
+        t, turned, code = next_root(1.0, NO, lid, None, span, path, np.inf)
         if t >= end or code == GRAZING:
             return np.inf, turned, -1, 0.0, CLEAR
         if code != CLEAR:
@@ -131,41 +129,41 @@ def dive(x, y, t, end, turned, turn, motion, slack, ground):
 
 
 @compiled
-def first_contact(own_kind, own_index, h, base, x, y, t, end, turn, motion, slack, ground):
-    """First contact in [t, end) of one satellite with the wall.
+def first_contact(own, base, path, t, end, ground):
+    """-> (Touch, h, base): the first contact in [t, end) of one satellite with the wall, its hollow and cell.
 
-    (x, y) is where it was at the start of the flight: on the piece ``own_kind``, ``own_index`` (or NO_PIECE), and
-    in the hollow ``h`` of the cell that begins at ``base``, or above the tops if h is -1. Returns time (inf if none),
-    kind, index, hollow, its cell's left end, state and code.
+    The flight starts on ``own``, of which the hollow is in the cell that begins at ``base``; above the tops that is -1.
     """
+    x, y, turn, motion, slack = path
     turned = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
     state = satellite_after(t, turned, turn, motion)
-    if own_kind == TOP:
+    h = own.hollow
+    if own.kind == TOP:
         # it rises, and its path bends upward
-        return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
+        return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
     if h < 0:
-        t, turned, h, base, code = dive(x, y, t, end, turned, turn, motion, slack, ground)
+        t, turned, h, base, code = descent(path, Span(t, end, turned), ground)
         state = satellite_after(t, turned, turn, motion)
         if t >= end:
-            return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
+            return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
         if h < 0 or code != CLEAR:
-            return t, TOP, -1, -1, base, state, code
+            return Touch(t, TOP, -1, state, code), -1, base
     came_from = ZERO
     for cell in range(MOST_CELLS):
         if cell & (CELLS_A_LOOK - 1) == CELLS_A_LOOK - 1 and is_raised(ground.stop):
             break
-        t, kind, index, state, code = first_in_hollow(
-            h, own_kind, own_index, came_from, x - base, y, t, end, turned, turn, motion, slack, ground
-        )
-        if kind != SIDE or code == BOUNCE_LIMIT:
-            return t, kind, index, h, base, state, code
+        shifted = Path(x - base, y, turn, motion, slack)
+        touch = first_in_hollow(h, own, came_from, shifted, Span(t, end, turned), ground)
+        t, state = touch.time, touch.state
+        if touch.kind != SIDE or touch.code == BOUNCE_LIMIT:
+            return touch, h, base
         if y + state.dy > 0.0 and motion.v2 + motion.omega * state.sine > 0.0:
-            return np.inf, NO_PIECE, -1, -1, base, state, CLEAR
+            return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
         turned = turning(motion.spin * t)
-        base += index * ground.cell
-        came_from = -index
-        own_kind = ZERO
-    return t, NO_PIECE, -1, h, base, state, BOUNCE_LIMIT
+        base += touch.piece * ground.cell
+        came_from = -touch.piece
+        own = Place(ZERO, NOTHING, h)
+    return Touch(t, NO_PIECE, -1, state, BOUNCE_LIMIT), h, base
 
 
 @inlined
@@ -229,21 +227,19 @@ def out_of_reach_after(angle, motion, ring):
 
 
 @inlined
-def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, ground):
-    """First contact of any satellite before ``end``.
+def first_of_all(own, below, path, height, angle, end, ring, ground):
+    """-> (t, Place, base, Chosen, code): the first contact of any satellite before ``end``; t is ``end`` if none.
 
-    The satellite 0 is at (x, y), the disk at ``height``, and ``own`` is its (kind, index, hollow); ``below`` is the
-    (number, hollow, base) of another one that is below the tops, with hollow -1 for none. Returns the time, which is
-    ``end`` if there is none, (kind, index, hollow), base, the satellite's number, its place with the sine and cosine
-    of its angle, and code.
+    The path is that of satellite 0, which starts on ``own``; the disk is at ``height``.
     """
-    reach, slack, rate = ring.reach, ring.slack, abs(motion.spin)
+    x, y, turn, motion, slack = path
+    reach, rate = ring.reach, abs(motion.spin)
     passed = out_of_reach_after(angle, motion, ring)
-    time, kind, index, hollow, base, state, code = first_contact(
-        own.kind, own.piece, own.hollow, 0.0, x, y, 0.0, min(end, passed), turn, motion, slack, ground
-    )
-    hit, chosen, touched = Place(kind, index, hollow), 0, Touch(x + state.dx, y + state.dy, (state.sine, state.cosine))
-    time = min(time, end)
+    touch, hollow, base = first_contact(own, 0.0, path, 0.0, min(end, passed), ground)
+    state, code = touch.state, touch.code
+    hit = Place(touch.kind, touch.piece, hollow)
+    chosen = Chosen(0, x + state.dx, y + state.dy, (state.sine, state.cosine))
+    time = min(touch.time, end)
     # the others in the order in which they come within reach of the wall
     step = -1 if motion.spin > 0.0 else 1
     # numba's floor is a float
@@ -266,49 +262,49 @@ def first_of_all(own, below, x, y, height, angle, turn, motion, end, ring, groun
             # the path bends upward, so that it stays above its first tangent
             if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * sine_other) * until < 0.0:
                 inside, left = (below.hollow, below.base) if j == below.number else (NOTHING, 0.0)
-                t, kind, index, hollow, left, state, unclear = first_contact(
-                    ZERO, NOTHING, inside, left, x_other, y_other, start, until, turn_other, motion, slack, ground
-                )
-                tied = hit.kind != NO_PIECE and abs(t - time) <= tie
-                if t < time:
-                    time, hit, base, code, chosen = t, Place(kind, index, hollow), left, unclear, j
-                    touched = Touch(x_other + state.dx, y_other + state.dy, (state.sine, state.cosine))
+                there = Path(x_other, y_other, turn_other, motion, slack)
+                touch, hollow, left = first_contact(Place(ZERO, NOTHING, inside), left, there, start, until, ground)
+                tied = hit.kind != NO_PIECE and abs(touch.time - time) <= tie
+                if touch.time < time:
+                    time, hit, base, code = touch.time, Place(touch.kind, touch.piece, hollow), left, touch.code
+                    state = touch.state
+                    chosen = Chosen(j, x_other + state.dx, y_other + state.dy, (state.sine, state.cosine))
                 if tied:
                     code = CORNER
         j += step
     else:
         code = BOUNCE_LIMIT
-    return time, hit, base, chosen, touched, code
+    return time, hit, base, chosen, code
 
 
 @compiled
-def left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, ring, ground):
-    """The neighbour of the satellite ``chosen`` that is below the tops when that one touches the wall, as ``below``.
+def left_below(own, below, path, angle, time, chosen, ring, ground):
+    """-> Below: the neighbour of the satellite that touches the wall that is below the tops then.
 
     Under an overhang its place does not tell its hollow; where it came in does. At most one satellite is below the
     tops beside the one that touches.
     """
     if ground.is_open:
         return Below(ZERO, NOTHING, 0.0)
-    later = angle + motion.spin * time + chosen * ring.spacing
+    motion = path.motion
+    later = angle + motion.spin * time + chosen.number * ring.spacing
     for side in (-1, 1):
         if abs(later + side * ring.spacing) <= ring.reach:
-            _, height, _ = satellite_at(touched.x, touched.y, touched.turn, side, ring)
+            _, height, _ = satellite_at(chosen.x, chosen.y, chosen.turn, side, ring)
             if height <= 0.0:
-                j = chosen + side
+                j = chosen.number + side
                 if j == 0 and own.hollow >= 0:
                     return Below(j, own.hollow, 0.0)
                 if j == below.number and below.hollow >= 0:
                     return below
                 other = angle + j * ring.spacing
-                x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
+                x_other, y_other, turn_other = satellite_at(path.x, path.y, path.turn, j, ring)
                 start = 0.0
                 if abs(other) > ring.reach:
                     # it came within reach on the way
                     start = (abs(other) - ring.reach) / abs(motion.spin)
-                t, _, h, base, _ = dive(
-                    x_other, y_other, start, time, turning(motion.spin * start), turn_other, motion, ring.slack, ground
-                )
+                there = Path(x_other, y_other, turn_other, motion, path.slack)
+                t, _, h, base, _ = descent(there, Span(start, time, turning(motion.spin * start)), ground)
                 if t < time:
                     return Below(j, h, base)
     return Below(ZERO, NOTHING, 0.0)
@@ -333,142 +329,153 @@ def reflect(v1, v2, omega, n1, n2, turn, disk):
 
 
 @inlined
-def collide_disk(place, angle, v1, v2, omega, disk, ring, limit, ground):
-    """One collision of a disk that comes down at height 0, its lowest satellite at ``angle`` from the lowest point.
+def longest_flight(height, motion, ring):
+    """-> float: a time by which the disk is back, or would be lower than it can be; -inf if there is none."""
+    if motion.v2 > 0.0:
+        return max(-height / motion.v2, 0.0)
+    if motion.v2 < 0.0:
+        return -(height + ring.floor) / motion.v2
+    if motion.omega != 0.0:
+        return MOST_CELLS * ring.spacing / abs(motion.spin)
+    return -np.inf
 
-    ``disk`` is (m, J) with m + J = 1. The velocities have kinetic norm 1. Returns the disk's displacement, its turn,
-    the time, the velocities, contacts, whether two satellites took part, and the status.
+
+@inlined
+def collide_disk(place, angle, velocity, disk, ring, limit, ground):
+    """-> (displacement, turn, time, velocity, contacts, two, status): one collision of a disk that comes down.
+
+    It is at height 0, its lowest satellite at ``angle`` from the lowest point. ``disk`` is (m, J) with m + J = 1. The
+    velocities have kinetic norm 1. ``two`` says whether two satellites took part.
     """
     scale, spacing = ring.scale, ring.spacing
+    v1, v2, omega = velocity
     travel, turned, passed, contacts, two = 0.0, 0.0, 0.0, 0, False
     sine, versed = turning(angle)
     x, y, height = place + sine / scale, versed / scale, 0.0
     own, below = Place(ZERO, NOTHING, NOTHING), Below(ZERO, NOTHING, 0.0)
+    status = BOUNCE_LIMIT
     while not is_raised(ground.stop):
-        turn, motion = (sine, 1.0 - versed), flight(v1, v2, omega, scale)
-        # by then it is back, or would be lower than it can be
-        if v2 > 0.0:
-            end = max(-height / v2, 0.0)
-        elif v2 < 0.0:
-            end = -(height + ring.floor) / v2
-        elif omega != 0.0:
-            end = MOST_CELLS * spacing / abs(motion.spin)
-        else:
-            return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
-        time, hit, base, chosen, touched, code = first_of_all(
-            own, below, x, y, height, angle, turn, motion, end, ring, ground
-        )
+        path = Path(x, y, (sine, 1.0 - versed), flight(v1, v2, omega, scale), ring.slack)
+        end = longest_flight(height, path.motion, ring)
+        if end == -np.inf:
+            break
+        time, hit, base, chosen, code = first_of_all(own, below, path, height, angle, end, ring, ground)
         travel += v1 * time
-        turned += motion.spin * time
+        turned += path.motion.spin * time
         passed += time
         if code != CLEAR:
-            return travel, turned, passed, v1, v2, omega, contacts, two, code
+            status = code
+            break
         if hit.kind == NO_PIECE:
-            return travel, turned, passed, v1, v2, omega, contacts, two, ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
+            status = ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
+            break
         if contacts >= limit:
-            return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
-        left = left_below(own, below, x, y, angle, turn, time, chosen, touched, motion, ring, ground)
-        below = Below(left.number - chosen, left.hollow, left.base - base)
-        two = two or (contacts > 0 and chosen != 0)
+            break
+        left = left_below(own, below, path, angle, time, chosen, ring, ground)
+        below = Below(left.number - chosen.number, left.hollow, left.base - base)
+        two = two or (contacts > 0 and chosen.number != 0)
         contacts += 1
-        angle += chosen * spacing + motion.spin * time
+        angle += chosen.number * spacing + path.motion.spin * time
         sine, versed = turning(angle)
-        own, x, y, n1, n2 = hit, touched.x - base, 0.0, 0.0, 1.0
+        own, x, y, n1, n2 = hit, chosen.x - base, 0.0, 0.0, 1.0
         if hit.kind != TOP:
-            x, y, n1, n2 = surface(hit.kind, hit.piece, x, touched.y, ground)
+            x, y, n1, n2 = surface(hit.kind, hit.piece, x, chosen.y, ground)
         height = y - versed / scale
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (sine, 1.0 - versed), disk)
-    return travel, turned, passed, v1, v2, omega, contacts, two, BOUNCE_LIMIT
+    return travel, turned, passed, (v1, v2, omega), contacts, two, status
+
+
+@inlined
+def unit_velocity(velocity, i, disk):
+    """-> (norm, unit): the kinetic norm of a disk's velocity, and that divided by it."""
+    mass, inertia = disk
+    norm = math.sqrt(mass * (velocity[i, V1] ** 2 + velocity[i, V2] ** 2) + inertia * velocity[i, OMEGA] ** 2)
+    return norm, (velocity[i, V1] / norm, velocity[i, V2] / norm, velocity[i, OMEGA] / norm)
 
 
 @compiled
-def collide_disks(
-    position, velocity, disk, ring, limit, ground, out_position, out_velocity, times, contacts, two_satellites, status,
-):  # fmt: skip
-    """Collide a block of disks; fills the output arrays."""
-    mass, inertia = disk
+def collide_disks(position, velocity, disk, ring, limit, ground, results):
+    """Collide a block of disks; fills the results, see `DiskResults`."""
     scale, spacing = ring.scale, ring.spacing
     width = scale * ground.cell
     for i in range(position.shape[0]):
         if is_raised(ground.stop):
             break
-        norm = math.sqrt(mass * (velocity[i, V1] ** 2 + velocity[i, V2] ** 2) + inertia * velocity[i, OMEGA] ** 2)
+        norm, unit = unit_velocity(velocity, i, disk)
         place = (position[i, X1] - math.floor(position[i, X1] / width) * width) / scale
         angle = position[i, ALPHA] - spacing * round(position[i, ALPHA] / spacing)
-        travel, turned, time, v1, v2, omega, contacts[i], two_satellites[i], status[i] = collide_disk(
-            place,
-            angle,
-            velocity[i, V1] / norm,
-            velocity[i, V2] / norm,
-            velocity[i, OMEGA] / norm,
-            disk,
-            ring,
-            limit,
-            ground,
+        travel, turned, time, (v1, v2, omega), results.contacts[i], results.two_satellites[i], results.status[i] = (
+            collide_disk(place, angle, unit, disk, ring, limit, ground)
         )
-        out_position[i, X1] = position[i, X1] + scale * travel
-        out_position[i, ALPHA] = position[i, ALPHA] + turned
-        out_velocity[i, V1], out_velocity[i, V2], out_velocity[i, OMEGA] = norm * v1, norm * v2, norm * omega
-        times[i] = scale * time / norm
+        results.position[i, X1] = position[i, X1] + scale * travel
+        results.position[i, ALPHA] = position[i, ALPHA] + turned
+        results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
+            norm * v1,
+            norm * v2,
+            norm * omega,
+        )
+        results.time[i] = scale * time / norm
 
 
 @inlined
-def roll_disk(place, v1, v2, omega, disk, deepest, slack, limit, ground):
-    """One collision on the cylinder: the contact moves on a straight line with the velocity (v1 + omega, v2).
+def roll_disk(place, velocity, disk, rolling, limit, ground):
+    """-> (displacement, turn, time, velocity, contacts, status): one collision on the cylinder.
 
-    It starts at (place, 0); ``deepest`` is the wall's depth. Returns the disk's displacement, its turn, the time, the
-    velocities, contacts and status.
+    The contact moves on a straight line with the velocity (v1 + omega, v2) and starts at (place, 0).
     """
+    v1, v2, omega = velocity
     travel, turned, passed, contacts = 0.0, 0.0, 0.0, 0
     x, y = place, 0.0
-    own = Place(ZERO, NOTHING, NOTHING)
+    own, status = Place(ZERO, NOTHING, NOTHING), BOUNCE_LIMIT
     while not is_raised(ground.stop):
-        motion = flight(v1 + omega, v2, 0.0, 1.0)
+        path = Path(x, y, (0.0, 1.0), flight(v1 + omega, v2, 0.0, 1.0), rolling.slack)
         end = FOREVER
         if v2 > 0.0:
             end = -y / v2
         elif v2 < 0.0:
-            end = min(2.0 * (y + deepest + ground.cell) / -v2, FOREVER)
-        time, kind, index, hollow, base, state, code = first_contact(
-            own.kind, own.piece, own.hollow, 0.0, x, y, 0.0, end, (0.0, 1.0), motion, slack, ground
-        )
-        time = min(time, end)
+            end = min(2.0 * (y + rolling.deepest + ground.cell) / -v2, FOREVER)
+        touch, hollow, base = first_contact(own, 0.0, path, 0.0, end, ground)
+        kind, state, code = touch.kind, touch.state, touch.code
+        time = min(touch.time, end)
         travel += v1 * time
         turned += omega * time
         passed += time
-        if code == CLEAR and kind == NO_PIECE:
-            code = ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
-            return travel, turned, passed, v1, v2, omega, contacts, code
-        if code == CLEAR and contacts >= limit:
-            code = BOUNCE_LIMIT
         if code != CLEAR:
-            return travel, turned, passed, v1, v2, omega, contacts, code
+            status = code
+            break
+        if kind == NO_PIECE:
+            status = ESCAPED if v2 > 0.0 else BOUNCE_LIMIT
+            break
+        if contacts >= limit:
+            break
         contacts += 1
-        own, x, y, n1, n2 = Place(kind, index, hollow), x + state.dx - base, y + state.dy, 0.0, 1.0
+        own, x, y, n1, n2 = Place(kind, touch.piece, hollow), x + state.dx - base, y + state.dy, 0.0, 1.0
         if kind == TOP:
             y = 0.0
         else:
-            x, y, n1, n2 = surface(kind, index, x, y, ground)
+            x, y, n1, n2 = surface(kind, touch.piece, x, y, ground)
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (0.0, 1.0), disk)
-    return travel, turned, passed, v1, v2, omega, contacts, BOUNCE_LIMIT
+    return travel, turned, passed, (v1, v2, omega), contacts, status
 
 
 @compiled
-def roll_disks(
-    position, velocity, disk, scale, deepest, slack, limit, ground, out_position, out_velocity, times, contacts, status,
-):  # fmt: skip
-    """Collide a block of disks on the cylinder; fills the output arrays."""
-    mass, inertia = disk
+def roll_disks(position, velocity, disk, rolling, limit, ground, results):
+    """Collide a block of disks on the cylinder; fills the results, see `DiskResults`."""
+    scale = rolling.scale
     for i in range(position.shape[0]):
         if is_raised(ground.stop):
             break
-        norm = math.sqrt(mass * (velocity[i, V1] ** 2 + velocity[i, V2] ** 2) + inertia * velocity[i, OMEGA] ** 2)
+        norm, unit = unit_velocity(velocity, i, disk)
         place = (position[i, X1] + position[i, ALPHA]) / scale
-        travel, turned, time, v1, v2, omega, contacts[i], status[i] = roll_disk(
-            place - math.floor(place / ground.cell) * ground.cell, velocity[i, V1] / norm, velocity[i, V2] / norm,
-            velocity[i, OMEGA] / norm, disk, deepest, slack, limit, ground,
-        )  # fmt: skip
-        out_position[i, X1] = position[i, X1] + scale * travel
-        out_position[i, ALPHA] = position[i, ALPHA] + scale * turned
-        out_velocity[i, V1], out_velocity[i, V2], out_velocity[i, OMEGA] = norm * v1, norm * v2, norm * omega
-        times[i] = scale * time / norm
+        place -= math.floor(place / ground.cell) * ground.cell
+        travel, turned, time, (v1, v2, omega), results.contacts[i], results.status[i] = roll_disk(
+            place, unit, disk, rolling, limit, ground
+        )
+        results.position[i, X1] = position[i, X1] + scale * travel
+        results.position[i, ALPHA] = position[i, ALPHA] + scale * turned
+        results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
+            norm * v1,
+            norm * v2,
+            norm * omega,
+        )
+        results.time[i] = scale * time / norm

@@ -9,7 +9,7 @@ What stays the same along a row travels in two named tuples, `Task` and `Chain`.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,15 +19,18 @@ from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
 from ...scene.scene import Scene, Tables
+from ...tracing.compiled.options import OPTIONS
 from ...tracing.compiled.pointers import call_at
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, nearby_address, trace_rays_address
 from ...tracing.compiled.records import Results, results_for
 
-# Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Integers
-# are born as such, np.int64(0): for a bare 0 type inference compiles what it is passed to once more.
-# A dictionary, because numba's annotations do not know the two options.
-_NO_WRAPPERS: Any = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-inner = njit(cache=True, nogil=True, error_model="numpy", **_NO_WRAPPERS)
+# Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Those
+# that neither allocate nor return arrays count no references, see `options`. Integers are born as such, np.int64(0):
+# for a bare 0 type inference compiles what it is passed to once more.
+_INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+inner = njit(**_INNER)
+inlined = njit(**_INNER, forceinline=True)
+allocating = njit(**{**_INNER, "_nrt": True})
 
 # Samples of one row at most; what is then still undecided counts as error.
 MOST_SAMPLES = 1 << 13
@@ -108,7 +111,7 @@ def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats) -> Sett
     return Setting(tables.hollows[hollow], tables, limits, np.require(edges, np.float64, ["C", "A", "W"]), tracer)
 
 
-@inner
+@allocating
 def empty_chain():
     """Room for the samples of one row; the last one has the successor -1."""
     return Chain(
@@ -121,14 +124,14 @@ def empty_chain():
     )
 
 
-@inner
+@allocating
 def task_of(setting, theta, degree, flights):
     """-> Task: a row at an angle."""
     setting.tracer.angles[:] = theta
     return Task(setting, theta, degree, flights)
 
 
-@inner
+@inlined
 def trace_block(places, task):
     """Trace rays, no more than `BLOCK`, into the results of the tracer."""
     setting = task.setting
@@ -138,7 +141,7 @@ def trace_block(places, task):
     call_at(tracer.address, None, (*rays, setting.tables, limit, tracer.stop, tracer.results, tracer.nearby))
 
 
-@inner
+@inlined
 def outcome(k, x, task):
     """-> (angle, label): the outgoing angle of ray k of the block, which entered at x, and its label.
 
@@ -164,7 +167,7 @@ def outcome(k, x, task):
     return out, HASH_FACTOR * (results.itinerary[k] + np.uint64(16)) + np.uint64(cell)
 
 
-@inner
+@inlined
 def probe(x, task):
     """-> (angle, label): `outcome` of one ray."""
     places = task.setting.tracer.places[:1]
@@ -173,13 +176,13 @@ def probe(x, task):
     return outcome(np.int64(0), x, task)
 
 
-@inner
+@inlined
 def is_spent(task):
     """Whether the row has taken as many flights as it may."""
     return task.flights[0] >= task.setting.limits.flights
 
 
-@inner
+@inlined
 def spread(first, second, degree):
     """Largest difference of cos, and of cos and sin of ``degree`` times the angle."""
     k = max(degree, 1)
@@ -189,7 +192,7 @@ def spread(first, second, degree):
     )
 
 
-@inner
+@inlined
 def undecided(before, task, chain):
     """What the gap after a sample may contribute to a row's error."""
     xs, outs, _, follow, _, _ = chain
@@ -198,7 +201,7 @@ def undecided(before, task, chain):
     return 0.5 * width * (spread(outs[before], outs[after], task.degree) + math.sqrt(width / whole))
 
 
-@inner
+@inlined
 def insert(x, before, count, task, chain):
     """Put a sample at x behind another one."""
     xs, outs, labels, follow, _, _ = chain
@@ -245,7 +248,8 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
                 fresh[fresh_count] = k
                 fresh_count += 1
         gap_count = fresh_count
-        gaps[:gap_count] = fresh[:gap_count]
+        for g in range(gap_count):
+            gaps[g] = fresh[g]
         if not moved:
             break
     return count

@@ -7,12 +7,15 @@ ends. ``rules`` are what `gauss_tables` gives. ``nodes`` are the outgoing angles
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from .changes import FIRST_LABEL, inner, is_spent, outcome, trace_block
+from .changes import FIRST_LABEL, allocating, inner, is_spent, outcome, trace_block
 
 ORDERS = (4, 7, 12, 20, 32)
 # Nodes of one row at most.
@@ -25,10 +28,21 @@ LEAST_RATIO = 0.03
 # Pieces are not halved below this share of the opening.
 NARROWEST = 1e-9
 MOST_HALVINGS = 40
+# The share of what the rules of a row may spend that those of any piece may, however short it is.
+LEAST_SHARE = 0.02
 
 
-def gauss_tables() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions in (0, 1) and weights of all rules after the substitution, one after the other, and their starts."""
+class Rules(NamedTuple):
+    """Positions in (0, 1) and weights of all rules, one after the other, their starts, and the first rule to use."""
+
+    places: Floats
+    weights: Floats
+    starts: NDArray[np.int64]
+    least: int
+
+
+def gauss_tables(least: int) -> Rules:
+    """The rules after the substitution, from number ``least`` on."""
     places, weights, starts = [], [], [0]
     for order in ORDERS:
         node, weight = np.polynomial.legendre.leggauss(order)
@@ -36,17 +50,18 @@ def gauss_tables() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         places.append(s * s * (3.0 - 2.0 * s))
         weights.append(0.5 * weight * 6.0 * s * (1.0 - s))
         starts.append(starts[-1] + order)
-    return np.concatenate(places), np.concatenate(weights), np.array(starts)
+    return Rules(np.concatenate(places), np.concatenate(weights), np.array(starts), least)
 
 
 @inner
-def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, strict):
+def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     """One rule after the other on [low, high], until two of them agree.
 
     Returns the number of nodes, the error, a place where a ray has another label (nan: none), and the number of rays.
     Without ``strict`` labels do not matter, and the difference of the rules has to show what the piece hides.
     """
-    places, weights, starts = rules
+    low, high = ends
+    places, weights, starts, least = rules
     node, mass = nodes
     degree = task.degree
     width = high - low
@@ -88,22 +103,24 @@ def apply_rules(low, high, label, goal, rules, least, task, nodes, filled, stric
     return used, error, np.nan, rays
 
 
-@inner
-def integrate_piece(ends, out, label, goal, share, rules, least, task, nodes, filled, strict):
-    """Nodes on a piece, which is halved where the rules do not agree; ``out`` is the angle of a ray of it.
+@allocating
+def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
+    """Nodes on a piece, which is halved where the rules do not agree.
 
-    Returns the number of nodes in all, the error, a place where a ray has another label (nan: none), and the rays.
+    ``sample`` are the angle and label of a ray of it. Returns the number of nodes in all, the error, a place where a
+    ray has another label (nan: none), and the rays.
     """
     whole = task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
     low_stack, high_stack = np.empty(MOST_HALVINGS + 2), np.empty(MOST_HALVINGS + 2)
     low_stack[0], high_stack[0] = ends
+    out, label = sample
     node, mass = nodes
     depth, error, rays = np.int64(1), 0.0, np.int64(0)
     while depth > 0:
         depth -= 1
         low, high = low_stack[depth], high_stack[depth]
-        allowed = goal * max((high - low) / whole, share)
-        used, miss, other, spent = apply_rules(low, high, label, allowed, rules, least, task, nodes, filled, strict)
+        allowed = goal * max((high - low) / whole, LEAST_SHARE)
+        used, miss, other, spent = apply_rules((low, high), label, allowed, rules, task, nodes, filled, strict)
         rays += spent
         if not math.isnan(other):
             return filled, error, other, rays

@@ -17,8 +17,8 @@ from .changes import (
     FIRST_LABEL,
     MOST_SAMPLES,
     add_change,
+    allocating,
     empty_chain,
-    inner,
     is_spent,
     sample_row,
     spread,
@@ -37,13 +37,11 @@ MOST_SEEDS = 128
 ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
 # The share of the tolerance that the Gauss rules may spend, and that all undecided gaps may take.
 RULE_SHARE, GAP_SHARE = 0.5, 0.25
-# The share of what the rules may spend that any piece may, however short it is.
-LEAST_SHARE = 0.02
 # The share of what the gaps may take for those of a change that was overlooked.
 LATE_SHARE = 0.05
 
 
-@inner
+@allocating
 def merged(first, second):
     """Two increasing sequences as one."""
     both = np.empty(first.shape[0] + second.shape[0])
@@ -58,8 +56,8 @@ def merged(first, second):
     return both
 
 
-@inner
-def march_row(task, goal, rules, least, places, chain, nodes, pieces):
+@allocating
+def march_row(task, goal, rules, places, chain, nodes, pieces):
     """Nodes and masses of one row; returns their number, the error, the lost width, the number of pieces and of rays.
 
     What a row that has spent its flights leaves undone is in its error. ``pieces`` receives first and last
@@ -87,7 +85,7 @@ def march_row(task, goal, rules, least, places, chain, nodes, pieces):
             j = follow[j]
         if j != i:
             ready, miss, other, spent = integrate_piece(
-                (xs[i], xs[j]), outs[i], labels[i], RULE_SHARE * goal, LEAST_SHARE, rules, least, task, nodes, filled,
+                (xs[i], xs[j]), (outs[i], labels[i]), RULE_SHARE * goal, rules, task, nodes, filled,
                 count < MOST_SAMPLES - 4 and not is_spent(task),
             )  # fmt: skip
             rays += spent
@@ -116,7 +114,7 @@ def march_row(task, goal, rules, least, places, chain, nodes, pieces):
     return filled, error, lost, number, rays + count
 
 
-@inner
+@allocating
 def room_for_pieces(count):
     """First places, last places and labels."""
     return np.empty(count), np.empty(count), np.empty(count, np.uint64)
@@ -143,7 +141,7 @@ def wide_middles(lows, highs, least):
 
 
 @_compile
-def march_rows(thetas, tolerances, setting, degree, rules, least, seeds, seed_starts):
+def march_rows(thetas, tolerances, setting, degree, rules, seeds, seed_starts):
     """Rows at increasing angles.
 
     A row starts from its seeds, which increase, and from the
@@ -168,7 +166,7 @@ def march_rows(thetas, tolerances, setting, degree, rules, least, seeds, seed_st
         task = task_of(setting, thetas[k], degree, spent)
         goal = tolerances[k] * whole
         places = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
-        filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, least, places, chain, nodes, pieces)
+        filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, places, chain, nodes, pieces)
         flights[k] = spent[0]
         previous = wide_middles(lows[:number], highs[:number], goal)
         begin, end = node_starts[k], node_starts[k] + filled

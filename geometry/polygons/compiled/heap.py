@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from numba import njit
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ....core.checks import Floats
+from ...tracing.compiled.options import inlined
 from .columns import FLUX, VERTEX_COLUMNS
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+
+class BeamTables(NamedTuple):
+    """The tables of beams, see `columns`, and the heap: slots, as many as the loop says."""
+
+    corners: Floats
+    real: Floats
+    whole: NDArray[np.int64]
+    heap: NDArray[np.int64]
 
 
-@_compile
+@inlined
 def push(heap, size, real, slot):
     """Put a beam on the heap; returns its new size."""
     i = size
@@ -23,7 +35,7 @@ def push(heap, size, real, slot):
     return size + 1
 
 
-@_compile
+@inlined
 def pop(heap, size, real):
     """Take the beam of most flux off the heap; returns it and the new size."""
     top = heap[0]
@@ -43,7 +55,7 @@ def pop(heap, size, real):
     return top, size
 
 
-@_compile
+@inlined
 def copied(slot, real, whole, new):
     """Copy a beam's numbers, but for its polygon, to a new slot."""
     for k in range(real.shape[1]):
@@ -52,7 +64,7 @@ def copied(slot, real, whole, new):
         whole[new, k] = whole[slot, k]
 
 
-@_compile
+@inlined
 def put(polygon, count, corners, slot):
     """Write a polygon into the tables."""
     for j in range(count):

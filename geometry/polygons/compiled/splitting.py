@@ -9,12 +9,14 @@ weights: every component keeps its relative accuracy down to grazing. `columns` 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
 from ....core.rounding import EPS
 from ...tracing.compiled.growing import larger, longer, taller
+from ...tracing.compiled.options import inlined
 from ...tracing.compiled.trigonometry import PI, PI_REST
 from ...tracing.double_double.arithmetic import add
 from .codes import FIRST_WALL, OPENING
@@ -57,7 +59,7 @@ from .columns import (
     WALL_NORMAL_Y,
     WHOLE_COLUMNS,
 )
-from .heap import copied, pop, push, put
+from .heap import BeamTables, copied, pop, push, put
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 # f is a sum of five products of numbers with one to three rounding errors each; every term is counted in `f`'s size.
@@ -69,6 +71,8 @@ DONE, BUDGET = 0, 1
 RECOUNT = 4096
 # A beam may pass this many triangles for every beam that the budget allows.
 STEPS_A_BEAM = 64
+# Slots of the tables, and vertices of a beam, to begin with.
+ROOM, WIDE = 1024, 12
 
 
 @_compile
@@ -100,7 +104,7 @@ def wall_lines(x, y, turn_high):
     return lines
 
 
-@_compile
+@inlined
 def polygon_flux(polygon, count):
     """The integral of dp dtheta over a polygon of lines, positive if counterclockwise, as a fan of triangles.
 
@@ -119,7 +123,7 @@ def polygon_flux(polygon, count):
     return total
 
 
-@_compile
+@inlined
 def clip(polygon, count, values, wanted, edge_x, edge_y, out):
     """The part of a polygon where the functional has the wanted sign; returns its number of vertices."""
     size = 0
@@ -147,10 +151,37 @@ def clip(polygon, count, values, wanted, edge_x, edge_y, out):
     return size
 
 
-@_compile
-def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
-    """Take a beam through an edge of its triangle: on to the next one, back from a wall, or out (then True)."""
-    code = beyond[edge]
+class Apex(NamedTuple):
+    """The third vertex of a beam's triangle, unfolded, and the rounding errors of its coordinates; the two sides there.
+
+    ``left`` is the edge of the triangle left of the beam, ``right`` that on the right.
+    """
+
+    x: float
+    y: float
+    error_x: float
+    error_y: float
+    left: int
+    right: int
+
+
+class Signs(NamedTuple):
+    """On which sides of the lines of a beam an apex lies.
+
+    ``positive`` and ``negative`` say which signs the functional has. ``rounding`` bounds the flux of what lies beyond
+    the line of an apex that divides the beam by less than rounding.
+    """
+
+    positive: bool
+    negative: bool
+    rounding: float
+
+
+@inlined
+def enter(edge, slot, beams, mesh, distance):
+    """-> bool: take a beam through an edge of its triangle: on to the next one, back from a wall, or out (True)."""
+    real, whole = beams.real, beams.whole
+    code = mesh.beyond[edge]
     if code >= 0:
         whole[slot, EDGE] = code
         return False
@@ -161,7 +192,7 @@ def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
     wall = FIRST_WALL - code
     sign = float(whole[slot, SIGN])
     # the image of the wall's unit normal, whose angle is turn + sign (direction + pi / 2)
-    turn = sign * turn_high[wall], sign * turn_low[wall]
+    turn = sign * mesh.turn_high[wall], sign * mesh.turn_low[wall]
     high, low = add((real[slot, TURN], real[slot, TURN_LOW]), turn)
     sine, cosine = math.sin(high), math.cos(high)
     sine, cosine = sine + low * cosine, cosine - low * sine
@@ -178,22 +209,12 @@ def enter(edge, slot, real, whole, beyond, turn_high, turn_low, distance):
     return False
 
 
-@_compile
-def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, tolerance, max_beams, halves):
-    """Carry the beams of all rays through the hollow, the largest first; of the rays with theta < pi/2 if halves is 1.
-
-    Returns the tables, the number of slots, the rounding bound (flux) and the number of splits.
-    """
-    width = x[x.shape[0] - 1]
-    distance = wall_lines(x, y, turn_high)[:, WALL_DISTANCE]
-    room, wide = 1024, 12
-    corners = np.empty((room, wide, VERTEX_COLUMNS))
-    real = np.zeros((room, REAL_COLUMNS))
-    whole = np.zeros((room, WHOLE_COLUMNS), np.int64)
-    heap = np.empty(room, np.int64)
-    used, queue = 0, 0
+@inlined
+def entrance_beams(beams, mesh, halves):
+    """-> int: fill in the beams of the rays with theta < pi/2, of all if ``halves`` is 2; returns the heap's size."""
+    width, queue = mesh.x[mesh.x.shape[0] - 1], 0
     for half in range(halves):
-        polygon = corners[half]
+        polygon = beams.corners[half]
         for i in range(3):
             for k in range(VERTEX_COLUMNS):
                 polygon[i, k] = 0.0
@@ -203,133 +224,194 @@ def split_beams(x, y, triangles, beyond, turn_high, turn_low, entrance, toleranc
         else:
             polygon[0, LINE_S], polygon[1, LINE_C], polygon[2, LINE_S] = 1.0, -1.0, 1.0
             polygon[2, LINE_P], polygon[1, CUT_X] = width, width
-        whole[half, COUNT], whole[half, EDGE], whole[half, SIGN] = 3, entrance, 1
-        real[half, FLUX] = polygon_flux(polygon, 3)
-        queue = push(heap, queue, real, half)
-        used += 1
-    total = real[:halves, FLUX].sum()
-    open_flux = total
+        beams.whole[half, COUNT], beams.whole[half, EDGE], beams.whole[half, SIGN] = 3, mesh.entrance, 1
+        beams.real[half, FLUX] = polygon_flux(polygon, 3)
+        queue = push(beams.heap, queue, beams.real, half)
+    return queue
+
+
+@inlined
+def apex_of(slot, beams, mesh):
+    """-> Apex: of the triangle that a beam enters."""
+    real, edge = beams.real, beams.whole[slot, EDGE]
+    sign = float(beams.whole[slot, SIGN])
+    triangle, side = edge // 3, edge % 3
+    apex = mesh.triangles[triangle, (side + 2) % 3]
+    x, y = mesh.x[apex], mesh.y[apex]
+    sine, cosine = math.sin(real[slot, TURN]), math.cos(real[slot, TURN])
+    sine, cosine = sine + real[slot, TURN_LOW] * cosine, cosine - real[slot, TURN_LOW] * sine
+    xx, xy, yx, yy = cosine * x, -sign * sine * y, sine * x, sign * cosine * y
+    # the side of the triangle between its apex and the vertex of the edge that lies left of the beam, or right
+    left, right = (side + 1) % 3, (side + 2) % 3
+    if sign < 0.0:
+        left, right = right, left
+    return Apex(
+        xx + xy + real[slot, T_X],
+        yx + yy + real[slot, T_Y],
+        FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(real[slot, T_X])) + real[slot, ERROR_X],
+        FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(real[slot, T_Y])) + real[slot, ERROR_Y],
+        3 * triangle + left,
+        3 * triangle + right,
+    )
+
+
+@inlined
+def signs_of(polygon, count, apex, values):
+    """-> Signs: fill in the values of an apex's functional at the vertices of a beam, 0 within rounding."""
+    doubtful, doubt = False, 0.0
+    positive, negative = False, False
+    low, high = 0, 0
+    for i in range(count):
+        p, s, c = polygon[i, LINE_P], polygon[i, LINE_S], polygon[i, LINE_C]
+        value = apex.x * s - apex.y * c - p
+        slack = apex.error_x * s + apex.error_y * abs(c) + FUNCTIONAL_ULPS * EPS * p
+        if abs(value) <= slack:
+            if value != 0.0:
+                doubtful = True
+            value = 0.0
+        doubt = max(doubt, slack)
+        values[i] = value
+        positive = positive or value > 0.0
+        negative = negative or value < 0.0
+        if c * polygon[low, LINE_S] > s * polygon[low, LINE_C]:
+            low = i
+        if c * polygon[high, LINE_S] < s * polygon[high, LINE_C]:
+            high = i
     rounding = 0.0
-    values = np.empty(wide)
-    first, second = np.empty((wide, VERTEX_COLUMNS)), np.empty((wide, VERTEX_COLUMNS))
-    splits, steps = 0, 0
-    status = DONE
-    slot = -1
+    if doubtful and not (positive and negative):
+        # what lies beyond the line, by at most `doubt` in p, over at most the beam's range of angles
+        spread = polygon[high, LINE_S] * polygon[low, LINE_C] - polygon[high, LINE_C] * polygon[low, LINE_S]
+        rounding = 0.5 * math.pi * doubt * abs(spread)
+    return Signs(positive, negative, rounding)
+
+
+@inlined
+def cut_rounding(polygon, count, apex, rounding):
+    """-> float: a bound, added to ``rounding``, of the flux on the wrong side of the line through an apex.
+
+    The line is misplaced by at most ``doubt`` in p over the cut's range of angles.
+    """
+    for i in range(count):
+        if polygon[i, CUT_X] == apex.x and polygon[i, CUT_Y] == apex.y:
+            j = i + 1 if i + 1 < count else 0
+            here_s, here_c, there_s, there_c = (
+                polygon[i, LINE_S],
+                polygon[i, LINE_C],
+                polygon[j, LINE_S],
+                polygon[j, LINE_C],
+            )
+            p, s, c = max(polygon[i, LINE_P], polygon[j, LINE_P]), max(here_s, there_s), max(abs(here_c), abs(there_c))
+            doubt = apex.error_x * s + apex.error_y * c + FUNCTIONAL_ULPS * EPS * p
+            rounding += 0.5 * math.pi * doubt * abs(here_s * there_c - here_c * there_s)
+    return rounding
+
+
+@_compile
+def with_room(beams, used, count):
+    """-> Beams: tables with a slot beyond ``used`` and with room for polygons of one vertex more than ``count``."""
+    corners, real, whole, heap = beams
+    room, wide = corners.shape[0], corners.shape[1]
+    if used == room:
+        room *= 2
+        corners = larger(corners, room, wide)
+        real, whole, heap = taller(real, room), taller(whole, room), longer(heap, room)
+    if count + 1 >= wide:
+        corners = larger(corners, room, 2 * wide)
+    return BeamTables(corners, real, whole, heap)
+
+
+@inlined
+def queue_flux(beams, queue):
+    """-> float: flux of the beams on the heap."""
+    total = 0.0
+    for i in range(queue):
+        total += beams.real[beams.heap[i], FLUX]
+    return total
+
+
+@inlined
+def cut_beam(slot, new, apex, values, room, beams, rounding):
+    """-> float: divide a beam by the line through an apex, its right part to a new slot; adds to ``rounding``.
+
+    ``room`` are two polygons to work in.
+    """
+    polygon, count = beams.corners[slot], beams.whole[slot, COUNT]
+    first, second = room
+    count_first = clip(polygon, count, values, 1.0, apex.x, apex.y, first)
+    count_second = clip(polygon, count, values, -1.0, apex.x, apex.y, second)
+    copied(slot, beams.real, beams.whole, new)
+    put(first, count_first, beams.corners, slot)
+    put(second, count_second, beams.corners, new)
+    beams.whole[slot, COUNT], beams.whole[new, COUNT] = count_first, count_second
+    beams.real[slot, FLUX] = polygon_flux(beams.corners[slot], count_first)
+    beams.real[new, FLUX] = polygon_flux(beams.corners[new], count_second)
+    return cut_rounding(first, count_first, apex, rounding)
+
+
+@_compile
+def split_beams(mesh, tolerance, max_beams, halves):
+    """-> (corners, real, whole, used, rounding, splits, status): the beams of all rays, the largest divided first.
+
+    Of the rays with theta < pi/2 if ``halves`` is 1. The tables have ``used`` slots; ``rounding`` is a bound of flux.
+    """
+    distance = wall_lines(mesh.x, mesh.y, mesh.turn_high)[:, WALL_DISTANCE]
+    beams = BeamTables(
+        np.empty((ROOM, WIDE, VERTEX_COLUMNS)),
+        np.zeros((ROOM, REAL_COLUMNS)),
+        np.zeros((ROOM, WHOLE_COLUMNS), np.int64),
+        np.empty(ROOM, np.int64),
+    )
+    used, queue = halves, entrance_beams(beams, mesh, halves)
+    total = beams.real[:halves, FLUX].sum()
+    open_flux = total
+    rounding, splits, steps, status, slot = 0.0, 0, 0, DONE, -1
+    values, polygons = np.empty(WIDE), (np.empty((WIDE, VERTEX_COLUMNS)), np.empty((WIDE, VERTEX_COLUMNS)))
     while True:
         if slot < 0:
             if queue == 0:
                 break
             if splits % RECOUNT == 0 or open_flux <= tolerance * total:
-                open_flux = 0.0
-                for i in range(queue):
-                    open_flux += real[heap[i], FLUX]
+                open_flux = queue_flux(beams, queue)
                 if open_flux <= tolerance * total:
                     break
             if used >= max_beams or steps >= STEPS_A_BEAM * max_beams:
                 status = BUDGET
                 break
-            slot, queue = pop(heap, queue, real)
+            slot, queue = pop(beams.heap, queue, beams.real)
         steps += 1
         if steps >= STEPS_A_BEAM * max_beams:
-            queue = push(heap, queue, real, slot)
-            status = BUDGET
+            queue, status = push(beams.heap, queue, beams.real, slot), BUDGET
             break
-        edge, count = whole[slot, EDGE], whole[slot, COUNT]
-        sign = float(whole[slot, SIGN])
-        triangle, side = edge // 3, edge % 3
-        apex = triangles[triangle, (side + 2) % 3]
-        sine, cosine = math.sin(real[slot, TURN]), math.cos(real[slot, TURN])
-        sine, cosine = sine + real[slot, TURN_LOW] * cosine, cosine - real[slot, TURN_LOW] * sine
-        xx, xy, yx, yy = cosine * x[apex], -sign * sine * y[apex], sine * x[apex], sign * cosine * y[apex]
-        vx, vy = xx + xy + real[slot, T_X], yx + yy + real[slot, T_Y]
-        size_x = FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(real[slot, T_X])) + real[slot, ERROR_X]
-        size_y = FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(real[slot, T_Y])) + real[slot, ERROR_Y]
-        polygon = corners[slot]
-        doubtful, doubt = False, 0.0
-        positive, negative = False, False
-        low_i, high_i = 0, 0
-        for i in range(count):
-            p, s, c = polygon[i, LINE_P], polygon[i, LINE_S], polygon[i, LINE_C]
-            value = vx * s - vy * c - p
-            slack = size_x * s + size_y * abs(c) + FUNCTIONAL_ULPS * EPS * p
-            if abs(value) <= slack:
-                if value != 0.0:
-                    doubtful = True
-                value = 0.0
-            doubt = max(doubt, slack)
-            values[i] = value
-            positive = positive or value > 0.0
-            negative = negative or value < 0.0
-            if c * polygon[low_i, LINE_S] > s * polygon[low_i, LINE_C]:
-                low_i = i
-            if c * polygon[high_i, LINE_S] < s * polygon[high_i, LINE_C]:
-                high_i = i
-        if doubtful and not (positive and negative):
-            # what lies beyond the line, by at most `doubt` in p, over at most the beam's range of angles
-            spread = polygon[high_i, LINE_S] * polygon[low_i, LINE_C] - polygon[high_i, LINE_C] * polygon[low_i, LINE_S]
-            rounding += 0.5 * math.pi * doubt * abs(spread)
-        # the side of the triangle between its apex and the vertex of the edge that lies left of the beam, or right
-        left_side, right_side = (side + 1) % 3, (side + 2) % 3
-        if sign < 0.0:
-            left_side, right_side = right_side, left_side
-        if not (positive and negative):
-            if not positive and not negative:
-                rounding += abs(real[slot, FLUX])
-            out = 3 * triangle + (right_side if negative else left_side)
-            if enter(out, slot, real, whole, beyond, turn_high, turn_low, distance):
-                open_flux -= real[slot, FLUX]
+        apex, count = apex_of(slot, beams, mesh), beams.whole[slot, COUNT]
+        signs = signs_of(beams.corners[slot], count, apex, values)
+        rounding += signs.rounding
+        if not (signs.positive and signs.negative):
+            if not signs.positive and not signs.negative:
+                rounding += abs(beams.real[slot, FLUX])
+            if enter(apex.right if signs.negative else apex.left, slot, beams, mesh, distance):
+                open_flux -= beams.real[slot, FLUX]
                 slot = -1
             continue
         if used >= max_beams:
-            queue = push(heap, queue, real, slot)
-            status = BUDGET
+            queue, status = push(beams.heap, queue, beams.real, slot), BUDGET
             break
         splits += 1
-        if used == room:
-            room *= 2
-            corners = larger(corners, room, wide)
-            real, whole, heap = taller(real, room), taller(whole, room), longer(heap, room)
-            polygon = corners[slot]
-        if count + 1 >= wide:
-            wide *= 2
-            corners = larger(corners, room, wide)
-            polygon = corners[slot]
-            values = longer(values, wide)
-            first, second = np.empty((wide, VERTEX_COLUMNS)), np.empty((wide, VERTEX_COLUMNS))
-        count_first = clip(polygon, count, values, 1.0, vx, vy, first)
-        count_second = clip(polygon, count, values, -1.0, vx, vy, second)
-        for i in range(count_first):
-            if first[i, CUT_X] == vx and first[i, CUT_Y] == vy:
-                # the line that divides is misplaced by at most `doubt` in p over the cut's range of angles
-                j = i + 1 if i + 1 < count_first else 0
-                s, c = max(first[i, LINE_S], first[j, LINE_S]), max(abs(first[i, LINE_C]), abs(first[j, LINE_C]))
-                doubt = size_x * s + size_y * c + FUNCTIONAL_ULPS * EPS * max(first[i, LINE_P], first[j, LINE_P])
-                rounding += (
-                    0.5
-                    * math.pi
-                    * doubt
-                    * abs(first[i, LINE_S] * first[j, LINE_C] - first[i, LINE_C] * first[j, LINE_S])
-                )
-        new = used
+        beams = with_room(beams, used, count)
+        if values.shape[0] < beams.corners.shape[1]:
+            wide = beams.corners.shape[1]
+            values, polygons = np.empty(wide), (np.empty((wide, VERTEX_COLUMNS)), np.empty((wide, VERTEX_COLUMNS)))
+            signs_of(beams.corners[slot], count, apex, values)
+        open_flux -= beams.real[slot, FLUX]
+        rounding = cut_beam(slot, used, apex, values, polygons, beams, rounding)
+        open_flux += beams.real[slot, FLUX] + beams.real[used, FLUX]
+        for part, edge in ((slot, apex.left), (used, apex.right)):
+            if enter(edge, part, beams, mesh, distance):
+                open_flux -= beams.real[part, FLUX]
+            else:
+                queue = push(beams.heap, queue, beams.real, part)
         used += 1
-        copied(slot, real, whole, new)
-        put(first, count_first, corners, slot)
-        put(second, count_second, corners, new)
-        whole[slot, COUNT], whole[new, COUNT] = count_first, count_second
-        open_flux -= real[slot, FLUX]
-        real[slot, FLUX] = polygon_flux(corners[slot], count_first)
-        real[new, FLUX] = polygon_flux(corners[new], count_second)
-        open_flux += real[slot, FLUX] + real[new, FLUX]
-        if enter(3 * triangle + left_side, slot, real, whole, beyond, turn_high, turn_low, distance):
-            open_flux -= real[slot, FLUX]
-        else:
-            queue = push(heap, queue, real, slot)
-        if enter(3 * triangle + right_side, new, real, whole, beyond, turn_high, turn_low, distance):
-            open_flux -= real[new, FLUX]
-        else:
-            queue = push(heap, queue, real, new)
         slot = -1
-    return corners, real, whole, used, rounding, splits, status
+    return beams.corners, beams.real, beams.whole, used, rounding, splits, status
 
 
 @_compile

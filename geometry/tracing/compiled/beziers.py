@@ -41,7 +41,7 @@ def falling_root(a0, a1, a2, a3, low, high):
         step = s - value / slope if slope != 0.0 else 0.5 * (low + high)
         if not low < step < high:
             step = 0.5 * (low + high)
-        if abs(step - s) <= EPS * abs(step) or step == low or step == high:
+        if abs(step - s) <= EPS * abs(step) or step in (low, high):
             return step
         s = step
     return s

@@ -159,8 +159,12 @@ def cell_of(x, cell):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def trace_closed(x, theta, hollows, closed, cell, limit, out_x, out_theta, bounces, status):
-    """Trace a block of rays through flat tops and closed forms; all others get the status `UNDECIDED`."""
+def trace_closed(x, theta, hollows, closed, cell, limit, results):
+    """Trace a block of rays through flat tops and closed forms; all others get the status `UNDECIDED`.
+
+    ``results`` are four arrays to fill: x, theta, collisions, status.
+    """
+    out_x, out_theta, bounces, status = results
     room = np.empty((6, RAYS))
     rays, others, met = np.empty(RAYS, np.int64), np.empty(RAYS, np.int64), np.empty(RAYS, np.int64)
     # the rays of a hollow in a block are a list: the first one, and for each the next one, numbers from 0 in the block

@@ -32,11 +32,13 @@ LEAST_SHARE = 5e-324
 
 
 @inlined
-def line_time(joints, lines, j, c_before, c_after, px, py, vx, vy):
+def line_time(tables, j, sides, px, py, vx, vy):
     """-> (t, share): flight time to the line that starts at joint j, and the share of it there, negative from its end.
 
-    ``c_before`` and ``c_after`` are the numbers c of its joints.
+    ``sides`` are the numbers c of its joints.
     """
+    joints, lines = tables.joints, tables.lines
+    c_before, c_after = sides
     share = c_before / (c_before - c_after)
     near = j
     if share > 0.5:
@@ -68,7 +70,7 @@ def nearest_line(scope, own, px, py, vx, vy, time):
     ``nearby`` says that a line is met so close that the start's rounding may count; see `nearby`.
     """
     tables, slack = scope.tables, scope.slack
-    joints, lines = tables.joints, tables.lines
+    joints = tables.joints
     close = NEARBY_SLACKS * slack
     best, found, best_share, nearby = np.inf, -1, 0.0, False
     first, end = scope.joints
@@ -79,7 +81,7 @@ def nearest_line(scope, own, px, py, vx, vy, time):
         if c_before >= 0.0 >= c_after and c_before > c_after and joints[j, STARTS_LINE] > 0.0:
             is_own = own.kind == LINE and own.number == j
             if not is_own:
-                t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
+                t, share = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
                 if t > close:
                     if t < min(best, time):
                         best, found, best_share = t, j, share
@@ -96,8 +98,8 @@ def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
     Lines are listed in every cell that they nearly touch, so the walk's own rounding leaves out no line that the ray
     can meet; the signs at the joints are the same numbers in every cell.
     """
-    hollow, slack, grid = scope.hollow, scope.slack, scope.tables.grid
-    joints, lines = scope.tables.joints, scope.tables.lines
+    tables, hollow, slack = scope.tables, scope.hollow, scope.slack
+    joints, grid = tables.joints, tables.grid
     close = NEARBY_SLACKS * slack
     columns, rows, base = int(hollow[GRID_COLUMNS]), int(hollow[GRID_ROWS]), int(hollow[GRID_START])
     x, y = (px - hollow[GRID_X]) / hollow[CELL_WIDTH], (py - hollow[GRID_Y]) / hollow[CELL_HEIGHT]
@@ -121,7 +123,7 @@ def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
             c_after, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
             corner_time = min(corner_time, ahead)
             if c_before >= 0.0 >= c_after and c_before > c_after and (own.kind != LINE or j != own.number):
-                t, share = line_time(joints, lines, j, c_before, c_after, px, py, vx, vy)
+                t, share = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
                 # of two lines at one distance the first in the order of the wall is hit, as without a grid
                 if t > close:
                     if t < best or (t == best and j < found):

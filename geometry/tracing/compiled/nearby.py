@@ -67,7 +67,7 @@ def line_nearby(tables, j, px, py, vx, vy, slack):
     c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
     c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
     if joints[j, STARTS_LINE] > 0.0 and c_before >= 0.0 >= c_after and c_before > c_after:
-        t, share = line_time(joints, tables.lines, j, c_before, c_after, px, py, vx, vy)
+        t, share = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
         height, reach = t * (c_before - c_after), slack * tables.lines[j, LENGTH]
         if abs(t) <= NEARBY_SLACKS * slack and height >= -reach:
             return t, share, height > reach
@@ -89,8 +89,12 @@ def arc_nearby(arc, px, py, vx, vy, slack):
 
 
 @compiled
-def piece_nearby(tables, kind, number, own, px, py, vx, vy, slack):
-    """-> (t, s, tangent, is_clear): flight time to a piece that is met close by, or inf, and where it is met."""
+def piece_nearby(tables, piece, own, px, py, vx, vy, slack):
+    """-> (t, s, tangent, is_clear): flight time to a piece that is met close by, or inf, and where it is met.
+
+    ``piece`` is its kind and row.
+    """
+    kind, number = piece
     is_own = own.kind == kind and own.number == number
     t, s, tangent, is_clear = np.inf, 0.0, 0, False
     if kind == BEZIER:
@@ -123,7 +127,7 @@ def hit_nearby(scope, own, px, py, vx, vy):
         (BEZIER, scope.beziers),
     ):
         for number in range(first, end):
-            t, s, tangent, is_clear = piece_nearby(tables, kind, number, own, px, py, vx, vy, slack)
+            t, s, tangent, is_clear = piece_nearby(tables, (kind, number), own, px, py, vx, vy, slack)
             if t < found.time:
                 hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else DOUBTFUL)
                 if is_clear or starts_in_front(tables, hit, own, px, py, vx, vy, slack):

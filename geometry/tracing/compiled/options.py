@@ -1,8 +1,9 @@
 """How the loops over flights are compiled. Loads numba.
 
 Arrays belong to the caller for the whole run. To count references to them, an atomic operation at each function that
-takes one, took a quarter of the time of the disk's collision: such functions are compiled without numba's run time, and
-allocate nothing. Passing an array costs ten arguments, so small functions are inlined.
+takes one, took a quarter of the time of the disk's collision: such functions are compiled without numba's run time.
+They allocate nothing, and they return arrays only to callers that count no references either. Passing an array costs
+ten arguments, so small functions are inlined.
 """
 
 from __future__ import annotations

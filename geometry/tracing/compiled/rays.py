@@ -131,18 +131,16 @@ def nearest_curve(scope, own, px, py, vx, vy):
         t, tangent, _ = arc_time(circles[k], is_own, px, py, vx, vy, 1.0)
         if abs(t) <= close and not is_own:
             nearby = True
-        elif 0.0 <= t < time:
-            if on_arc_after(circles[k], t, px, py, vx, vy, 1.0, slack):
-                time, kind, number, doubt = t, CIRCLE, k, tangent
+        elif 0.0 <= t < time and on_arc_after(circles[k], t, px, py, vx, vy, 1.0, slack):
+            time, kind, number, doubt = t, CIRCLE, k, tangent
     first, end = scope.ellipses
     for k in range(first, end):
         is_own = own.kind == ELLIPSE and own.number == k
         t, tangent, _ = arc_time(ellipses[k], is_own, px, py, vx, vy, ellipses[k, STRETCH])
         if abs(t) <= close and not is_own:
             nearby = True
-        elif 0.0 <= t < time:
-            if on_arc_after(ellipses[k], t, px, py, vx, vy, ellipses[k, STRETCH], slack):
-                time, kind, number, doubt = t, ELLIPSE, k, tangent
+        elif 0.0 <= t < time and on_arc_after(ellipses[k], t, px, py, vx, vy, ellipses[k, STRETCH], slack):
+            time, kind, number, doubt = t, ELLIPSE, k, tangent
     first, end = scope.beziers
     for k in range(first, end):
         own_s = own.s if own.kind == BEZIER and own.number == k else -1.0
@@ -256,10 +254,10 @@ def skip_run(scope, hit, own, px, py, vx, vy, most):
     # the ray came from this line, to that one, and back
     if hit.kind == LINE and own.kind == LINE and own.before == number:
         lines, pairs = tables.lines, tables.pairs
-        nx, ny = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
+        normal = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
         for row in range(int(lines[number, FIRST_PAIR]), int(lines[number, PAIRS_END])):
             if pairs[row, PARTNER] == own.number:
-                return skip_crossings(pairs[row], nx, ny, px, py, vx, vy, scope.slack, most)
+                return skip_crossings(pairs[row], normal, px, py, vx, vy, scope.slack, most)
     return px, py, vx, vy, np.int64(0)
 
 

@@ -70,19 +70,19 @@ def skip_hops(arc, px, py, vx, vy, most):
 
 
 @compiled
-def skip_crossings(pair, nx, ny, px, py, vx, vy, slack, most):
+def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
     """-> (px, py, vx, vy, hits): carry a ray that has just left a line for the facing one, by hits of an even number.
 
-    They are ``most`` at most.
-    ``pair`` is a row of the table of that name (see `scene`), (nx, ny) the unit normal of the line. With beta the angle
-    between the lines, g the gap at the ray and alpha the angle of its velocity with the direction u of the apex, the
-    unfolded lines are a fan: hit k lies
+    They are ``most`` at most. ``pair`` is a row of the table of that name, ``normal`` the unit normal of the line. With
+    beta the angle between the lines, g the gap at the ray and alpha the angle of its velocity with the direction u of
+    the apex, the unfolded lines are a fan: hit k lies
 
         s_k = g (2 sin(k beta/2) / sin(beta)) cos(alpha + k beta/2) / sin(alpha + k beta)
 
     further towards the apex and its angle is alpha + k beta; for beta = 0, s_k = g k cot(alpha). All terms keep
     their digits down to beta = 0, because the distance g / sin(beta) of the apex enters by its inverse only.
     """
+    nx, ny = normal
     ux, uy, sine, beta = pair[APEX_X], pair[APEX_Y], pair[PAIR_SINE], pair[PAIR_ANGLE]
     along, away = vx * ux + vy * uy, vx * nx + vy * ny
     ahead = (pair[NEAR_X] - px) * ux + (pair[NEAR_Y] - py) * uy

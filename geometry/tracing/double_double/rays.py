@@ -155,13 +155,13 @@ def face_of(tables, kind, number, s):
 
 
 @_compile
-def meets(tables, hit, own, px, py, vx, vy, height, errors):
-    """-> bool: whether a ray meets a piece that it hits; ``height`` is that of its start in front of the piece.
+def meets(tables, hit, own, px, py, vx, vy, heights):
+    """-> bool: whether a ray meets a piece that it hits.
 
-    ``errors`` are the slack of double precision, within which the pieces' own places decide, so that both tracers go
-    the same way, and the error of the ray.
+    ``heights`` are that of its start in front of the piece, the slack of double precision, within which the pieces' own
+    places decide, so that both tracers go the same way, and the error of the ray.
     """
-    slack, error = errors
+    height, slack, error = heights
     if height > slack or own.kind in (LID, SIDE):
         return height >= -error
     if height < -slack:
@@ -250,7 +250,7 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
             t = dot(dx, dy, vx, vy)
             height = t[0] * (before[0] - after[0]) / tables.lines[j - 1, LENGTH]
             hit = WideHit(t, LINE, j - 1, share)
-            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, height, (scope.slack, error)):
+            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, (height, scope.slack, error)):
                 nearest = hit
         before = after
     return nearest, corner
@@ -267,8 +267,8 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
             is_own = own.kind == ARC and own.number == k
             t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
             graze = min(graze, undecided)
-            hit, errors = WideHit(t, ARC, k, own.s), (slack * widest, error * widest)
-            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, height, errors):
+            hit, heights = WideHit(t, ARC, k, own.s), (height, slack * widest, error * widest)
+            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, heights):
                 nearest = hit
     low, high = scope.beziers
     for k in range(low, high):
@@ -279,7 +279,7 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
             nearest = WideHit(t, BEZIER, k, s)
         if near_s[0] >= 0.0:
             hit = WideHit((0.0, 0.0), BEZIER, k, near_s)
-            if meets(tables, hit, own, px, py, vx, vy, 0.0, (slack, error)):
+            if meets(tables, hit, own, px, py, vx, vy, (0.0, slack, error)):
                 nearest = hit
     return nearest, graze
 
@@ -341,10 +341,10 @@ def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
             dx, dy = subtract(wide(joints[j, JOINT_X]), px), subtract(wide(joints[j, JOINT_Y]), py)
             ahead = dot(dx, dy, vx, vy)[0]
             width = width_at(scope, sizes, ahead, error)
-            met = 0.0 < ahead and (ahead - hit.time[0]) * incidence <= 2.0 * width
-            if met and abs(cross(dx, dy, vx, vy)[0]) <= width:
-                if hit.kind != LINE or is_beside(joints, hit.number, j):
-                    return True
+            met = ahead > 0.0 and (ahead - hit.time[0]) * incidence <= 2.0 * width
+            met = met and abs(cross(dx, dy, vx, vy)[0]) <= width
+            if met and (hit.kind != LINE or is_beside(joints, hit.number, j)):
+                return True
     return False
 
 
