@@ -206,12 +206,12 @@ class Isometries:
     sign: Floats
     offset: Floats
     probabilities: Callable[[Floats], Floats]
-    kinks: Floats
+    breakpoints: Floats
 
     def __call__(self, function: Function, rule: Rule) -> Function:
         targets = function.breaks
         sources = (self.sign[:, None] * (targets - self.offset[:, None])).ravel() if targets.size else np.empty(0)
-        breaks = np.concatenate((self.kinks, sources[(sources > 0.0) & (sources < PI)]))
+        breaks = np.concatenate((self.breakpoints, sources[(sources > 0.0) & (sources < PI)]))
         return Function(lambda theta: self._means(function, theta), np.unique(breaks))
 
     def _means(self, function: Function, theta: Floats) -> Floats:

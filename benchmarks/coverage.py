@@ -144,9 +144,9 @@ class Rays(ker.DrivenLaw):
 
     reversible = True
 
-    def respond(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    def reflect(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
         # other rays for every seed: the library's own are the same for every law
-        return self.closed.respond(np.mod(x + self.seed * 0.6180339887498949, 1.0), theta)
+        return self.closed.reflect(np.mod(x + self.seed * 0.6180339887498949, 1.0), theta)
 
 
 def resistance_once(rng: np.random.Generator, rays: int = RESISTANCE_RAYS) -> tuple[float, float]:

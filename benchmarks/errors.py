@@ -20,7 +20,7 @@ from asperity import kernels as ker
 from asperity.core.tables import table
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import row_matrix
-from asperity.kernels.walls.conditionals import adaptive_rows
+from asperity.kernels.walls.conditionals import adaptive_conditionals
 
 TESTS = Path(__file__).parents[1] / "tests"
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
@@ -73,7 +73,7 @@ def outcomes(
         exact = np.array([float.fromhex(value) for value in entry["rows"]])
         within = moments
         for tolerance in tolerances:
-            rows = adaptive_rows(wall, entry["angles"], tolerance)
+            rows = adaptive_conditionals(wall, entry["angles"], tolerance)
             distance = np.abs(rows.mean(np.cos) - exact)
             for k, miss in enumerate(distance.tolist()):
                 yield Outcome("row", kind, tolerance, float(rows.error[k]), miss, entry["row_errors"][k])

@@ -67,7 +67,7 @@ def _of_mushroom(wall: geo.Wall) -> Found:
     entry = (np.arange(GRAZING_POINTS) + 0.5) / GRAZING_POINTS
     law = ker.WallLaw(wall)
     ratios = [
-        float(np.mean(np.sin(angle) / np.sin(law.respond(entry, np.full_like(entry, angle)))))
+        float(np.mean(np.sin(angle) / np.sin(law.reflect(entry, np.full_like(entry, angle)))))
         for angle in GRAZING_ANGLES
     ]
     angles = ", ".join(f"{angle:g}" for angle in GRAZING_ANGLES)

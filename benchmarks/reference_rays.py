@@ -32,7 +32,7 @@ def rays_of(wall: geo.Wall, number: int, net: int) -> Iterator[tuple[Floats, Flo
     for start in range(0, number, CHUNK):
         points = engine.random(min(CHUNK, number - start)).clip(tiny, below_one)
         theta = np.arccos(1.0 - 2.0 * points[:, 1]).clip(1e-9, np.pi - 1e-9)
-        yield theta, law.respond(points[:, 0], theta)
+        yield theta, law.reflect(points[:, 0], theta)
 
 
 def sampled_sums(wall: geo.Wall, bases: dict[str, ker.Basis], rays: int) -> dict[str, list[Floats]]:

@@ -13,7 +13,7 @@ from asperity.kernels.bases.panels import ONE_PANEL
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import KRONROD_SHARE, row_matrix
 from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
-from asperity.kernels.walls.conditionals import adaptive_rows
+from asperity.kernels.walls.conditionals import adaptive_conditionals
 from plain_tracer import trace_plainly
 from random_curved_walls import random_curved_wall
 
@@ -25,7 +25,7 @@ ANGLES = np.array([0.003, 0.4, 1.0, 1.7, 2.9])
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-10])
 def test_rows_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(tolerance: float) -> None:
-    rows = adaptive_rows(ARCS, ANGLES, tolerance)
+    rows = adaptive_conditionals(ARCS, ANGLES, tolerance)
     exact = ker.CircularArcLaw(1.2).apply(np.cos, ANGLES)
     assert np.all(rows.error <= 2.0 * tolerance)
     assert np.all(np.abs(rows.mean(np.cos) - exact) <= rows.error + 1e-13)
@@ -50,7 +50,7 @@ def test_matrices_of_a_focusing_arc_lie_within_their_errors_in_every_basis(basis
 def test_rows_of_random_walls_agree_with_a_plain_tracer(kind: int) -> None:
     wall, entries = random_curved_wall(kind), 400
     x = (np.arange(entries) + 0.5) / entries * wall.period
-    rows = adaptive_rows(wall, [1.1], 1e-7)
+    rows = adaptive_conditionals(wall, [1.1], 1e-7)
     plain = np.mean([math.cos(trace_plainly(wall, place, 1.1)[1]) for place in x.tolist()])
     # a midpoint sum over some twenty changes of itinerary, each of which shifts at most one point by a value of 2
     assert abs(rows.mean(np.cos)[0] - plain) < 20 * 2.0 / entries
@@ -78,8 +78,8 @@ def test_rows_of_equal_hollows_and_flat_tops_are_those_of_one_hollow() -> None:
     width = arc.end[0] - arc.start[0]
     top = geo.Segment((2.0 * width, 0.0), (2.5 * width, 0.0))
     twice = geo.Wall([arc, arc.moved(width, 0.0), top], period=2.5 * width)
-    one = adaptive_rows(geo.focusing_arcs(0.8), [1.0], 1e-9)
-    both = adaptive_rows(twice, [1.0], 1e-9)
+    one = adaptive_conditionals(geo.focusing_arcs(0.8), [1.0], 1e-9)
+    both = adaptive_conditionals(twice, [1.0], 1e-9)
     assert both.rays == one.rays
     mixed = 0.8 * one.mean(np.cos)[0] + 0.2 * math.cos(np.pi - 1.0)
     assert both.mean(np.cos)[0] == pytest.approx(mixed, abs=1e-12)
@@ -115,7 +115,7 @@ def test_a_look_at_some_rows_tells_a_chaotic_hollow_in_sums_and_in_the_other_con
 
 
 def test_rows_of_channels_without_bottom_in_sight_are_those_of_the_closed_form():
-    rows = adaptive_rows(geo.rectangular_teeth(1e6), ANGLES, 1e-9)
+    rows = adaptive_conditionals(geo.rectangular_teeth(1e6), ANGLES, 1e-9)
     exact = ker.RectangularTeethLaw(1e6).apply(np.cos, ANGLES)
     # at 0.003 a ray has 7e8 hits; what ends within rounding of a corner, of a hollow so deep, counts as lost
     assert np.all(rows.lost < [1e-5, *[1e-8] * 4]) and np.all(rows.error < [1e-4, *[1e-6] * 4])
@@ -132,7 +132,7 @@ def test_rows_of_a_wall_with_an_island_agree_with_traced_rays():
     bowl = geo.Arc((0.5, -0.05), (0.5, 0.4), np.pi, 2.0 * np.pi)
     wall = geo.Wall([bowl], islands=[[geo.Arc((0.5, -0.1), 0.02, 0.0, -2.0 * np.pi)]])
     theta, x = np.array([1.0, 1.9]), (np.arange(20_000) + 0.5) / 20_000
-    rows = adaptive_rows(wall, theta, 1e-6)
+    rows = adaptive_conditionals(wall, theta, 1e-6)
     traced = geo.trace(wall, x, theta[:, None])
     # a midpoint sum over some hundred changes of itinerary, each of which shifts at most one point by a value of 2
     assert np.all(traced.escaped) and np.all(rows.error < 1e-4)

@@ -27,7 +27,7 @@ class LinearLaw(ker.Law):
 
     reversible = True
     mirror_symmetric = True
-    fan_out = ANGLES.size
+    evaluations = ANGLES.size
 
     def _sample(self, theta: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         slope, draw = 3.0 * self.g * np.cos(theta), rng.random(theta.shape)

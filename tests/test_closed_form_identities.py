@@ -21,8 +21,8 @@ ANGLES = [0.02, 0.3, 0.7, math.pi / 4, 1.1, math.pi / 3, math.pi / 2, 2.0, 2.9, 
 
 # ---- laws that hold for every wall --------------------------------------------------------------------------------
 def flux_pairing(law: BranchLaw, f: Callable, g: Callable, limit: int, order: int) -> float:
-    kinks, _ = law.breakpoints(limit)
-    angle, weight = SINE.quadrature(np.concatenate([[0.0], kinks, [math.pi]]), order)
+    breakpoints, _ = law.breakpoints(limit)
+    angle, weight = SINE.quadrature(np.concatenate([[0.0], breakpoints, [math.pi]]), order)
     return float(weight @ (f(angle) * law.apply(g, angle)))
 
 
@@ -54,9 +54,9 @@ def test_rectangular_law_is_in_detailed_balance(ratio: float) -> None:
 @pytest.mark.parametrize("angle", [0.05, 0.7, math.pi / 4, 1.1, math.pi / 2, 2.0, 2.9, math.pi - 1e-3])
 def test_triangular_branches_are_smooth_between_kinks(angle: float) -> None:
     law = TriangularTeethLaw(angle)
-    kinks, left_out = law.breakpoints(10**6)
+    breakpoints, left_out = law.breakpoints(10**6)
     assert left_out == 0.0
-    edges = np.concatenate([[0.0], kinks, [math.pi]])
+    edges = np.concatenate([[0.0], breakpoints, [math.pi]])
     eight = rule_by_slot(law, edges, 8)
     sixteen = rule_by_slot(law, edges, 16)
     assert np.max(np.abs(eight - sixteen)) < 1e-13
@@ -71,8 +71,8 @@ def rule_by_slot(law: BranchLaw, edges: np.ndarray, order: int) -> np.ndarray:
 
 @pytest.mark.parametrize("law", [TriangularTeethLaw(0.7), TriangularTeethLaw(2.0), RectangularTeethLaw(1.3)])
 def test_every_slot_is_one_isometry_between_kinks(law: BranchLaw) -> None:
-    kinks, _ = law.breakpoints(400)
-    edges = np.concatenate([[0.0], kinks, [math.pi]])
+    breakpoints, _ = law.breakpoints(400)
+    edges = np.concatenate([[0.0], breakpoints, [math.pi]])
     low, width = edges[:-1, None], np.diff(edges)[:, None]
     theta = low + width * np.array([0.1, 0.3, 0.6, 0.9])
     probability, outgoing = law.branches(theta)
@@ -85,8 +85,8 @@ def test_every_slot_is_one_isometry_between_kinks(law: BranchLaw) -> None:
 
 
 def test_rectangular_kinks_say_how_much_they_leave_out() -> None:
-    kinks, left_out = RectangularTeethLaw(1.0).breakpoints(101)
-    assert kinks.size == 101
+    breakpoints, left_out = RectangularTeethLaw(1.0).breakpoints(101)
+    assert breakpoints.size == 101
     # cot(theta) = k/2, k = 1..50: beyond lies cot(theta) > 25, of probability 1 - 25/sqrt(1 + 625)
     assert abs(left_out - (1.0 - 25.0 / math.sqrt(626.0))) < 1e-15
     assert RectangularTeethLaw(1e8).breakpoints(100)[1] > 0.99
@@ -112,8 +112,8 @@ def test_triangular_correlation_has_the_value_found_by_an_independent_program() 
 
 def test_arc_correlation_has_the_value_found_by_an_independent_program() -> None:
     law = CircularArcLaw(1.2)
-    kinks, _ = law.breakpoints(1000)
-    angle, weight = SINE.quadrature(np.concatenate([[0.0], kinks, [math.pi]]), 6)
+    breakpoints, _ = law.breakpoints(1000)
+    angle, weight = SINE.quadrature(np.concatenate([[0.0], breakpoints, [math.pi]]), 6)
     ratio = 3.0 * float(weight @ (np.cos(angle) * law.apply(np.cos, angle)))
     assert abs(ratio - 0.327558333378) < 1e-12
 
@@ -152,7 +152,7 @@ def test_arc_rows_by_formula_equal_the_mean_over_entry_points() -> None:
     for xi in (1e-3, 0.5, 1.2, math.pi / 2):
         law = CircularArcLaw(xi)
         for theta in (1e-5, 0.3 * xi, 0.999 * xi, xi, 1.3 * xi, 1.5, math.pi - 0.4 * xi):
-            mean = float(np.mean(np.cos(2.0 * law.respond(x, theta))))
+            mean = float(np.mean(np.cos(2.0 * law.reflect(x, theta))))
             assert abs(mean - law.apply(lambda angle: np.cos(2.0 * angle), theta)) < 1e-5
 
 
@@ -161,12 +161,12 @@ def test_arc_rows_by_formula_equal_the_mean_over_entry_points() -> None:
 def test_closed_forms_answer_mirrored_rays_with_mirrored_angles(xi: float, x: float, theta: float) -> None:
     mirrored = math.pi - theta
     for law in (CircularArcLaw(xi), TriangularTeethLaw(2.0 * xi * 0.999), RectangularTeethLaw(xi)):
-        there = float(law.respond(x, theta))
+        there = float(law.reflect(x, theta))
         if isinstance(law, RectangularTeethLaw):
             # its mirror image has the flat top on the right: the crevice [1/2, 1] is mirrored in x = 3/4
-            back = float(law.respond(1.5 - x if x > 0.5 else x, mirrored))
+            back = float(law.reflect(1.5 - x if x > 0.5 else x, mirrored))
         else:
-            back = float(law.respond(1.0 - x, mirrored))
+            back = float(law.reflect(1.0 - x, mirrored))
         if int(law.hits(x, theta)) < 50 and not near_tie(law, x, theta):
             assert abs(there + back - math.pi) < 1e-9
 

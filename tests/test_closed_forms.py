@@ -82,7 +82,7 @@ def compare(law: Law, walls: list[Callable[[np.ndarray, np.ndarray], Hit]], numb
     """Rays of the invariant measure: equal hits and, up to rounding times the hits, equal angles."""
     rng = np.random.default_rng(seed)
     x, theta = rng.uniform(1e-3, 1.0 - 1e-3, number), SINE.sample(number, rng)
-    outgoing, hits = law.respond(x, theta), law.hits(x, theta)
+    outgoing, hits = law.reflect(x, theta), law.hits(x, theta)
     for k in range(number):
         if isinstance(law, RectangularTeethLaw) and x[k] < 0.5:
             angle, count = math.pi - theta[k], 1
@@ -111,7 +111,7 @@ def test_circular_law_is_what_rays_do(xi: float) -> None:
 # ---- distributions against the same rays over all entry points --------------------------------------------------
 def distribution_by_entry_points(law: Law, theta: float, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Distinct outgoing angles and the share of a fine midpoint grid of entry points that leads to each."""
-    outgoing = law.respond((np.arange(points) + 0.5) / points, theta)
+    outgoing = law.reflect((np.arange(points) + 0.5) / points, theta)
     angle, count = np.unique(outgoing.round(9), return_counts=True)
     return angle, count / points
 
@@ -134,7 +134,7 @@ def test_triangular_branches_are_the_shares_of_entry_points(angle: float, theta:
 @given(ratio=st.floats(1e-3, 20.0), theta=st.floats(0.02, math.pi - 0.02))
 def test_rectangular_branches_are_the_shares_of_entry_points(ratio: float, theta: float) -> None:
     law, points = RectangularTeethLaw(ratio), 20_000
-    specular = np.mean(np.abs(law.respond((np.arange(points) + 0.5) / points, theta) - (math.pi - theta)) < 1e-12)
+    specular = np.mean(np.abs(law.reflect((np.arange(points) + 0.5) / points, theta) - (math.pi - theta)) < 1e-12)
     if abs(theta - math.pi / 2) > 1e-9:
         assert abs(law.branches(theta)[0][0] - specular) < 2.0 / points
 
@@ -192,7 +192,7 @@ EXTREME_LAWS = [
 @pytest.mark.parametrize("law", EXTREME_LAWS, ids=repr)
 def test_extreme_walls_and_angles_give_probabilities_and_angles(law: Law) -> None:
     x = np.array([1e-12, 1e-3, 0.4, 0.5 + 1e-9, 0.9, 1.0 - 1e-12])[:, None]
-    outgoing, hits = law.respond(x, EXTREME), law.hits(x, EXTREME)
+    outgoing, hits = law.reflect(x, EXTREME), law.hits(x, EXTREME)
     assert np.all((outgoing > 0.0) & (outgoing < math.pi))
     assert np.all(hits >= 1)
     assert np.allclose(law.apply(np.ones_like, EXTREME), 1.0, rtol=0.0, atol=4 * EPS)
@@ -214,7 +214,7 @@ def test_closed_forms_equal_high_precision_down_to_grazing_and_next_to_the_tips(
                     continue
                 compared += 1
                 assert law.hits(x, theta) == hits, (x, theta)
-                assert abs(float(law.respond(x, theta)) - angle) <= 64 * EPS, (x, theta)
+                assert abs(float(law.reflect(x, theta)) - angle) <= 64 * EPS, (x, theta)
     assert compared > 30
 
 
@@ -273,7 +273,7 @@ def test_angles_and_entry_points_outside_their_range_are_refused(law: Law) -> No
             law.apply(np.cos, theta)
     for x in (0.0, 1.0, -0.5):
         with pytest.raises(InputError, match="x: expected entry points"):
-            law.respond(x, 1.0)
+            law.reflect(x, 1.0)
     with pytest.raises(InputError, match="default_rng"):
         law.sample(1.0, np.random)
 
@@ -289,7 +289,7 @@ def test_samples_have_the_mean_that_the_operator_gives(law: Law) -> None:
 
 def test_respond_and_sample_broadcast() -> None:
     law = CircularArcLaw(0.5)
-    assert law.respond(np.full((3, 1), 0.3), np.full(4, 1.0)).shape == (3, 4)
+    assert law.reflect(np.full((3, 1), 0.3), np.full(4, 1.0)).shape == (3, 4)
     assert law.sample(1.0, np.random.default_rng(0)).shape == ()
     assert law.apply(lambda angle: np.stack([angle, angle**2], axis=-1), np.full((2, 3), 1.0)).shape == (2, 3, 2)
     assert law.apply(np.cos, np.empty(0)).shape == (0,)
@@ -312,7 +312,7 @@ def test_the_law_of_a_crevice_is_that_of_every_float64_angle_however_many_its_cr
 @pytest.mark.parametrize("ratio", [0.7, 30.0, 1e6, 1e12])
 def test_rays_into_a_crevice_have_the_law_and_the_parity_of_their_hits(ratio, theta):
     law, x = RectangularTeethLaw(ratio), (np.arange(20_000) + 0.5) / 20_000
-    outgoing = law.respond(x, theta)
+    outgoing = law.reflect(x, theta)
     back = np.abs(outgoing - theta) <= 1e-12 * theta
     assert np.mean(back) == pytest.approx(law.branches(theta)[0][1], abs=1e-4)
     assert np.array_equal(law.hits(x, theta) % 2 == 0, back)

@@ -122,7 +122,7 @@ def test_the_law_of_the_foreshortened_wall_is_the_closed_form_with_corrected_par
     hits = law.hits(x, theta)
     same = teeth.collisions == hits
     assert same.mean() > 0.99999
-    assert np.max(np.abs(teeth.theta - law.respond(x, theta))[same]) < 1e-12
+    assert np.max(np.abs(teeth.theta - law.reflect(x, theta))[same]) < 1e-12
 
 
 def test_from_wall_foreshortens_and_the_constructor_does_not():

@@ -38,7 +38,7 @@ PARTS = [
     CYCLE,
 ]
 laws = st.sampled_from(PARTS)
-cheap = st.sampled_from([law for law in PARTS if law.fan_out <= 200])
+cheap = st.sampled_from([law for law in PARTS if law.evaluations <= 200])
 
 
 def smooth(angle: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def test_sums_act_linearly(first: Law, second: Law, share: float) -> None:
 def test_composition_is_associative_and_the_first_law_acts_first(first: Law, second: Law, third: Law) -> None:
     both = (first @ second) @ third, first @ (second @ third)
     assert all(isinstance(law, Composition) and len(law.laws) == 3 for law in both)
-    if both[0].fan_out < 20_000:
+    if both[0].evaluations < 20_000:
         nested = first.apply(lambda a: second.apply(lambda b: third.apply(smooth, b), a), THETA[:5])
         assert all(np.array_equal(law.apply(smooth, THETA[:5]), nested) for law in both)
 
@@ -93,7 +93,7 @@ def test_specular_and_retroreflection_are_involutions() -> None:
 @given(cheap, cheap)
 def test_adjoints_pass_to_the_other_side_of_the_inner_product(first: Law, second: Law) -> None:
     for law in (first @ second, 0.4 * first + 0.6 * second, first**2, first.in_specular_frame()):
-        if law.fan_out < 2_000:
+        if law.evaluations < 2_000:
             check_adjoint(law)
 
 
@@ -281,8 +281,8 @@ def test_branches_of_compounds_are_merged_and_act_like_the_law(law: Law) -> None
 
 @pytest.mark.parametrize("law", COMPOUNDS[:3], ids=repr)
 def test_compounds_are_smooth_between_their_kinks(law: Law) -> None:
-    kinks, left_out = law.breakpoints(300)
-    edges = np.concatenate([[0.0], kinks, [math.pi]])
+    breakpoints, left_out = law.breakpoints(300)
+    edges = np.concatenate([[0.0], breakpoints, [math.pi]])
     sums = []
     for order in (8, 16):
         angle, weight = SINE.quadrature(edges, order)

@@ -9,7 +9,7 @@ from scipy.linalg import qr
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.spectral.eigenvalues.completeness import Deflated, margin_below, norm_beyond
-from asperity.spectral.eigenvalues.dense import end_values, outermost
+from asperity.spectral.eigenvalues.dense import end_values, extremal
 
 SIZE = 600
 RNG = np.random.default_rng(7)
@@ -40,7 +40,7 @@ SPECTRA = {
 def test_the_values_of_largest_modulus_are_those_of_their_ranks_within_their_errors(leading, k):
     array = with_spectrum(leading)
     exact = np.sort(np.concatenate([leading, BULK[len(leading) :]]))[::-1]
-    found = outermost(array, None, k)
+    found = extremal(array, None, k)
     # LAPACK may stand in for Lanczos, but not for a proof that fails: these matrices have no other eigenvalues
     assert "Cholesky factorisations no other" in found.method or "since Lanczos" in found.method
     ranks = np.concatenate([np.arange(found.top), len(exact) + np.arange(found.top - len(found.values), 0)])
@@ -53,7 +53,7 @@ def test_the_values_of_largest_modulus_are_those_of_their_ranks_within_their_err
 
 
 def test_the_largest_value_is_found_where_all_moduli_are_at_the_lower_end():
-    found = outermost(with_spectrum([-0.9, -0.8, -0.7]), None, 2)
+    found = extremal(with_spectrum([-0.9, -0.8, -0.7]), None, 2)
     assert found.top == 1
     assert found.values[0] == pytest.approx(np.sort(BULK[3:])[-1], abs=1e-10)
     assert np.allclose(found.values[1:], [-0.8, -0.9], rtol=0.0, atol=1e-10)
@@ -95,7 +95,7 @@ def test_a_deflated_matrix_is_the_compression_to_the_complement():
     assert matrix.frobenius == pytest.approx(np.linalg.norm(exact), rel=1e-12)
     values = np.linalg.eigvalsh(exact)[::-1]
     assert norm_beyond(matrix, values[:1]) >= np.abs(values[1:]).max()
-    found = outermost(array, constant, 2)
+    found = extremal(array, constant, 2)
     ranks = np.concatenate([np.arange(found.top), SIZE + np.arange(found.top - len(found.values), 0)])
     assert np.all(np.abs(found.values - values[ranks]) <= found.errors)
 
@@ -105,7 +105,7 @@ def test_the_factorisation_proves_what_is_off_the_constants_whatever_the_constan
     constant, turned = BASIS[:, 10], 5.0 * BASIS[:, 20]
     array = with_spectrum([0.9, -0.8, 0.7, -0.6])
     array += np.outer(constant, turned) + np.outer(turned, constant)
-    found = outermost(0.5 * (array + array.T), constant, 3)
+    found = extremal(0.5 * (array + array.T), constant, 3)
     assert "Cholesky factorisations no other" in found.method
     assert np.allclose(found.values, [0.9, 0.7, -0.8], rtol=0.0, atol=found.errors.max())
     assert found.errors.max() < 1e-10

@@ -64,7 +64,7 @@ class Swap(ker.BranchLaw):
     """Specular reflection for steep angles, retroreflection for others: two kinks."""
 
     steep: float
-    fan_out = 2
+    evaluations = 2
 
     def branches(self, theta: object) -> tuple[np.ndarray, np.ndarray]:
         theta = np.asarray(theta, dtype=np.float64)

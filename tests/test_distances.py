@@ -21,7 +21,7 @@ from asperity.estimates import Estimate
 from asperity.kernels.distances import joint as joint_distance
 from asperity.kernels.distances.pseudometric import flux_means
 from asperity.kernels.distances.transport import Distributions, grid_wasserstein, wasserstein
-from asperity.kernels.walls.conditionals import WallRows
+from asperity.kernels.walls.conditionals import WallConditionals
 
 KINDS = ("rows", "sup", "joint", "pseudometric")
 
@@ -186,7 +186,7 @@ def test_the_error_between_laws_holds_against_a_finer_level(order):
 
 def test_rows_of_arcs_in_closed_form_are_those_that_are_traced():
     theta, edges = np.array([0.02, 0.4, 0.9, 1.5, 2.9]), np.linspace(0.0, np.pi, 33)
-    traced = WallRows(geo.focusing_arcs(0.9), 0, edges[1:-1])(theta, 1e-10)
+    traced = WallConditionals(geo.focusing_arcs(0.9), 0, edges[1:-1])(theta, 1e-10)
     for k, masses in enumerate(ker.CircularArcLaw(0.9).row_masses(theta, edges)):
         part = slice(traced.starts[k], traced.starts[k + 1])
         counted = np.histogram(traced.nodes[part], edges, weights=traced.weights[part])[0]

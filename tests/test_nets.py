@@ -11,7 +11,7 @@ from asperity import kernels as ker
 from asperity.errors import InputError
 from asperity.kernels.bases.mirror import reflection_matrix
 from asperity.kernels.sampling import rays as ray_sums
-from asperity.kernels.sampling.sobol import PARTS, SOBOL_BITS, Net
+from asperity.kernels.sampling.sobol import PARTS, SOBOL_BITS, SobolSampler
 
 TEETH = ker.TriangularTeethLaw(1.1)
 BASES = [ker.Bins(16), ker.Bins(9), ker.Legendre(6), ker.Panels(np.linspace(0.0, np.pi, 5), 2)]
@@ -25,8 +25,8 @@ class Bounce(ker.DrivenLaw):
 
     reversible = True
 
-    def respond(self, x: object, theta: object) -> np.ndarray:
-        return TEETH.respond(x, theta)  # type: ignore[arg-type]
+    def reflect(self, x: object, theta: object) -> np.ndarray:
+        return TEETH.reflect(x, theta)  # type: ignore[arg-type]
 
 
 def sampled(law: ker.Law, basis: ker.Basis, seed: int) -> ker.KernelMatrix:
@@ -50,7 +50,7 @@ def test_matrices_from_half_of_the_rays_are_mirror_symmetric_markov_and_right_wi
 @pytest.mark.parametrize("looks", [(8, 16), (64, 512), (8, 4096), (128, 1024, 2048)], ids=repr)
 def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks):
     basis, last = ker.Bins(4), looks[-1]
-    parted, whole = (Net(Bounce(mirror_symmetric=None), basis, np.random.default_rng(3)) for _ in range(2))
+    parted, whole = (SobolSampler(Bounce(mirror_symmetric=None), basis, np.random.default_rng(3)) for _ in range(2))
     for look in looks:
         found, rays, _ = parted.sampled(look, symmetrise=False)
         assert rays == look
@@ -64,7 +64,7 @@ def test_a_net_that_goes_on_is_the_net_that_was_never_looked_at(looks):
 def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at_a_time(looks, chunk, monkeypatch):
     monkeypatch.setattr(ray_sums, "SMALLEST_CHUNK", chunk)
     basis, law = ker.Bins(2), Bounce(mirror_symmetric=None)
-    net, twin = (Net(law, basis, np.random.default_rng(5)) for _ in range(2))
+    net, twin = (SobolSampler(law, basis, np.random.default_rng(5)) for _ in range(2))
     for look in looks:
         net.sampled(look, symmetrise=False)
     digits = [[int(place * 2**SOBOL_BITS) for place in point] for point in twin.sequence.random(net.sums.each)]
@@ -73,14 +73,14 @@ def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at
         shifted = [[number ^ by for number, by in zip(point, shift, strict=True)] for point in digits]
         x, u = (np.array(shifted) / 2**SOBOL_BITS + beyond).T
         incoming = ker.SINE.quantile(u)
-        cells = [2 * (incoming > np.pi / 2), law.respond(x, incoming) > np.pi / 2]
+        cells = [2 * (incoming > np.pi / 2), law.reflect(x, incoming) > np.pi / 2]
         assert np.array_equal(table.ravel(), np.bincount(cells[0] + cells[1], minlength=4))
 
 
 @pytest.mark.parametrize("rays", [8, 64, 1024])
 def test_each_part_is_a_net(rays):
     # of 2^k points of a (0, k, 2)-net one is in every dyadic rectangle of that area, in any shape
-    net = Net(Bounce(mirror_symmetric=None), ker.Bins(2), np.random.default_rng(6))
+    net = SobolSampler(Bounce(mirror_symmetric=None), ker.Bins(2), np.random.default_rng(6))
     digits = (net.sequence.random(rays) * 2.0**SOBOL_BITS).astype(np.uint64)
     for shift in net.shifts:
         x, y = ((digits ^ shift) * 2.0**-SOBOL_BITS).T
@@ -90,7 +90,7 @@ def test_each_part_is_a_net(rays):
 
 
 def test_more_rays_than_a_net_has_are_refused_before_the_first_is_traced():
-    net = Net(Bounce(), ker.Bins(2), np.random.default_rng(1))
+    net = SobolSampler(Bounce(), ker.Bins(2), np.random.default_rng(1))
     with pytest.raises(InputError, match="at most 34359738368 rays, got 34359738369; use method 'monte-carlo'"):
         net.sampled(PARTS * 2**SOBOL_BITS + 1, symmetrise=False)
     assert net.sums.each == 0 and not net.sums.tables.any()

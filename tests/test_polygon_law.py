@@ -104,9 +104,9 @@ def test_probabilities_sum_to_one_and_are_linear_in_the_cotangent_between_kinks(
     assert np.abs(probability.sum(axis=-1) - 1.0).max() < 1e-14
     assert law.isometry_table().mass() == pytest.approx(1.0, abs=1e-13)
     assert probability.min() >= 0.0 and outgoing.min() > 0.0 and outgoing.max() < math.pi
-    kinks, left_out = law.breakpoints(10**6)
+    breakpoints, left_out = law.breakpoints(10**6)
     assert left_out < 0.1
-    edges = np.concatenate([[0.05], kinks[(kinks > 0.05) & (kinks < 3.09)], [3.09]])
+    edges = np.concatenate([[0.05], breakpoints[(breakpoints > 0.05) & (breakpoints < 3.09)], [3.09]])
     width = np.diff(edges)
     inside = edges[:-1] + np.array([[0.2], [0.5], [0.8]]) * width
     inside = inside[:, width > 1e-6]
@@ -153,9 +153,9 @@ def test_different_hollows_add_up_by_their_widths_and_equal_ones_are_computed_on
     found = ker.discretise(ker.PolygonLaw(wall), basis).symmetric
     assert calls == [3, 4]
     alone = ker.PolygonLaw(geo.Wall.from_vertices(SKEW))
-    flipped = ker.PolygonLaw(geo.Wall.from_vertices(SKEW).mirrored())
+    mirrored_angle = ker.PolygonLaw(geo.Wall.from_vertices(SKEW).mirrored())
     last = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.9), (0.5, -0.1), (1, 0)]))
-    total = (3.0 * alone + flipped + last + ker.specular()) * (1.0 / 6.0)
+    total = (3.0 * alone + mirrored_angle + last + ker.specular()) * (1.0 / 6.0)
     assert np.linalg.norm(found - ker.discretise(total, basis).symmetric) < 1e-12
 
 

@@ -97,7 +97,7 @@ def test_channels_of_rectangular_teeth_count_every_hit(ratio, theta):
     assert clear.mean() > 0.85
     assert traced.escaped[clear].all()
     assert np.array_equal(traced.collisions[clear], law.hits(x, theta)[clear])
-    assert np.max(np.abs(traced.theta - law.respond(x, theta))[clear]) <= 8 * EPS
+    assert np.max(np.abs(traced.theta - law.reflect(x, theta))[clear]) <= 8 * EPS
 
 
 @pytest.mark.parametrize("angle", [1e-8, 1e-6, 1e-4, 1e-2, 0.25])
@@ -105,7 +105,7 @@ def test_wedges_of_triangular_teeth_count_every_hit(angle):
     x, theta = rays(2, 100_000)
     law = ker.TriangularTeethLaw(angle)
     traced = geo.trace(geo.triangular_teeth(angle), x, theta, max_collisions=NO_LIMIT)
-    hits, outgoing = law.hits(x, theta), law.respond(x, theta)
+    hits, outgoing = law.hits(x, theta), law.reflect(x, theta)
     # the number of hits changes where the angle at the last hit is 0, the outgoing angle is near 0 or pi there
     clear = np.minimum(outgoing, np.pi - outgoing) > 1e-12
     assert clear.mean() > 0.999

@@ -21,8 +21,8 @@ class Bounce(ker.DrivenLaw):
     closed: ker.TriangularTeethLaw = ker.TriangularTeethLaw(1.1)  # noqa: RUF009
     reversible = True
 
-    def respond(self, x: object, theta: object) -> np.ndarray:
-        return self.closed.respond(x, theta)  # type: ignore[arg-type]
+    def reflect(self, x: object, theta: object) -> np.ndarray:
+        return self.closed.reflect(x, theta)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("method", ["auto", "qmc", "monte-carlo", "quadrature"])
@@ -56,7 +56,7 @@ def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand
     class Drift(ker.DrivenLaw):
         """Keeps the measure and moves shares of it by a tenth and a bit: not reversible."""
 
-        def respond(self, x: object, theta: object) -> np.ndarray:
+        def reflect(self, x: object, theta: object) -> np.ndarray:
             share = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * np.asarray(x), 1.0)
             return ker.SINE.quantile(np.clip(share, 1e-12, 1 - 1e-12))
 
@@ -138,7 +138,7 @@ def test_rays_that_never_escape_are_counted_bounded_and_finally_refused() -> Non
         lost: float = 0.0
 
         def random_map(self) -> RandomMap:
-            return lambda x, theta: (self.respond(x, theta), x > self.lost)
+            return lambda x, theta: (self.reflect(x, theta), x > self.lost)
 
     whole, few = (ker.discretise(Leaky(lost=lost), ker.Bins(8), samples=2**16) for lost in (0.0, 5e-5))
     assert whole.unresolved == 0.0 < few.unresolved < 1e-4

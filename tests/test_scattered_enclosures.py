@@ -71,7 +71,7 @@ def test_errors_of_images_of_arcs_and_of_unresolved_polygons_are_counted():
     vectors, arc = np.eye(60), ker.CircularArcLaw(1.2)
     # midpoint sums over entry points, by parts where the fastest functions turn once
     x = (np.arange(200_000) + 0.5) / 200_000
-    midpoint = np.array([basis.evaluate(arc.respond(x, np.full(x.size, one))).mean(axis=0) for one in angle])
+    midpoint = np.array([basis.evaluate(arc.reflect(x, np.full(x.size, one))).mean(axis=0) for one in angle])
     found, error = image_rule(arc, basis, vectors)(angle, 1e-8)
     assert np.all(np.abs(found - midpoint).max(axis=1) <= error + 1e-3) and error.max() < 1e-2
     wall = geo.Wall.from_vertices([(0, 0), (0.2, -0.9), (0.45, -0.2), (0.8, -1.1), (1, 0)])

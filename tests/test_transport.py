@@ -24,11 +24,11 @@ SPLIT_ENDS = 0.553793141530490365784789110521
 # ---- resistance --------------------------------------------------------------------------------------------------
 def rectangular_resistance(ratio):
     """Half flat tops, half crevices: 1/2 + R/2, by Gauss rules between the angles where d = 2 r cot(theta) is whole."""
-    kinks = np.arctan(2 * ratio / np.arange(1, 2000))[::-1]
-    theta, weight = gauss_rule(np.concatenate(([1e-300], kinks, [np.pi / 2])), 8)
+    breakpoints = np.arctan(2 * ratio / np.arange(1, 2000))[::-1]
+    theta, weight = gauss_rule(np.concatenate(([1e-300], breakpoints, [np.pi / 2])), 8)
     d = 2 * ratio / np.tan(theta)
     # the rays beyond 2000 crossings see the mean of the law
-    retro = np.where(theta < kinks[0], 0.5, np.abs(d - 2 * np.round(0.5 * d)))
+    retro = np.where(theta < breakpoints[0], 0.5, np.abs(d - 2 * np.round(0.5 * d)))
     cost = (1 - retro) * 0.75 * (1 - np.cos(2 * theta)) + retro * 1.5
     return 0.5 + 0.5 * float(weight @ (cost * np.sin(theta)))
 

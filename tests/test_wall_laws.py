@@ -15,7 +15,7 @@ from asperity.kernels.laws.law import Law, specular
 from asperity.kernels.walls.circular_arc import CircularArcLaw
 from asperity.kernels.walls.rectangular import RectangularTeethLaw
 from asperity.kernels.walls.triangular import TriangularTeethLaw
-from asperity.kernels.walls.wall_law import LOST_TOLERANCE, WallLaw
+from asperity.kernels.walls.wall_law import UNRESOLVED_TOLERANCE, WallLaw
 
 
 def same(law: Law | None, expected: Law) -> bool:
@@ -88,8 +88,8 @@ def test_traced_rays_go_where_the_closed_form_says(wall: geo.Wall) -> None:
     rng = np.random.default_rng(8)
     x, theta = rng.uniform(0.001, 0.999, 20_000), SINE.sample(20_000, rng)
     outgoing, escaped = law.outcomes(x, theta)
-    assert escaped.mean() > 1.0 - LOST_TOLERANCE
-    error = np.abs(outgoing - law.closed_form.respond(x, theta))
+    assert escaped.mean() > 1.0 - UNRESOLVED_TOLERANCE
+    error = np.abs(outgoing - law.closed_form.reflect(x, theta))
     assert np.median(error) < 1e-15
     # a ray within rounding of a corner or of a change of its hits may go the other way
     assert np.mean(error[escaped] > 1e-9) < 1e-4
@@ -112,7 +112,7 @@ def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
     assert escaped.tolist() == [False, True]
     assert np.allclose(outgoing, math.pi / 2)
     with pytest.raises(AccuracyError, match=r"0\.5 of 2 rays did not escape") as info:
-        law.respond([0.5, 0.6], math.pi / 2)
+        law.reflect([0.5, 0.6], math.pi / 2)
     assert info.value.defect == 0.5
 
 

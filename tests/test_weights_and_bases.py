@@ -264,8 +264,8 @@ def test_panels_for_an_arc_follow_five_kinks_and_are_graded_to_where_they_gather
     edges = Panels.for_wall(geo.focusing_arcs(half_angle)).edges
     mirrored = lambda angle: near(edges, angle) and near(edges, np.pi - angle)  # noqa: E731
     assert mirrored(half_angle)
-    kinks = [half_angle * (1.0 + sign / n) for n in range(1, 6) for sign in (1.0, -1.0)]
-    assert all(mirrored(kink) for kink in kinks if 0.0 < kink < np.pi)
+    breakpoints = [half_angle * (1.0 + sign / n) for n in range(1, 6) for sign in (1.0, -1.0)]
+    assert all(mirrored(breakpoint) for breakpoint in breakpoints if 0.0 < breakpoint < np.pi)
     assert not near(edges, half_angle * (1.0 + 1.0 / 6.0)) and not near(edges, half_angle * (1.0 - 1.0 / 6.0))
     # half way to grazing nine panels shrink towards it, and five towards the critical angle, 0.35^5 < 0.01 < 0.35^4
     half = 0.5 * half_angle

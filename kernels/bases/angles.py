@@ -8,14 +8,14 @@ from ...core.checks import Floats
 from .measure import LARGEST_ANGLE, SMALLEST_ANGLE
 
 
-def kept_inside(angle: Floats) -> Floats:
+def clipped_inside(angle: Floats) -> Floats:
     """Move angles that rounding put on or past an end of (0, pi) to the nearest float64 inside it."""
     return np.asarray(np.clip(angle, SMALLEST_ANGLE, LARGEST_ANGLE))
 
 
-def flipped(angle: Floats) -> Floats:
+def mirrored_angle(angle: Floats) -> Floats:
     """Return pi - angle, inside (0, pi)."""
-    return kept_inside(np.pi - angle)
+    return clipped_inside(np.pi - angle)
 
 
 def mixed_arccos(share: Floats, theta: Floats, half: float) -> tuple[Floats, Floats]:

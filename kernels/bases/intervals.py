@@ -14,7 +14,7 @@ from .measure import SINE
 BISECTIONS = 60
 
 
-def ragged(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def joined_lists(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """The row that each entry belongs to, and its place there, of rows with so many entries.
 
     Examples
@@ -46,7 +46,7 @@ def edges_inside(edges: Floats, low: Floats, high: Floats) -> tuple[NDArray[np.i
     [[0, 0], [1.0, 2.0]]
     """
     first = np.searchsorted(edges, low, side="right")
-    owner, place = ragged(np.maximum(np.searchsorted(edges, high, side="left") - first, 0))
+    owner, place = joined_lists(np.maximum(np.searchsorted(edges, high, side="left") - first, 0))
     return owner, edges[first[owner] + place]
 
 
@@ -64,12 +64,12 @@ def between_cuts(owner: NDArray[np.intp], cut: Floats) -> tuple[NDArray[np.intp]
     return owner[kept], cut[kept], cut[kept + 1]
 
 
-def without_outermost(angles: Floats, number: int) -> tuple[Floats, float]:
+def without_extremal(angles: Floats, number: int) -> tuple[Floats, float]:
     """Sorted angles but for so many of them, half at either end, and the measure of what lies beyond those that stay.
 
     Examples
     --------
-    >>> kept, beyond = without_outermost(np.array([0.5, 1.0, 2.0]), 2)
+    >>> kept, beyond = without_extremal(np.array([0.5, 1.0, 2.0]), 2)
     >>> kept.tolist(), round(beyond, 12)
     ([1.0], 1.0)
     """

@@ -25,7 +25,7 @@ EXTRA_NODES = 11
 RATIO, SMALLEST = 0.35, 1e-4
 WIDEST = np.pi / 24
 # Kinks xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this share of xi.
-KINK_SPACING = 0.05
+BREAKPOINT_SPACING = 0.05
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
@@ -95,9 +95,11 @@ class Panels(Basis):
         followed: list[float] = []
         if half_angle is not None:
             special += [half_angle, np.pi - half_angle]
-            last = int(np.ceil(KINK_SPACING**-0.5))
-            kinks = [half_angle * (1.0 + sign / n) for n in range(1, last + 1) for sign in (-1.0, 1.0)]
-            followed = [angle for kink in kinks for angle in (kink, np.pi - kink) if 0.0 < angle < np.pi]
+            last = int(np.ceil(BREAKPOINT_SPACING**-0.5))
+            breakpoints = [half_angle * (1.0 + sign / n) for n in range(1, last + 1) for sign in (-1.0, 1.0)]
+            followed = [
+                angle for breakpoint in breakpoints for angle in (breakpoint, np.pi - breakpoint) if 0.0 < angle < np.pi
+            ]
         return cls(_graded_edges(special, followed, smallest), degree)
 
     @property

@@ -22,7 +22,7 @@ MOST_VALUES = 2**26
 # Numbers held at a time.
 CHUNK = 2**21
 # Kinks that panels begin with; the share of the tolerance that one of them may spend, and what rounding leaves.
-FIRST_KINKS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
+FIRST_BREAKPOINTS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
 # Angles are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
@@ -33,7 +33,7 @@ class HasAction(Protocol):
     def apply(self, function: Callable[[Floats], Floats], theta: ArrayLike) -> Floats: ...
     def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
     @property
-    def fan_out(self) -> int: ...
+    def evaluations(self) -> int: ...
 
 
 class Actions:
@@ -64,11 +64,11 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
     Panels between edges and kinks are halved until each is settled or the work exceeds about a second. The error is the
     sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
     """
-    breaks = law.breakpoints(FIRST_KINKS)[0]
+    breaks = law.breakpoints(FIRST_BREAKPOINTS)[0]
     edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, breaks)))
     low, high = edges[:-1], edges[1:]
     total, error, spent = np.zeros((basis.size, basis.size)), 0.0, 0
-    values = NODES.size * basis.size * max(int(law.fan_out), 1)
+    values = NODES.size * basis.size * max(int(law.evaluations), 1)
     while low.size:
         spent += values * low.size
         # the next round is twice as large at most

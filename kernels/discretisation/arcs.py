@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from ..bases.angles import flipped, kept_inside
+from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.assembly import add_blocks, add_masses
 from ..bases.basis import Basis
-from ..bases.intervals import between_cuts, edges_inside, ragged
+from ..bases.intervals import between_cuts, edges_inside, joined_lists
 from ..bases.measure import gauss_on_intervals
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..bases.panels import Panels
@@ -183,7 +183,7 @@ def _add_rows(
     first = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * upper, side="right")
     last = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * lower, side="left")
     number = np.maximum(last - first, 0) + 1
-    row, place = ragged(number)
+    row, place = joined_lists(number)
     above = np.clip(last[row] - place, 0, edges.size - 1)
     cut = (np.pi + theta[row] - edges[above]) / (2.0 * strips.hits[row])
     low = np.where(place == 0, lower[row], np.clip(cut, lower[row], upper[row]))
@@ -207,7 +207,7 @@ def _add_rows(
             owner = row[part]
             each = np.repeat(owner, order)
             outgoing = np.pi + theta[each] - 2.0 * strips.hits[each] * chord
-            outgoing = flipped(outgoing) if mirrored else kept_inside(outgoing)
+            outgoing = mirrored_angle(outgoing) if mirrored else clipped_inside(outgoing)
             share = (share * np.sin(chord) * weight[each])[:, None]
             if isinstance(basis, Panels):
                 panel, values = basis.local(outgoing)

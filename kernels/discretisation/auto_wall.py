@@ -10,17 +10,17 @@ from ...core.errors import AccuracyError
 from ..bases.basis import Basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
-from ..sampling.sobol import Net
+from ..sampling.sobol import SobolSampler
 from ..walls.conditionals import is_few
 from ..walls.wall_law import FEW_PIECES, WallLaw
 from .isometry_tables import IsometryTables
 from .method import QUICK_SEGMENTS, Budget, MethodName
-from .sampled import net_matrix
+from .sampled import sobol_matrix
 from .traced import Traced
 
 # So many rays tell how many the tolerance needs: the error of a scrambled net falls like their number to a power of
 # about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
-FIRST_RAYS, NET_ORDER, NET_MARGIN = 2**14, 0.75, 2.0
+FIRST_RAYS, SOBOL_ORDER, SOBOL_MARGIN = 2**14, 0.75, 2.0
 # So many rays take long enough for a pilot run of traced angles, with as many segments: a ray has two or three.
 MANY_RAYS = 2**17
 # Traced angles that take longer than all rays must predict this share of their error.
@@ -58,18 +58,18 @@ class AutoWall:
     def _quick(self, law: WallLaw, basis: Basis, budget: Budget) -> KernelMatrix:
         if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
             return IsometryTables().matrix(law.exact_law, basis, budget)
-        net = Net(law, basis, budget.rng)
+        net = SobolSampler(law, basis, budget.rng)
         found, predicted = _few_rays(law, net, basis, budget)
         if found is not None:
             return found
         if law.exact_law is not None:
             return IsometryTables().matrix(law.exact_law, basis, budget)
         if not Traced().accepts(law, basis):
-            return net_matrix(net, basis, budget)
+            return sobol_matrix(net, basis, budget)
         return _traced_or_all_rays(law, net, basis, budget, predicted)
 
 
-def _few_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget) -> tuple[KernelMatrix | None, float]:
+def _few_rays(law: WallLaw, net: SobolSampler, basis: Basis, budget: Budget) -> tuple[KernelMatrix | None, float]:
     """The matrix within the tolerance by fewer rays than all, or None; and the error that all rays predict.
 
     The latter is infinite where a few rays do not tell.
@@ -80,17 +80,17 @@ def _few_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget) -> tuple[Ker
         return None, predicted
     while number < budget.rays:
         try:
-            found = net_matrix(net, basis, replace(budget, rays=number))
+            found = sobol_matrix(net, basis, replace(budget, rays=number))
         except AccuracyError:
             # a bin without rays, or rays that do not escape: these few are no measure
             break
         error = float(found.error)
         if error <= budget.tolerance:
             return found, error
-        predicted = error * (number / budget.rays) ** NET_ORDER
-        if error > budget.tolerance * (budget.rays / (NET_MARGIN * number)) ** NET_ORDER:
+        predicted = error * (number / budget.rays) ** SOBOL_ORDER
+        if error > budget.tolerance * (budget.rays / (SOBOL_MARGIN * number)) ** SOBOL_ORDER:
             break
-        needed = NET_MARGIN * number * (error / budget.tolerance) ** (1.0 / NET_ORDER)
+        needed = SOBOL_MARGIN * number * (error / budget.tolerance) ** (1.0 / SOBOL_ORDER)
         number = max(2 * number, int(needed))
         if affordable and number >= MANY_RAYS:
             found = Traced().matrix(law, basis, replace(budget, segments=number, fallback=budget.tolerance))
@@ -99,7 +99,9 @@ def _few_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget) -> tuple[Ker
     return None, predicted
 
 
-def _traced_or_all_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget, predicted: float) -> KernelMatrix:
+def _traced_or_all_rays(
+    law: WallLaw, net: SobolSampler, basis: Basis, budget: Budget, predicted: float
+) -> KernelMatrix:
     """The more exact of the two; no rays where tracing angles predicts more, nor the reverse where rays will do."""
     rays = _all_rays(net, basis, budget) if predicted <= budget.tolerance else None
     if rays is not None:
@@ -115,10 +117,10 @@ def _traced_or_all_rays(law: WallLaw, net: Net, basis: Basis, budget: Budget, pr
     return traced if rays is None else _more_exact(traced, rays)
 
 
-def _all_rays(net: Net, basis: Basis, budget: Budget) -> KernelMatrix | None:
+def _all_rays(net: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix | None:
     """The matrix by rays; None if too many do not escape, where traced angles count theirs in their error."""
     try:
-        return net_matrix(net, basis, budget)
+        return sobol_matrix(net, basis, budget)
     except AccuracyError:
         return None
 

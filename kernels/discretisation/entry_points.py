@@ -56,7 +56,7 @@ def _product_rule(law: DrivenLaw, basis: Basis, samples: int, split: int) -> Flo
     step = max(1, CHUNK // entries)
     for start in range(0, angle.size, step):
         rows = slice(start, start + step)
-        outgoing = law.respond(x, angle[rows, None])
+        outgoing = law.reflect(x, angle[rows, None])
         if basis.is_partition:
             _add_masses(total, basis, angle[rows], outgoing, mass[rows] / entries)
         else:

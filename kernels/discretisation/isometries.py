@@ -25,7 +25,7 @@ from .method import Budget, MethodName
 NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
 # Kinks that accumulate at grazing are followed until the omitted share is negligible or listing and using them would
 # take more than about a second.
-FEWEST_KINKS, KINK_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
+FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
 # Nodes times branches held at a time.
 CHUNK = 2**22
 
@@ -36,7 +36,7 @@ class Branching(Protocol):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
     def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
     @property
-    def fan_out(self) -> int: ...
+    def evaluations(self) -> int: ...
 
 
 class Isometries:
@@ -83,17 +83,17 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
     """
     worst = 2.0 * largest_square_sum(basis)
-    limit = FEWEST_KINKS
-    kinks, omitted = law.breakpoints(limit)
-    most = KINK_WORK // law.fan_out**2
+    limit = FEWEST_BREAKPOINTS
+    breakpoints, omitted = law.breakpoints(limit)
+    most = BREAKPOINT_WORK // law.evaluations**2
     if not basis.is_partition:
         most = min(most, FUNCTION_WORK // basis.size)
     while omitted * worst > tolerance and 2 * limit <= most:
         limit *= 2
-        kinks, omitted = law.breakpoints(limit)
-    edges = np.unique(np.concatenate((basis.edges, kinks)))
+        breakpoints, omitted = law.breakpoints(limit)
+    edges = np.unique(np.concatenate((basis.edges, breakpoints)))
     edges = np.unique(
-        np.concatenate((edges, preimages(law.branches, np.concatenate(([0.0], kinks, [np.pi])), basis.edges)))
+        np.concatenate((edges, preimages(law.branches, np.concatenate(([0.0], breakpoints, [np.pi])), basis.edges)))
     )
     total = np.zeros((basis.size, basis.size))
     width, near = np.diff(edges), np.minimum(edges[1:], np.pi - edges[:-1])
@@ -111,7 +111,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
 
 def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:
     # large steps: every one adds up whole matrices
-    step = max(CHUNK // (order * law.fan_out), 1)
+    step = max(CHUNK // (order * law.evaluations), 1)
     for start in range(0, low.size, step):
         angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)
         _add_nodes(law, basis, angle, weight, total)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.intervals import between_cuts, edges_inside
@@ -75,7 +75,7 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
         moved += 4.0 * crevice.share * omitted
         if crevice.exchanged:
             specular, retro = retro, specular
-        mirror = kept_inside(np.pi - theta)
+        mirror = clipped_inside(np.pi - theta)
         incoming = np.concatenate([theta, theta, mirror, mirror])
         outgoing = np.concatenate([mirror, theta, theta, mirror])
         weight = crevice.share * np.concatenate([specular, retro, specular, retro])
@@ -119,7 +119,7 @@ def _add_masses(
     middle = 0.5 * (low + high)
     # the integral of a sinusoid is its value in the middle times 2 sin(width/2)
     mass = table.density(middle, piece) * np.sin(0.5 * (high - low))
-    image = kept_inside(table.sign[piece] * middle + table.offset[piece])
+    image = clipped_inside(table.sign[piece] * middle + table.offset[piece])
     add_products(total, basis, middle, image, mass)
 
 
@@ -134,7 +134,7 @@ def _add_nodes(
             part = chosen[begin : begin + step]
             angle, weight = gauss_on_intervals(low[part], high[part], int(nodes))
             owner = np.repeat(piece[part], nodes)
-            image = kept_inside(table.sign[owner] * angle + table.offset[owner])
+            image = clipped_inside(table.sign[owner] * angle + table.offset[owner])
             add_products(total, basis, angle, image, 0.5 * weight * table.density(angle, owner))
 
 

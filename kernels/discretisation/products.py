@@ -24,7 +24,7 @@ from ..matrices.matrix import KernelMatrix
 from ..walls.words import law_of
 from .isometries import Isometries, isometric_matrix
 from .method import Budget, MethodName, Recipe, computed, isometric_rounding
-from .scattering import degrees_kept, is_scattered, local_values, scattered_matrix, split
+from .scattering import degrees_used, is_scattered, local_values, scattered_matrix, split
 
 # Panels of this width and degree to begin with; narrower ones follow the polynomials of a basis, n of them on (0, pi).
 WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
@@ -32,7 +32,7 @@ WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
 # panels of the lowest degree whose last two show how the rest falls off.
 MOST_FUNCTIONS, LOWEST_DEGREE = 1600, 2
 # Kinks of a factor that edges are put at from the start, and edges nearer than this to each other.
-KINKS, SAME_EDGE = 16, 1e-10
+BREAKPOINTS, SAME_EDGE = 16, 1e-10
 # Matrices of that size held at a time, and what they may take.
 MATRICES, MOST_GIGABYTES = 5, 4.0
 # Coefficients of a function that jumps on a panel fall off like 1/k, so that what a panel of degree 9 leaves out is
@@ -254,8 +254,8 @@ def _terms(factor: Factor, panels: Panels, budget: Budget) -> list[tuple[float, 
 
 def _on_panels(factor: Factor, panels: Panels, budget: Budget) -> tuple[Floats, float]:
     law = factor.law
-    if isinstance(law, HenyeyGreensteinLaw) and degrees_kept(law) <= HIGHEST_DEGREE:
-        polynomials = Legendre(degrees_kept(law))
+    if isinstance(law, HenyeyGreensteinLaw) and degrees_used(law) <= HIGHEST_DEGREE:
+        polynomials = Legendre(degrees_used(law))
         angle, mass = SINE.quadrature(panels.edges, _nodes(polynomials, panels))
         ends = local_values(panels, angle).T @ (mass[:, None] * polynomials.evaluate(angle))
         return np.asarray((ends * law.g ** np.arange(polynomials.n)) @ ends.T), 0.0
@@ -276,9 +276,9 @@ def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
         special.append(law.outgoing_breakpoints)
         if isinstance(law, InvolutionLaw):
             jumps = jumps_of_map(law.map)
-            special += [jumps, np.asarray(law.map(basis.edges[1:-1]))] if jumps.size <= KINKS else []
+            special += [jumps, np.asarray(law.map(basis.edges[1:-1]))] if jumps.size <= BREAKPOINTS else []
             continue
-        special.append(law.breakpoints(KINKS)[0])
+        special.append(law.breakpoints(BREAKPOINTS)[0])
     found = np.unique(np.clip(np.concatenate(special), 0.0, np.pi))
     found = found[np.append(True, np.diff(found) > SAME_EDGE)]
     found[-1] = np.pi

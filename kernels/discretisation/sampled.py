@@ -7,7 +7,7 @@ from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.counts import SampledArray
 from ..sampling.monte_carlo import independent_rays
-from ..sampling.sobol import PARTS, Net
+from ..sampling.sobol import PARTS, SobolSampler
 from .method import Budget, MethodName
 
 
@@ -20,7 +20,7 @@ class Sobol:
         return law.random_map() is not None
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        return net_matrix(Net(law, basis, budget.rng), basis, budget)
+        return sobol_matrix(SobolSampler(law, basis, budget.rng), basis, budget)
 
 
 class MonteCarlo:
@@ -37,7 +37,7 @@ class MonteCarlo:
         return _sampled(self.name, found, basis, budget, spread)
 
 
-def net_matrix(net: Net, basis: Basis, budget: Budget) -> KernelMatrix:
+def sobol_matrix(net: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix by at least ``budget.rays`` rays of a net, which goes on where it was."""
     found = net.sampled(budget.rays, symmetrise=budget.symmetrise)
     return _sampled("qmc", found, basis, budget, f"spread of {PARTS} nets")

@@ -145,7 +145,7 @@ def local_values(basis: Basis, angle: Floats) -> Any:
     return csr_array(basis.evaluate(angle))
 
 
-def degrees_kept(law: HenyeyGreensteinLaw) -> int:
+def degrees_used(law: HenyeyGreensteinLaw) -> int:
     """How many polynomials the law leaves with more than a negligible factor; 1 for g = 0."""
     return 1 if abs(law.g) <= NEGLIGIBLE else 1 + int(np.ceil(np.log(NEGLIGIBLE) / np.log(abs(law.g))))
 
@@ -153,7 +153,7 @@ def degrees_kept(law: HenyeyGreensteinLaw) -> int:
 def is_scattered(laws: Sequence[Law]) -> bool:
     """Whether a chain is made of isometries and scatterings that are not too near to a mirror."""
     scatterings = [law for law in laws if isinstance(law, HenyeyGreensteinLaw)]
-    near = any(degrees_kept(law) > HIGHEST_DEGREE for law in scatterings)
+    near = any(degrees_used(law) > HIGHEST_DEGREE for law in scatterings)
     others = [law for law in laws if not isinstance(law, HenyeyGreensteinLaw)]
     return bool(scatterings) and not near and all(map(lists_branches, others))
 
@@ -179,7 +179,7 @@ def scattered_matrix(laws: Sequence[Law], basis: Basis, isometric: IsometricMatr
             pieces.append(())
         else:
             pieces[-1] = (*pieces[-1], law)
-    needed = [degrees_kept(law) for law in scatterings]
+    needed = [degrees_used(law) for law in scatterings]
     size = basis.size
     if isinstance(basis, Legendre):
         # a scattering at an end of the chain sees the polynomials of the basis alone

@@ -18,7 +18,7 @@ from ..expectations.angle_panels import NODES, AnglePanels
 from ..expectations.basis_means import VALUES_AT_ONCE, means_of_basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
-from ..walls.conditionals import WallRows
+from ..walls.conditionals import WallConditionals
 from ..walls.wall_law import WallLaw
 from .method import MOST_SEGMENTS, Budget, MethodName, computed, rounding
 
@@ -160,7 +160,7 @@ class _Integrator:
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
         share = SHARE_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_SHARE
         longest = max(int(share * budget.segments), LEAST_SEGMENTS)
-        self.rows = WallRows(wall, degree, inside, least, longest)
+        self.rows = WallConditionals(wall, degree, inside, least, longest)
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)

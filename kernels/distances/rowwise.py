@@ -17,7 +17,7 @@ from .transport import power_mean, wasserstein
 
 # Gauss nodes on a panel in the incoming angle, panels without kinks, kinks and cells of the outgoing angle on the
 # coarsest level; every level doubles all of them.
-NODES, PANELS, KINKS, CELLS = 4, 12, 24, 64
+NODES, PANELS, BREAKPOINTS, CELLS = 4, 12, 24, 64
 # Rows times cells of a level: some seconds. Rows without cells count as these many atoms.
 MOST_CORNERS, FEW_ATOMS = 2**22, 32
 # Any angle; whether rows have densities does not depend on it.
@@ -81,7 +81,7 @@ def _is_atomic(law: Law) -> bool:
 
 
 def _panels(first: Law, second: Law, level: int) -> tuple[Floats, Floats]:
-    limit = KINKS * 2**level
+    limit = BREAKPOINTS * 2**level
     points = [law.breakpoints(limit)[0] for law in (first, second)]
     coarse = np.unique(np.concatenate((np.linspace(0.0, np.pi, PANELS + 1), *points)))
     pieces = 2**level

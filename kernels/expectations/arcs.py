@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ..bases.intervals import cell_among, ragged
+from ..bases.intervals import cell_among, joined_lists
 from ..bases.legendre import legendre_moments
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.panels import Panels
@@ -95,7 +95,7 @@ def arc_images(lines: ArcLines, panels: Panels, theta: Floats) -> tuple[Floats, 
     first = cell_among(panels.edges, ends[0])
     last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
     gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
-    owner, place = ragged(np.where(single, 0, last - first + 1))
+    owner, place = joined_lists(np.where(single, 0, last - first + 1))
     for start in range(0, owner.size, CHUNK):
         own, panel = owner[start : start + CHUNK], (first[owner] + place)[start : start + CHUNK]
         low, high = panels.edges[panel], panels.edges[panel + 1]

@@ -73,10 +73,10 @@ class Expectations(ABC):
 
 @dataclass(frozen=True)
 class ByApply(Expectations):
-    """By the operator of a law, whose errors are not known, at ``fan_out`` angles for each."""
+    """By the operator of a law, whose errors are not known, at ``evaluations`` angles for each."""
 
     apply: Callable[[AngleFunction, ArrayLike], Floats]
-    fan_out: int
+    evaluations: int
     traced: bool = False
 
     @property
@@ -84,7 +84,7 @@ class ByApply(Expectations):
         return self.traced
 
     def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
-        step = max(1, VALUES_AT_ONCE // (self.basis.size * max(self.fan_out, 1)))
+        step = max(1, VALUES_AT_ONCE // (self.basis.size * max(self.evaluations, 1)))
         parts = [self.apply(self.basis.evaluate, theta[start : start + step]) for start in range(0, theta.size, step)]
         return np.concatenate(parts), np.full(theta.size, np.nan)
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.errors import InputError
 from ...core.rounding import EPS
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.intervals import edges_inside
 
 # Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
@@ -46,7 +46,7 @@ def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
 
     The order of slots stays, so that a slot that was one isometry between two breakpoints remains so.
     """
-    probability, outgoing = probability.copy(), kept_inside(outgoing)
+    probability, outgoing = probability.copy(), clipped_inside(outgoing)
     slots = probability.shape[-1]
     for late in range(1, slots):
         for early in range(late):

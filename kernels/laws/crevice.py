@@ -63,5 +63,5 @@ def crevice_breakpoints(height_to_width: float, limit: int) -> tuple[Floats, flo
     if last == 0:
         return np.empty(0), 1.0
     steep = np.arctan(2.0 * height_to_width / np.arange(last, 0, -1))
-    kinks = np.concatenate([steep, [0.5 * np.pi], np.pi - steep[::-1]])
-    return kinks, float(2.0 * SINE.cdf(steep[0]))
+    breakpoints = np.concatenate([steep, [0.5 * np.pi], np.pi - steep[::-1]])
+    return breakpoints, float(2.0 * SINE.cdf(steep[0]))

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from .distribution import Distribution
-from .law import Law, set_facts
+from .law import Law, set_properties
 
 DensityFunction = Callable[[Floats, Floats], Floats]
 
@@ -83,7 +83,7 @@ class DensityLaw(Law):
 
     outgoing_breakpoints: Floats = frozen(())
     sampling_error: float = 0.0
-    fan_out = PANEL_COUNTS[0] * GAUSS_NODES
+    evaluations = PANEL_COUNTS[0] * GAUSS_NODES
     _function: DensityFunction
     _panel_count: int = PANEL_COUNTS[0]
 
@@ -92,12 +92,12 @@ class DensityLaw(Law):
             raise InputError(f"density: expected a function of (theta, theta_out), got {density!r}")
         points = np.unique(finite_array("breakpoints", breakpoints))
         inside = frozen(points[(points > 0.0) & (points < np.pi)])
-        set_facts(self, _function=density, outgoing_breakpoints=inside)
-        set_facts(self, _panel_count=self._panels_needed())
-        set_facts(self, fan_out=(self._grid(self._panel_count).size - 1) * GAUSS_NODES)
+        set_properties(self, _function=density, outgoing_breakpoints=inside)
+        set_properties(self, _panel_count=self._panels_needed())
+        set_properties(self, evaluations=(self._grid(self._panel_count).size - 1) * GAUSS_NODES)
         reversible, mirror_symmetric = self._measured_symmetries()
-        set_facts(self, reversible=reversible, mirror_symmetric=mirror_symmetric)
-        set_facts(self, sampling_error=self._measured_sampling_error())
+        set_properties(self, reversible=reversible, mirror_symmetric=mirror_symmetric)
+        set_properties(self, sampling_error=self._measured_sampling_error())
 
     def __setattr__(self, name: str, value: object) -> None:
         raise FrozenInstanceError(f"{type(self).__name__} is immutable: cannot set {name}")
@@ -185,7 +185,7 @@ class DensityLaw(Law):
             # the shape of a value is known to the function alone
             value = np.asarray(function(np.empty(theta.shape)), dtype=np.float64)
             return np.empty(theta.shape + value.shape[theta.ndim :])
-        step = max(1, CHUNK // self.fan_out)
+        step = max(1, CHUNK // self.evaluations)
         starts = range(0, flat.size, step)
         parts = [self._apply_chunk(function, flat[start : start + step]) for start in starts]
         total = np.concatenate(parts)
@@ -222,7 +222,7 @@ class DensityLaw(Law):
         outgoing = np.empty(flat.size)
         for start in range(0, flat.size, step):
             part = slice(start, start + step)
-            outgoing[part] = _inverse_cdf(edges, self.density(flat[part, None], kept_inside(edges)), draw[part])
+            outgoing[part] = _inverse_cdf(edges, self.density(flat[part, None], clipped_inside(edges)), draw[part])
         return outgoing.reshape(theta.shape)
 
     def __repr__(self) -> str:
@@ -281,7 +281,7 @@ class DensityLaw(Law):
         outgoing, weight = self._row_quadrature(edges, CHECK_NODES)
         mass = (self.density(probes[:, None], outgoing) * weight).reshape(PROBES, edges.size - 1, CHECK_NODES)
         exact = np.cumsum(mass.sum(axis=-1), axis=-1)
-        table = np.cumsum(_cell_masses(edges, self.density(probes[:, None], kept_inside(edges))), axis=-1)
+        table = np.cumsum(_cell_masses(edges, self.density(probes[:, None], clipped_inside(edges))), axis=-1)
         return float(np.max(np.abs(exact / exact[:, -1:] - table / table[:, -1:])))
 
 
@@ -338,4 +338,4 @@ def _inverse_cdf(edges: Floats, value: Floats, draw: Floats) -> Floats:
     root = np.sqrt(np.maximum(left * left + 2.0 * (right - left) * rest / width, 0.0))
     step = np.divide(2.0 * rest, left + root, out=np.zeros_like(rest), where=left + root > 0.0)
     outgoing: Floats = edges[cell] + np.minimum(step, width)
-    return kept_inside(outgoing)
+    return clipped_inside(outgoing)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.checks import Floats
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 
 
 class Distribution(NamedTuple):
@@ -50,7 +50,9 @@ class Distribution(NamedTuple):
 
     def mirrored(self) -> Distribution:
         """That of pi minus the outgoing angle, on pi minus the edges in reverse order."""
-        return Distribution((self.below[:, -1:] - self.below)[:, ::-1], kept_inside(np.pi - self.position), self.mass)
+        return Distribution(
+            (self.below[:, -1:] - self.below)[:, ::-1], clipped_inside(np.pi - self.position), self.mass
+        )
 
     def cumulative(self, edges: Floats) -> Floats:
         """The whole mass below each of the edges, atoms included."""

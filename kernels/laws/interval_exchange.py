@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, frozen
 from ...core.errors import InputError
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE
@@ -70,7 +70,7 @@ class IntervalExchangeLaw(Law):
 
     reversible = True
     exact_apply = True
-    fan_out = 1
+    evaluations = 1
 
     def __post_init__(self) -> None:
         flux, edges = self._checked_flux(), self.matrix.basis.edges
@@ -94,7 +94,7 @@ class IntervalExchangeLaw(Law):
         piece = np.clip(np.searchsorted(self.starts, share, side="right") - 1, 0, self.starts.size - 1)
         moved = share + (self.starts[self.partner[piece]] - self.starts[piece])
         angle = SINE.quantile(np.clip(moved, 0.0, 1.0))
-        return kept_inside(np.where(self.partner[piece] == piece, theta, angle))
+        return clipped_inside(np.where(self.partner[piece] == piece, theta, angle))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """All angles between two pieces."""

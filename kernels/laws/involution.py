@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
 from ..bases.intervals import bisected
 from ..bases.measure import SINE
@@ -89,7 +89,7 @@ class InvolutionLaw(Law):
             raise InputError(
                 f"map: expected angles in (0, pi), got {image[where]:.9g} at theta = {np.asarray(theta)[where]:.9g}"
             )
-        return kept_inside(image)
+        return clipped_inside(image)
 
     def _check_return(self, theta: Floats, back: Floats) -> None:
         worst = int(np.argmax(np.abs(back - theta)))
@@ -121,7 +121,7 @@ class InvolutionLaw(Law):
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The image is the one atom."""
         image = np.asarray(self.map(theta), dtype=np.float64)
-        return Distribution.of_atoms(edges, kept_inside(image)[:, None], np.ones((theta.size, 1)))
+        return Distribution.of_atoms(edges, clipped_inside(image)[:, None], np.ones((theta.size, 1)))
 
     def random_map(self) -> RandomMap:
         """The map, whatever the number."""

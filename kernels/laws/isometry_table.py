@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, angles, frozen
 from ...core.errors import InputError
 from ...core.rounding import EPS
-from ..bases.angles import kept_inside
-from ..bases.intervals import ragged, without_outermost
+from ..bases.angles import clipped_inside
+from ..bases.intervals import joined_lists, without_extremal
 from .crevice import crevice_breakpoints, crevice_retro
 
 Whole = NDArray[np.int64]
@@ -221,7 +221,7 @@ class IsometryTable:
         whole = np.bincount(query, weights=total, minlength=flat.size)
         share = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
         count = np.bincount(query, minlength=flat.size)
-        _, slot = ragged(count)
+        _, slot = joined_lists(count)
         slots = int(count.max(initial=1))
         filled = np.zeros((flat.size, slots))
         which = np.zeros((flat.size, slots), dtype=np.int64)
@@ -234,7 +234,7 @@ class IsometryTable:
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles, as `rows`."""
         probability, sign, offset = self.rows(theta)
-        return probability, kept_inside(sign * np.asarray(theta, dtype=np.float64)[..., None] + offset)
+        return probability, clipped_inside(sign * np.asarray(theta, dtype=np.float64)[..., None] + offset)
 
     def _entries(self, theta: Floats) -> tuple[Whole, Whole, Floats]:
         """All (angle, isometry, probability) with pieces of the same isometry still apart."""
@@ -247,7 +247,7 @@ class IsometryTable:
         step = max(CHUNK // max(int(size.max(initial=1)), 1), 1)
         for begin in range(0, theta.size, step):
             part = slice(begin, begin + step)
-            owner, place = ragged(size[part])
+            owner, place = joined_lists(size[part])
             query = begin + owner
             piece = members[first[bucket[query]] + place]
             at = theta[query]
@@ -271,7 +271,7 @@ class IsometryTable:
         buckets = int(np.clip(ENTRIES_PER_PIECE * self.low.size * np.pi / max(width, 1e-300), 1, 2**20))
         left = np.clip((self.low * (buckets / np.pi)).astype(np.int64) - 1, 0, buckets - 1)
         right = np.clip((self.high * (buckets / np.pi)).astype(np.int64) + 1, 0, buckets - 1)
-        piece, place = ragged(right - left + 1)
+        piece, place = joined_lists(right - left + 1)
         bucket = left[piece] + place
         order = np.argsort(bucket, kind="stable")
         first = np.concatenate([[0], np.cumsum(np.bincount(bucket, minlength=buckets))])
@@ -284,13 +284,13 @@ class IsometryTable:
         """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of those left out."""
         lists, left_out = [self.ends], 0.0
         for crevice in self.crevices:
-            kinks, omitted = crevice_breakpoints(crevice.height_to_width, max(limit // len(self.crevices), 1))
-            lists.append(kinks)
+            breakpoints, omitted = crevice_breakpoints(crevice.height_to_width, max(limit // len(self.crevices), 1))
+            lists.append(breakpoints)
             left_out = max(left_out, omitted)
         found = np.unique(np.concatenate(lists))
         surplus = self.ends.size - limit
         if surplus <= 0:
             return found, left_out
         # too many everywhere: those nearest to pi/2 stay
-        found, beyond = without_outermost(found, surplus)
+        found, beyond = without_extremal(found, surplus)
         return found, min(left_out + beyond, 1.0)

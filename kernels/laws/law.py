@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_array, generator, whole_number
 from ...core.errors import InputError
-from ..bases.angles import flipped
+from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.mirror import is_mirror_symmetric
 from ..expectations.basis_means import ByApply, Expectations, Mirrored, Weighted
@@ -51,7 +51,7 @@ class Law(ABC):
         Whether P~ commutes with J f(theta) = f(pi - theta); None where it is not known.
     frame : {"paper", "specular"}
         ``"specular"`` after `in_specular_frame`, where specular reflection is the identity (Feres' convention).
-    fan_out : int
+    evaluations : int
         At how many outgoing angles `apply` evaluates its function for one incoming angle: its cost.
     exact_apply : bool
         Whether `apply` gives expectations to rounding, of any function. Where it is a quadrature the answer is no, and
@@ -68,7 +68,7 @@ class Law(ABC):
     reversible: bool | None = None
     mirror_symmetric: bool | None = None
     frame: Frame = "paper"
-    fan_out: int = 1
+    evaluations: int = 1
     exact_apply: bool = False
 
     # A law is an operator, not an array: numpy must leave ``0.3 * law`` to us.
@@ -154,7 +154,7 @@ class Law(ABC):
 
     def expectations(self, basis: Basis) -> Expectations:
         """E[e_j(Theta') | theta] of all functions of a basis, with errors if the law knows them; by default `apply`."""
-        return ByApply(basis, self.apply, self.fan_out)
+        return ByApply(basis, self.apply, self.evaluations)
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
@@ -247,34 +247,34 @@ class BranchLaw(Law):
 
 
 class DrivenLaw(Law):
-    """A law theta' = respond(X, theta) with X uniform in (0, 1): the reflection of a ray that enters at random.
+    """A law theta' = reflect(X, theta) with X uniform in (0, 1): the reflection of a ray that enters at random.
 
-    Subclasses give `respond`. Unless they know better, expectations are midpoint sums over ``fan_out`` entry points:
-    the error falls like 1/fan_out where respond jumps, and like its square elsewhere.
+    Subclasses give `reflect`. Unless they know better, expectations are midpoint sums over ``evaluations`` entry
+    points: the error falls like 1/evaluations where `reflect` jumps, and like its square elsewhere.
     """
 
-    fan_out = 256
+    evaluations = 256
 
     @abstractmethod
-    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle for the entry point ``x`` in (0, 1), as a share of the period, and the angle ``theta``."""
 
     def random_map(self) -> RandomMap:
-        """`respond`."""
-        return lambda x, theta: (self.respond(x, theta), None)
+        """`reflect`."""
+        return lambda x, theta: (self.reflect(x, theta), None)
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """Equally spaced entry points, each an atom."""
         x = (np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS
-        outgoing = self.respond(x, theta[:, None])
+        outgoing = self.reflect(x, theta[:, None])
         return Distribution.of_atoms(edges, outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        return self.respond(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
+        return self.reflect(np.maximum(rng.random(theta.shape), SMALLEST_DRAW), theta)
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        x = (np.arange(self.fan_out) + 0.5) / self.fan_out
-        outgoing = self.respond(x.reshape((-1,) + (1,) * theta.ndim), theta)
+        x = (np.arange(self.evaluations) + 0.5) / self.evaluations
+        outgoing = self.reflect(x.reshape((-1,) + (1,) * theta.ndim), theta)
         return np.asarray(np.mean(np.asarray(function(outgoing), dtype=np.float64), axis=0))
 
 
@@ -283,7 +283,7 @@ def entry_inside(x: Floats) -> Floats:
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
 
 
-def set_facts(law: Law, **facts: object) -> None:
+def set_properties(law: Law, **facts: object) -> None:
     """Set attributes of a law under construction; afterwards it is immutable."""
     for name, value in facts.items():
         object.__setattr__(law, name, value)
@@ -341,10 +341,10 @@ class Combination(Law):
             if not math.isfinite(weight):
                 raise InputError(f"terms: expected finite weights, got {weight!r} for {law!r}")
         laws = [law for _, law in self.terms]
-        set_facts(self, frame=common_frame(laws, "add"), fan_out=sum(law.fan_out for law in laws))
+        set_properties(self, frame=common_frame(laws, "add"), evaluations=sum(law.evaluations for law in laws))
         used = [law for weight, law in self.terms if weight]
-        set_facts(self, reversible=_sum_promise([law.reversible for law in used]))
-        set_facts(self, mirror_symmetric=_sum_promise([law.mirror_symmetric for law in used]))
+        set_properties(self, reversible=_sum_promise([law.reversible for law in used]))
+        set_properties(self, mirror_symmetric=_sum_promise([law.mirror_symmetric for law in used]))
 
     @staticmethod
     def of(law: Law) -> Combination:
@@ -506,11 +506,11 @@ class Composition(Law):
             flat.extend(law.laws if isinstance(law, Composition) else (law,))
         if not flat:
             raise InputError("laws: expected at least one, got none")
-        set_facts(self, laws=tuple(flat), frame=common_frame(flat, "compose"))
+        set_properties(self, laws=tuple(flat), frame=common_frame(flat, "compose"))
         palindrome = all(law is back or law == back for law, back in zip(flat, reversed(flat), strict=True))
-        set_facts(self, reversible=True if palindrome and all(law.reversible for law in flat) else None)
-        set_facts(self, mirror_symmetric=True if all(law.mirror_symmetric for law in flat) else None)
-        set_facts(self, fan_out=math.prod(law.fan_out for law in flat))
+        set_properties(self, reversible=True if palindrome and all(law.reversible for law in flat) else None)
+        set_properties(self, mirror_symmetric=True if all(law.mirror_symmetric for law in flat) else None)
+        set_properties(self, evaluations=math.prod(law.evaluations for law in flat))
 
     @staticmethod
     def of(first: Law, second: Law) -> Law:
@@ -558,7 +558,7 @@ class Composition(Law):
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
-    `apply` evaluates its function at ``fan_out ** n`` angles and raises an InputError where that is out of reach:
+    `apply` evaluates its function at ``evaluations ** n`` angles and raises an InputError where that is out of reach:
     use ``discretise(law, basis) ** n`` there.
 
     Examples
@@ -573,11 +573,13 @@ class Power(Law):
 
     def __post_init__(self) -> None:
         whole_number("exponent", self.exponent, 0)
-        set_facts(self, frame=self.law.frame, mirror_symmetric=self.law.mirror_symmetric or self.exponent == 0 or None)
-        set_facts(self, reversible=self.law.reversible or self.exponent == 0 or None)
+        set_properties(
+            self, frame=self.law.frame, mirror_symmetric=self.law.mirror_symmetric or self.exponent == 0 or None
+        )
+        set_properties(self, reversible=self.law.reversible or self.exponent == 0 or None)
         # A float: whole numbers of 10^5 digits serve nobody.
-        grown = math.exp(min(self.exponent * math.log(self.law.fan_out), 700.0))
-        set_facts(self, fan_out=round(grown))
+        grown = math.exp(min(self.exponent * math.log(self.law.evaluations), 700.0))
+        set_properties(self, evaluations=round(grown))
 
     def adjoint(self) -> Law:
         """(P^n)* = (P*)^n."""
@@ -630,9 +632,10 @@ def as_base(law: Law) -> str:
 
 
 def _check_cost(law: Law) -> None:
-    if law.fan_out > MOST_EVALUATIONS:
+    if law.evaluations > MOST_EVALUATIONS:
         raise InputError(
-            f"apply: {law!r} needs {law.fan_out:.1e} evaluations for each angle (at most {MOST_EVALUATIONS:.0e}); use "
+            f"apply: {law!r} needs {law.evaluations:.1e} evaluations for each angle (at most "
+            f"{MOST_EVALUATIONS:.0e}); use "
             "discretise() and compose the matrices"
         )
 
@@ -662,8 +665,10 @@ class SpecularFrame(Law):
 
     def __post_init__(self) -> None:
         mirror = self.law.mirror_symmetric
-        set_facts(self, frame=_other_frame(self.law.frame), mirror_symmetric=mirror, fan_out=self.law.fan_out)
-        set_facts(self, reversible=mirror if self.law.reversible else None)
+        set_properties(
+            self, frame=_other_frame(self.law.frame), mirror_symmetric=mirror, evaluations=self.law.evaluations
+        )
+        set_properties(self, reversible=mirror if self.law.reversible else None)
 
     @staticmethod
     def of(law: Law) -> Law:
@@ -683,7 +688,7 @@ class SpecularFrame(Law):
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         probability, outgoing = self.law.branches(theta)
-        return probability, flipped(outgoing)
+        return probability, mirrored_angle(outgoing)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return self.law.breakpoints(limit)
@@ -699,7 +704,7 @@ class SpecularFrame(Law):
 
         def mirrored(x: Floats, theta: Floats) -> tuple[Floats, NDArray[np.bool_] | None]:
             outgoing, escaped = inner(x, theta)
-            return flipped(outgoing), escaped
+            return mirrored_angle(outgoing), escaped
 
         return mirrored
 
@@ -717,10 +722,10 @@ class SpecularFrame(Law):
         return Mirrored(basis, self.law.expectations(basis), self.mirror_symmetric is True)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
-        return flipped(self.law.sample(theta, rng))
+        return mirrored_angle(self.law.sample(theta, rng))
 
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
-        return self.law.apply(lambda angle: function(flipped(angle)), theta)
+        return self.law.apply(lambda angle: function(mirrored_angle(angle)), theta)
 
     def __repr__(self) -> str:
         return f"{as_base(self.law)}.in_specular_frame()"
@@ -742,12 +747,12 @@ class IsometryLaw(BranchLaw):
     retro: bool
 
     mirror_symmetric = True
-    fan_out = 1
+    evaluations = 1
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """One branch, of probability 1."""
         theta = angles("theta", theta)
-        outgoing = theta.copy() if self.retro else flipped(theta)
+        outgoing = theta.copy() if self.retro else mirrored_angle(theta)
         return np.ones((*theta.shape, 1)), outgoing[..., None]
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:

@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from ...core.checks import Floats
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE, gauss_on_intervals
@@ -55,7 +55,7 @@ class LeastResistanceLaw(Law):
     reversible = True
     mirror_symmetric = True
     exact_apply = True
-    fan_out = 2
+    evaluations = 2
 
     @property
     def split_ends(self) -> float:
@@ -70,7 +70,7 @@ class LeastResistanceLaw(Law):
         away = np.where(size < SPLIT_BEGINS, 0.0, away)
         partner = np.where(size < SPLIT_BEGINS, -size, partners(size, self.split_ends))
         image = np.stack([-size, partner], axis=-1) * np.where(x < 0.0, -1.0, 1.0)[..., None]
-        return np.stack([1.0 - away, away], axis=-1), kept_inside(image + 0.5 * np.pi)
+        return np.stack([1.0 - away, away], axis=-1), clipped_inside(image + 0.5 * np.pi)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Where the formula changes."""

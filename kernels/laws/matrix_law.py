@@ -7,14 +7,14 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import InputError
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
 from ..bases.intervals import cell_among
 from ..bases.measure import SINE
 from ..matrices.matrix import KernelMatrix
 from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw
-from .law import set_facts
+from .law import set_properties
 
 # Rows that were divided by their sum add up to 1 within a few roundings; rows of a matrix whose flux was symmetrised
 # instead do not, and are no law.
@@ -49,7 +49,7 @@ class MatrixLaw(DensityLaw):
     >>> law = MatrixLaw([[0.25, 0.75], [0.75, 0.25]])
     >>> round(float(law.apply(lambda theta: theta < np.pi / 2, 1.0)), 14)
     0.25
-    >>> law.reversible, law.fan_out
+    >>> law.reversible, law.evaluations
     (True, 32)
     """
 
@@ -82,15 +82,15 @@ class MatrixLaw(DensityLaw):
             )
         masses = SINE.mass(edges[:-1], edges[1:])
         array = array / sums[:, None]
-        set_facts(self, array=frozen(array), edges=frozen(edges), _masses=masses)
-        set_facts(self, outgoing_breakpoints=frozen(edges[1:-1]))
-        set_facts(self, frame=frame, fan_out=array.shape[0] * GAUSS_NODES)
+        set_properties(self, array=frozen(array), edges=frozen(edges), _masses=masses)
+        set_properties(self, outgoing_breakpoints=frozen(edges[1:-1]))
+        set_properties(self, frame=frame, evaluations=array.shape[0] * GAUSS_NODES)
         flux = masses[:, None] * array
-        set_facts(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= SYMMETRY_TOLERANCE * np.max(flux)))
+        set_properties(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= SYMMETRY_TOLERANCE * np.max(flux)))
         even = bool(np.max(np.abs(masses - masses[::-1])) <= SYMMETRY_TOLERANCE)
         mirror = bool(np.max(np.abs(array - array[::-1, ::-1])) <= SYMMETRY_TOLERANCE)
         # On bins that are not symmetric about pi/2 the entries alone do not tell.
-        set_facts(self, mirror_symmetric=mirror if even else None)
+        set_properties(self, mirror_symmetric=mirror if even else None)
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
@@ -153,4 +153,4 @@ def _uniform_between(low: Floats, high: Floats, share: Floats) -> Floats:
     share = np.where(upper, 1.0 - share, share)
     angle = SINE.quantile(SINE.cdf(low) + share * SINE.mass(low, high))
     angle = np.clip(angle, low, high)
-    return kept_inside(np.where(upper, np.pi - angle, angle))
+    return clipped_inside(np.where(upper, np.pi - angle, angle))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, number_between, whole_number
-from ..bases.angles import flipped, kept_inside
+from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
 from .density import GAUSS_NODES, DensityLaw
 
@@ -53,7 +53,7 @@ class HenyeyGreensteinLaw(DensityLaw):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "g", number_between("g", self.g, -1.0, 1.0))
-        object.__setattr__(self, "fan_out", (2 * self._doublings() + 4) * GAUSS_NODES)
+        object.__setattr__(self, "evaluations", (2 * self._doublings() + 4) * GAUSS_NODES)
 
     def eigenvalue(self, degree: int) -> float:
         """g^l, the eigenvalue of the Legendre polynomial of degree l in cos(theta)."""
@@ -112,8 +112,8 @@ class HenyeyGreensteinLaw(DensityLaw):
         along, across = half_cosine**2 - half_sine**2, 2.0 * half_sine * half_cosine
         forward = along * np.cos(theta) - across * np.cos(azimuth) * np.sin(theta)
         upward = along * np.sin(theta) + across * np.cos(azimuth) * np.cos(theta)
-        outgoing = kept_inside(np.arctan2(np.hypot(upward, across * np.sin(azimuth)), forward))
-        return outgoing if self.g >= 0.0 else flipped(outgoing)
+        outgoing = clipped_inside(np.arctan2(np.hypot(upward, across * np.sin(azimuth)), forward))
+        return outgoing if self.g >= 0.0 else mirrored_angle(outgoing)
 
     def __repr__(self) -> str:
         return f"henyey_greenstein({self.g!r})"

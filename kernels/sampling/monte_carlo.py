@@ -40,7 +40,7 @@ def independent_rays(
                     outgoing = law.sample(theta, own)
                 else:
                     outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta)
-                    sums.count_lost(escaped)
+                    sums.count_unresolved(escaped)
                 sums.add(part, theta, outgoing)
                 bar.update(theta.size)
     return sums.array(symmetrise=symmetrise)

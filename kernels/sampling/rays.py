@@ -14,7 +14,7 @@ from ..bases.assembly import largest_square_sum
 from ..bases.basis import Basis
 from ..bases.mirror import reflection_matrix
 from ..laws.law import Law
-from ..walls.traced_map import LOST_TOLERANCE
+from ..walls.traced_map import UNRESOLVED_TOLERANCE
 from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
 
 # Rays at a time; more where adding up the matrices of counts would take longer than the rays.
@@ -52,7 +52,7 @@ class RaySums:
         found = (count_pairs if self.basis.is_partition else sum_products)(self.basis, incoming, outgoing)
         self.tables[table] += found
 
-    def count_lost(self, escaped: NDArray[np.bool_] | None) -> None:
+    def count_unresolved(self, escaped: NDArray[np.bool_] | None) -> None:
         """Count the rays that did not escape."""
         self.lost += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
 
@@ -68,9 +68,9 @@ class RaySums:
         """
         used = len(self.tables) * self.each
         share = self.lost / used
-        if share > LOST_TOLERANCE:
+        if share > UNRESOLVED_TOLERANCE:
             raise AccuracyError(
-                f"{self.law!r}: {share:.2g} of {used} rays did not escape, more than {LOST_TOLERANCE:g}; "
+                f"{self.law!r}: {share:.2g} of {used} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
                 "geometry.trace(wall, x, theta).counts() says how they ended",
                 share,
             )

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import InputError
-from ..bases.angles import kept_inside
+from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.mirror import is_mirror_symmetric
@@ -21,7 +21,7 @@ PARTS = 8
 SOBOL_BITS = 32
 
 
-class Net:
+class SobolSampler:
     """Rays of a law that is driven by a uniform number, with incoming angles from the invariant measure.
 
     They are eight parts of the same number of rays. Each part is the same scrambled Sobol sequence after a random
@@ -84,8 +84,8 @@ class Net:
         digits = (self.sequence.random(number) * 2.0**SOBOL_BITS).astype(np.uint64)
         points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS + self.beyond[:, None]
         x, u = np.moveaxis(points, -1, 0)
-        theta: Floats = kept_inside(SINE.quantile(0.5 * u if self.halved else u))
+        theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
         outgoing, escaped = self.reflect(entry_inside(x), theta)
-        self.sums.count_lost(escaped)
+        self.sums.count_unresolved(escaped)
         for part in range(PARTS):
             self.sums.add(part, theta[part], outgoing[part])

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between
-from ..bases.angles import flipped, kept_inside, mixed_arccos
+from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
 from ..bases.basis import AngleFunction, Basis
-from ..bases.intervals import ragged
+from ..bases.intervals import joined_lists
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.panels import Panels
 from ..expectations.arcs import ArcMeans, ArcPieces, PiecesOfRows, arc_images, outgoing_lines
@@ -63,7 +63,7 @@ class CircularArcLaw(DrivenLaw):
     A ray through the centre of a semicircle goes back where it came from.
 
     >>> law = CircularArcLaw(np.pi / 2)
-    >>> round(float(law.respond(0.5, 1.25)), 15), int(law.hits(0.5, 1.25))
+    >>> round(float(law.reflect(0.5, 1.25)), 15), int(law.hits(0.5, 1.25))
     (1.25, 1)
     """
 
@@ -71,17 +71,17 @@ class CircularArcLaw(DrivenLaw):
 
     reversible = True
     mirror_symmetric = True
-    fan_out = 8 * NODES
+    evaluations = 8 * NODES
 
     def __post_init__(self) -> None:
         checked = number_between("half_angle", self.half_angle, 0.0, 0.5 * np.pi, closed="high")
         object.__setattr__(self, "half_angle", checked)
 
-    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
         right, base, chord, hits = self._rotation(entry_points(x), angles("theta", theta))
-        outgoing = kept_inside(np.pi + base - 2.0 * hits * chord)
-        return np.where(right, flipped(outgoing), outgoing)
+        outgoing = clipped_inside(np.pi + base - 2.0 * hits * chord)
+        return np.where(right, mirrored_angle(outgoing), outgoing)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
         """Number of reflections of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
@@ -97,9 +97,11 @@ class CircularArcLaw(DrivenLaw):
         k = np.arange(1.0, count + 1.0)
         left = self.half_angle * np.concatenate([[1.0], 1.0 + 1.0 / k, k / (k + 1.0)])
         left = np.concatenate([left, [0.5 * np.pi - self.half_angle]])
-        kinks = np.unique(np.concatenate([left, np.pi - left]))
+        breakpoints = np.unique(np.concatenate([left, np.pi - left]))
         low, high = self.half_angle * count / (count + 1.0), self.half_angle * (count + 1.0) / count
-        return kinks[(kinks > 0.0) & (kinks < np.pi)], min(float(2.0 * SINE.mass(low, min(high, np.pi))), 1.0)
+        return breakpoints[(breakpoints > 0.0) & (breakpoints < np.pi)], min(
+            float(2.0 * SINE.mass(low, min(high, np.pi))), 1.0
+        )
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The masses between the edges, as integrals of a sine."""
@@ -133,7 +135,7 @@ class CircularArcLaw(DrivenLaw):
 
     def _means(self, function: AngleFunction, theta: Floats, nodes: int, most_hits: int) -> Floats:
         ray, mirrored, outgoing, weight = self._row_quadrature(theta, nodes, most_hits)
-        angle = kept_inside(np.where(mirrored[:, None], np.pi - outgoing, outgoing))
+        angle = clipped_inside(np.where(mirrored[:, None], np.pi - outgoing, outgoing))
         value = np.asarray(function(angle), dtype=np.float64)
         piece = np.einsum("ij,ij...->i...", weight, value)
         total = np.bincount(ray, weights=weight.sum(axis=1), minlength=theta.size)
@@ -191,7 +193,7 @@ class CircularArcLaw(DrivenLaw):
             most = np.minimum(np.ceil((total - low) / (2.0 * low)), most_hits)
         most = np.maximum(most, fewest)
         pieces = np.where((high > low) | alone, most - fewest + 2.0, 0.0).astype(np.intp)
-        owner, order = ragged(pieces)
+        owner, order = joined_lists(pieces)
         hits = np.asarray(fewest[owner] + order, dtype=np.float64)
         # The last piece of every row holds all the rays with more hits, at the mean of their outgoing angles.
         rest = order == pieces[owner] - 1

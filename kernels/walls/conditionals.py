@@ -14,7 +14,7 @@ from ...geometry import Wall
 from ..bases.basis import AngleFunction
 from ..bases.legendre import Legendre
 from ..expectations.basis_means import Expectations, means_of_basis
-from .hollow_conditionals import NO_LIMIT, HollowRows
+from .hollow_conditionals import NO_LIMIT, HollowConditionals
 
 # Pieces of a wall up to which a row takes no more than some milliseconds.
 MOST_PIECES = 64
@@ -28,7 +28,7 @@ MANY_FLIGHTS, MOST_FLIGHTS_OF_A_LOOK = 15_000, 400_000
 
 
 @dataclass(frozen=True)
-class AdaptiveRows:
+class AdaptiveConditionals:
     """Rows P(theta, d theta') of a wall as weighted outgoing angles.
 
     Attributes
@@ -67,9 +67,9 @@ def is_few(wall: Wall) -> bool:
     return len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
 
 
-def adaptive_rows(
+def adaptive_conditionals(
     wall: Wall, theta: ArrayLike, tolerance: float = 1e-10, degree: int = 1, edges: ArrayLike = ()
-) -> AdaptiveRows:
+) -> AdaptiveConditionals:
     r"""Rows of a wall's law to a tolerance.
 
     Parameters
@@ -87,7 +87,7 @@ def adaptive_rows(
 
     Returns
     -------
-    AdaptiveRows
+    AdaptiveConditionals
 
     Raises
     ------
@@ -107,7 +107,7 @@ def adaptive_rows(
     --------
     >>> from math import cos
     >>> from asperity import geometry as geo
-    >>> rows = adaptive_rows(geo.flat(), [0.5])
+    >>> rows = adaptive_conditionals(geo.flat(), [0.5])
     >>> rows.weights.tolist(), bool(rows.mean(np.cos)[0] == cos(np.pi - 0.5))
     ([1.0], True)
     """
@@ -115,10 +115,10 @@ def adaptive_rows(
     if not finite_number("tolerance", tolerance) > 0.0:
         raise InputError(f"tolerance: expected a number greater than 0, got {tolerance!r}")
     incoming = np.atleast_1d(angles("theta", theta)).ravel()
-    return WallRows(wall, int(degree), np.asarray(edges, dtype=np.float64))(incoming, tolerance)
+    return WallConditionals(wall, int(degree), np.asarray(edges, dtype=np.float64))(incoming, tolerance)
 
 
-class WallRows:
+class WallConditionals:
     """Rows of one wall for one kind of functions; what is the same for all calls is made once."""
 
     def __init__(
@@ -136,10 +136,10 @@ class WallRows:
         self.stale: set[float] = set()
 
     @cached_property
-    def _hollows(self) -> list[HollowRows]:
+    def _hollows(self) -> list[HollowConditionals]:
         """The rows of one hollow of each shape."""
         task = self.degree, self.edges, self.least_level, self.most_flights
-        return [HollowRows(self.wall.scene, k, *task) for k, _ in self._shapes]
+        return [HollowConditionals(self.wall.scene, k, *task) for k, _ in self._shapes]
 
     @property
     def _shares(self) -> list[float]:
@@ -159,7 +159,7 @@ class WallRows:
             for hollows in shapes
         ]
 
-    def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveRows:
+    def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveConditionals:
         """Rows at checked angles."""
         incoming, place = np.unique(theta, return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
@@ -182,7 +182,7 @@ class WallRows:
             for k, angle in enumerate(incoming.tolist()):
                 nodes[k].append(np.array([np.pi - angle]))
                 weights[k].append(np.array([flat]))
-        return AdaptiveRows(
+        return AdaptiveConditionals(
             theta,
             np.concatenate([part for k in place.tolist() for part in nodes[k]]),
             np.concatenate([part for k in place.tolist() for part in weights[k]]),
@@ -217,13 +217,13 @@ class TracedExpectations(Expectations):
         return True
 
     @cached_property
-    def _rows(self) -> WallRows:
+    def _rows(self) -> WallConditionals:
         basis = self.basis
         inside, degree, level = np.empty(0), max(1, basis.size - 1), 0
         if not isinstance(basis, Legendre):
             inside = basis.edges[1:-1]
             degree, level = (0, 0) if basis.is_partition else (1, PANEL_LEVEL)
-        return WallRows(self.wall, degree, inside, level)
+        return WallConditionals(self.wall, degree, inside, level)
 
     def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         found = self._rows(theta, tolerance)
@@ -232,5 +232,7 @@ class TracedExpectations(Expectations):
 
     def are_costly(self) -> bool:
         """Whether a look at some angles takes very many flights."""
-        rows = WallRows(self.wall, 1, np.empty(0), most_flights=MOST_FLIGHTS_OF_A_LOOK)(LOOK_ANGLES, LOOK_TOLERANCE)
+        rows = WallConditionals(self.wall, 1, np.empty(0), most_flights=MOST_FLIGHTS_OF_A_LOOK)(
+            LOOK_ANGLES, LOOK_TOLERANCE
+        )
         return rows.flights > MANY_FLIGHTS * LOOK_ANGLES.size

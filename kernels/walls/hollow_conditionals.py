@@ -43,8 +43,8 @@ class _Pieces(NamedTuple):
 
 
 @dataclass
-class HollowRows:
-    """The rows of one hollow for one kind of functions; see `WallRows`.
+class HollowConditionals:
+    """The rows of one hollow for one kind of functions; see `WallConditionals`.
 
     A piece that is narrower than the distance of the samples can be overlooked in a row. Its neighbours in theta may
     have seen it: so rows are compared with those on either side, whenever either was computed.

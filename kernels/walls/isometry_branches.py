@@ -9,7 +9,7 @@ from ...core.checks import Floats, angles
 from ..laws.law import Law
 
 # Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.
-KINKS = 20_000
+BREAKPOINTS = 20_000
 
 
 def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
@@ -41,7 +41,7 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     table = law.isometry_table()
     if table is not None:
         return table.rows(incoming)
-    edges = np.concatenate([[0.0], law.breakpoints(KINKS)[0], [np.pi]])
+    edges = np.concatenate([[0.0], law.breakpoints(BREAKPOINTS)[0], [np.pi]])
     right = np.clip(np.searchsorted(edges, incoming, side="right"), 1, len(edges) - 1)
     low, high = edges[right - 1], edges[right]
     # the midpoint towards the farther end of the interval

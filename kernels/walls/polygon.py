@@ -133,7 +133,7 @@ class PolygonLaw(BranchLaw):
         return Estimate(share, share, "bound", f"beams of at most {self.max_beams} a hollow")
 
     @cached_property
-    def fan_out(self) -> int:  # type: ignore[override]
+    def evaluations(self) -> int:  # type: ignore[override]
         """The largest number of branches at an angle, of up to a few hundred angles spread over (0, pi)."""
         edges = np.concatenate([[0.0], self._table.ends, [np.pi]])
         edges = edges[:: edges.size // MOST_PROBES + 1]
@@ -146,7 +146,7 @@ class PolygonLaw(BranchLaw):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return self._table.breakpoints(limit)
 
-    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
         return traced_angles(self.wall, x, theta)
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, positive_number
-from ..bases.angles import flipped
+from ..bases.angles import mirrored_angle
 from ..laws.crevice import crevice_breakpoints, crevice_retro, crossings_modulo_two
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entry_points
@@ -55,7 +55,7 @@ class RectangularTeethLaw(BranchLaw):
     height_to_width: float
 
     mirror_symmetric = True
-    fan_out = 2
+    evaluations = 2
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "height_to_width", positive_number("height_to_width", self.height_to_width))
@@ -69,7 +69,7 @@ class RectangularTeethLaw(BranchLaw):
         """Probabilities and angles, shape ``theta.shape + (2,)``: specular first, then retroreflection."""
         theta = angles("theta", theta)
         retro = 0.5 * crevice_retro(self.height_to_width, theta)
-        return np.stack([1.0 - retro, retro], axis=-1), np.stack([flipped(theta), theta], axis=-1)
+        return np.stack([1.0 - retro, retro], axis=-1), np.stack([mirrored_angle(theta), theta], axis=-1)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """The angles where d is a whole number, cot theta = k / (2 r), and the probability beyond the last of them."""
@@ -79,11 +79,11 @@ class RectangularTeethLaw(BranchLaw):
         """Half of it flat tops, half of it crevices."""
         return IsometryTable.joined([IsometryTable.flat(0.5), IsometryTable.of_crevice(0.5, self.height_to_width)])
 
-    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left end of the flat top."""
         x, theta = entry_points(x), angles("theta", theta)
         sides = _sides_hit(x, theta, crossings_modulo_two(self.height_to_width, theta))
-        return np.where(np.mod(sides, 2.0) == 0.0, flipped(theta), theta)
+        return np.where(np.mod(sides, 2.0) == 0.0, mirrored_angle(theta), theta)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
         """Number of reflections, a hit of the flat top counting as one; at most 2^62 are counted.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles
-from ..bases.angles import flipped, kept_inside
+from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.measure import gauss_on_intervals
@@ -48,12 +48,12 @@ class RepeatedTeethLaw(BranchLaw):
     times: int
 
     mirror_symmetric = True
-    fan_out = 2
+    evaluations = 2
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         theta = angles("theta", theta)
         retro = self.retro(crevice_retro(self.height_to_width, theta))
-        return np.stack([1.0 - retro, retro], axis=-1), np.stack([flipped(theta), theta], axis=-1)
+        return np.stack([1.0 - retro, retro], axis=-1), np.stack([mirrored_angle(theta), theta], axis=-1)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         return crevice_breakpoints(self.height_to_width, limit)
@@ -76,7 +76,7 @@ def repeated_teeth_matrix(law: RepeatedTeethLaw, basis: Basis, exchanged: bool) 
     total = np.zeros((basis.size, basis.size))
     r, begin = law.height_to_width, first_crossing(basis)
     steep = np.arctan2(2.0 * r, np.arange(begin, -1.0, -1.0))
-    edges = np.unique(np.concatenate((steep, basis.edges, kept_inside(np.pi - basis.edges))))
+    edges = np.unique(np.concatenate((steep, basis.edges, clipped_inside(np.pi - basis.edges))))
     edges = edges[(edges >= steep[0]) & (edges <= steep[-1])]
     nodes = max(LEAST_NODES, basis.nodes_per_interval) + law.times
     near, mass = gauss_on_intervals(edges[:-1], edges[1:], nodes)
@@ -85,8 +85,12 @@ def repeated_teeth_matrix(law: RepeatedTeethLaw, basis: Basis, exchanged: bool) 
     far, specular, retro, omitted = crevice_nodes(r, basis, law.times)
     # apart, because many small terms would be rounded like the large ones that they are added to
     for theta, mirrored, same in ((near, mass * (1.0 - back), mass * back), (far, specular, retro)):
-        ways = ((flipped(theta), same), (theta, mirrored)) if exchanged else ((flipped(theta), mirrored), (theta, same))
+        ways = (
+            ((mirrored_angle(theta), same), (theta, mirrored))
+            if exchanged
+            else ((mirrored_angle(theta), mirrored), (theta, same))
+        )
         for outgoing, weight in ways:
             add_products(total, basis, theta, outgoing, weight)
-            add_products(total, basis, flipped(theta), flipped(outgoing), weight)
+            add_products(total, basis, mirrored_angle(theta), mirrored_angle(outgoing), weight)
     return total, 4.0 * omitted * largest_square_sum(basis) if omitted else 0.0

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 # Rays that end in a corner, at a tangency or at the bounce limit are sent back (see `WallLaw`). Their share bounds the
 # error in total variation; above this it would show in a kernel estimated from a million rays.
-LOST_TOLERANCE = 1e-4
+UNRESOLVED_TOLERANCE = 1e-4
 
 
 def traced_outcomes(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
@@ -36,10 +36,11 @@ def traced_angles(wall: Wall, x: ArrayLike, theta: ArrayLike) -> Floats:
     """Outgoing angles; raises an AccuracyError if more than a share of 1e-4 of the rays did not escape."""
     outgoing, escaped = traced_outcomes(wall, x, theta)
     lost = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
-    if lost > LOST_TOLERANCE:
+    if lost > UNRESOLVED_TOLERANCE:
         raise AccuracyError(
-            f"WallLaw(wall={wall!r}): {lost:.2g} of {escaped.size} rays did not escape, more than {LOST_TOLERANCE:g}; "
-            "geometry.trace(wall, x, theta).counts() says how they ended, WallLaw.outcomes() which they were",
+            f"WallLaw(wall={wall!r}): {lost:.2g} of {escaped.size} rays did not escape, more than "
+            f"{UNRESOLVED_TOLERANCE:g}; geometry.trace(wall, x, theta).counts() says how they ended, "
+            "WallLaw.outcomes() which they were",
             lost,
         )
     return outgoing

@@ -9,16 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, number_between
 from ...core.rounding import EPS
-from ..bases.angles import flipped, kept_inside, mixed_arccos
-from ..bases.intervals import without_outermost
+from ..bases.angles import clipped_inside, mirrored_angle, mixed_arccos
+from ..bases.intervals import without_extremal
 from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entry_points
 
 # Kinks closer together than this are one kink computed in two ways.
-KINK_SPACING = 16.0 * EPS
+BREAKPOINT_SPACING = 16.0 * EPS
 # A table has four pieces between two kinks; laws with more kinks than this have none.
-MOST_LISTED_KINKS = 2**17
+MOST_LISTED_BREAKPOINTS = 2**17
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ class TriangularTeethLaw(BranchLaw):
     Right-angled teeth are corner reflectors: every ray that hits both sides goes back where it came from.
 
     >>> law = TriangularTeethLaw(np.pi / 2)
-    >>> float(law.respond(0.5, 1.5)), int(law.hits(0.5, 1.5))
+    >>> float(law.reflect(0.5, 1.5)), int(law.hits(0.5, 1.5))
     (1.5, 2)
     """
 
     angle: float
 
     mirror_symmetric = True
-    fan_out = 4
+    evaluations = 4
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "angle", number_between("angle", self.angle, 0.0, np.pi))
@@ -108,19 +108,19 @@ class TriangularTeethLaw(BranchLaw):
                 (around + 0.5) * psi - 0.5 * np.pi,
             ]
         )
-        kinks = np.sort(np.concatenate([left, np.pi - left]))
-        kinks = kinks[(kinks > KINK_SPACING) & (kinks < np.pi - KINK_SPACING)]
-        kinks = kinks[np.diff(kinks, prepend=-1.0) > KINK_SPACING]
-        if first == 1 and kinks.size <= limit:
-            return kinks, 0.0
-        return without_outermost(kinks, max(kinks.size - limit, 0))
+        breakpoints = np.sort(np.concatenate([left, np.pi - left]))
+        breakpoints = breakpoints[(breakpoints > BREAKPOINT_SPACING) & (breakpoints < np.pi - BREAKPOINT_SPACING)]
+        breakpoints = breakpoints[np.diff(breakpoints, prepend=-1.0) > BREAKPOINT_SPACING]
+        if first == 1 and breakpoints.size <= limit:
+            return breakpoints, 0.0
+        return without_extremal(breakpoints, max(breakpoints.size - limit, 0))
 
     def isometry_table(self) -> IsometryTable | None:
         """The pieces between the kinks, or None where there are too many."""
-        if 4.0 * np.pi / self.angle > MOST_LISTED_KINKS:
+        if 4.0 * np.pi / self.angle > MOST_LISTED_BREAKPOINTS:
             return None
-        kinks, _ = self.breakpoints(2 * MOST_LISTED_KINKS)
-        edges = np.unique(np.concatenate([[0.0], kinks, [0.5 * np.pi, np.pi]]))
+        breakpoints, _ = self.breakpoints(2 * MOST_LISTED_BREAKPOINTS)
+        edges = np.unique(np.concatenate([[0.0], breakpoints, [0.5 * np.pi, np.pi]]))
         low, high = edges[:-1], edges[1:]
         middle = 0.5 * (low + high)
         most, most_mirror = self._most_hits(middle), self._most_hits(np.pi - middle)
@@ -140,11 +140,11 @@ class TriangularTeethLaw(BranchLaw):
         offset = np.where(left_side, offset, np.where(even, -offset, 2.0 * np.pi - offset))
         return IsometryTable(np.where(even, 1.0, -1.0), offset, np.tile(low, 4), np.tile(high, 4), *ends)
 
-    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
         right, base, count = self._unfolded(entry_points(x), angles("theta", theta))
-        outgoing = kept_inside(self._turned(base, count))
-        return np.where(right, flipped(outgoing), outgoing)
+        outgoing = clipped_inside(self._turned(base, count))
+        return np.where(right, mirrored_angle(outgoing), outgoing)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
         """Number of reflections of the ray that enters at ``x`` in (0, 1), measured from the left tip."""

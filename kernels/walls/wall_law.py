@@ -21,10 +21,10 @@ from ..laws.distribution import Distribution
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import Combination, DrivenLaw, Law, RandomMap, specular
 from .circular_arc import CircularArcLaw
-from .conditionals import AdaptiveRows, TracedExpectations, WallRows, adaptive_rows, is_few
+from .conditionals import AdaptiveConditionals, TracedExpectations, WallConditionals, adaptive_conditionals, is_few
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
-from .traced_map import LOST_TOLERANCE, traced_angles, traced_outcomes
+from .traced_map import UNRESOLVED_TOLERANCE, traced_angles, traced_outcomes
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
@@ -51,8 +51,8 @@ CELL_TOLERANCE = 1e-9
 class WallLaw(DrivenLaw):
     """The law P~ of a wall: a ray enters at a uniform point of the period.
 
-    `respond` and `outcomes` trace rays. `sample` and `apply` use the closed form if there is one, else they trace;
-    `branches`, `kinks` and `discretise` use the exact law if there is one.
+    `reflect` and `outcomes` trace rays. `sample` and `apply` use the closed form if there is one, else they trace;
+    `branches`, `breakpoints` and `discretise` use the exact law if there is one.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class WallLaw(DrivenLaw):
     Raises
     ------
     AccuracyError
-        By `respond`, `sample` and `apply` if more than a share of 1e-4 of the rays did not escape; ``defect`` is the
+        By `reflect`, `sample` and `apply` if more than a share of 1e-4 of the rays did not escape; ``defect`` is the
         share.
 
     Notes
@@ -102,7 +102,7 @@ class WallLaw(DrivenLaw):
         # An asymmetric cell may still have a symmetric law, so its absence proves nothing.
         object.__setattr__(self, "mirror_symmetric", True if self.wall.is_mirror_symmetric else None)
         if self.closed_form is not None:
-            object.__setattr__(self, "fan_out", self.closed_form.fan_out)
+            object.__setattr__(self, "evaluations", self.closed_form.evaluations)
             object.__setattr__(self, "mirror_symmetric", self.closed_form.mirror_symmetric)
 
     @property
@@ -148,7 +148,7 @@ class WallLaw(DrivenLaw):
         """`outcomes`."""
         return self.outcomes
 
-    def respond(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
         return traced_angles(self.wall, x, theta)
 
@@ -172,7 +172,7 @@ class WallLaw(DrivenLaw):
             return self.exact_law.distribution(theta, edges)
         if not is_few(self.wall):
             return super().distribution(theta, edges)
-        found = WallRows(self.wall, 0, edges[1:-1])(theta, CELL_TOLERANCE)
+        found = WallConditionals(self.wall, 0, edges[1:-1])(theta, CELL_TOLERANCE)
         owner = np.repeat(np.arange(theta.size), np.diff(found.starts))
         level = found.nodes == (np.pi - theta)[owner]
         cells = edges.size - 1
@@ -188,7 +188,7 @@ class WallLaw(DrivenLaw):
         if self.exact_law is not None:
             return self.exact_law.expectations(basis)
         if not is_few(self.wall):
-            return ByApply(basis, self.apply, self.fan_out, traced=True)
+            return ByApply(basis, self.apply, self.evaluations, traced=True)
         return TracedExpectations(basis, self.wall)
 
     def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
@@ -203,7 +203,9 @@ class WallLaw(DrivenLaw):
         mean = self.rows(incoming).mean(function)
         return mean.reshape(incoming.shape + mean.shape[1:])
 
-    def rows(self, theta: ArrayLike, tolerance: float = APPLY_TOLERANCE, degree: int = APPLY_DEGREE) -> AdaptiveRows:
+    def rows(
+        self, theta: ArrayLike, tolerance: float = APPLY_TOLERANCE, degree: int = APPLY_DEGREE
+    ) -> AdaptiveConditionals:
         """Rows of the traced law with an error each: ``rows.mean(f)`` is what `apply` gives, ``rows.error`` its error.
 
         Parameters
@@ -217,7 +219,7 @@ class WallLaw(DrivenLaw):
 
         Returns
         -------
-        AdaptiveRows
+        AdaptiveConditionals
             One row an angle, in their order.
 
         Raises
@@ -232,10 +234,12 @@ class WallLaw(DrivenLaw):
         >>> rows.mean(np.cos).round(6).tolist(), bool(rows.error.max() < 1e-7)
         ([0.330126, 0.006489], True)
         """
-        found = adaptive_rows(self.wall, angles("theta", theta).ravel(), tolerance, degree)
+        found = adaptive_conditionals(self.wall, angles("theta", theta).ravel(), tolerance, degree)
         lost = float(np.mean(found.lost))
-        if lost > LOST_TOLERANCE:
-            raise AccuracyError(f"{self!r}: {lost:.2g} of the rays did not escape, more than {LOST_TOLERANCE:g}", lost)
+        if lost > UNRESOLVED_TOLERANCE:
+            raise AccuracyError(
+                f"{self!r}: {lost:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", lost
+            )
         return found
 
 

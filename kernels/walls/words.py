@@ -104,7 +104,7 @@ def _chain(parts: Sequence[Sum | None]) -> Sum | None:
 
 def reduced(word: Word) -> Word:
     """The shortest word for the same operator that the rules above lead to."""
-    return _joined(_flipped(_forgotten(word)))
+    return _joined(_mirrored_angle(_forgotten(word)))
 
 
 def _forgotten(word: Word) -> Word:
@@ -118,7 +118,7 @@ def _forgotten(word: Word) -> Word:
     return (lambertian(), *after[kept:])
 
 
-def _flipped(word: Word) -> Word:
+def _mirrored_angle(word: Word) -> Word:
     """With flips moved through mirror-symmetric laws: one at most in each run of these, in a scattering if there is."""
     found: list[Law] = []
     run: list[Law] = []

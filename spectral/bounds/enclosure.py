@@ -19,7 +19,7 @@ from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import made_of_isometries
-from ..eigenvalues.parity import Parity, halves, outermost_by_parity
+from ..eigenvalues.parity import Parity, extremal_by_parity, halves
 from ..eigenvalues.spectra import check_reversible
 from .contraction import refuse_unless_self_adjoint
 from .operator_residuals import Residuals, image_rule, residuals
@@ -346,7 +346,7 @@ def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Fl
     """Pairs of largest modulus, descending, constants first, with their parities; what comes next with its residual."""
     symmetric = _galerkin(law, basis, tolerance)
     constant = np.asarray(basis.constant)
-    found, names = outermost_by_parity(symmetric, halves(basis, law), constant, len(symmetric), "largest")
+    found, names = extremal_by_parity(symmetric, halves(basis, law), constant, len(symmetric), "largest")
     rest, inner = found.values, found.vectors
     order = np.argsort(-np.abs(rest), kind="stable")
     chosen = np.sort(order[: k - 1])

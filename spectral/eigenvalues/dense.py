@@ -83,7 +83,7 @@ def _reflect(v: Floats, array: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Extremes:
+class ExtremalEigenvalues:
     """The outermost eigenvalues of a symmetric matrix.
 
     Attributes
@@ -110,7 +110,7 @@ class Extremes:
     method: str
 
 
-def outermost(array: Floats, constant: Floats | None, k: int, which: Which = "moduli") -> Extremes:
+def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "moduli") -> ExtremalEigenvalues:
     r"""The k largest eigenvalues; or the k of largest modulus, and with them always the largest one.
 
     Parameters
@@ -168,7 +168,7 @@ def counted_from_above(values: Floats, which: Which) -> int:
     return len(values) if which == "largest" else max(int(np.sum(values > 0.0)), min(1, len(values)))
 
 
-def _proved(matrix: Deflated, k: int, which: Which) -> Extremes | str:
+def _proved(matrix: Deflated, k: int, which: Which) -> ExtremalEigenvalues | str:
     """By Lanczos and Cholesky; in words why not, where the one does not converge or the other does not bear it out."""
     end: Literal["LM", "LA"] = "LM" if which == "moduli" else "LA"
     none = _nothing(len(matrix.array))
@@ -179,13 +179,13 @@ def _proved(matrix: Deflated, k: int, which: Which) -> Extremes | str:
         if found is None:
             return "Lanczos did not converge"
         listed = _without_others(matrix, found, k, which)
-        if isinstance(listed, Extremes):
+        if isinstance(listed, ExtremalEigenvalues):
             return listed
         reason, found = listed, _more(matrix, found, MORE_VALUES, end)
     return reason
 
 
-def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Extremes | str:
+def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> ExtremalEigenvalues | str:
     """The k wanted ones of those found; or why they are not good, or other eigenvalues may be beyond the last."""
     values, vectors = found
     rounding = len(matrix.array) * EPS * max(1.0, float(np.abs(values).max()))
@@ -214,7 +214,7 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
     lower = np.maximum(reach.get(-1.0, 0.0) + chosen[top:], 0.0)
     how = "Frobenius norms" if others <= min(ends.values()) else "Cholesky factorisations"
     sides = f"above {reach[1.0]:.12g}" + (f" or below {-reach[-1.0]:.12g}" if -1.0 in reach else "")
-    return Extremes(
+    return ExtremalEigenvalues(
         chosen, vectors[:, places], top, residuals[places], 2.0 * joint + np.concatenate([upper, lower]),
         f"Lanczos, and by {how} no other eigenvalue is {sides}",
     )  # fmt: skip
@@ -254,7 +254,7 @@ def _nothing(size: int) -> _Pairs:
     return np.empty(0), np.empty((size, 0))
 
 
-def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which, method: str) -> Extremes:
+def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which, method: str) -> ExtremalEigenvalues:
     from scipy.linalg import eigh
 
     values, vectors = eigh(array) if constant is None else off_constants(array, constant)
@@ -265,4 +265,4 @@ def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which, met
     norm = max(1.0, float(np.abs(values).max(initial=0.0)))
     residuals = np.linalg.norm(Deflated.of(array, constant) @ vectors - vectors * values, axis=0)
     errors = residuals + len(array) * EPS * norm
-    return Extremes(values, vectors, top, residuals, errors, method)
+    return ExtremalEigenvalues(values, vectors, top, residuals, errors, method)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...kernels import Bins
 from ...kernels.bases.mirror import is_mirror_symmetric, reflection_matrix
-from .dense import Extremes, Which, compressed, counted_from_above, outermost, symmetric_half, wanted
+from .dense import ExtremalEigenvalues, Which, compressed, counted_from_above, extremal, symmetric_half, wanted
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -63,30 +63,30 @@ def halves(basis: Basis, law: Law | KernelMatrix) -> Halves | None:
     return columns((image == here) & (sign > 0.0), 1.0), columns((image == here) & (sign < 0.0), -1.0)
 
 
-def outermost_by_parity(
+def extremal_by_parity(
     array: Floats, split: Halves | None, constant: Floats | None, k: int, which: Which = "moduli"
-) -> tuple[Extremes, tuple[Parity, ...]]:
-    """`outermost` of the symmetric half of a matrix, with the parities of the eigenvectors.
+) -> tuple[ExtremalEigenvalues, tuple[Parity, ...]]:
+    """`extremal` of the symmetric half of a matrix, with the parities of the eigenvectors.
 
     Of a mirror-symmetric law, even and odd functions do not mix: two matrices of half the size take a quarter of the
     work, and what a sampled matrix mixes is left out as the noise that it is. ``split`` is what `halves` gives.
     """
     if split is None:
-        found = outermost(symmetric_half(array), constant, k, which)
+        found = extremal(symmetric_half(array), constant, k, which)
         nothing: Parity = "none"
         return found, (nothing,) * len(found.values)
-    parts: list[tuple[Extremes, csr_array[Any], Parity]] = []
+    parts: list[tuple[ExtremalEigenvalues, csr_array[Any], Parity]] = []
     names: tuple[Parity, Parity] = ("even", "odd")
     for half, name in zip(split, names, strict=True):
         if half.shape[1]:
             inside = None if constant is None or name == "odd" else np.asarray(half.T @ constant)
-            parts.append((outermost(compressed(array, half.T.tocsr()), inside, k, which), half, name))
+            parts.append((extremal(compressed(array, half.T.tocsr()), inside, k, which), half, name))
     return _merged(parts, k, which)
 
 
 def _merged(
-    parts: list[tuple[Extremes, csr_array[Any], Parity]], k: int, which: Which
-) -> tuple[Extremes, tuple[Parity, ...]]:
+    parts: list[tuple[ExtremalEigenvalues, csr_array[Any], Parity]], k: int, which: Which
+) -> tuple[ExtremalEigenvalues, tuple[Parity, ...]]:
     """The k wanted ones of both halves: each of these lists as many of its own."""
     values = np.concatenate([part.values for part, _, _ in parts])
     vectors = np.concatenate([half @ part.vectors for part, half, _ in parts], axis=1)
@@ -98,5 +98,5 @@ def _merged(
     methods = dict.fromkeys(part.method for part, _, _ in parts)
     values = values[order]
     top = counted_from_above(values, which)
-    found = Extremes(values, vectors[:, order], top, residuals[order], errors[order], "; ".join(methods))
+    found = ExtremalEigenvalues(values, vectors[:, order], top, residuals[order], errors[order], "; ".join(methods))
     return found, tuple(names[order].tolist())

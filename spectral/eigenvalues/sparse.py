@@ -12,8 +12,8 @@ from ...core.checks import Floats, finite_array, frozen, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix
-from .dense import Extremes, outermost, symmetric_half
-from .parity import Parity, halves, outermost_by_parity
+from .dense import ExtremalEigenvalues, extremal, symmetric_half
+from .parity import Parity, extremal_by_parity, halves
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -117,7 +117,7 @@ def leading_eigenvalues(
     whole_number("k", k, 1)
     source = np.random.default_rng(0) if rng is None else rng
     if isinstance(matrix, KernelMatrix):
-        found, parity = outermost_by_parity(matrix.symmetric, halves(matrix.basis, matrix), None, k, "largest")
+        found, parity = extremal_by_parity(matrix.symmetric, halves(matrix.basis, matrix), None, k, "largest")
         return _listed(found, parity if "none" not in parity else ())
     if isinstance(matrix, LinearOperator):
         return _matrix_free(matrix, k, source)
@@ -131,10 +131,10 @@ def leading_eigenvalues(
 
 
 def _dense(array: Floats, k: int) -> LeadingEigenvalues:
-    return _listed(outermost(symmetric_half(array), None, k, "largest"), ())
+    return _listed(extremal(symmetric_half(array), None, k, "largest"), ())
 
 
-def _listed(found: Extremes, parity: tuple[Parity, ...]) -> LeadingEigenvalues:
+def _listed(found: ExtremalEigenvalues, parity: tuple[Parity, ...]) -> LeadingEigenvalues:
     number = len(found.values)
     return LeadingEigenvalues(
         frozen(found.values), frozen(found.vectors), frozen(found.residuals), float(found.errors.max(initial=0.0)),

@@ -14,8 +14,8 @@ from ...core.estimates import NORMAL_95, Estimate
 from ...core.rounding import EPS
 from ...kernels import Basis, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
-from .dense import Extremes, compressed, end_values
-from .parity import Parity, halves, outermost_by_parity
+from .dense import ExtremalEigenvalues, compressed, end_values
+from .parity import Parity, extremal_by_parity, halves
 from .standard_errors import sampling_errors, sampling_quantile
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ ANGLES, SHOWN_FUNCTIONS = 400, 5
 EIGENVALUE = "eigenvalue with its total error"
 
 
-def two_grid_changes(matrix: KernelMatrix, found: Extremes) -> Floats:
+def two_grid_changes(matrix: KernelMatrix, found: ExtremalEigenvalues) -> Floats:
     """Change of every eigenvalue off the constants from the coarser basis, by its rank from its end of the spectrum.
 
     A step of parity can leave an eigenvalue unchanged by accident; so a share of the change before counts too. ``inf``
@@ -223,7 +223,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
     """
     check_reversible(matrix)
     constant = np.asarray(matrix.basis.constant)
-    rest, names = outermost_by_parity(matrix.symmetric, halves(matrix.basis, matrix), constant, max(k - 1, 1))
+    rest, names = extremal_by_parity(matrix.symmetric, halves(matrix.basis, matrix), constant, max(k - 1, 1))
     chosen = np.sort(np.argsort(-np.abs(rest.values), kind="stable")[: k - 1])
     image = 0.5 * (matrix.symmetric @ constant + constant @ matrix.symmetric)
     first = float(constant @ image)

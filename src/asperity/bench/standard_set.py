@@ -153,14 +153,14 @@ def prepare(scene: str) -> None:
     from ..geometry import trace
     from ..geometry.polygons.beams import beams_of
     from ..kernels import Legendre, WallLaw, discretise
-    from ..kernels.walls.conditionals import adaptive_rows
+    from ..kernels.walls.conditionals import adaptive_conditionals
 
     wall = wall_of(scene)
     for one in (wall, wall.foreshorten(DISK)):
         trace(one, [0.3, 0.6], [1.0, 2.0])
         # towards corners, which takes more than double precision
         trace(one, np.clip(one.vertices[:, 0], 0.0, np.nextafter(one.period, 0.0)), 0.5 * np.pi)
-        adaptive_rows(one, [1.0], 1e-2)
+        adaptive_conditionals(one, [1.0], 1e-2)
     if wall.is_polygonal:
         beams_of([(0.0, 0.0), (0.3, -0.5), (0.6, -0.4), (1.0, 0.0)])
     if scene in QUANTITIES["disk"].scenes:

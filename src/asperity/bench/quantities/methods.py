@@ -106,13 +106,13 @@ def stratified_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Ge
     x = (cell[:, None] + rng.random((side, side))) / side
     u = -1.0 + 2.0 * (cell + rng.random((side, side))) / side
     theta = np.arccos(-u).ravel()
-    return estimate(theta, WallLaw(wall).respond(x.ravel(), theta), basis)
+    return estimate(theta, WallLaw(wall).reflect(x.ravel(), theta), basis)
 
 
 def monte_carlo_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
     """From so many independent rays, traced even where a closed form could be sampled."""
     theta = np.arccos(1.0 - 2.0 * rng.random(int(budget)))
-    return estimate(theta, WallLaw(wall).respond(rng.random(int(budget)), theta), basis)
+    return estimate(theta, WallLaw(wall).reflect(rng.random(int(budget)), theta), basis)
 
 
 def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:

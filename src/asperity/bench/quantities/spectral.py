@@ -63,7 +63,7 @@ def eta_at(wall: Wall, angle: float) -> float:
     law, total = WallLaw(wall), 0.0
     for theta in (angle, np.pi - angle):
         # the specular convention turns the sign of cot(Theta)
-        total -= float(np.mean(np.tan(theta) / np.tan(law.respond(entry, theta))))
+        total -= float(np.mean(np.tan(theta) / np.tan(law.reflect(entry, theta))))
     return (1.0 + 0.5 * total) / (1.0 - 0.5 * total)
 
 

@@ -174,7 +174,7 @@ def outgoing_angle_of_an_arc(angle: Code) -> Verdict:
         found = angle(theta + hits * step, theta - gamma >= np.pi / 2)
         return every(
             agreement(found, out, TRACED, x=x, theta=theta),
-            agreement(CircularArcLaw(xi).respond(x, theta), out, TRACED, x=x, theta=theta),
+            agreement(CircularArcLaw(xi).reflect(x, theta), out, TRACED, x=x, theta=theta),
         )
 
     return every_arc(check)

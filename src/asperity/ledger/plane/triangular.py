@@ -191,7 +191,7 @@ def probability_of_fewer_hits(probability: Code) -> Verdict:
         r"n = \Bigl\lfloor \frac{\theta + h}{\psi} + \frac12 \Bigr\rfloor,\ "
         r"\theta' = \begin{cases} \pi + \theta - n\psi & n \text{ even} \\ n\psi - \theta & n \text{ odd} \end{cases}"
         r"\ (h < \tfrac\pi2); \text{ else the mirror image}",
-        lambda psi, x, theta: TriangularTeethLaw(psi).respond(x, theta),
+        lambda psi, x, theta: TriangularTeethLaw(psi).reflect(x, theta),
     ),
     reason="Rays with θ > (π − ψ)/2 may pass the bottom on its right, where the mirror image of the law holds: up to "
     "four outcomes. The corrected law agrees with traced rays for all ψ and θ.",
