@@ -23,6 +23,7 @@ from scipy.special import eval_legendre
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
+from asperity.estimates import Estimate
 from asperity.kernels.laws.phase_function import HenyeyGreensteinLaw
 
 from .pages import print_table
@@ -132,7 +133,8 @@ def given_case(number: int) -> Case:
             factor = np.sqrt(mass / flux.sum(axis=1))
             flux = factor[:, None] * flux * factor
         array, root = flux / mass[:, None], np.sqrt(mass)
-        law = ker.MatrixLaw(_Binned(array, ker.Bins(edges))) ** power
+        given = ker.KernelMatrix(root[:, None] * array / root, ker.Bins(edges), Estimate(0.0, 0.0, "bound", "given"))
+        law = ker.MatrixLaw(given) ** power
         exact = np.append(np.linalg.eigvalsh(root[:, None] * array / root) ** power, np.zeros(3))
     else:
         law, exact = ker.CircularArcLaw(1.2) ** power, np.array(ARC) ** power
@@ -151,12 +153,6 @@ def given_case(number: int) -> Case:
 def _as_density(g: float) -> ker.Law:
     """The scattering as a density that a user wrote."""
     return ker.DensityLaw(ker.henyey_greenstein(g).density)
-
-
-@dataclass(frozen=True)
-class _Binned:
-    array: Floats
-    basis: ker.Bins
 
 
 def refused_case(number: int) -> Case:
