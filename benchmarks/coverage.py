@@ -11,14 +11,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from unittest import mock
 
 import numpy as np
 
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.kernels.aerodynamics import drag as functional
+from asperity.kernels.aerodynamics import drag
+from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.walls.circular_arc import CircularArcLaw
 from asperity.spectral.eigenvalues.standard_errors import sampling_errors, sampling_quantile
 
@@ -152,7 +153,7 @@ class Rays(ker.DrivenLaw):
 def resistance_once(rng: np.random.Generator, rays: int = RESISTANCE_RAYS) -> tuple[float, float]:
     """The error of the resistance of triangular teeth with a random apex angle, by rays."""
     closed = ker.TriangularTeethLaw(float(rng.uniform(0.3, 2.8)))
-    with mock.patch.object(functional, "DEFAULT_SAMPLES", rays):
+    with mock.patch.object(drag, "Budget", partial(Budget, rays=rays)):
         found = ker.resistance(Rays(closed, int(rng.integers(1000))), 1e-9)
     return abs(found.value - float(ker.resistance(closed))), found.error
 
