@@ -19,7 +19,7 @@ def joined_lists(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np
 
     Examples
     --------
-    >>> [part.tolist() for part in ragged(np.array([2, 0, 3]))]
+    >>> [part.tolist() for part in joined_lists(np.array([2, 0, 3]))]
     [[0, 0, 2, 2, 2], [0, 1, 0, 1, 2]]
     """
     owner = np.repeat(np.arange(number.size), number)
