@@ -144,11 +144,10 @@ def hollow_radius(wall: Wall) -> float:
     radius = math.inf
     for path in (wall.pieces, *wall.islands):
         for k, piece in enumerate(path):
-            before = path[k - 1]
-            if k > 0 or path is not wall.pieces or before.end[1] == piece.start[1]:
-                (ax, ay), (bx, by) = before.tangent(1.0), piece.tangent(0.0)
-                if ax * by - ay * bx > CORNER:
-                    return 0.0
+            # the first piece follows the last one, of the period before or of the island
+            (ax, ay), (bx, by) = path[k - 1].tangent(1.0), piece.tangent(0.0)
+            if ax * by - ay * bx > CORNER:
+                return 0.0
             radius = min(radius, _radius(piece))
     return radius
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, frozen
+from ...core.checks import Floats
 from ...core.errors import AsperityError, InputError
-from ...core.estimates import Estimate
 from ..bases.legendre import Legendre
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
@@ -63,11 +62,6 @@ class UnitHollow:
         if len(wall.hollows) != 1 or wall.flat_top > 0.0:
             return None
         return cls(wall, f"polygon of {len(inner)} inner vertices")
-
-    @property
-    def vertices(self) -> Floats | None:
-        """The inner vertices of a polygon, shape (n, 2); None of a curved hollow."""
-        return frozen(self.wall.vertices[1:-1]) if self.wall.is_polygonal else None
 
     @property
     def pieces(self) -> int:
@@ -137,9 +131,3 @@ def random_polygons(number: int, most_vertices: int, rng: np.random.Generator) -
         if hollow is not None:
             found.append(hollow)
     return found
-
-
-def law_moments(law: Law, basis: Legendre, tolerance: float) -> tuple[Floats, Estimate]:
-    """The moments of a law and their error in the Frobenius norm."""
-    matrix = discretise(law, basis, tolerance=tolerance)
-    return matrix.symmetric, matrix.error

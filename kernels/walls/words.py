@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from ..laws.ideal import LambertianLaw, lambertian
 from ..laws.involution import InvolutionLaw
-from ..laws.law import Composition, IsometryLaw, Law, Power, SpecularFrame, retroreflection, specular
+from ..laws.law import Composition, IsometryLaw, Law, SpecularFrame, retroreflection, specular
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import Rules, fold
 from .rectangular import RectangularTeethLaw
@@ -52,23 +52,6 @@ def law_of(word: Word) -> Law:
     if len(word) == 2 and word[1] == specular():
         return SpecularFrame(word[0])
     return Composition(word)
-
-
-def factors_of(law: Law) -> Word:
-    """The laws whose product the law is, sums among them left as they are.
-
-    Examples
-    --------
-    >>> factors_of((0.5 * specular() + 0.5 * lambertian()) ** 2)
-    (0.5*specular() + 0.5*lambertian(), 0.5*specular() + 0.5*lambertian())
-    """
-    if isinstance(law, Composition):
-        return tuple(factor for part in law.laws for factor in factors_of(part))
-    if isinstance(law, Power):
-        return factors_of(law.law) * law.exponent
-    if isinstance(law, SpecularFrame):
-        return (*factors_of(law.law), specular())
-    return (law,)
 
 
 def _leaf(law: Law) -> Sum | None:
