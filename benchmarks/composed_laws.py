@@ -215,13 +215,13 @@ class Isometries:
         return Function(lambda theta: self._means(function, theta), np.unique(breaks))
 
     def _means(self, function: Function, theta: Floats) -> Floats:
-        share = self.probabilities(theta)
+        fraction = self.probabilities(theta)
         total = 0.0 * function.evaluate(theta)
         sign, offset = self.sign.astype(theta.dtype), self.offset.astype(theta.dtype)
         for branch in range(sign.size):
-            row = np.flatnonzero(share[:, branch] > 0.0)
+            row = np.flatnonzero(fraction[:, branch] > 0.0)
             outgoing = np.clip(sign[branch] * theta[row] + offset[branch], 0, theta.dtype.type(PI))
-            total[row] += share[row, branch][:, None] * function.evaluate(outgoing)
+            total[row] += fraction[row, branch][:, None] * function.evaluate(outgoing)
         return total
 
 
@@ -454,13 +454,13 @@ class Expression:
             found = found @ self
         return Expression(self.law**exponent, found.words, found.adjoint_words, found.cost)
 
-    def mixed(self, other: Expression, share: float) -> Expression:
+    def mixed(self, other: Expression, fraction: float) -> Expression:
         """A mixture."""
         words, back = (
-            tuple((share * a, word) for a, word in mine) + tuple(((1.0 - share) * a, word) for a, word in yours)
+            tuple((fraction * a, word) for a, word in mine) + tuple(((1.0 - fraction) * a, word) for a, word in yours)
             for mine, yours in ((self.words, other.words), (self.adjoint_words, other.adjoint_words))
         )
-        law = share * self.law + (1.0 - share) * other.law
+        law = fraction * self.law + (1.0 - fraction) * other.law
         return Expression(law, words, back, max(self.cost, other.cost))
 
     def turned(self) -> Expression:

@@ -48,7 +48,7 @@ class Tally:
 
     @property
     def coverage(self) -> float:
-        """The share that held."""
+        """The fraction that held."""
         return self.held / self.repeats
 
     def line(self) -> str:

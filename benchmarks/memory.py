@@ -12,7 +12,7 @@ from asperity import kernels as ker
 
 # Bins, and rays of one estimate after another; 10^10 would be as many chunks more, each added to the same counts.
 BINS, RAYS = 512, (2**20, 2**22, 2**23)
-# Objects of the interpreter come and go by this share.
+# Objects of the interpreter come and go by this fraction.
 SAME = 0.02
 
 

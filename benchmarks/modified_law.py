@@ -40,7 +40,7 @@ class Measured:
     ----------
     spacing : float
     inside : float
-        The share of the states at which K~ is defined as in the paper.
+        The fraction of the states at which K~ is defined as in the paper.
     distance, distance_error : float
         The mean of |w~' - w'|, kinetic norm of unit velocities, over the states inside, and the half width of its 95 %
         interval.
@@ -51,7 +51,7 @@ class Measured:
     defect : float
         The median over the states inside of |K~(K~(s)) - s| in the velocity.
     mismatches, mismatches_outside : float
-        The shares of the states inside, and of those outside that escaped, which do not come back.
+        The fractions of the states inside, and of those outside that escaped, which do not come back.
     """
 
     spacing: float

@@ -7,7 +7,7 @@ those whose errors do not show in the results that they prove or weigh.
 
 A mutant runs in a fork of a process that has imported what does not need the module; nothing is written to the tree.
 One that survives and is not known to be equivalent is tried again, by a fresh Python in a copy of the tree.
-``--share 0.1`` takes every tenth mutant.
+``--fraction 0.1`` takes every tenth mutant.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ def main() -> None:
     """Print a row a module, and the survivors that are not known to be equivalent."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=__doc__)
     parser.add_argument("modules", nargs="*", metavar="MODULE", help=f"among {', '.join(TESTS)}")
-    parser.add_argument("--share", type=float, default=1.0, help="share of the mutants that are tried")
+    parser.add_argument("--fraction", type=float, default=1.0, help="fraction of the mutants that are tried")
     parser.add_argument("--seed", type=int, default=0, help="which ones")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="modules at a time")
     options = parser.parse_args()
@@ -109,12 +109,12 @@ def main() -> None:
         left = [mutant for mutant in alive if mutant.change not in same]
         found.extend(left)
         killed = len(mutants) - len(alive)
-        share = 100.0 * killed / max(killed + len(left), 1)
-        return f"`{module}` | {len(mutants)} | {killed} | {len(alive) - len(left)} | {len(left)} | {share:.1f} %"
+        fraction = 100.0 * killed / max(killed + len(left), 1)
+        return f"`{module}` | {len(mutants)} | {killed} | {len(alive) - len(left)} | {len(left)} | {fraction:.1f} %"
 
     modules = options.modules or list(TESTS)
     with ProcessPoolExecutor(options.jobs, get_context("spawn"), max_tasks_per_child=1) as pool:
-        tries = pool.map(partial(mutants_of, share=options.share, seed=options.seed, same=same), modules)
+        tries = pool.map(partial(mutants_of, fraction=options.fraction, seed=options.seed, same=same), modules)
         print_table(
             "module | mutants | killed | equivalent | survived | killed of the others", map(cells, modules, tries)
         )
@@ -128,7 +128,7 @@ def known_equivalents() -> set[tuple[str, str, str]]:
     return {(entry["module"], entry["before"], entry["after"]) for entry in listed}
 
 
-def mutants_of(module: str, share: float, seed: int, same: set[tuple[str, str, str]]) -> list[Mutant]:
+def mutants_of(module: str, fraction: float, seed: int, same: set[tuple[str, str, str]]) -> list[Mutant]:
     """Try the mutants of one module; the process must be a fresh one."""
     original = (ROOT / module).read_text(encoding="utf-8")
     _warm(module)
@@ -137,7 +137,7 @@ def mutants_of(module: str, share: float, seed: int, same: set[tuple[str, str, s
         sys.exit(f"the tests of {module} fail without a fault: run pytest {' '.join(_tests(module))}")
     changed = list(_changed_sources(original))
     found = []
-    for source in random.Random(seed).sample(changed, round(share * len(changed))):
+    for source in random.Random(seed).sample(changed, round(fraction * len(changed))):
         mutant = _mutant(module, original, source, _is_killed(module, source, round(PATIENCE * seconds + SECONDS))[0])
         if not mutant.killed and mutant.change not in same:
             mutant = replace(mutant, killed=_is_killed_afresh(module, source))

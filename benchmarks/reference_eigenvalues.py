@@ -17,7 +17,7 @@ ARC_LAMBDA2, ARC_ERROR = 0.3670253152, 3e-10
 # Sizes in which Legendre matrices are extrapolated.
 SIZES = (16, 32, 64)
 # Degrees of the panels of the cusps, coarser and finer; towards each special angle there are so many, the last of this
-# share of the first.
+# fraction of the first.
 DEGREES, PANELS, SMALLEST = (2, 3), 9, 1e-3
 GRAZING_ANGLES, GRAZING_POINTS = (1e-5, 1e-6, 1e-7), 2**22
 

@@ -96,7 +96,7 @@ POLYGON_WALLS = 100
 PEAK_ANGLES = (1e-4, 0.1)
 PLATE_THICKNESS = (1e-17, 1e-12)
 # Every third plate has no thickness.
-THIN_SHARE = 1 / 3
+THIN_FRACTION = 1 / 3
 # Distances from a corner at which rays are aimed.
 BESIDE_CORNERS = (1e-17, 1e-9)
 FLOOR = -0.9
@@ -219,7 +219,7 @@ def sharp_peaks(rng: np.random.Generator) -> geo.Wall:
 
 
 def _thickness(rng: np.random.Generator) -> float:
-    return 0.0 if rng.random() < THIN_SHARE else float(_log_uniform(PLATE_THICKNESS, rng, 1)[0])
+    return 0.0 if rng.random() < THIN_FRACTION else float(_log_uniform(PLATE_THICKNESS, rng, 1)[0])
 
 
 def standing_plates(rng: np.random.Generator) -> geo.Wall:

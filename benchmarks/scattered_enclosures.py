@@ -164,12 +164,12 @@ def refused_case(number: int) -> Case:
 
 
 def _judge(g: float, law: ker.Law, degrees: int, panels: int) -> Floats:
-    node, share = np.polynomial.legendre.leggauss(NODES)
+    node, fraction = np.polynomial.legendre.leggauss(NODES)
     # kinks of the law as edges: they make the rule better, not its values others
     edges = np.union1d(np.linspace(0.0, np.pi, panels + 1), law.breakpoints(BREAKPOINTS)[0])
     half = 0.5 * np.diff(edges)[:, None]
     angle = (0.5 * (edges[1:] + edges[:-1])[:, None] + half * node).ravel()
-    weight = 0.5 * (half * share).ravel() * np.sin(angle)
+    weight = 0.5 * (half * fraction).ravel() * np.sin(angle)
     degree = np.arange(degrees)
 
     def values(theta: Floats) -> Floats:

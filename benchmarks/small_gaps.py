@@ -41,8 +41,8 @@ ALLOWED, PRECISE = 200.0, 1.1e-2
 ANGLES, ENTRIES = 16, 12
 # Of the plain judge: nets of points, for their spread, and polynomials.
 NETS, POINTS, DEGREES = 8, 2**15, 24
-# The share of the gap that so many polynomials miss where eigenfunctions are not smooth, at grazing and near the half
-# angle of arcs: walls of slopes below 1/2, and others.
+# The fraction of the gap that so many polynomials miss where eigenfunctions are not smooth, at grazing and near the
+# half angle of arcs: walls of slopes below 1/2, and others.
 MISSED, MISSED_STEEP = 5e-3, 0.1
 SIGMAS = 4.0
 

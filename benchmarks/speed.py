@@ -62,7 +62,7 @@ class Throughput:
 
 @dataclass(frozen=True)
 class RunTime:
-    """Mean number of hits of a ray, seconds a ray, and the share of the rays that escaped."""
+    """Mean number of hits of a ray, seconds a ray, and the fraction of the rays that escaped."""
 
     what: str
     hits: float
@@ -142,7 +142,7 @@ def _peak_flops(rounds: int = 200_000) -> float:
 
 def _throughput_table(measured: list[Throughput]) -> str:
     return table(
-        "wall | bounces a ray | million bounces/s, one thread | two threads | speed-up | share of the flop limit",
+        "wall | bounces a ray | million bounces/s, one thread | two threads | speed-up | fraction of the flop limit",
         (
             f"{row.wall} | {row.bounces_per_ray:.2f} | {row.one_thread / 1e6:.1f} | {row.two_threads / 1e6:.1f} "
             f"| {row.two_threads / row.one_thread:.2f} | {row.one_thread / row.flop_limit:.3f}"
@@ -153,4 +153,4 @@ def _throughput_table(measured: list[Throughput]) -> str:
 
 def _runs_table(measured: list[RunTime]) -> str:
     rows = (f"{run.what} | {run.hits:.1e} | {1e6 * run.seconds:.2f} | {run.escaped:.3f}" for run in measured)
-    return table("run of hits in one step | hits a ray | microseconds a ray | share that escaped", rows)
+    return table("run of hits in one step | hits a ray | microseconds a ray | fraction that escaped", rows)

@@ -1,11 +1,11 @@
 """Verdicts and gaps of random walls, and eigenvalues to a tolerance, against references of other formulas.
 
 ``python -m benchmarks.verdicts`` prints three tables. *Theorems*: polygons have no gap, in both conventions; with a
-Lambertian share a their gap is a. *Random walls*: segments, arcs, ellipses and Bezier pieces, flat tops and islands, as
-they are, mixed and squared, in both conventions. Their judge follows rays with `tests.textbook_tracer`, which shares no
-formula with the library's tracer; its Galerkin matrices in Legendre polynomials never show too much, so the gap that is
-reported must not be larger than theirs; where the verdict is *isolated* their values at three degrees must lead to it;
-and where it is *essential edge* the edge must lie between two bounds from rays that meet straight pieces only.
+Lambertian fraction a their gap is a. *Random walls*: segments, arcs, ellipses and Bezier pieces, flat tops and islands,
+as they are, mixed and squared, in both conventions. Their judge follows rays with `tests.textbook_tracer`, which shares
+no formula with the library's tracer; its Galerkin matrices in Legendre polynomials never show too much, so the gap that
+is reported must not be larger than theirs; where the verdict is *isolated* their values at three degrees must lead to
+it; and where it is *essential edge* the edge must lie between two bounds from rays that meet straight pieces only.
 *Tolerances*: `spectrum(law, tolerance=t)` against eigenvalues that are known. ``--first`` and ``--last`` choose a range
 of the random walls; rows are printed as they are found, so that what was stopped goes on where it ended.
 """
@@ -37,7 +37,7 @@ from .pages import print_table
 
 Floats = NDArray[np.float64]
 
-POLYGONS, WALLS, TOLERANCE, SHARE = 20, 48, 1e-3, 0.3
+POLYGONS, WALLS, TOLERANCE, FRACTION = 20, 48, 1e-3, 0.3
 # The judge's rays, in as many blocks, whose spread is its error; the degrees of its matrices.
 LOG_RAYS, BLOCKS, DEGREES = 18, 8, (16, 32, 64)
 # Angles and entry points of its straight rays; a step, and the turn by it that a curved piece gives.
@@ -111,10 +111,10 @@ class Judge:
 
     wall: geo.Wall
 
-    def outgoing(self, share: Floats, theta: Floats) -> Floats:
-        """Outgoing angles of rays that enter at shares of the period; specular on flat tops."""
+    def outgoing(self, fraction: Floats, theta: Floats) -> Floats:
+        """Outgoing angles of rays that enter at fractions of the period; specular on flat tops."""
         pieces = [*self.wall.pieces, *(piece for loop in self.wall.islands for piece in loop)]
-        x = share * self.wall.period
+        x = fraction * self.wall.period
         flat = np.zeros(x.shape, dtype=bool)
         for piece in self.wall.pieces:
             if isinstance(piece, geo.Segment) and piece.start[1] == 0.0 == piece.end[1]:
@@ -127,12 +127,12 @@ class Judge:
         """<e_i, P e_j> off the constants from each block of rays, shape (blocks, degree, degree)."""
         found = []
         for block in range(BLOCKS):
-            share, u = np.clip(
+            fraction, u = np.clip(
                 Sobol(2, rng=np.random.default_rng(block)).random(2**LOG_RAYS // BLOCKS).T, 1e-12, 1 - 1e-12
             )
             theta = np.arccos(1.0 - 2.0 * u)
-            here, there = (_polynomials(angle) for angle in (theta, self.outgoing(share, theta)))
-            found.append(here.T @ there / share.size)
+            here, there = (_polynomials(angle) for angle in (theta, self.outgoing(fraction, theta)))
+            found.append(here.T @ there / fraction.size)
         return np.array(found)
 
     def straight(self) -> tuple[float, float]:
@@ -143,37 +143,37 @@ class Judge:
         """
         theta = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
         out, kept = self._straight_rays(theta)
-        low, share = _interpolation(out)
+        low, fraction = _interpolation(out)
         matrix = np.zeros((ANGLES, ANGLES))
         row = np.repeat(np.arange(ANGLES), POINTS).reshape(out.shape)
-        np.add.at(matrix, (row[kept], low[kept]), (1.0 - share)[kept] / POINTS)
-        np.add.at(matrix, (row[kept], low[kept] + 1), share[kept] / POINTS)
+        np.add.at(matrix, (row[kept], low[kept]), (1.0 - fraction)[kept] / POINTS)
+        np.add.at(matrix, (row[kept], low[kept] + 1), fraction[kept] / POINTS)
         root = np.sqrt(np.sin(theta))
         even = root[:, None] * matrix / root
         below = float(np.linalg.eigvalsh(0.5 * (even + even.T))[-1])
         between = np.pi * (np.arange(BETWEEN * ANGLES) + 0.5) / (BETWEEN * ANGLES)
         out, kept = self._straight_rays(between)
-        places, (own, own_share) = _interpolation(out), _interpolation(between)
+        places, (own, own_fraction) = _interpolation(out), _interpolation(between)
         above = float(kept.mean(axis=1).max())
         for excess in EXCESSES:
             function = np.linalg.solve(np.eye(ANGLES) - matrix / (below * (1.0 + excess) + 1e-9), np.ones(ANGLES))
             if function.min() >= 1.0:
                 image = np.where(kept, (1 - places[1]) * function[places[0]] + places[1] * function[places[0] + 1], 0.0)
-                here = (1 - own_share) * function[own] + own_share * function[own + 1]
+                here = (1 - own_fraction) * function[own] + own_fraction * function[own + 1]
                 above = min(above, float((image.mean(axis=1) / here).max()))
         return below, above
 
     def _straight_rays(self, theta: Floats) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing angles, a row each incoming angle, and which are of rays that a step does not turn."""
         shift = np.random.default_rng(1).random((theta.size, 1))
-        share = np.clip((np.arange(POINTS) + shift) / POINTS, 1e-9, 1.0 - 2.0 * STEP)
+        fraction = np.clip((np.arange(POINTS) + shift) / POINTS, 1e-9, 1.0 - 2.0 * STEP)
         angle = np.repeat(theta, POINTS)
-        out, beside = (self.outgoing(share.ravel() + step, angle).reshape(share.shape) for step in (0.0, STEP))
+        out, beside = (self.outgoing(fraction.ravel() + step, angle).reshape(fraction.shape) for step in (0.0, STEP))
         return out, np.abs(out - beside) <= TURN
 
 
 def _interpolation(angle: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """The place on the grid below every angle, and the share of the one above."""
+    """The place on the grid below every angle, and the fraction of the one above."""
     place = np.clip(angle * ANGLES / np.pi - 0.5, 0.0, ANGLES - 1.0)
     low = np.minimum(place.astype(np.intp), ANGLES - 2)
     return low, place - low
@@ -259,10 +259,10 @@ def rows_of(name: str, wall: geo.Wall, tolerance: float, more: bool) -> Iterator
     gap = spec.spectral_gap(turned, tolerance)
     yield Row(f"{name}, specular", gap, Reference.of(matrices * signs, norm=not gap.self_adjoint), edge)
     if more:
-        mixed = SHARE * ker.lambertian() + (1.0 - SHARE) * law
-        rest = 1.0 - SHARE
+        mixed = FRACTION * ker.lambertian() + (1.0 - FRACTION) * law
+        rest = 1.0 - FRACTION
         yield Row(
-            f"{name}, {SHARE:g} Lambertian", spec.spectral_gap(mixed, tolerance), Reference.of(rest * matrices),
+            f"{name}, {FRACTION:g} Lambertian", spec.spectral_gap(mixed, tolerance), Reference.of(rest * matrices),
             (rest * low, rest * high),
         )  # fmt: skip
         both = Reference.of(matrices, norm=True)
@@ -274,11 +274,11 @@ def theorems() -> Iterator[tuple[str, spec.SpectralGap, bool]]:
     """Polygons and what is made of them: name, gap, whether it is what the theorem says."""
     for seed in range(POLYGONS):
         law = ker.WallLaw(geo.Wall.from_vertices(wall_with(random_hollow(seed))))
-        mixed = SHARE * ker.lambertian() + (1.0 - SHARE) * law
+        mixed = FRACTION * ker.lambertian() + (1.0 - FRACTION) * law
         for what, each, value in (
             ("", law, 0.0), (", specular", law.in_specular_frame(), 0.0), (", squared", law**2, 0.0),
-            (f", {SHARE:g} Lambertian", mixed, SHARE),
-            (f", {SHARE:g} Lambertian, specular", mixed.in_specular_frame(), SHARE),
+            (f", {FRACTION:g} Lambertian", mixed, FRACTION),
+            (f", {FRACTION:g} Lambertian, specular", mixed.in_specular_frame(), FRACTION),
         ):  # fmt: skip
             gap = spec.spectral_gap(each)
             verdict = "no gap" if value == 0.0 else "essential edge"

@@ -33,7 +33,8 @@ from asperity.geometry.tracing.double_double.arithmetic import (
 from asperity.geometry.tracing.refinement import RefinedTrace
 
 ESCAPED, CORNER, BOUNCE_LIMIT = 0, 1, 3
-# In front of a place, as a share of the cell and the depth: double-doubles carry some 1e-31, plates are 1e-17 at least.
+# In front of a place, as a fraction of the cell and the depth: double-doubles carry some 1e-31, plates are 1e-17 at
+# least.
 NEAR = 1e-25
 # What doubles may be off where they only sort out segments that the ray cannot meet.
 ROOM = 1e-9
@@ -134,13 +135,13 @@ def _follow_rays(x, theta, table, corners, period, size, limit, out_x, out_theta
             # the velocity along the segment stays, the one across turns round
             ex = two_sum(table[found, 2], -table[found, 0])
             ey = two_sum(table[found, 3], -table[found, 1])
-            share = divide(dot(vx, vy, ex, ey), dot(ex, ey, ex, ey))
-            share = (2.0 * share[0], 2.0 * share[1])
-            vx, vy = subtract(multiply(share, ex), vx), subtract(multiply(share, ey), vy)
+            fraction = divide(dot(vx, vy, ex, ey), dot(ex, ey, ex, ey))
+            fraction = (2.0 * fraction[0], 2.0 * fraction[1])
+            vx, vy = subtract(multiply(fraction, ex), vx), subtract(multiply(fraction, ey), vy)
             # back onto the segment, across
             ax, ay = add(wide(table[found, 0]), shift), wide(table[found, 1])
-            share = divide(dot(subtract(px, ax), subtract(py, ay), ex, ey), dot(ex, ey, ex, ey))
-            px, py = add(ax, multiply(share, ex)), add(ay, multiply(share, ey))
+            fraction = divide(dot(subtract(px, ax), subtract(py, ay), ex, ey), dot(ex, ey, ex, ey))
+            px, py = add(ax, multiply(fraction, ex)), add(ay, multiply(fraction, ey))
         out_x[i, 0], out_x[i, 1] = px
         out_theta[i, 0], out_theta[i, 1] = direction_angle(vx, vy)
         bounces[i], status[i] = hits, outcome

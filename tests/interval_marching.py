@@ -103,7 +103,7 @@ class Row:
     theta : float
         The incoming angle, radians.
     edges : array of shape (n + 1,)
-        Ends of the intervals as shares of the opening, from 0 to 1, ascending.
+        Ends of the intervals as fractions of the opening, from 0 to 1, ascending.
     sign : array of int8, shape (n,)
         +1 or -1; 0 where the bounce limit was met, or the limit of intervals.
     offset, outgoing : arrays of shape (n,)
@@ -134,7 +134,7 @@ class Rows:
     first : array of int, shape (m + 1,)
         Where the intervals of each angle begin in the other arrays.
     low, high : arrays
-        Ends of the intervals as shares of the opening.
+        Ends of the intervals as fractions of the opening.
     sign, offset, bounces : arrays
         As in `Row`.
     """

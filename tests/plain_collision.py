@@ -32,8 +32,8 @@ def _away(piece, points):
     start, end = np.array(piece.start), np.array(piece.end)
     if isinstance(piece, geo.Segment):
         edge = end - start
-        share = np.clip((points - start) @ edge / (edge @ edge), 0.0, 1.0)
-        return points - start - share[..., None] * edge
+        fraction = np.clip((points - start) @ edge / (edge @ edge), 0.0, 1.0)
+        return points - start - fraction[..., None] * edge
     radius, outward = piece.semi_axes[0], points - np.array(piece.center)
     low, high = sorted((piece.start_angle, piece.end_angle))
     inside = (np.arctan2(outward[..., 1], outward[..., 0]) - low) % (2 * np.pi) <= high - low
@@ -92,8 +92,8 @@ def collide_plainly(disk, wall, scale, spacing, position, velocity, most_contact
         covector = np.stack([k[:, 0], k[:, 1], k[:, 0] * np.cos(angle) + k[:, 1] * np.sin(angle)], axis=-1)
         vector = covector / [disk.mass, disk.mass, disk.inertia]
         w = moving[active]
-        share = np.sum(covector * w, axis=1) / np.sum(covector * vector, axis=1)
-        moving[active] = w - 2.0 * share[:, None] * vector
+        fraction = np.sum(covector * w, axis=1) / np.sum(covector * vector, axis=1)
+        moving[active] = w - 2.0 * fraction[:, None] * vector
     return out_position, out_velocity, contacts
 
 

@@ -55,9 +55,9 @@ class Flight:
             ex, ey = bx - ax, by - ay
             for shift in (-1, 0, 1):
                 rx, ry = x - shift * self.period - ax, y - ay
-                share = min(max((rx * ex + ry * ey) / (ex * ex + ey * ey), mp.mpf(0)), mp.mpf(1))
+                fraction = min(max((rx * ex + ry * ey) / (ex * ex + ey * ey), mp.mpf(0)), mp.mpf(1))
                 size = mp.hypot(ex, ey)
-                away = mp.hypot(rx - share * ex, ry - share * ey)
+                away = mp.hypot(rx - fraction * ex, ry - fraction * ey)
                 found.append((away, k, (-ey / size, ex / size), (rx * -ey + ry * ex) / size))
         return min(found, key=lambda one: one[0]), found
 

@@ -45,7 +45,7 @@ from asperity.geometry.scene.columns import (
 DIGITS = 50
 # Guard digits, and the distance below which a hit is the ray's own start: 50 digits lie between the two.
 GUARD, NEAR = 25, mp.mpf(10) ** -40
-# Of more lines than so many only those are looked at that doubles, off by this share of the cell, do not rule out.
+# Of more lines than so many only those are looked at that doubles, off by this fraction of the cell, do not rule out.
 MANY_LINES, DOUBLE_ERROR = 64, 1e-9
 # Crossings between two sides, or hops along an arc, that are worth a division.
 FEW = 4

@@ -41,9 +41,9 @@ def _bezier(start, end, rng):
     (x0, y0), (x1, y1) = start, end
     nx, ny = y1 - y0, x0 - x1
     points = [start]
-    for share in (1 / 3, 2 / 3):
+    for fraction in (1 / 3, 2 / 3):
         off = rng.uniform(-0.35, 0.35)
-        points.append((x0 + share * (x1 - x0) + off * nx, y0 + share * (y1 - y0) + off * ny))
+        points.append((x0 + fraction * (x1 - x0) + off * nx, y0 + fraction * (y1 - y0) + off * ny))
     return Bezier([*points, end])
 
 

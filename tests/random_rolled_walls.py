@@ -129,7 +129,7 @@ def textbook_exit(wall: geo.Wall, x: float, theta: float, cells: int = 6, most_h
 
 
 def _meetings(piece, p, v):
-    """(t, share, unit normal to the free side) of every meeting of a line with a piece."""
+    """(t, fraction, unit normal to the free side) of every meeting of a line with a piece."""
     if isinstance(piece, Segment):
         a, e = np.array(piece.start), np.array(piece.end) - piece.start
         det = e[0] * v[1] - e[1] * v[0]
@@ -186,9 +186,9 @@ def spiked_path(number: int) -> tuple[np.ndarray, bool]:
     y = -rng.uniform(0.3, 1.0, count + 2)
     y[0] = y[-1] = -rng.uniform(0.3, 1.0)
     edge = int(rng.integers(count + 1))
-    share = float(rng.uniform(0.1, 0.9)) if rng.random() < 0.7 else 0.0
+    fraction = float(rng.uniform(0.1, 0.9)) if rng.random() < 0.7 else 0.0
     start = np.array([x[edge], y[edge]])
-    foot = start + share * (np.array([x[edge + 1], y[edge + 1]]) - start)
+    foot = start + fraction * (np.array([x[edge + 1], y[edge + 1]]) - start)
     upward = bool(rng.random() < 0.5)
     height = float(rng.uniform(0.01, 0.25)) * (1.0 if upward else -1.0)
     # steeper than every edge: it leaves the graph on one side
@@ -197,6 +197,6 @@ def spiked_path(number: int) -> tuple[np.ndarray, bool]:
     tip = foot + np.array([aside, height])
     middle = foot + float(rng.uniform(0.2, 0.8)) * (tip - foot)
     spike = [tip, middle, foot] if rng.random() < 0.5 else [tip, foot]
-    before = [foot] if share > 0.0 else []
+    before = [foot] if fraction > 0.0 else []
     left, right = np.column_stack([x, y])[: edge + 1], np.column_stack([x, y])[edge + 1 :]
     return np.vstack([left, *([p] for p in (*before, *spike)), right]), upward

@@ -184,12 +184,12 @@ def moment_of(wall):
     """<u, P u>/<u, u> and its error: flat tops, which reflect u to -u, in closed form."""
     table, (left, right) = table_of(wall), opening(wall)
     edges, missed = panel_edges(wall, Legendre(2), Budget(CUT_TOLERANCE, segments=CUT_FLIGHTS))
-    share, flat = (right - left) / wall.period, 1.0 - (right - left) / wall.period
+    fraction, flat = (right - left) / wall.period, 1.0 - (right - left) / wall.period
     if missed > ROUGH:
         rng = np.random.default_rng(11)
         means = [stratified_mean(table, left, right, rng.random((STRATA, STRATA, 2))) for _ in range(REPLICATES)]
         # int u^2 du/2 = 1/3
-        return 3.0 * share * float(np.mean(means)) - flat, 9.0 * share * float(np.std(means, ddof=1)) / math.sqrt(
+        return 3.0 * fraction * float(np.mean(means)) - flat, 9.0 * fraction * float(np.std(means, ddof=1)) / math.sqrt(
             REPLICATES
         )
     moment, flux, error = adaptive_sums(table, left, right, edges)

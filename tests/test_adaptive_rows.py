@@ -11,7 +11,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.bases.panels import ONE_PANEL
 from asperity.kernels.discretisation.method import Budget
-from asperity.kernels.discretisation.traced import KRONROD_SHARE, row_matrix
+from asperity.kernels.discretisation.traced import KRONROD_FRACTION, row_matrix
 from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from asperity.kernels.walls.conditionals import adaptive_conditionals
 from plain_tracer import trace_plainly
@@ -62,13 +62,13 @@ def test_a_matrix_that_runs_out_of_rays_says_by_how_much_it_fell_short() -> None
     assert abs(matrix[1, 1] - FIRST_MOMENT) <= error
 
 
-@pytest.mark.parametrize("power, share", [(0.5, 0.375), (1.0, 0.255)])
-def test_where_rows_are_not_smooth_kronrods_rule_errs_by_a_share_of_its_difference_from_gausss(power, share):
+@pytest.mark.parametrize("power, fraction", [(0.5, 0.375), (1.0, 0.255)])
+def test_where_rows_are_not_smooth_kronrods_rule_errs_by_a_fraction_of_its_difference_from_gausss(power, fraction):
     place = (np.arange(100_000) + 0.5) / 50_000 - 1.0
     values = np.maximum(NODES - place[:, None], 0.0) ** power
     miss = values @ KRONROD - (1.0 - place) ** (power + 1.0) / (power + 1.0)
     scale = np.sqrt(np.mean((values @ (KRONROD - GAUSS)) ** 2))
-    assert np.sqrt(np.mean(miss**2)) / scale == pytest.approx(share, abs=0.001) and share < KRONROD_SHARE
+    assert np.sqrt(np.mean(miss**2)) / scale == pytest.approx(fraction, abs=0.001) and fraction < KRONROD_FRACTION
     # with either sign, so that the errors of panels are added as squares
     assert abs(np.mean(miss)) < 0.002 * scale
 

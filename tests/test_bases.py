@@ -132,9 +132,9 @@ def test_short_intervals_keep_relative_accuracy_in_both_measures(low: float, wid
 
 @pytest.mark.parametrize("measure", [SINE, SINE_SQUARED], ids=["sin", "sin2"])
 def test_quantiles_invert_the_distribution(measure: object) -> None:
-    share = np.concatenate((np.logspace(-14, -0.5, 40), 1.0 - np.logspace(-14, -0.5, 40)))
-    assert np.allclose(SINE.cdf(SINE.quantile(share)), share, rtol=1e-13, atol=3e-16)
-    assert np.allclose(SINE_SQUARED.cdf(SINE_SQUARED.quantile(share)), share, rtol=1e-13, atol=3e-16)
+    fraction = np.concatenate((np.logspace(-14, -0.5, 40), 1.0 - np.logspace(-14, -0.5, 40)))
+    assert np.allclose(SINE.cdf(SINE.quantile(fraction)), fraction, rtol=1e-13, atol=3e-16)
+    assert np.allclose(SINE_SQUARED.cdf(SINE_SQUARED.quantile(fraction)), fraction, rtol=1e-13, atol=3e-16)
 
 
 def test_samples_follow_the_measure() -> None:

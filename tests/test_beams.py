@@ -127,9 +127,9 @@ def test_a_ray_in_the_middle_of_a_piece_is_traced_to_its_isometry(seed):
         ray = geo.trace(wall, 1.0 + x, theta)
         same = ray.collisions == beams.bounces[k]
         image = beams.sign[k] * theta + beams.offset[k]
-        share = np.mean(same & (np.abs(ray.theta - image) < 1e-11))
+        fraction = np.mean(same & (np.abs(ray.theta - image) < 1e-11))
         # a grid of n points finds an interval's length within 1/n
-        assert share >= beams.sine[k] + beams.cosine[k] / np.tan(theta) - 1.0 / 4001
+        assert fraction >= beams.sine[k] + beams.cosine[k] / np.tan(theta) - 1.0 / 4001
 
 
 def test_a_plate_of_no_thickness_shields_what_is_behind_it():

@@ -157,7 +157,7 @@ def test_the_correlation_of_v1_is_that_of_the_ideal_disks():
     smooth, rough = ker.smooth_matrix(uniform_disk.DISK), ker.no_slip_matrix(uniform_disk.DISK)
     velocity = uniform_disk.sampled_velocities(200_000, np.random.default_rng(2))
     square = np.mean(velocity[:, 0] ** 2)
-    along, roll = uniform_disk.velocity_share()
+    along, roll = uniform_disk.velocity_fraction()
     assert square == pytest.approx(along**2 / 4 + roll**2 / 4, rel=0.02)
     for matrix, moment in ((smooth, -1.0), (rough, 1.0)):
         incoming = -velocity
@@ -218,9 +218,9 @@ def test_a_plan_is_kept_whatever_the_parts_take(monkeypatch):
     for greedy in (lambda number: True, lambda number: number % 2, lambda number: number > 6):
         start, plan = now[0], TimePlan(100.0, 10)
         for number in range(10):
-            share = plan.next_share()
-            assert 0.0 < share <= 100.0 - (now[0] - start)
-            now[0] += share if greedy(number) else 0.0
+            fraction = plan.next_fraction()
+            assert 0.0 < fraction <= 100.0 - (now[0] - start)
+            now[0] += fraction if greedy(number) else 0.0
         assert now[0] - start <= 100.0 + 1e-9
 
 

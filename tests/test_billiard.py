@@ -28,7 +28,7 @@ def smooth(disk):
 
 
 def in_a_strip(ratio, steps, n=20):
-    """A no-slip strip: record, and widths as shares of l sqrt(1 + m/J) where l = sqrt(1/v2^2 - 1)."""
+    """A no-slip strip: record, and widths as fractions of l sqrt(1 + m/J) where l = sqrt(1/v2^2 - 1)."""
     disk, rng = geo.Disk(ratio, 1.0), np.random.default_rng(0)
     velocity = disk.from_angles(rng.uniform(0.3, 2.8, n), rng.uniform(0.3, 2.8, n))
     record = ker.play(geo.Container.strip(), no_slip(disk), np.zeros((n, 2)), velocity, steps, rng)
@@ -160,6 +160,6 @@ def test_the_example_finds_the_strip_bounded_and_the_wedge_periodic_until_the_wa
     widths = [value for name, value in found.items() if "width/bound" in name and "arcs" not in name]
     assert len(widths) == 20 and max(widths) <= 1 + 1e-12
     assert found["focusing arcs, median width/bound"] > 1.0
-    assert found["no-slip wedge, share that stays"] > 0.05
+    assert found["no-slip wedge, fraction that stays"] > 0.05
     assert found["no-slip wedge, displacement in ten collisions"] < 1e-10
-    assert found["rough wedge, share that stays"] < found["no-slip wedge, share that stays"]
+    assert found["rough wedge, fraction that stays"] < found["no-slip wedge, share that stays"]

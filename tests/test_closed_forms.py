@@ -110,7 +110,7 @@ def test_circular_law_is_what_rays_do(xi: float) -> None:
 
 # ---- distributions against the same rays over all entry points --------------------------------------------------
 def distribution_by_entry_points(law: Law, theta: float, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Distinct outgoing angles and the share of a fine midpoint grid of entry points that leads to each."""
+    """Distinct outgoing angles and the fraction of a fine midpoint grid of entry points that leads to each."""
     outgoing = law.reflect((np.arange(points) + 0.5) / points, theta)
     angle, count = np.unique(outgoing.round(9), return_counts=True)
     return angle, count / points
@@ -118,21 +118,21 @@ def distribution_by_entry_points(law: Law, theta: float, points: int) -> tuple[n
 
 @settings(max_examples=60, deadline=None)
 @given(angle=st.floats(0.15, 3.0), theta=st.floats(0.02, math.pi - 0.02))
-def test_triangular_branches_are_the_shares_of_entry_points(angle: float, theta: float) -> None:
+def test_triangular_branches_are_the_fractions_of_entry_points(angle: float, theta: float) -> None:
     law, points = TriangularTeethLaw(angle), 20_000
     probability, outgoing = law.branches(theta)
     expected = {}
-    for share, target in zip(probability, outgoing, strict=True):
-        expected[round(float(target), 9)] = expected.get(round(float(target), 9), 0.0) + share
-    for target, share in zip(*distribution_by_entry_points(law, theta, points), strict=True):
+    for fraction, target in zip(probability, outgoing, strict=True):
+        expected[round(float(target), 9)] = expected.get(round(float(target), 9), 0.0) + fraction
+    for target, fraction in zip(*distribution_by_entry_points(law, theta, points), strict=True):
         near = sum(value for key, value in expected.items() if abs(key - target) < 1e-8)
-        assert abs(near - share) < 4.0 / points
+        assert abs(near - fraction) < 4.0 / points
     assert abs(sum(expected.values()) - 1.0) < 8 * EPS
 
 
 @settings(max_examples=60, deadline=None)
 @given(ratio=st.floats(1e-3, 20.0), theta=st.floats(0.02, math.pi - 0.02))
-def test_rectangular_branches_are_the_shares_of_entry_points(ratio: float, theta: float) -> None:
+def test_rectangular_branches_are_the_fractions_of_entry_points(ratio: float, theta: float) -> None:
     law, points = RectangularTeethLaw(ratio), 20_000
     specular = np.mean(np.abs(law.reflect((np.arange(points) + 0.5) / points, theta) - (math.pi - theta)) < 1e-12)
     if abs(theta - math.pi / 2) > 1e-9:
@@ -221,10 +221,10 @@ def test_closed_forms_equal_high_precision_down_to_grazing_and_next_to_the_tips(
 def high_precision(law: Law, x: float, theta: float) -> tuple[float, int, float]:
     """The formulas of the facts in 60 digits; slack is the distance of the count of hits to a whole number."""
     mp = mpmath.mp
-    t, share, pi = mp.mpf(theta), mp.mpf(x), mp.pi
+    t, fraction, pi = mp.mpf(theta), mp.mpf(x), mp.pi
     if isinstance(law, TriangularTeethLaw):
         psi = mp.mpf(law.angle)
-        c = (1 - share) * mp.cos(t - psi / 2) + share * mp.cos(t + psi / 2)
+        c = (1 - fraction) * mp.cos(t - psi / 2) + fraction * mp.cos(t + psi / 2)
         base, cosine = (t, c) if c > 0 else (pi - t, -c)
         count = (base + mp.acos(cosine)) / psi + mp.mpf(1) / 2
         n = int(mp.floor(count))
@@ -234,7 +234,7 @@ def high_precision(law: Law, x: float, theta: float) -> tuple[float, int, float]
         return float(out if c > 0 else pi - out), n, slack
     if isinstance(law, CircularArcLaw):
         xi = mp.mpf(law.half_angle)
-        delta = mp.acos(share * mp.cos(t - xi) + (1 - share) * mp.cos(t + xi))
+        delta = mp.acos(fraction * mp.cos(t - xi) + (1 - fraction) * mp.cos(t + xi))
         gamma = t - delta
         if delta >= pi / 2:
             step = 2 * (pi - delta)
@@ -245,9 +245,9 @@ def high_precision(law: Law, x: float, theta: float) -> tuple[float, int, float]
         n = int(mp.ceil(count))
         return float(t + sign * (n * step - pi)), n, 1.0 if count < 0.5 else tie_distance(count)
     d = 2 * mp.mpf(law.height_to_width) * abs(mp.cot(t))
-    if share <= 0.5:
+    if fraction <= 0.5:
         return float(pi - t), 1, 1.0
-    ahead = 2 * share - 1 if t < pi / 2 else 2 - 2 * share
+    ahead = 2 * fraction - 1 if t < pi / 2 else 2 - 2 * fraction
     count = d - ahead
     n = max(int(mp.ceil(count)), 0)
     # beyond 1e12 crossings, float64 does not resolve the fractional part to the 1e-3 asked for here

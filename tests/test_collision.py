@@ -98,9 +98,9 @@ def test_branches_give_the_sampled_velocities():
     after = K.sample(np.tile(before, (n, 1)), np.random.default_rng(RNG))
     which = np.argmin(np.linalg.norm(after[:, None] - expected, axis=2), axis=1)
     assert np.max(np.linalg.norm(after - expected[which], axis=1)) < 1e-13
-    share = np.bincount(which, minlength=len(expected)) / n
+    fraction = np.bincount(which, minlength=len(expected)) / n
     probability = np.array([p for p, _ in K.branches(theta)])
-    assert np.all(np.abs(share - probability) <= 4.5 * np.sqrt(probability * (1 - probability) / n) + 1e-12)
+    assert np.all(np.abs(fraction - probability) <= 4.5 * np.sqrt(probability * (1 - probability) / n) + 1e-12)
 
 
 @pytest.mark.parametrize("ratio", [0.1, 1.0, 10.0])
@@ -112,8 +112,8 @@ def test_the_law_of_the_foreshortened_wall_is_the_closed_form_with_corrected_par
     x, theta = rng.random(50_000), np.arccos(1 - 2 * rng.random(50_000))
     r, psi = 0.8, 1.1
     teeth = geo.trace(geo.rectangular_teeth(r).foreshorten(disk), x, theta)
-    specular_share = ker.RectangularTeethLaw(r / kappa).branches(theta)
-    exact = np.sum(specular_share[0] * (np.abs(specular_share[1] - (np.pi - theta)[:, None]) < 1e-9), axis=1)
+    specular_fraction = ker.RectangularTeethLaw(r / kappa).branches(theta)
+    exact = np.sum(specular_fraction[0] * (np.abs(specular_fraction[1] - (np.pi - theta)[:, None]) < 1e-9), axis=1)
     hit = np.abs(teeth.theta - (np.pi - theta)) < 1e-9
     assert teeth.escaped.all()
     assert abs(np.sum(hit - exact)) < 4.5 * np.sqrt(np.sum(exact * (1 - exact)))

@@ -13,7 +13,7 @@ from asperity.kernels.collisions import collision_law as collision
 DISK = geo.Disk(1.0, 0.5)
 
 
-def test_retroreflection_turns_all_but_the_share_along_chi() -> None:
+def test_retroreflection_turns_all_but_the_fraction_along_chi() -> None:
     K = ker.CollisionLaw(ker.retroreflection(), DISK)
     velocity = np.array([[1.0, -1.0, 0.0], [0.0, -2.0, 3.0], [-0.5, -1e-12, 0.25]])
     # chi is along (-1, 0, 1): v1 + J/m omega, at mass 1 and inertia 1/2 a third of one, two thirds of the other
@@ -25,7 +25,7 @@ def test_retroreflection_turns_all_but_the_share_along_chi() -> None:
     assert K.sample(velocity[0], np.random.default_rng(0)).shape == (3,)
 
 
-def test_specular_reflection_turns_the_vertical_share_alone() -> None:
+def test_specular_reflection_turns_the_vertical_fraction_alone() -> None:
     K = ker.CollisionLaw(ker.specular(), DISK)
     found = K.sample([[1.0, -3.0, 4.0]], np.random.default_rng(0))
     assert np.allclose(found, [[1.0, 3.0, 4.0]], rtol=1e-14)

@@ -51,9 +51,9 @@ def agree(first: Law, second: Law, tolerance: float = 1e-13) -> bool:
 
 @settings(max_examples=40, deadline=None)
 @given(laws, laws, st.floats(0.0, 1.0))
-def test_sums_act_linearly(first: Law, second: Law, share: float) -> None:
-    law = share * first + (1.0 - share) * second
-    expected = share * first.apply(smooth, THETA) + (1.0 - share) * second.apply(smooth, THETA)
+def test_sums_act_linearly(first: Law, second: Law, fraction: float) -> None:
+    law = fraction * first + (1.0 - fraction) * second
+    expected = fraction * first.apply(smooth, THETA) + (1.0 - fraction) * second.apply(smooth, THETA)
     assert np.allclose(law.apply(smooth, THETA), expected, rtol=0.0, atol=1e-14)
     assert np.allclose(law.apply(lambda a: 3.0 * smooth(a) - 2.0, THETA), 3.0 * expected - 2.0, rtol=0.0, atol=1e-13)
 

@@ -109,8 +109,8 @@ def test_rolling_parametrises_the_free_configurations_on_single_contact(wall):
     point = np.stack([rng.uniform(-2, 2, 2000), rng.uniform(-wall.depth, 0, 2000)], axis=-1) * space.scale
     alpha = rng.uniform(-3, 3, 2000) * space.spacing
     single = space.is_single(alpha)
-    share = 1.0 - 2.0 * space.gap_radius / space.spacing
-    assert abs(single.mean() - share) < 5 * np.sqrt(share * (1 - share) / 2000)
+    fraction = 1.0 - 2.0 * space.gap_radius / space.spacing
+    assert abs(single.mean() - fraction) < 5 * np.sqrt(fraction * (1 - fraction) / 2000)
     rolled = space.contains(space.charts.roll(point, alpha))
     straight = space.cylinder_contains(space.charts.roll_linear(point, alpha))
     np.testing.assert_array_equal(rolled[single], straight[single])

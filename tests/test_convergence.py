@@ -35,11 +35,11 @@ def test_psi_goes_over_into_pi_minus_psi_with_order_one_in_the_spacing(study):
     assert np.all((study.psi_defect / study.spacings > 0.15) & (study.psi_defect / study.spacings < 0.3))
 
 
-def test_the_share_of_collisions_with_two_satellites_is_of_the_order_of_scale_over_spacing_squared(study):
+def test_the_fraction_of_collisions_with_two_satellites_is_of_the_order_of_scale_over_spacing_squared(study):
     ratio = study.two_satellites / (study.scales / study.spacings**2)
     assert np.all((ratio > 0.4) & (ratio < 0.9))
     # the paper's good set leaves out more angles than those at which two satellites do touch
-    assert np.all(study.two_satellites < study.gap_share)
+    assert np.all(study.two_satellites < study.gap_fraction)
     # collisions in which one satellite takes part follow the modified law, but for a few near corners
     assert np.all(study.strays < study.two_satellites)
 

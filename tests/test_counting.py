@@ -31,7 +31,7 @@ def test_pairs_are_counted_in_their_cells() -> None:
     assert np.allclose(weighted, 2.0 * products[0] - 0.5 * products[1], rtol=1e-14, atol=1e-14)
 
 
-def test_rows_are_shares_and_fluxes_count_both_ways() -> None:
+def test_rows_are_fractions_and_fluxes_count_both_ways() -> None:
     rows = array_from_counts([COUNTS], UNEVEN, symmetrise=False, independent=True)
     # P = C_ij / N_i is heights S / heights, heights 2 and 2 / sqrt(3)
     scale = np.array([[1.0, math.sqrt(3.0)], [1.0 / math.sqrt(3.0), 1.0]])
@@ -108,7 +108,7 @@ def noise() -> list[np.ndarray]:
 
 
 def test_errors_of_rows_are_those_of_binomials() -> None:
-    # each row has one free share with variance p (1 - p) / N; with equal bins ||error||^2 = 2 (e_1^2 + e_2^2)
+    # each row has one free fraction with variance p (1 - p) / N; with equal bins ||error||^2 = 2 (e_1^2 + e_2^2)
     n = 10**7
     counts = np.array([[3 * n, 7 * n], [7 * n, 3 * n]])
     found = array_from_counts([counts], Bins(2), symmetrise=False, independent=True)
@@ -124,8 +124,8 @@ def test_errors_of_symmetrised_counts_are_those_of_a_multinomial() -> None:
     n = 10**8
     counts = np.array([[3 * n, n], [2 * n, 4 * n]])
     found = array_from_counts([counts], UNEVEN, symmetrise=True, independent=True)
-    share = np.array([0.3, 0.3, 0.4])  # first diagonal place, both others together, second diagonal place
-    covariance = (np.diag(share) - np.outer(share, share)) / (10 * n)
+    fraction = np.array([0.3, 0.3, 0.4])  # first diagonal place, both others together, second diagonal place
+    covariance = (np.diag(fraction) - np.outer(fraction, fraction)) / (10 * n)
     # entries 4 p_1, (4/sqrt 3) p_2 / 2 twice, (4/3) p_3
     form = np.diag([16.0, 16.0 / 3.0 / 4.0 * 2.0, 16.0 / 9.0])
     mean, variance = np.trace(form @ covariance), 2.0 * np.trace(form @ covariance @ form @ covariance)
@@ -144,13 +144,13 @@ def test_quantiles_of_norms_are_those_of_chi_squares() -> None:
 
 @pytest.mark.parametrize("number", [2, 3, 4])
 def test_the_mean_of_the_squared_error_is_estimated_without_bias(number: int) -> None:
-    share, weight = np.array([0.2, 0.5, 0.3]), np.array([1.0, 3.0, 0.5])
+    fraction, weight = np.array([0.2, 0.5, 0.3]), np.array([1.0, 3.0, 0.5])
     mean = 0.0
     for draws in itertools.product(range(3), repeat=number):
         counts = np.bincount(draws, minlength=3)
         estimate, _ = counting._squared_norms(counts[None], weight, np.array([number]))
-        mean += np.prod(share[list(draws)]) * float(estimate[0])
-    assert mean == pytest.approx(number * float(weight @ (share * (1.0 - share))), rel=1e-12)
+        mean += np.prod(fraction[list(draws)]) * float(estimate[0])
+    assert mean == pytest.approx(number * float(weight @ (fraction * (1.0 - fraction))), rel=1e-12)
 
 
 def test_a_single_pair_has_a_large_spread() -> None:
@@ -167,29 +167,30 @@ def test_the_variance_of_the_squared_error_is_that_of_poisson_counts_in_small_ce
 
 
 def test_the_variance_of_four_draws_is_counted_by_hand() -> None:
-    # two and two: squares of shares are estimated as 1/6 each, so E k^2 = (1/3)^2, for 12 ordered pairs of draws, twice
+    # two and two: squares of fractions are estimated as 1/6 each, so E k^2 = (1/3)^2, for 12 ordered pairs of draws,
+    # twice
     mean, variance = counting._squared_norms(np.array([[2, 2]]), np.ones(2), np.array([4]))
     assert mean[0] == pytest.approx(16 / 3 * 0.5) and variance[0] == pytest.approx(24 / 9)
 
 
-@pytest.mark.parametrize(("number", "share"), [(2000, 0.003), (2000, 0.5), (3000, 0.2)])
-def test_the_variance_of_the_squared_error_is_that_of_binomials(number: int, share: float) -> None:
+@pytest.mark.parametrize(("number", "fraction"), [(2000, 0.003), (2000, 0.5), (3000, 0.2)])
+def test_the_variance_of_the_squared_error_is_that_of_binomials(number: int, fraction: float) -> None:
     first = np.arange(number + 1)
     with np.errstate(all="raise", under="ignore"):
         counts = np.stack([first, number - first], axis=1)
         _, found = counting._squared_norms(counts, np.array([1.0, 2.0]), np.full(number + 1, number))
-    likely = binom.pmf(first, number, share)
-    square = 3.0 * (first - number * share) ** 2
+    likely = binom.pmf(first, number, fraction)
+    square = 3.0 * (first - number * fraction) ** 2
     exact = likely @ square**2 - (likely @ square) ** 2
     assert likely @ found == pytest.approx(exact, rel=0.005)
 
 
 def test_parts_along_one_line_have_students_error() -> None:
     rng = np.random.default_rng(1)
-    line, shares = rng.normal(size=(3, 3)), rng.normal(size=8)
-    parts = [2.0 + share * line for share in shares]
+    line, fractions = rng.normal(size=(3, 3)), rng.normal(size=8)
+    parts = [2.0 + fraction * line for fraction in fractions]
     middle = np.mean(parts, axis=0)
-    exact = t.ppf(0.975, 7) * np.std(shares, ddof=1) / math.sqrt(8.0) * np.linalg.norm(line)
+    exact = t.ppf(0.975, 7) * np.std(fractions, ddof=1) / math.sqrt(8.0) * np.linalg.norm(line)
     assert half_width(middle, parts) == pytest.approx(exact, rel=1e-10)
     assert half_width(middle, [middle] * 8) == 0.0
 

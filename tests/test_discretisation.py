@@ -117,9 +117,11 @@ def test_sums_are_done_term_by_term() -> None:
 # ---- deterministic laws ------------------------------------------------------------------------------------------
 def shuffled(theta: np.ndarray) -> np.ndarray:
     """Swaps the quarters [0, 1/4] and [1/2, 3/4] of the measure and reverses the last quarter."""
-    share = ker.SINE.cdf(theta)
-    image = np.where(share < 0.25, share + 0.5, np.where((share > 0.5) & (share < 0.75), share - 0.5, share))
-    image = np.where(share > 0.75, 1.75 - share, image)
+    fraction = ker.SINE.cdf(theta)
+    image = np.where(
+        fraction < 0.25, fraction + 0.5, np.where((fraction > 0.5) & (fraction < 0.75), fraction - 0.5, fraction)
+    )
+    image = np.where(fraction > 0.75, 1.75 - fraction, image)
     return ker.SINE.quantile(np.clip(image, 1e-16, 1 - 1e-16))
 
 
@@ -130,10 +132,10 @@ def test_involutions_with_jumps_are_resolved_exactly() -> None:
     expected[[0, 1, 2, 3, 4, 5, 6, 7], [4, 5, 2, 3, 0, 1, 7, 6]] = 1.0
     assert np.abs(bins.array - expected).max() < 1e-9
     smooth = ker.discretise(law, ker.Legendre(8))
-    # u = 1 - 2 share; <u, u o T> over the four quarters
-    share = (np.arange(400_000) + 0.5) / 400_000
-    image = ker.SINE.cdf(shuffled(ker.SINE.quantile(share)))
-    assert smooth.symmetric[1, 1] == pytest.approx(3.0 * np.mean((1 - 2 * share) * (1 - 2 * image)), abs=1e-9)
+    # u = 1 - 2 fraction; <u, u o T> over the four quarters
+    fraction = (np.arange(400_000) + 0.5) / 400_000
+    image = ker.SINE.cdf(shuffled(ker.SINE.quantile(fraction)))
+    assert smooth.symmetric[1, 1] == pytest.approx(3.0 * np.mean((1 - 2 * fraction) * (1 - 2 * image)), abs=1e-9)
     assert smooth.tolerance_met and smooth.stochastic_defect() < 1e-12
 
 

@@ -104,11 +104,11 @@ def test_specular_and_retroreflection_are_as_far_apart_as_their_angles(order):
     assert abs(found.value - mean_turn(order)) <= found.error < 1e-10
 
 
-@pytest.mark.parametrize("kind, share", [("rows", np.pi / 4), ("sup", np.pi / 2)])
-def test_laws_of_maxwell_differ_by_what_the_diffuse_share_moves(kind, share):
+@pytest.mark.parametrize("kind, fraction", [("rows", np.pi / 4), ("sup", np.pi / 2)])
+def test_laws_of_maxwell_differ_by_what_the_diffuse_fraction_moves(kind, fraction):
     # W_1(point at x, sin/2) = pi/2 - sin(x), with the mean pi/4 and the supremum pi/2
     found = ker.distance(ker.maxwell(0.2), ker.maxwell(0.7), kind=kind)
-    assert abs(found.value - 0.5 * share) <= found.error < 1e-4
+    assert abs(found.value - 0.5 * fraction) <= found.error < 1e-4
 
 
 def test_a_supremum_at_grazing_is_within_the_error():

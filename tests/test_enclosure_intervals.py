@@ -22,9 +22,9 @@ def measured(quotients, norms, errors=None) -> Residuals:
     return Residuals(np.asarray(quotients, dtype=float), errors, np.asarray(norms, dtype=float), 7)
 
 
-def mixed(own: float, other: float, share: float = 0.01) -> tuple[float, float]:
-    """Quotient and residual of sqrt(1 - share) u + sqrt(share) v, of eigenfunctions u to ``own`` and v to ``other``."""
-    return (1.0 - share) * own + share * other, float(np.sqrt(share * (1.0 - share))) * abs(own - other)
+def mixed(own: float, other: float, fraction: float = 0.01) -> tuple[float, float]:
+    """Quotient and residual of sqrt(1 - fraction) u + sqrt(fraction) v, u to the value ``own``, v to ``other``."""
+    return (1.0 - fraction) * own + fraction * other, float(np.sqrt(fraction * (1.0 - fraction))) * abs(own - other)
 
 
 def interval(found: Residuals, rest: float, place: int) -> tuple[float, float]:
@@ -169,22 +169,22 @@ def apart(law, quotients, norms, next_value):
     return number, separation.radius, separation.kind
 
 
-SHARE = ker.maxwell(0.25)  # an essential spectrum up to .75, all but the constants within .75
+FRACTION = ker.maxwell(0.25)  # an essential spectrum up to .75, all but the constants within .75
 RANK = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])  # .4 beyond the constants, and nothing beyond that
 
 
 @pytest.mark.parametrize(
     ("law", "quotients", "norms", "next_value", "expected"),
     [
-        (SHARE, [1, 0.9, -0.8], [0, 0.01, 0.01], 0.7, (3, 0.75, "bound")),
-        (SHARE, [1, 0.9, -0.8], [0, 0.01, 0.01], 0.78, (3, 0.78, "estimate")),
-        (SHARE, [1, -0.8, 0.9], [0, 0.01, 0.01], 0.787, (2, 0.81, "estimate")),
+        (FRACTION, [1, 0.9, -0.8], [0, 0.01, 0.01], 0.7, (3, 0.75, "bound")),
+        (FRACTION, [1, 0.9, -0.8], [0, 0.01, 0.01], 0.78, (3, 0.78, "estimate")),
+        (FRACTION, [1, -0.8, 0.9], [0, 0.01, 0.01], 0.787, (2, 0.81, "estimate")),
         # the joint residual of .03 and .04 is .05
-        (SHARE, [1, 0.85], [0.03, 0.04], 0.795, (2, 0.795, "estimate")),
-        (SHARE, [1, 0.85], [0.03, 0.04], 0.805, (1, 0.75, "bound")),
-        (SHARE, [1, 0.76], [0, 0.02], 0.1, (1, 0.75, "bound")),
-        (SHARE, [1, 0.98], [0, 0.1], 0.9, (1, 0.75, "bound")),
-        (SHARE, [1, 0.9], [0.5, 0.001], 0.1, (0, 0.75, "bound")),
+        (FRACTION, [1, 0.85], [0.03, 0.04], 0.795, (2, 0.795, "estimate")),
+        (FRACTION, [1, 0.85], [0.03, 0.04], 0.805, (1, 0.75, "bound")),
+        (FRACTION, [1, 0.76], [0, 0.02], 0.1, (1, 0.75, "bound")),
+        (FRACTION, [1, 0.98], [0, 0.1], 0.9, (1, 0.75, "bound")),
+        (FRACTION, [1, 0.9], [0.5, 0.001], 0.1, (0, 0.75, "bound")),
         (RANK, [1, 0.5], [0, 0.125], 0.25, (2, 0.0, "bound")),
         (RANK, [1, 0.5], [0, 0.125], 0.375, (1, 0.4, "bound")),
         (RANK, [1, 0.5], [0, 0.125], 0.45, (1, 0.4, "bound")),
@@ -199,7 +199,7 @@ def test_the_largest_number_that_stays_beyond_the_rest(law, quotients, norms, ne
 
 def test_where_none_is_apart_the_first_refusal_is_told():
     found = measured([1.0, 0.9], [0.5, 0.001])
-    _, separation = enclosure._first_that_separates(SHARE, found, np.arange(2), 0.1)
+    _, separation = enclosure._first_that_separates(FRACTION, found, np.arange(2), 0.1)
     assert "norm of the essential part" in separation.reason
 
 
@@ -238,12 +238,12 @@ def test_powers_come_in_descending_order_after_the_constants():
 def test_the_residual_of_a_power_bounds_that_of_the_trial_function(own, exponent):
     """Of sqrt(1 - s) u + sqrt(s) v the residual is known; v may have any eigenvalue, also one of modulus 1."""
     for other in (-1.0, -0.5, 0.0, 0.3, 0.95, 1.0):
-        for share in (1e-6, 0.01):
-            value, norm = mixed(own, other, share)
+        for fraction in (1e-6, 0.01):
+            value, norm = mixed(own, other, fraction)
             claimed = raised([item(value - norm, value, value + norm, residual=norm)], exponent)[0].residual
             actual = np.hypot(
-                np.sqrt(1.0 - share) * (own**exponent - value**exponent),
-                np.sqrt(share) * (other**exponent - value**exponent),
+                np.sqrt(1.0 - fraction) * (own**exponent - value**exponent),
+                np.sqrt(fraction) * (other**exponent - value**exponent),
             )
             assert actual <= claimed * (1.0 + 1e-12)
 

@@ -17,7 +17,7 @@ def pairs(number: int, seed: int, invariant: bool = True) -> tuple[np.ndarray, n
     return theta, LAW.sample(theta, rng)
 
 
-def test_rows_are_shares_of_the_counts() -> None:
+def test_rows_are_fractions_of_the_counts() -> None:
     theta, image = pairs(5000, 0)
     found = ker.estimate(theta, image, ker.Bins(6))
     expected = np.zeros((6, 6), dtype=int)
@@ -47,8 +47,8 @@ def test_the_z_score_is_that_of_the_raw_pairs_for_any_incoming_angles(invariant:
 def test_pairs_of_an_irreversible_law_give_a_large_z_score() -> None:
     rng = np.random.default_rng(3)
     theta = np.pi * rng.beta(1.2, 1.6, 20_000)
-    share = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * rng.random(theta.size), 1.0)
-    found = ker.estimate(theta, ker.SINE.quantile(np.clip(share, 1e-12, 1 - 1e-12)), ker.Bins(12), symmetrise=True)
+    fraction = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * rng.random(theta.size), 1.0)
+    found = ker.estimate(theta, ker.SINE.quantile(np.clip(fraction, 1e-12, 1 - 1e-12)), ker.Bins(12), symmetrise=True)
     assert found.symmetry_defect().z_score > 10.0
     assert np.abs(found.flux - found.flux.T).max() < 1e-17
 

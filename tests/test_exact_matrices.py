@@ -25,7 +25,7 @@ def _beams(bins: ker.Bins) -> np.ndarray:
 @pytest.mark.parametrize("made", [_closed_form, _beams], ids=["closed form", "beams"])
 def test_triangular_teeth_on_512_bins_are_right_to_1e_13_as_an_operator(made) -> None:
     miss = made(ker.Bins(BINS)) - reference()
-    # an ulp of an end of one of 2424 masses, as a share of a bin: each of them less than 1e-13, together more
+    # an ulp of an end of one of 2424 masses, as a fraction of a bin: each of them less than 1e-13, together more
     assert np.abs(miss).max() < 1e-13
     assert np.linalg.norm(miss, 2) < 1.2e-13
     assert np.linalg.norm(miss) < float(ker.discretise(ker.TriangularTeethLaw(ANGLE), ker.Bins(BINS)).error)

@@ -60,14 +60,14 @@ def test_the_published_gap_is_found():
 def test_deep_teeth_toss_a_coin_between_smooth_and_no_slip():
     found = load("no_slip_or_smooth").main()
     # facts 1 with the foreshortened ratio r (1 + m/J)^(1/2)
-    for ratio, share in found.items():
+    for ratio, fraction in found.items():
         d = 2 * ratio * np.sqrt(3) / np.tan(1.0)
         specular = 1 - (d % 1) / 2 if int(d) % 2 == 0 else 0.5 + (d % 1) / 2
-        assert share == pytest.approx(1 - specular, abs=1e-12)
+        assert fraction == pytest.approx(1 - specular, abs=1e-12)
 
 
 def test_a_rough_wall_mixes_with_maxwells_law_as_theory_says():
-    found = load("maxwell_or_rough").main(half_angle=0.3, share=0.25)
+    found = load("maxwell_or_rough").main(half_angle=0.3, fraction=0.25)
     rough, maxwell = found["rough wall"], found["Maxwell's law"]
     # the gap of a shallow wall is four times its mean squared slope, less a few per cent at this depth
     xi = 0.3

@@ -128,13 +128,13 @@ def test_deep_channels_follow_the_law_of_rectangular_teeth(theta, height_to_widt
     flagged = np.mean(traced.status == geo.Status.CORNER)
     assert traced.escaped.mean() + flagged == 1.0
     assert flagged <= 0.02
-    # the number of crossings is known to a relative eps, and so is the share of each outcome
+    # the number of crossings is known to a relative eps, and so is the fraction of each outcome
     crossings = 2.0 * height_to_width / np.tan(theta)
     unsure = 4.0 / RAYS + flagged + 4.0 * np.finfo(float).eps * crossings
     for weight, angle in zip(np.ravel(weights), np.ravel(angles), strict=True):
-        share = np.mean(np.abs(traced.theta - angle) <= 64 * np.finfo(float).eps)
+        fraction = np.mean(np.abs(traced.theta - angle) <= 64 * np.finfo(float).eps)
         # equidistant rays resolve the two intervals of each branch to one ray an end
-        assert share == pytest.approx(weight, abs=unsure)
+        assert fraction == pytest.approx(weight, abs=unsure)
 
 
 def test_flags_in_deep_channels_are_settled_where_half_an_ulp_of_the_angle_meets_no_corner():

@@ -107,7 +107,7 @@ def test_the_parabola_pair_sends_grazing_rays_back_and_has_no_visible_gap():
     assert gap.verdict == "essential edge" and 0.0 <= float(gap) <= 1e-6 and gap.error <= 1e-6
 
 
-def test_a_mushroom_ends_at_an_essential_edge_above_its_share_of_flat_tops():
+def test_a_mushroom_ends_at_an_essential_edge_above_its_fraction_of_flat_tops():
     edge = essential_edge(ker.WallLaw(geo.mushrooms(0.3)))
     assert edge.low > 0.7 and edge.high < 1.0 and edge.error < 1e-6
     # E[sin(theta)/sin(theta')] by plain tracing at theta = 1e-5, by z-score over shifted lattices

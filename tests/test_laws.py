@@ -189,11 +189,11 @@ def test_densities_that_are_no_laws_are_refused_with_the_defect() -> None:
 
 
 def test_breakpoints_let_densities_jump() -> None:
-    share = float(SINE.mass(0.0, 1.0))
-    law = DensityLaw(lambda a, b: np.where(b < 1.0, 2.0, 1.0) * SINE.density(b) / (1.0 + share), breakpoints=[1.0])
-    assert abs(float(law.apply(lambda a: a < 1.0, 0.5)) - 2.0 * share / (1.0 + share)) < 1e-14
+    fraction = float(SINE.mass(0.0, 1.0))
+    law = DensityLaw(lambda a, b: np.where(b < 1.0, 2.0, 1.0) * SINE.density(b) / (1.0 + fraction), breakpoints=[1.0])
+    assert abs(float(law.apply(lambda a: a < 1.0, 0.5)) - 2.0 * fraction / (1.0 + fraction)) < 1e-14
     drawn = law.sample(np.full(20_000, 0.5), np.random.default_rng(2))
-    assert_z((drawn < 1.0).astype(float), 2.0 * share / (1.0 + share))
+    assert_z((drawn < 1.0).astype(float), 2.0 * fraction / (1.0 + fraction))
 
 
 def test_laws_are_immutable() -> None:

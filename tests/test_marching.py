@@ -75,7 +75,7 @@ def test_the_middle_of_every_interval_is_traced_to_its_angle(seed):
     assert np.abs(ray.theta - row.outgoing[wide]).max() < 1e-13 * row.bounces.max()
 
 
-def test_limits_leave_a_share_unresolved_and_never_hang():
+def test_limits_leave_a_fraction_unresolved_and_never_hang():
     crevice = [(0, 0), (0, -1e6), (1, -1e6), (1, 0)]
     row = exact_row(crevice, 0.1, max_bounces=1000)
     assert row.unresolved == 1.0

@@ -227,11 +227,11 @@ def test_unequal_rows_are_told_from_the_invariant_measure() -> None:
 
 @pytest.mark.parametrize("dimensions", [1, 3, 20])
 def test_z_scores_from_replicates_have_the_tails_of_a_normal(dimensions: int) -> None:
-    """The share above 2 is that of a normal, 0.0228, within 4.5 standard errors and the fit's quarter."""
+    """The fraction above 2 is that of a normal, 0.0228, within 4.5 standard errors and the fit's quarter."""
     rng = np.random.default_rng(5)
     scores = [replicate_z_score(list(rng.normal(size=(8, dimensions)))) for _ in range(4000)]
-    share = np.mean(np.array(scores) > 2.0)
-    assert abs(share - 0.0228) < 0.0228 / 4 + 4.5 * np.sqrt(0.0228 / 4000)
+    fraction = np.mean(np.array(scores) > 2.0)
+    assert abs(fraction - 0.0228) < 0.0228 / 4 + 4.5 * np.sqrt(0.0228 / 4000)
     assert np.max(scores) < 5.0
 
 

@@ -42,11 +42,11 @@ def test_the_table_of_triangular_teeth_is_their_law(psi: float) -> None:
     table = law.isometry_table()
     assert table is not None and table.mass() == pytest.approx(1.0, abs=1e-14)
     theta = np.concatenate([[1e-9, 1e-4, math.pi - 1e-4], np.random.default_rng(1).uniform(0.001, 3.14, 500)])
-    (share, angle), (expected, outgoing) = table.branches(theta), law.branches(theta)
-    assert np.abs(share.sum(axis=-1) - 1.0).max() < 1e-14
+    (fraction, angle), (expected, outgoing) = table.branches(theta), law.branches(theta)
+    assert np.abs(fraction.sum(axis=-1) - 1.0).max() < 1e-14
     # next to a kink, known to a few ulps, a probability is known to an ulp over the width of its interval
     for k in (1, 2, 5):
-        found, wanted = (share * np.cos(k * angle)).sum(-1), (expected * np.cos(k * outgoing)).sum(-1)
+        found, wanted = (fraction * np.cos(k * angle)).sum(-1), (expected * np.cos(k * outgoing)).sum(-1)
         assert np.abs(found - wanted).max() < 1e-13 + 64.0 * EPS / psi
 
 
@@ -110,10 +110,10 @@ def test_probabilities_sum_to_one_and_are_linear_in_the_cotangent_between_kinks(
     width = np.diff(edges)
     inside = edges[:-1] + np.array([[0.2], [0.5], [0.8]]) * width
     inside = inside[:, width > 1e-6]
-    share = law.branches(inside)[0]
+    fraction = law.branches(inside)[0]
     low, middle, high = np.cos(inside) / np.sin(inside)
     weight = ((middle - low) / (high - low))[:, None]
-    assert np.abs((1.0 - weight) * share[0] + weight * share[2] - share[1]).max() < 1e-11
+    assert np.abs((1.0 - weight) * fraction[0] + weight * fraction[2] - fraction[1]).max() < 1e-11
 
 
 @pytest.mark.parametrize("name", WALLS)
@@ -216,12 +216,12 @@ def test_signs_from_the_table_are_those_found_by_probing() -> None:
     for law in (ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(3.0)):
         probability, sign, offset = isometries(law, theta)
         image = sign * theta[:, None] + offset
-        share, outgoing = law.branches(theta)
+        fraction, outgoing = law.branches(theta)
         for k in (1, 3):
-            assert np.allclose((probability * np.cos(k * image)).sum(-1), (share * np.cos(k * outgoing)).sum(-1))
+            assert np.allclose((probability * np.cos(k * image)).sum(-1), (fraction * np.cos(k * outgoing)).sum(-1))
     frame = ker.TriangularTeethLaw(0.7).in_specular_frame().isometry_table()
     assert frame is not None
-    share, outgoing = frame.branches(theta)
+    fraction, outgoing = frame.branches(theta)
     wanted = ker.TriangularTeethLaw(0.7).in_specular_frame().apply(np.cos, theta)
-    assert np.allclose((share * np.cos(outgoing)).sum(-1), wanted, atol=1e-13)
+    assert np.allclose((fraction * np.cos(outgoing)).sum(-1), wanted, atol=1e-13)
     assert ker.lambertian().isometry_table() is None

@@ -54,11 +54,11 @@ def test_z_scores_of_sampled_matrices_are_those_of_noise(basis: ker.Basis, metho
 def test_a_law_that_is_not_reversible_is_found_out_also_when_symmetrised_by_hand() -> None:
     @dataclass(frozen=True)
     class Drift(ker.DrivenLaw):
-        """Keeps the measure and moves shares of it by a tenth and a bit: not reversible."""
+        """Keeps the measure and moves fractions of it by a tenth and a bit: not reversible."""
 
         def reflect(self, x: object, theta: object) -> np.ndarray:
-            share = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * np.asarray(x), 1.0)
-            return ker.SINE.quantile(np.clip(share, 1e-12, 1 - 1e-12))
+            fraction = np.mod(ker.SINE.cdf(theta) + 0.1 + 0.3 * np.asarray(x), 1.0)
+            return ker.SINE.quantile(np.clip(fraction, 1e-12, 1 - 1e-12))
 
     for method in ("qmc", "monte-carlo"):
         found = ker.discretise(Drift(), ker.Bins(16), method=method, samples=2**16)  # type: ignore[arg-type]

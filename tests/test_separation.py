@@ -7,7 +7,7 @@ import pytest
 
 from asperity import kernels as ker
 from asperity.spectral.bounds import separation
-from asperity.spectral.bounds.separation import lambertian_share, rest_of_spectrum
+from asperity.spectral.bounds.separation import lambertian_fraction, rest_of_spectrum
 
 EPS = float(np.finfo(float).eps)
 CONSTANTS = np.ones(1)
@@ -75,15 +75,15 @@ def test_of_a_density_of_rank_two_the_second_eigenvalue_is_left():
 
 @pytest.mark.parametrize("cut", [0.0, 0.3])
 def test_a_density_that_jumps_is_integrated_from_jump_to_jump(cut):
-    """Two states with the shares (1 - c)/2 and (1 + c)/2, the same one again with .6: eigenvalues 1 and .6.
+    """Two states with the fractions (1 - c)/2 and (1 + c)/2, the same one again with .6: eigenvalues 1 and .6.
 
     A jump in the middle needs no breakpoint: the panels end there.
     """
 
     def density(theta, out):
         same = (np.cos(theta) > cut) == (np.cos(out) > cut)
-        share = np.where(np.cos(out) > cut, 0.5 * (1.0 - cut), 0.5 * (1.0 + cut))
-        return 0.5 * np.sin(out) * (0.4 + np.where(same, 0.6 / share, 0.0))
+        fraction = np.where(np.cos(out) > cut, 0.5 * (1.0 - cut), 0.5 * (1.0 + cut))
+        return 0.5 * np.sin(out) * (0.4 + np.where(same, 0.6 / fraction, 0.0))
 
     law = ker.DensityLaw(density, [np.arccos(cut)] if cut else [])
     assert law.reversible
@@ -102,9 +102,9 @@ def test_laws_of_finite_rank_leave_nothing():
     assert abs(apart.radius - 0.4) < 1e-14 and apart.kind == "bound"
 
 
-def test_beyond_the_constants_a_lambertian_share_is_a_bound():
+def test_beyond_the_constants_a_lambertian_fraction_is_a_bound():
     apart = rest_of_spectrum(ker.maxwell(0.25), CONSTANTS, 0.0, 0.4)
-    assert (apart.radius, apart.kind) == (0.75, "bound") and "a Lambertian share a = 0.25" in apart.reason
+    assert (apart.radius, apart.kind) == (0.75, "bound") and "a Lambertian fraction a = 0.25" in apart.reason
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_beyond_other_eigenvalues_it_is_the_essential_edge_or_the_next_value(nex
     assert ("norm of the essential part, 0.75" in apart.reason) == (kind == "bound")
 
 
-def test_without_a_lambertian_share_the_next_value_is_an_estimate():
+def test_without_a_lambertian_fraction_the_next_value_is_an_estimate():
     apart = rest_of_spectrum(ker.CircularArcLaw(1.2), CONSTANTS, 0.0, 0.4)
     assert (apart.radius, apart.kind) == (0.4, "estimate")
 
@@ -133,14 +133,14 @@ def test_where_fast_oscillations_reach_further_than_the_next_value_nothing_is_kn
     assert ("what rays show" in found.reason) == (radius == 1.0)
 
 
-def test_the_lambertian_share_of_sums_and_products():
+def test_the_lambertian_fraction_of_sums_and_products():
     diffuse, turned = ker.lambertian(), ker.specular()
-    assert lambertian_share(diffuse) == 1.0 and lambertian_share(turned) == 0.0
-    assert lambertian_share(0.25 * diffuse + 0.75 * turned) == pytest.approx(0.25)
-    assert lambertian_share(turned @ diffuse) == 1.0
-    assert lambertian_share((0.5 * diffuse + 0.5 * turned) ** 3) == pytest.approx(0.875)
-    assert lambertian_share(ker.maxwell(0.5) @ ker.maxwell(0.25)) == pytest.approx(0.625)
-    assert lambertian_share(ker.maxwell(0.25).in_specular_frame()) == pytest.approx(0.25)
+    assert lambertian_fraction(diffuse) == 1.0 and lambertian_fraction(turned) == 0.0
+    assert lambertian_fraction(0.25 * diffuse + 0.75 * turned) == pytest.approx(0.25)
+    assert lambertian_fraction(turned @ diffuse) == 1.0
+    assert lambertian_fraction((0.5 * diffuse + 0.5 * turned) ** 3) == pytest.approx(0.875)
+    assert lambertian_fraction(ker.maxwell(0.5) @ ker.maxwell(0.25)) == pytest.approx(0.625)
+    assert lambertian_fraction(ker.maxwell(0.25).in_specular_frame()) == pytest.approx(0.25)
     # the weights add up to 1 + 2e-16
-    shares = 0.1 * diffuse + 0.1 * diffuse + 0.4 * diffuse + 0.3 * diffuse + 0.1 * diffuse
-    assert lambertian_share(shares) == 1.0
+    fractions = 0.1 * diffuse + 0.1 * diffuse + 0.4 * diffuse + 0.3 * diffuse + 0.1 * diffuse
+    assert lambertian_fraction(fractions) == 1.0

@@ -98,15 +98,17 @@ def test_sides_that_are_neither_vertical_nor_overhanging_let_nothing_graze(law):
     assert limit.root == limit.error == 0.0 and limit.resolved
 
 
-def test_the_edge_of_a_shallow_wall_is_its_share_of_flat_tops():
-    for share in (0.0, 0.25, 0.999):
-        top = [geo.Segment((0, 0), (share, 0))] if share else []
-        depth = 1e-6 * (1.0 - share)
-        wall = geo.Wall([*top, geo.Bezier([(share, 0), (0.5 * (1 + share), -depth), (1, 0)])])
+def test_the_edge_of_a_shallow_wall_is_its_fraction_of_flat_tops():
+    for fraction in (0.0, 0.25, 0.999):
+        top = [geo.Segment((0, 0), (fraction, 0))] if fraction else []
+        depth = 1e-6 * (1.0 - fraction)
+        wall = geo.Wall([*top, geo.Bezier([(fraction, 0), (0.5 * (1 + fraction), -depth), (1, 0)])])
         edge = essential_edge(ker.WallLaw(wall))
-        assert abs(edge.low - share) <= 1e-15 and abs(edge.high - share) <= 1e-15
+        assert abs(edge.low - fraction) <= 1e-15 and abs(edge.high - fraction) <= 1e-15
         limit = grazing_symbol(ker.WallLaw(wall))
-        assert np.allclose(limit.matrix, [[0.0, share], [share, 0.0]], rtol=0.0, atol=1e-15) and limit.error == 0.0
+        assert (
+            np.allclose(limit.matrix, [[0.0, fraction], [fraction, 0.0]], rtol=0.0, atol=1e-15) and limit.error == 0.0
+        )
 
 
 def test_a_traced_side_that_grazing_rays_leave_steeply_has_the_limit_that_its_shape_tells():
@@ -159,16 +161,16 @@ def test_no_gap_is_negative():
     assert sure.cut_at_zero() is sure
 
 
-def test_a_share_of_identity_scales_the_gap():
-    arc, share = ker.CircularArcLaw(1.2), 1e-12
+def test_a_fraction_of_identity_scales_the_gap():
+    arc, fraction = ker.CircularArcLaw(1.2), 1e-12
     for law, eigenvalue in (
-        ((1.0 - share) * ker.retroreflection() + share * arc, 0.3670253152),
-        (((1.0 - share) * ker.specular() + share * arc).in_specular_frame(), 0.311346443),
+        ((1.0 - fraction) * ker.retroreflection() + fraction * arc, 0.3670253152),
+        (((1.0 - fraction) * ker.specular() + fraction * arc).in_specular_frame(), 0.311346443),
     ):
-        gap = spec.spectral_gap(law, tolerance=1e-5 * share)
-        assert gap.verdict == "isolated" and gap.error <= 1e-5 * share
+        gap = spec.spectral_gap(law, tolerance=1e-5 * fraction)
+        assert gap.verdict == "isolated" and gap.error <= 1e-5 * fraction
         # weights of a sum are known to a rounding of 1
-        assert abs(gap.value - share * (1.0 - eigenvalue)) <= gap.error + 2e-9 * share + 1e-16
+        assert abs(gap.value - fraction * (1.0 - eigenvalue)) <= gap.error + 2e-9 * fraction + 1e-16
 
 
 def bent_teeth(depth, bend):

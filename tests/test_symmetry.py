@@ -77,39 +77,39 @@ def test_single_transitions_and_no_transitions_say_nothing() -> None:
 @pytest.mark.parametrize("weights", [[0.2] * 5, [0.1, 0.15, 0.2, 0.25, 0.3]])
 @pytest.mark.parametrize("number", [1, 2, 5])
 def test_the_score_of_incoming_angles_has_enumerated_moments(weights: list[float], number: int) -> None:
-    share = np.array(weights)
+    fraction = np.array(weights)
     statistics, likely = [], []
     for draws in itertools.product(range(5), repeat=number):
         totals = np.bincount(draws, minlength=5)
-        statistics.append(float(np.sum((totals - number * share) ** 2 / (number * share))))
-        likely.append(float(np.prod(share[list(draws)])))
+        statistics.append(float(np.sum((totals - number * fraction) ** 2 / (number * fraction))))
+        likely.append(float(np.prod(fraction[list(draws)])))
     statistics, likely = np.array(statistics), np.array(likely)
     mean = likely @ statistics
     variance = likely @ statistics**2 - mean**2
     if variance < 1e-6:
         # one draw of equal cells is no statistic
-        assert invariance_z_score(np.array([1, 0, 0, 0, 0]), share) == 0.0
+        assert invariance_z_score(np.array([1, 0, 0, 0, 0]), fraction) == 0.0
         return
     assert mean == pytest.approx(4.0)
     for totals in ([number, 0, 0, 0, 0], [number - 1, 0, 0, 1, 0], [0, 0, 0, 0, number]):
         totals = np.array(totals)
-        statistic = float(np.sum((totals - number * share) ** 2 / (number * share)))
+        statistic = float(np.sum((totals - number * fraction) ** 2 / (number * fraction)))
         expected = score_of(statistic, 4.0, variance)
         if 0.5 < statistic < 12.0:
-            assert invariance_z_score(totals, share) == pytest.approx(expected, abs=0.06)
+            assert invariance_z_score(totals, fraction) == pytest.approx(expected, abs=0.06)
 
 
 def test_the_score_of_many_incoming_angles_is_that_of_pearson() -> None:
-    share = np.array([0.1, 0.2, 0.3, 0.4])
+    fraction = np.array([0.1, 0.2, 0.3, 0.4])
     for shift in (0, 100, 200):
         totals = np.array([10_000, 20_000, 30_000, 40_000]) + shift * np.array([1, -1, 1, -1])
-        expected = 1e5 * share
+        expected = 1e5 * fraction
         statistic = float(np.sum((totals - expected) ** 2 / expected))
         if shift:
             score = norm.isf(chi2.sf(statistic, 3))
-            assert invariance_z_score(totals, share) == pytest.approx(score, abs=0.05)
+            assert invariance_z_score(totals, fraction) == pytest.approx(score, abs=0.05)
         else:
-            assert invariance_z_score(totals, share) < -3.0
+            assert invariance_z_score(totals, fraction) < -3.0
     assert invariance_z_score(np.array([7]), np.array([1.0])) == 0.0
 
 

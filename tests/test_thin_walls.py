@@ -54,8 +54,8 @@ def test_rays_that_were_lost_or_wrong(kind, number, x, theta):
 def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
     joints, lines = np.array([[0.0, -1.0], [2.0, -1.0]]), np.array([[2.0, 0.0]])
     tables = NO_TABLES._replace(joints=joints, lines=lines)
-    time, share = line_time(tables, 0, (2.0, 0.0), 2.0, 0.0, 0.0, -1.0)
-    assert time == 1.0 and share < 0.0
+    time, fraction = line_time(tables, 0, (2.0, 0.0), 2.0, 0.0, 0.0, -1.0)
+    assert time == 1.0 and fraction < 0.0
 
 
 @pytest.mark.parametrize("theta", [1e-4, 1e-6, np.pi - 1e-7, 1e-9])
@@ -117,8 +117,8 @@ def _exact_hits(wall, x, theta):
         px, py, hits, own, cell = px + t * vx, py + t * vy, hits + 1, (k, shift), shift
         (ax, ay), (bx, by) = segments[k]
         ex, ey = bx - ax, by - ay
-        share = 2 * (vx * ex + vy * ey) / (ex * ex + ey * ey)
-        vx, vy = share * ex - vx, share * ey - vy
+        fraction = 2 * (vx * ex + vy * ey) / (ex * ex + ey * ey)
+        vx, vy = fraction * ex - vx, fraction * ey - vy
 
 
 PLATES = {
@@ -179,8 +179,12 @@ def test_a_plate_whose_faces_cross_by_rounding_is_a_plate_without_thickness():
     rng = np.random.default_rng(5)
     crossed = 0
     for _ in range(20):
-        foot, tip, share = rng.uniform([0.3, -0.95], [0.5, -0.7]), rng.uniform([0.4, -0.4], [0.7, -0.1]), rng.random()
-        middle = tuple(foot + share * (tip - foot))
+        foot, tip, fraction = (
+            rng.uniform([0.3, -0.95], [0.5, -0.7]),
+            rng.uniform([0.4, -0.4], [0.7, -0.1]),
+            rng.random(),
+        )
+        middle = tuple(foot + fraction * (tip - foot))
         foot, tip = tuple(foot), tuple(tip)
         crossed += ExactPoints(np.array([foot, tip, middle])).turn(0, 1, 2) > 0
         ends = [(0.0, 0.0), (0.0, -0.95)], [(1.0, -0.95), (1.0, 0.0)]

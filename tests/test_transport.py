@@ -53,7 +53,7 @@ def test_resistances_in_closed_form_lie_within_their_errors(law, exact):
 @pytest.mark.parametrize("ratio", [0.3, 1.0])
 def test_rectangular_teeth_have_half_their_flat_tops_resistance_and_half_of_the_crevices(ratio):
     found = ker.resistance(ker.RectangularTeethLaw(ratio))
-    # beyond 2000 crossings, a share of 1e-7 of the flux, the reference has only the mean, good to one period
+    # beyond 2000 crossings, a fraction of 1e-7 of the flux, the reference has only the mean, good to one period
     assert found.value == pytest.approx(rectangular_resistance(ratio), abs=1e-9)
 
 
@@ -324,7 +324,7 @@ def test_the_best_pair_of_parabolas_has_each_focus_in_the_others_tip():
 
 
 def test_two_parameters_are_searched_together():
-    # a mixture of three laws whose resistance is quadratic in the shares, with the maximum 1.5 at (0.3, 0.6)
+    # a mixture of three laws whose resistance is quadratic in the fractions, with the maximum 1.5 at (0.3, 0.6)
     def member(a, b):
         loss = (a - 0.3) ** 2 + (b - 0.6) ** 2
         return (1 - loss) * ker.retroreflection() + loss * ker.specular()

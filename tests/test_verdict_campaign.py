@@ -39,7 +39,7 @@ def test_an_island_of_segments_has_a_straight_part():
     island = [geo.Segment(a, b) for a, b in zip(corners, corners[1:] + corners[:1], strict=True)]
     found = straight_part(ker.WallLaw(geo.Wall([bowl], islands=[island])))
     # rays from above that the upper sides send away at once
-    assert 0.05 < found.share < found.low <= found.high < 1.0
+    assert 0.05 < found.fraction < found.low <= found.high < 1.0
 
 
 def test_changes_that_shrink_lead_beyond_an_edge_or_not():
@@ -63,7 +63,7 @@ def test_one_segment_among_curves_reaches_as_far_as_its_best_pair_of_angles():
     theta = np.linspace(0.01, np.pi - 0.01, 400)
     x = (np.arange(4000) + 0.5) / 4000
 
-    def share(angle):
+    def fraction(angle):
         out, _ = law.outcomes(x[None, :], angle[:, None])
         traced = geo.trace(wall, np.broadcast_to(x, out.shape), np.broadcast_to(angle[:, None], out.shape))
         mirrored = np.abs(out - (np.pi + 2.0 * slope - angle)[:, None]) < 1e-9
@@ -71,7 +71,7 @@ def test_one_segment_among_curves_reaches_as_far_as_its_best_pair_of_angles():
 
     back = np.pi + 2.0 * slope - theta
     inside = (back > 0.0) & (back < np.pi)
-    expected = np.sqrt(share(theta[inside]) * share(back[inside])).max()
+    expected = np.sqrt(fraction(theta[inside]) * fraction(back[inside])).max()
     found = straight_part(law)
     assert found.low - 2e-3 <= expected <= found.high + 1e-3
 

@@ -93,7 +93,7 @@ def test_a_law_outside_the_hull_of_given_hollows_ends_with_its_distance_and_a_bo
     found = ker.wall_for(ker.lambertian(), moments=MOMENTS, hollows=[geo.flat(), geo.triangular_teeth(1.0)])
     assert float(found.defect) > 0.5
     assert found.bound.kind == "bound" and float(found.bound) < 1e-12
-    # no other share of flat tops is nearer
+    # no other fraction of flat tops is nearer
     flat, teeth = moments_of(ker.specular()), moments_of(ker.TriangularTeethLaw(1.0))
     others = [np.linalg.norm(w * flat + (1 - w) * teeth - moments_of(ker.lambertian())) for w in np.linspace(0, 1, 201)]
     assert min(others) >= float(found.defect) * (1.0 - 1e-12)

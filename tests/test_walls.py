@@ -67,7 +67,7 @@ WALLS = {**CLOSED, **OPEN}
 
 
 @pytest.mark.parametrize("name", WALLS)
-def test_pieces_share_their_joints_to_the_bit(name):
+def test_pieces_fraction_their_joints_to_the_bit(name):
     wall = WALLS[name]
     assert wall.vertices.shape == (len(wall.pieces) + 1, 2)
     for piece, start, end in zip(wall.pieces, wall.vertices[:-1], wall.vertices[1:], strict=True):

@@ -61,16 +61,16 @@ def test_densities_at_angles_whose_sines_are_known() -> None:
 def test_quantiles_are_accurate_at_both_ends(measure) -> None:
     small = np.concatenate((np.logspace(-60, -1, 119), [0.2, 0.3, 0.45, 0.499, 0.5]))
     with mpmath.workdps(90):
-        for share, angle in zip(small, measure.quantile(small), strict=True):
+        for fraction, angle in zip(small, measure.quantile(small), strict=True):
             slope = float(measure.density(angle))
-            miss = float(exact_mass_fine(measure.name, angle) - mpmath.mpf(share))
+            miss = float(exact_mass_fine(measure.name, angle) - mpmath.mpf(fraction))
             assert abs(miss) < 1.2e-15 * slope * angle
-    for share in (1e-9, 0.01, 0.2, 0.45):
-        alone = float(measure.quantile(share))
+    for fraction in (1e-9, 0.01, 0.2, 0.45):
+        alone = float(measure.quantile(fraction))
         with mpmath.workdps(90):
             found = float(exact_mass_fine(measure.name, alone))
-        assert found == pytest.approx(share, rel=2e-15, abs=0.0)
-    # 1 - share is exact: the upper half is the mirror image of the lower one
+        assert found == pytest.approx(fraction, rel=2e-15, abs=0.0)
+    # 1 - fraction is exact: the upper half is the mirror image of the lower one
     upper = 1.0 - np.array([2.0**-50, 2.0**-40, 2.0**-20, 0.125, 0.25, 0.4375])
     assert np.abs(np.pi - measure.quantile(upper) - measure.quantile(1.0 - upper)).max() < 9e-16
     assert measure.quantile([0.0, 1.0]).tolist() == [0.0, np.pi]
@@ -308,8 +308,8 @@ def test_sums_of_products_are_those_of_single_pairs(basis, chunk: int, monkeypat
     incoming, outgoing, weight = np.pi * rng.random(40), np.pi * rng.random(40), rng.normal(size=40)
     total = np.full((basis.size, basis.size), 0.5)
     expected = total.copy()
-    for theta, turned, share in zip(incoming, outgoing, weight, strict=True):
-        expected += share * np.outer(basis.evaluate(theta), basis.evaluate(turned))
+    for theta, turned, fraction in zip(incoming, outgoing, weight, strict=True):
+        expected += fraction * np.outer(basis.evaluate(theta), basis.evaluate(turned))
     add_products(total, basis, incoming, outgoing, weight)
     assert np.abs(total - expected).max() < 1e-12 * np.abs(expected).max()
 

@@ -185,8 +185,8 @@ def follow(table, x, theta):
                     det = ex * vy - ey * vx
                     if det != 0.0:
                         rx, ry = row[1] - px, row[2] - py
-                        share = (vx * ry - vy * rx) / det
-                        if -1e-15 <= share <= 1.0 + 1e-15:
+                        fraction = (vx * ry - vy * rx) / det
+                        if -1e-15 <= fraction <= 1.0 + 1e-15:
                             t = (ex * ry - ey * rx) / det
             elif row[0] == 1.0:
                 t = arc_time(row, k == own, px, py, vx, vy)

@@ -13,7 +13,7 @@ FEWEST_EXPECTED = 10.0
 
 
 def chi_square_p(wall: geo.Wall, law: ker.Law, rays: int, cells: int, rng: np.random.Generator) -> float:
-    """The share of fair samples that would agree worse with the law than this one of the wall's traced rays.
+    """The fraction of fair samples that would agree worse with the law than this one of the wall's traced rays.
 
     It is 0 if a ray did not escape, or went where the law has less than 1e-9 of the flux.
     """

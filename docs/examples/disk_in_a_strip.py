@@ -1,7 +1,7 @@
 """A disk between two plates: no-slip plates hold it in a bounded part of the strip, really rough ones let it go.
 
 Between no-slip plates at distance 1 (for the disk's centre) the motion along them stays within the full width
-l sqrt(1 + m/J), l = sqrt(1/v2^2 - 1) with v2 the normal share of the kinetic speed. In a no-slip wedge whose angle
+l sqrt(1 + m/J), l = sqrt(1/v2^2 - 1) with v2 the normal fraction of the kinetic speed. In a no-slip wedge whose angle
 fits, every orbit that does not leave is periodic. Plates with a real roughness have a random law, and both effects are
 gone.
 """
@@ -26,7 +26,7 @@ def no_slip(disk: geo.Disk) -> ker.CollisionLaw:
 
 
 def main(disks: int = 20, collisions: int = 1000) -> dict[str, float]:
-    """Greatest and least widths as shares of the bound, by m/J; then the strip and the wedge with rough walls."""
+    """Greatest and least widths as fractions of the bound, by m/J; then the strip and the wedge with rough walls."""
     rng = np.random.default_rng(0)
     found = {}
     for ratio in RATIOS:
@@ -43,7 +43,7 @@ def main(disks: int = 20, collisions: int = 1000) -> dict[str, float]:
 def strip_widths(
     disk: geo.Disk, law: ker.CollisionLaw | None, disks: int, collisions: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """Widths of the places of collision in a strip, as shares of the no-slip bound of the initial velocity."""
+    """Widths of the places of collision in a strip, as fractions of the no-slip bound of the initial velocity."""
     velocity = disk.from_angles(rng.uniform(0.3, 2.8, disks), rng.uniform(0.3, 2.8, disks))
     walls = no_slip(disk) if law is None else law
     record = ker.play(geo.Container.strip(), walls, np.zeros((disks, 2)), velocity, collisions, rng)
@@ -52,7 +52,7 @@ def strip_widths(
 
 
 def wedge_orbits(disks: int, collisions: int, rng: np.random.Generator) -> dict[str, float]:
-    """A wedge in which no-slip velocities have period 10: shares of disks that stay, and how well they come back."""
+    """A wedge in which no-slip velocities have period 10: fractions of disks that stay, and how well they come back."""
     disk, order = geo.Disk(1.0, 1.0), 5
     opening = math.acos(1.0 - 2.0 * math.cos(2.0 * math.pi / order))
     start = np.tile([math.cos(opening / 2), math.sin(opening / 2)], (10 * disks, 1))
@@ -62,7 +62,7 @@ def wedge_orbits(disks: int, collisions: int, rng: np.random.Generator) -> dict[
     for name, law in walls.items():
         record = ker.play(geo.Container.wedge(opening), law, start, velocity, collisions, rng)
         stay = record.collisions == collisions
-        found[f"{name} wedge, share that stays"] = float(stay.mean())
+        found[f"{name} wedge, fraction that stays"] = float(stay.mean())
         if stay.any():
             moved = record.position[1 + 2 * order, stay] - record.position[1, stay]
             found[f"{name} wedge, displacement in ten collisions"] = float(np.median(np.abs(moved)))

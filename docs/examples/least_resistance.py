@@ -69,7 +69,7 @@ def _draw(
         right.axhline(level, color="0.6", linewidth=0.8)
         below = level < 1.0
         right.annotate(name, (1.6, level), xytext=(0, -9 if below else 2), textcoords="offset points", size=8)
-    right.set(xlabel="parameter", ylabel="R", title="resistance, as a share of the smooth body's")
+    right.set(xlabel="parameter", ylabel="R", title="resistance, as a fraction of the smooth body's")
     right.legend(loc="upper center", fontsize=7)
     right.set_ylim(0.93, 1.75)
     figure.savefig(path, dpi=110)

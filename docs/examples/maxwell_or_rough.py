@@ -1,10 +1,10 @@
 """Maxwell's law against a rough wall: laws that can be mixed and composed.
 
-Maxwell let a share a of the particles leave the wall as Lambert's law says, and the others specularly. A rough wall
-without any diffuse share also scatters. Which share a has the same spectral gap? For Maxwell's law the gap is a, in the
-convention where specular reflection is the identity, so that the gap of the wall is the answer. Mixed with Maxwell's
-law, and reflected twice, the wall's gap obeys what theory says of mixtures and powers: it is at least the mean of the
-two gaps, and 1 - (1 - gap)^2 after two reflections where no eigenvalue has a larger modulus.
+Maxwell let a fraction a of the particles leave the wall as Lambert's law says, and the others specularly. A rough wall
+without any diffuse fraction also scatters. Which fraction a has the same spectral gap? For Maxwell's law the gap is a,
+in the convention where specular reflection is the identity, so that the gap of the wall is the answer. Mixed with
+Maxwell's law, and reflected twice, the wall's gap obeys what theory says of mixtures and powers: it is at least the
+mean of the two gaps, and 1 - (1 - gap)^2 after two reflections where no eigenvalue has a larger modulus.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from asperity import spectral as spec
 POLYNOMIALS = 32
 
 
-def main(half_angle: float = 0.3, share: float = 0.25) -> dict[str, float]:
+def main(half_angle: float = 0.3, fraction: float = 0.25) -> dict[str, float]:
     """Gaps of focusing arcs, of Maxwell's law, of their mixture in equal parts, and of two reflections in a row."""
     basis = ker.Legendre(POLYNOMIALS)
 
@@ -24,7 +24,7 @@ def main(half_angle: float = 0.3, share: float = 0.25) -> dict[str, float]:
         return spec.spectrum(ker.discretise(law, basis), k=4).gap
 
     rough = ker.CircularArcLaw(half_angle).in_specular_frame()
-    maxwell = ker.maxwell(share).in_specular_frame()
+    maxwell = ker.maxwell(fraction).in_specular_frame()
     twice = ker.discretise(rough, basis) ** 2
     return {
         "rough wall": gap(rough),

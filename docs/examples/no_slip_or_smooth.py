@@ -25,5 +25,5 @@ def main(depths: tuple[float, ...] = (0.25, 0.5, 1.0, 4.0), theta: float = 1.0) 
 
 
 if __name__ == "__main__":
-    for ratio, share in main().items():
-        print(f"height/width {ratio:5g}: no-slip with probability {share:.12f}")
+    for ratio, fraction in main().items():
+        print(f"height/width {ratio:5g}: no-slip with probability {fraction:.12f}")

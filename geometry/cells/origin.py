@@ -137,22 +137,22 @@ def _joined_beziers(before: Bezier, after: Bezier, tolerance: float) -> Bezier |
     if before.degree != after.degree:
         return None
     first, second = (np.array(part.control_points) for part in (before, after))
-    # the derivative at the joint, times the share of the parameter that each part has
+    # the derivative at the joint, times the fraction of the parameter that each part has
     left, right = math.dist(first[-1], first[-2]), math.dist(second[1], second[0])
     if left == 0.0 or right == 0.0:
         return None
-    share = left / (left + right)
-    inner = [first[0] + (first[1] - first[0]) / share]
+    fraction = left / (left + right)
+    inner = [first[0] + (first[1] - first[0]) / fraction]
     if before.degree == 3:
-        inner.append(second[-1] + (second[-2] - second[-1]) / (1.0 - share))
+        inner.append(second[-1] + (second[-2] - second[-1]) / (1.0 - fraction))
     whole = Bezier([before.start, *(tuple(p) for p in inner), after.end])
-    return whole if _are_parts(whole, before, after, share, tolerance) else None
+    return whole if _are_parts(whole, before, after, fraction, tolerance) else None
 
 
-def _are_parts(whole: Curve, before: Curve, after: Curve, share: float, tolerance: float) -> bool:
-    """Whether points of both parts, and their joint, lie on the whole at their share of its parameter."""
+def _are_parts(whole: Curve, before: Curve, after: Curve, fraction: float, tolerance: float) -> bool:
+    """Whether points of both parts, and their joint, lie on the whole at their fraction of its parameter."""
     given = np.concatenate([before.point(INNER), [before.end], after.point(INNER)])
-    found = whole.point(np.concatenate([share * INNER, [share], share + (1.0 - share) * INNER]))
+    found = whole.point(np.concatenate([fraction * INNER, [fraction], fraction + (1.0 - fraction) * INNER]))
     return bool(np.abs(given - found).max() <= tolerance)
 
 

@@ -91,7 +91,7 @@ class ConfigurationSpace:
         return float(rolling.gap_radius(self.depth, self.spacing))
 
     def is_single(self, alpha: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether alpha is in Z, where only one satellite can touch; the rest has share 2 delta_0/rho."""
+        """Return whether alpha is in Z, where only one satellite can touch; the rest has the fraction 2 delta_0/rho."""
         bar = self.charts.residual(alpha)
         return np.asarray(np.abs(bar) <= 0.5 * self.spacing - self.gap_radius)
 

@@ -15,7 +15,7 @@ from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS, Outcomes
 from ..walls.wall import Wall
 from .configuration_space import ConfigurationSpace
-from .records import Rolling, ground_of, results_for, rounding_of_places, shares
+from .records import Rolling, ground_of, mass_fractions, results_for, rounding_of_places
 from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops
 
 # Newton's method on a convex function halves its error at worst, and squares it soon.
@@ -105,7 +105,7 @@ def collide_cylinder(
     whole_number("max_contacts", max_contacts, 1)
     start = at_the_tops(wall, eps, at, moving)
     n = len(at)
-    results, ground, masses = results_for(n), ground_of(wall.scene), shares(disk)
+    results, ground, masses = results_for(n), ground_of(wall.scene), mass_fractions(disk)
     rolling = Rolling(eps, wall.cell.depth, rounding_of_places(wall.scene, 0.0))
 
     def run(part: slice) -> None:

@@ -124,7 +124,7 @@ def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
     )
 
 
-def shares(disk: Disk) -> tuple[float, float]:
+def mass_fractions(disk: Disk) -> tuple[float, float]:
     """Mass and inertia in the unit m + J: laws know only their ratio."""
     total = disk.mass + disk.inertia
     return disk.mass / total, disk.inertia / total

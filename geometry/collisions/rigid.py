@@ -15,7 +15,7 @@ from ..disk.satellites import Satellites
 from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS, Outcomes, Status
 from ..walls.wall import Wall
-from .records import DiskResults, ground_of, results_for, ring_of, shares
+from .records import DiskResults, ground_of, mass_fractions, results_for, ring_of
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def collide(
     start = at_the_tops(wall, eps, at, moving)
     n = len(at)
     results = results_for(n)
-    ground, masses = ground_of(wall.scene), shares(disk)
+    ground, masses = ground_of(wall.scene), mass_fractions(disk)
 
     def run(part: slice) -> None:
         collide_disks(start[part], moving[part], masses, ring, max_contacts, ground, results.part(part))

@@ -13,7 +13,7 @@ GOLDEN = 0.6180339887498949
 ROW_SHIFT = 12345.6789
 # More of them at either end, each nearer to it by this ratio.
 END_SAMPLES, END_RATIO = 10, 0.3
-# The first and the last sample are this share of the row's tolerance, or of the opening, away from the ends.
+# The first and the last sample are this fraction of the row's tolerance, or of the opening, away from the ends.
 MARGIN = 1e-3
 
 _PLACES = np.arange(FIRST_SAMPLES)

@@ -145,8 +145,8 @@ def draw_collision(
     for j, number in enumerate(numbers):
         colour = RAY_COLOURS[j % len(RAY_COLOURS)]
         for before, after in pairwise(path):
-            share = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, None]
-            way = space.zoomed.satellite((before + share * (after - before)) / eps, number)
+            fraction = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, None]
+            way = space.zoomed.satellite((before + fraction * (after - before)) / eps, number)
             ax.plot(way[:, 0], way[:, 1], color=colour, linewidth=1.1)
     _draw_rims(ax, space, path, numbers)
     ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":")

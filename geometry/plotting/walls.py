@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 # Okabe and Ito's colours, which stay apart for colour-blind readers.
 RAY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SOLID, LEVEL = "0.82", "0.5"
-# Curves are drawn within this share of the picture's size, and corners nearer to each other than it are drawn as one:
-# a tenth of a pixel in a picture a thousand pixels wide.
+# Curves are drawn within this fraction of the picture's size, and corners nearer to each other than it are drawn as
+# one: a tenth of a pixel in a picture a thousand pixels wide.
 OUTLINE_TOLERANCE = 1e-4
 # How much of the two neighbouring cells is drawn beside the cell, and of free space above it, in periods.
 MARGIN, FREE = 0.12, 0.3
-# Both axes have one scale if the depth is within these shares of the period; a shallower or deeper wall would be a
+# Both axes have one scale if the depth is within these fractions of the period; a shallower or deeper wall would be a
 # line, and its vertical axis says how much it is stretched.
 SHALLOWEST, DEEPEST = 0.04, 3.0
 # Height over width of the picture of one cell of a wall that is stretched.
@@ -183,6 +183,6 @@ def _draw_ray(ax: Axes, ray: _Ray, colour: str) -> None:
     else:
         ax.plot(*ray.points[-1], "o", markersize=5.5, mfc="white", mec=colour, mew=1.3, zorder=4)
         arrows.append((ray.points[-1], ray.departure, 0.8))
-    for start, end, share in arrows:
-        tail, tip = start + (share - 0.05) * (end - start), start + share * (end - start)
+    for start, end, fraction in arrows:
+        tail, tip = start + (fraction - 0.05) * (end - start), start + fraction * (end - start)
         ax.annotate("", xy=tuple(tip), xytext=tuple(tail), arrowprops=style, zorder=4, annotation_clip=True)

@@ -54,7 +54,7 @@ class Beams:
     defect : float
         Distance of the flux of all pieces together from 1.
     rounding : float
-        Bound on the share of the flux that double precision may have put into the wrong leaf.
+        Bound on the fraction of the flux that double precision may have put into the wrong leaf.
     complete : bool
         Whether ``unresolved`` met the tolerance; if not, the budget of beams ran out.
     """
@@ -107,7 +107,7 @@ def beams_of(
     hollow_vertices : array_like of shape (n, 2)
         The chain from (left, 0) to (right, 0), with the hollow above it: ``wall.vertices[h.first : h.last + 1]``.
     tolerance : float
-        Stop when the unresolved share of the flux is no more than this.
+        Stop when the unresolved fraction of the flux is no more than this.
     max_beams : int
         Stop when there are so many beams; cavities with narrow necks never resolve completely.
     mirror_symmetric : bool

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.rounding import EPS, UNIT_ROUNDOFF
 
-# Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
+# Rounding of (b - a) x (c - a), as a fraction of the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ULPS = 3.0 + 16.0 * EPS
 
 Vector = tuple[int, int]

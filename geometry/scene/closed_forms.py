@@ -46,10 +46,10 @@ from .facing import WIDEST_WEDGE
 if TYPE_CHECKING:
     from ..curves.curve import Curve, Point
 
-# A ray whose line passes a joint within this share of the hollow's size, or an arc's hit within this angle of an end,
-# is left to the loop. This is far beyond what the loop calls a corner and beyond all rounding, so that the two never
-# disagree about a ray's number of hits or its status; and it is one ray in 10^8.
-DOUBT_SHARE = 2.0**-30
+# A ray whose line passes a joint within this fraction of the hollow's size, or an arc's hit within this angle of an
+# end, is left to the loop. This is far beyond what the loop calls a corner and beyond all rounding, so that the two
+# never disagree about a ray's number of hits or its status; and it is one ray in 10^8.
+DOUBT_FRACTION = 2.0**-30
 # Shallower arcs are left to the loop, which keeps the digits of positions along them.
 FLATTEST_BOWL = 0.05
 # In a narrower fan the loop takes runs of hits in one step.
@@ -91,7 +91,7 @@ def _fan_row(left: float, right: float, apex: Point, size: float) -> Floats:
     row = row_of(
         CHAIN + 2 * links * LINK_COLUMNS,
         {
-            FORM: FAN, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_SHARE * size,
+            FORM: FAN, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION * size,
             FAN_X: x, FAN_Y: y, COPIES: copies,
         },
     )  # fmt: skip
@@ -127,7 +127,7 @@ def _bowl_row(left: float, right: float, arc: Arc) -> Floats:
     return row_of(
         FORM_COLUMNS,
         {
-            FORM: BOWL, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_SHARE,
+            FORM: BOWL, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION,
             BOWL_X: 0.5 * (left + right), BOWL_Y: height, RADIUS: radius, HALF_ANGLE: half,
         },
     )  # fmt: skip

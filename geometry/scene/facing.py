@@ -18,7 +18,7 @@ WIDEST_WEDGE = 0.3
 MANY_LINES = 64
 # Pieces looked at for all pairs of a large hollow together; pairs beyond it go without runs. About a second.
 MOST_WORK = 50_000_000
-# Pieces that reach into the part between two lines by this share of the hollow's size touch it within rounding.
+# Pieces that reach into the part between two lines by this fraction of the hollow's size touch it within rounding.
 TOUCH_ULPS = 16.0
 
 PairRow = dict[int, float]

@@ -47,7 +47,7 @@ class TracePlan:
     --------
     >>> from asperity import geometry as geo
     >>> plan = geo.rectangular_teeth(3.0).plan()
-    >>> plan.pieces_left_out, plan.flat_share, plan.channels, plan.mirror_symmetric
+    >>> plan.pieces_left_out, plan.flat_fraction, plan.channels, plan.mirror_symmetric
     (1, 0.5, 1, True)
     >>> plan = geo.mushrooms(0.3, 0.5, 2).plan()
     >>> plan.hollows, plan.distinct_hollows, plan.arcs_with_runs
@@ -60,7 +60,7 @@ class TracePlan:
     hollows: int
     pieces_traced: int
     pieces_left_out: int
-    flat_share: float
+    flat_fraction: float
     arcs_with_runs: int
     wraps: bool
     channels: int
@@ -83,7 +83,7 @@ def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
         hollows=len(scene.hollows),
         pieces_traced=traced,
         pieces_left_out=pieces - traced,
-        flat_share=wall.flat_top / wall.period if wall.closes else 0.0,
+        flat_fraction=wall.flat_top / wall.period if wall.closes else 0.0,
         arcs_with_runs=runs,
         wraps=scene.is_open,
         channels=parallel,

@@ -29,8 +29,8 @@ CostFunction = Callable[[Floats, Floats], Floats]
 DEGREE, WIDTH = 10, np.pi / 4.0
 # Panels are halved so often at most, until the cost is represented to the tolerance.
 MOST_HALVINGS = 3
-# The matrix may spend this share of the tolerance.
-MATRIX_SHARE = 0.5
+# The matrix may spend this fraction of the tolerance.
+MATRIX_FRACTION = 0.5
 # Angles a panel, at Gauss nodes of another rule, at which the polynomials are compared with the cost.
 PROBES = 17
 
@@ -59,7 +59,7 @@ def resistance(
     r"""E[c(theta, theta')]: the mean resistance of a surface with the given law.
 
     By default R = (3/4) E[1 + cos(theta' - theta)] with theta distributed as sin(theta)/2 d theta: the resistance of a
-    rough convex body that tumbles in a thin medium, as a share of that of the smooth body.
+    rough convex body that tumbles in a thin medium, as a fraction of that of the smooth body.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def resistance(
     else:
         basis, coefficients, missed = _represented(weighted, finite_array("breakpoints", breakpoints), 0.1 * wanted)
     size = float(np.linalg.norm(coefficients))
-    matrix = recipe(law, "auto")(basis, Budget(MATRIX_SHARE * wanted / max(size, 1.0)))
+    matrix = recipe(law, "auto")(basis, Budget(MATRIX_FRACTION * wanted / max(size, 1.0)))
     value = float(np.sum(coefficients * matrix.symmetric))
     error = _error(matrix, coefficients) + missed
     how = f"{matrix.method} on {basis!r} ({matrix.error.method})"

@@ -45,10 +45,10 @@ def hat_masses(nodes: Floats) -> Floats:
     """Integrals of the piecewise linear hat functions against sin(theta)/2 d theta."""
     angle, weight = gauss_on_intervals(nodes[:-1], nodes[1:], NODES)
     mass = (weight * SINE.density(angle)).reshape(-1, NODES)
-    share = (angle.reshape(-1, NODES) - nodes[:-1, None]) / np.diff(nodes)[:, None]
+    fraction = (angle.reshape(-1, NODES) - nodes[:-1, None]) / np.diff(nodes)[:, None]
     hats = np.zeros(nodes.size)
-    hats[:-1] += np.sum(mass * (1.0 - share), axis=1)
-    hats[1:] += np.sum(mass * share, axis=1)
+    hats[:-1] += np.sum(mass * (1.0 - fraction), axis=1)
+    hats[1:] += np.sum(mass * fraction, axis=1)
     return hats
 
 

@@ -18,14 +18,16 @@ def mirrored_angle(angle: Floats) -> Floats:
     return clipped_inside(np.pi - angle)
 
 
-def mixed_arccos(share: Floats, theta: Floats, half: float) -> tuple[Floats, Floats]:
-    """Return delta = arccos(share cos(theta - half) + (1 - share) cos(theta + half)) and pi - delta.
+def mixed_arccos(fraction: Floats, theta: Floats, half: float) -> tuple[Floats, Floats]:
+    """Return delta = arccos(fraction cos(theta - half) + (1 - fraction) cos(theta + half)) and pi - delta.
 
     Both have full relative accuracy, however small: sin(delta/2)^2 and cos(delta/2)^2 are sums of non-negative terms.
     Cosines near pi/2 are taken as sines of the complement, so that theta -> pi - theta changes nothing but names.
     """
     complement = np.pi - theta
-    sine = share * np.sin(0.5 * (theta - half)) ** 2 + (1.0 - share) * np.sin(0.5 * (theta + half)) ** 2
-    cosine = share * np.sin(0.5 * (complement + half)) ** 2 + (1.0 - share) * np.sin(0.5 * (complement - half)) ** 2
+    sine = fraction * np.sin(0.5 * (theta - half)) ** 2 + (1.0 - fraction) * np.sin(0.5 * (theta + half)) ** 2
+    cosine = (
+        fraction * np.sin(0.5 * (complement + half)) ** 2 + (1.0 - fraction) * np.sin(0.5 * (complement - half)) ** 2
+    )
     sine, cosine = np.sqrt(sine), np.sqrt(cosine)
     return 2.0 * np.arctan2(sine, cosine), 2.0 * np.arctan2(cosine, sine)

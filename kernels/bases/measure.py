@@ -58,14 +58,14 @@ class AngularMeasure:
         return self.mass(0.0, angle)
 
     def quantile(self, probability: ArrayLike) -> Floats:
-        """The angle below which a share ``probability`` in [0, 1] of the measure lies."""
-        share = np.asarray(probability, dtype=np.float64)
+        """The angle below which a fraction ``probability`` in [0, 1] of the measure lies."""
+        fraction = np.asarray(probability, dtype=np.float64)
         if self.name == "sin":
             # arcsin of the smaller half keeps full relative accuracy at both ends of (0, pi)
-            lower = 2.0 * np.arcsin(np.sqrt(np.minimum(share, 0.5)))
-            upper = np.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(1.0 - share, 0.5)))
-            return np.where(share <= 0.5, lower, upper)
-        half = np.minimum(share, 1.0 - share)
+            lower = 2.0 * np.arcsin(np.sqrt(np.minimum(fraction, 0.5)))
+            upper = np.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(1.0 - fraction, 0.5)))
+            return np.where(fraction <= 0.5, lower, upper)
+        half = np.minimum(fraction, 1.0 - fraction)
         angle = np.minimum(np.cbrt(1.5 * np.pi * half), 0.5 * np.pi)
         for _ in range(NEWTON_STEPS):
             slope = self.density(angle)
@@ -73,7 +73,7 @@ class AngularMeasure:
             angle = np.clip(angle - step, 0.0, 0.5 * np.pi)
             if np.all(np.abs(step) <= 4e-16 * np.maximum(angle, 1e-300)):
                 break
-        return np.where(share <= 0.5, angle, np.pi - angle)
+        return np.where(fraction <= 0.5, angle, np.pi - angle)
 
     def sample(self, size: int | tuple[int, ...], rng: np.random.Generator) -> Floats:
         """Draw angles from the measure."""

@@ -24,7 +24,7 @@ EXTRA_NODES = 11
 # A function that behaves like theta^s at grazing is then missed by SMALLEST^(s + 1) in L^2(sin theta d theta).
 RATIO, SMALLEST = 0.35, 1e-4
 WIDEST = np.pi / 24
-# Kinks xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this share of xi.
+# Kinks xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this fraction of xi.
 BREAKPOINT_SPACING = 0.05
 
 
@@ -78,7 +78,7 @@ class Panels(Basis):
         degree : int
             Degree on each panel.
         smallest : float
-            Width of the smallest panel as a share of its distance to the next special angle.
+            Width of the smallest panel as a fraction of its distance to the next special angle.
 
         Notes
         -----

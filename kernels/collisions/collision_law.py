@@ -108,7 +108,7 @@ class CollisionLaw:
         generator(rng)
         frame = np.asarray(self.disk.frame)
         along, up, roll = (self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame)
-        # angle and size of minus the incoming velocity in the plane of chi_perp and e2^; the share along chi stays
+        # angle and size of minus the incoming velocity in the plane of chi_perp and e2^; the fraction along chi stays
         theta = np.arctan2(-up, -along)
         outgoing = self.law.sample(theta, rng)
         size = np.hypot(along, up)

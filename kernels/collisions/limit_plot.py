@@ -79,14 +79,14 @@ def draw_limit(
         ax = pyplot.figure(layout="constrained").subplots()
     right = ax.twinx()
     velocity = np.tile(-disk.from_angles(theta, psi), (samples, 1))
-    shares = (np.arange(samples) + 0.5) / samples
+    fractions = (np.arange(samples) + 0.5) / samples
     for colour, scale in zip(COLOURS, eps, strict=False):
         out, rolled = disk.to_angles(SatelliteLaw(wall, disk, float(scale)).sample(velocity, rng))
         ax.plot(out[:DRAWN], rolled[:DRAWN], ".", color=colour, markersize=2.0, alpha=0.6, zorder=2)
-        right.plot(np.sort(out), shares, color=colour, linewidth=1.4, label=f"true disk, eps = {scale:g}", zorder=3)
+        right.plot(np.sort(out), fractions, color=colour, linewidth=1.4, label=f"true disk, eps = {scale:g}", zorder=3)
     target = wall.foreshorten(disk)
-    limit = np.sort(trace(target, target.period * shares, theta).theta)
-    right.plot(limit, shares, color="black", linewidth=1.0, linestyle="--", label="limit law", zorder=4)
+    limit = np.sort(trace(target, target.period * fractions, theta).theta)
+    right.plot(limit, fractions, color="black", linewidth=1.0, linestyle="--", label="limit law", zorder=4)
     ax.axhline(math.pi - psi, color="black", linewidth=0.8, linestyle=":")
     ax.set_xlim(0.0, math.pi)
     ax.set_xlabel("theta' (radians)")

@@ -32,9 +32,9 @@ class LimitStudy:
     ----------
     scales, spacings : array
         eps and rho.
-    gap_share : array
-        2 delta_0/rho, the share of angles alpha at which two satellites can be below the tops (section 4.1): what the
-        paper's good set Z leaves out.
+    gap_fraction : array
+        2 delta_0/rho, the fraction of angles alpha at which two satellites can be below the tops (section 4.1): what
+        the paper's good set Z leaves out.
     distance : array
         Wasserstein distance of the law of (theta', psi') from that of K, with the metric of the sum of both angles'
         differences, averaged over incoming theta. As K's psi' is one number, this is the distance in theta' plus
@@ -64,7 +64,7 @@ class LimitStudy:
 
     scales: Floats
     spacings: Floats
-    gap_share: Floats
+    gap_fraction: Floats
     distance: Floats
     floor: Floats
     psi_defect: Floats
@@ -191,7 +191,7 @@ def limit_study(
     return LimitStudy(
         scales=frozen(eps),
         spacings=frozen([space.spacing for space in spaces]),
-        gap_share=frozen([2.0 * space.gap_radius / space.spacing for space in spaces]),
+        gap_fraction=frozen([2.0 * space.gap_radius / space.spacing for space in spaces]),
         errors={name: frozen(errors[:, j]) for j, name in enumerate(COLUMNS)},
         seconds=frozen(seconds),
         collisions=repetitions * math.prod(samples),

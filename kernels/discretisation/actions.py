@@ -21,8 +21,8 @@ from .method import Budget, MethodName, computed, rounding
 MOST_VALUES = 2**26
 # Numbers held at a time.
 CHUNK = 2**21
-# Kinks that panels begin with; the share of the tolerance that one of them may spend, and what rounding leaves.
-FIRST_BREAKPOINTS, PANEL_SHARE, SETTLED = 32, 0.02, 1e-15
+# Kinks that panels begin with; the fraction of the tolerance that one of them may spend, and what rounding leaves.
+FIRST_BREAKPOINTS, PANEL_FRACTION, SETTLED = 32, 0.02, 1e-15
 # Angles are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
@@ -79,7 +79,7 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
             panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
             panels.image = law.apply(basis.evaluate, panels.angle)
             difference = panels.differences(basis)
-            done = last | (difference <= max(PANEL_SHARE * tolerance, SETTLED))
+            done = last | (difference <= max(PANEL_FRACTION * tolerance, SETTLED))
             settled[start : start + step] = done
             total += panels.kept(done).values(basis).sum(axis=0)
             error += float(difference[done].sum())

@@ -22,7 +22,7 @@ from ..matrices.matrix import KernelMatrix
 from ..walls.circular_arc import CircularArcLaw
 from .method import Budget, MethodName, computed, rounding
 
-# Rays with more hits than this are a share of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
+# Rays with more hits than this are a fraction of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
 # pi - xi, both within 2 xi / MOST_HITS, and are counted there.
 MOST_HITS = 8192
 # Gauss nodes on pieces so short that functions of the basis are as smooth as sin(delta) there, and on other pieces of
@@ -161,7 +161,7 @@ def _add_strips(
 
 
 def _reach(strips: _Strips, edges: Floats) -> Floats:
-    """How far incoming and outgoing angles move along a strip, as a share of the basis' intervals that they are in."""
+    """How far incoming and outgoing angles move along a strip, as a fraction of the basis' intervals around them."""
     length, middle, widths = strips.high - strips.low, 0.5 * (strips.low + strips.high), np.diff(edges)
 
     def interval(angle: Floats) -> Floats:
@@ -203,20 +203,20 @@ def _add_rows(
         step = max(1, CHUNK // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))
         for start in range(0, selected.size, step):
             part = selected[start : start + step]
-            chord, share = gauss_on_intervals(low[part], high[part], order)
+            chord, fraction = gauss_on_intervals(low[part], high[part], order)
             owner = row[part]
             each = np.repeat(owner, order)
             outgoing = np.pi + theta[each] - 2.0 * strips.hits[each] * chord
             outgoing = mirrored_angle(outgoing) if mirrored else clipped_inside(outgoing)
-            share = (share * np.sin(chord) * weight[each])[:, None]
+            fraction = (fraction * np.sin(chord) * weight[each])[:, None]
             if isinstance(basis, Panels):
                 panel, values = basis.local(outgoing)
-                image = (values * share).reshape(part.size, order, -1).sum(axis=1)
+                image = (values * fraction).reshape(part.size, order, -1).sum(axis=1)
                 source, own = basis.local(incoming[owner])
                 # a piece ends at edges, so all its nodes are on the panel of the middle one
                 add_blocks(total, basis, source, panel[order // 2 :: order], own, image)
             else:
-                image = (basis.evaluate(outgoing) * share).reshape(part.size, order, -1).sum(axis=1)
+                image = (basis.evaluate(outgoing) * fraction).reshape(part.size, order, -1).sum(axis=1)
                 total += basis.evaluate(incoming[owner]).T @ image
     return float(mass.sum())
 

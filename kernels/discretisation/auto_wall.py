@@ -23,7 +23,7 @@ from .traced import Traced
 FIRST_RAYS, SOBOL_ORDER, SOBOL_MARGIN = 2**14, 0.75, 2.0
 # So many rays take long enough for a pilot run of traced angles, with as many segments: a ray has two or three.
 MANY_RAYS = 2**17
-# Traced angles that take longer than all rays must predict this share of their error.
+# Traced angles that take longer than all rays must predict this fraction of their error.
 TRACED_ADVANTAGE = 0.5
 
 

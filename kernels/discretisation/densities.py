@@ -26,10 +26,10 @@ from .method import Budget, MethodName, computed, rounding, until_settled
 
 # Evaluations of a density, and points of a map that are affordable: each is about a second or two.
 MOST_DENSITY_VALUES, MOST_MAP_POINTS = 2**25, 2**20
-# Gauss nodes in theta' on an interval, by the largest share that it has of a panel on which the law's 16 nodes reach
-# rounding. The singularities are then 3/8 of the panel away from its ends, and q nodes on a share r miss rho^(-2 q)
+# Gauss nodes in theta' on an interval, by the largest fraction that it has of a panel on which the law's 16 nodes reach
+# rounding. The singularities are then 3/8 of the panel away from its ends, and q nodes on a fraction r miss rho^(-2 q)
 # with rho + 1/rho = 2 + 3/(2 r): 1e-12 or less in each case.
-SHARES, SHARE_NODES = np.array([1 / 32, 1 / 4]), (4, 8, 16)
+FRACTIONS, FRACTION_NODES = np.array([1 / 32, 1 / 4]), (4, 8, 16)
 # Gauss nodes in theta on each interval of the coarsest level by rows: the most that are affordable. Rows that still
 # cost more than some seconds are left to product rules.
 ROW_NODES = (6, 4, 2)
@@ -129,9 +129,9 @@ def _with_mirror_image(half: Floats) -> Floats:
 
 
 def _row_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
-    """About how often the density is evaluated: most intervals between cell edges are small shares of a panel."""
+    """About how often the density is evaluated: most intervals between cell edges are small fractions of a panel."""
     panels: int = law.panels(outer[:1]).shape[-1]
-    values: int = (outer.size - 1) * order * (SHARE_NODES[0] * edges.size + SHARE_NODES[-1] * panels)
+    values: int = (outer.size - 1) * order * (FRACTION_NODES[0] * edges.size + FRACTION_NODES[-1] * panels)
     return values
 
 
@@ -147,12 +147,12 @@ def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order
     angle, mass = SINE.quadrature(outer, order)
     source = basis.index(angle)
     flux = np.zeros(basis.size**2)
-    step = max(1, ROW_CHUNK // (SHARE_NODES[0] * edges.size))
+    step = max(1, ROW_CHUNK // (FRACTION_NODES[0] * edges.size))
     for start in range(0, angle.size, step):
         part = slice(start, start + step)
         row, low, high, nodes = row_intervals(law, edges, angle[part])
         target = basis.index(0.5 * (low + high))
-        for count in SHARE_NODES:
+        for count in FRACTION_NODES:
             chosen = nodes == count
             outgoing, inner = gauss_on_intervals(low[chosen], high[chosen], count)
             shape = (-1, count)
@@ -166,8 +166,8 @@ def row_intervals(
     law: HasDensity, edges: Floats, theta: Floats
 ) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
     """Row, ends and number of Gauss nodes of the intervals into which cells and panels together cut (0, pi)."""
-    row, low, high, share = cut_by_edges(law.panels(theta), edges)
-    nodes = np.asarray(SHARE_NODES)[np.searchsorted(SHARES, share)]
+    row, low, high, fraction = cut_by_edges(law.panels(theta), edges)
+    nodes = np.asarray(FRACTION_NODES)[np.searchsorted(FRACTIONS, fraction)]
     return row, low, high, nodes
 
 
@@ -213,8 +213,8 @@ def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: f
 def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floats) -> Iterator[Floats]:
     pieces = 4
     while pieces == 4 or pieces * edges.size * basis.nodes_per_interval <= MOST_MAP_POINTS:
-        share = np.arange(pieces) / pieces
-        fine = np.concatenate(((edges[:-1, None] + share * np.diff(edges)[:, None]).ravel(), [np.pi]))
+        fraction = np.arange(pieces) / pieces
+        fine = np.concatenate(((edges[:-1, None] + fraction * np.diff(edges)[:, None]).ravel(), [np.pi]))
         if not isinstance(basis, Legendre):
             fine = np.unique(np.concatenate((fine, _crossings(map_angle, basis, fine))))
         if basis.is_partition:

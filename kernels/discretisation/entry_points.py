@@ -44,8 +44,8 @@ def entry_matrix(law: DrivenLaw, basis: Basis, samples: int) -> tuple[Floats, fl
 
 
 def _product_rule(law: DrivenLaw, basis: Basis, samples: int, split: int) -> Floats:
-    share = np.arange(split) / split
-    edges = np.append((basis.edges[:-1, None] + share * np.diff(basis.edges)[:, None]).ravel(), np.pi)
+    fraction = np.arange(split) / split
+    edges = np.append((basis.edges[:-1, None] + fraction * np.diff(basis.edges)[:, None]).ravel(), np.pi)
     angle, mass = SINE.quadrature(edges, 1 if basis.is_partition else basis.nodes_per_interval)
     if basis.is_partition:
         # one node an interval does not integrate the weight itself exactly; the measure of the interval does

@@ -23,7 +23,7 @@ from .method import Budget, MethodName
 # misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
 # scale of the distance to grazing; NARROW is measured in both, and 6 nodes leave (0.05)^12 / 12! there.
 NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
-# Kinks that accumulate at grazing are followed until the omitted share is negligible or listing and using them would
+# Kinks that accumulate at grazing are followed until the omitted fraction is negligible or listing and using them would
 # take more than about a second.
 FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
 # Nodes times branches held at a time.
@@ -78,7 +78,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     """<e_i, P e_j> for a law of isometries, and a bound of its Frobenius error apart from rounding.
 
     The interval (0, pi) is cut at the kinks of the law, the edges of the basis and the angles that a branch maps to
-    edges. On each piece every integrand is smooth. Where the law leaves kinks near grazing out, a share m of the
+    edges. On each piece every integrand is smooth. Where the law leaves kinks near grazing out, a fraction m of the
     measure, both the integral and its approximation are averages of e(theta) e(theta')^T over a measure of mass m, so
     they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
     """
@@ -122,5 +122,5 @@ def _add_nodes(law: Branching, basis: Basis, angle: Floats, weight: Floats, tota
     probability, outgoing = law.branches(angle)
     for slot in range(outgoing.shape[-1]):
         used = probability[:, slot] > 0.0
-        share = (mass * probability[:, slot])[used]
-        add_products(total, basis, angle[used], outgoing[used, slot], share)
+        fraction = (mass * probability[:, slot])[used]
+        add_products(total, basis, angle[used], outgoing[used, slot], fraction)

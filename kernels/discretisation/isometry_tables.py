@@ -69,16 +69,16 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
     moved = 2.0 * table.unresolved
     begin = first_crossing(basis)
     for crevice in table.crevices:
-        listed = crevice_pieces(crevice.height_to_width, begin).scaled(crevice.share)
+        listed = crevice_pieces(crevice.height_to_width, begin).scaled(crevice.fraction)
         _add_table(listed.in_specular_frame() if crevice.exchanged else listed, basis, total)
         theta, specular, retro, omitted = crevice_nodes(crevice.height_to_width, basis)
-        moved += 4.0 * crevice.share * omitted
+        moved += 4.0 * crevice.fraction * omitted
         if crevice.exchanged:
             specular, retro = retro, specular
         mirror = clipped_inside(np.pi - theta)
         incoming = np.concatenate([theta, theta, mirror, mirror])
         outgoing = np.concatenate([mirror, theta, theta, mirror])
-        weight = crevice.share * np.concatenate([specular, retro, specular, retro])
+        weight = crevice.fraction * np.concatenate([specular, retro, specular, retro])
         add_products(total, basis, incoming, outgoing, weight)
     return total, moved * largest_square_sum(basis) if moved else 0.0
 

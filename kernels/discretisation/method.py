@@ -26,10 +26,10 @@ MOST_SEGMENTS, QUICK_SEGMENTS = 40_000_000, 4_000_000
 # again where they were too coarse. On fourteen walls this told apart those whose matrix was of use.
 ORDER, DONE_AGAIN = 1.75, 2.0
 SEED_WITHOUT_RNG = 0
-# Rounding of a matrix: the edges of n cells carry a rounding error each, which moves a share of about n eps of a
+# Rounding of a matrix: the edges of n cells carry a rounding error each, which moves a fraction of about n eps of a
 # cell's measure; 1.2e-13 was measured where n eps is 1.1e-13.
 ROUNDING = 8.0 * EPS
-# Edges and offsets of isometries are rounded to about an ulp. That moves a share of about n eps of each of some n
+# Edges and offsets of isometries are rounded to about an ulp. That moves a fraction of about n eps of each of some n
 # cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
 DISPLACED = EPS
 

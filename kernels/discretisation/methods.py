@@ -111,7 +111,7 @@ class _Sum:
 
     @property
     def terms(self) -> Sequence[tuple[float, _Law]]:
-        return [(weight * share, one) for weight, part in self.parts for share, one in part.terms]
+        return [(weight * fraction, one) for weight, part in self.parts for fraction, one in part.terms]
 
     def has(self, wanted: MethodName, basis: Basis) -> bool:
         return wanted != "monte-carlo" and all(part.has(wanted, basis) for _, part in self.parts)
@@ -198,5 +198,5 @@ def _resolved(law: Law) -> Law:
 
 def _scaled_defect(weight: float, matrix: KernelMatrix, total: KernelMatrix) -> SymmetryDefect:
     raw = matrix.symmetry_defect()
-    share = weight * float(np.linalg.norm(matrix.symmetric)) / (float(np.linalg.norm(total.symmetric)) or 1.0)
-    return SymmetryDefect(share * float(raw), z_score=raw.z_score)
+    fraction = weight * float(np.linalg.norm(matrix.symmetric)) / (float(np.linalg.norm(total.symmetric)) or 1.0)
+    return SymmetryDefect(fraction * float(raw), z_score=raw.z_score)

@@ -38,10 +38,10 @@ MATRICES, MOST_GIGABYTES = 5, 4.0
 # Coefficients of a function that jumps on a panel fall off like 1/k, so that what a panel of degree 9 leaves out is
 # about twice what its last two functions hold; half as much again for singularities that are worse.
 TAIL = 3.0
-# Images under isometries are compared with their projections at these shares of a panel, as kinks may be too dense for
-# the last coefficients to show them; the norm from so few angles is taken this many times.
+# Images under isometries are compared with their projections at these fractions of a panel, as kinks may be too dense
+# for the last coefficients to show them; the norm from so few angles is taken this many times.
 PROBES, PROBED = np.array([0.0711, 0.2939, 0.5387, 0.8123]), 2.0
-# Panels that together make up this share of the error are cut in so many: every time all factors are made again.
+# Panels that together make up this fraction of the error are cut in so many: every time all factors are made again.
 MARKED, PARTS = 0.9, 4
 # Whether a factor needs rays is asked for any panels.
 ANY_PANELS = Panels(np.array([0.0, np.pi]), DEGREE)
@@ -118,7 +118,7 @@ class Chain:
 @dataclass(frozen=True)
 class _Level:
     symmetric: Floats
-    # share of the error of each panel, which is what the products between factors lose there
+    # fraction of the error of each panel, which is what the products between factors lose there
     lost: Floats
     # errors of the factors' matrices
     factors: float

@@ -28,42 +28,43 @@ if TYPE_CHECKING:
 # At the limit on its ray segments a matrix is returned with the error reached so far. One angle may use at most this
 # fraction of the limit, but at least so many: in some steep Bezier hollows angles with a fiftieth are not complete, and
 # in bottles with a neck of a hundredth of their width they have no end. If another method can take over, it is less.
-ANGLE_SHARE, SHARE_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
+ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
 ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
 # part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
 ASYMMETRY_FACTOR = 2.0
-# The error of Kronrod's rule as a share of its difference from Gauss's, in the root of the mean square over the places
-# in a panel where it may be: .38 at the root with which a piece is born, .26 at a kink. Its mean over the places is 0.
-KRONROD_SHARE = 0.5
+# The error of Kronrod's rule as a fraction of its difference from Gauss's, in the root of the mean square over the
+# places in a panel where it may be: .38 at the root with which a piece is born, .26 at a kink. Its mean over the places
+# is 0.
+KRONROD_FRACTION = 0.5
 # Rows at a time, so that their nodes fit into memory.
 ROWS_AT_ONCE = 1500
-# The rows together may spend this share of the tolerance.
-ROW_SHARE = 0.1
+# The rows together may spend this fraction of the tolerance.
+ROW_FRACTION = 0.1
 SMALLEST_ROW_TOLERANCE = 1e-14
 # Tolerances are approached in stages by this ratio, from one that is no coarser than this: where no more than a coarse
 # result can be had, its rows are coarse as well.
 STAGE_RATIO, COARSEST_STAGE = 1e-2, 0.1
-# The rows of a narrow panel may be coarser: the panel may spend this share of what all rows together may.
-FAIR_SHARE = 0.02
+# The rows of a narrow panel may be coarser: the panel may spend this fraction of what all rows together may.
+FAIR_FRACTION = 0.02
 COARSEST_ROW = 1e-4
-# Where a half has this share of its panel's difference of the two rules, or more, the integrand is not smooth: a kink
-# leaves 1/8 or more of it, a smooth integrand 2^-14.
+# Where a half has this fraction of its panel's difference of the two rules, or more, the integrand is not smooth: a
+# kink leaves 1/8 or more of it, a smooth integrand 2^-14.
 SMOOTH_SHRINKING = 1e-3
 # A smooth half's difference of the two rules is an error of Gauss, not of Kronrod: it is scaled by the ratio that was
 # measured on the whole panel, at least this, times a margin.
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# A stage that would leave more than this share of the error is not begun, nor one that would need a jump by more than
-# this to be of use.
+# A stage that would leave more than this fraction of the error is not begun, nor one that would need a jump by more
+# than this to be of use.
 WORTHWHILE, LARGEST_JUMP = 0.5, 4.0
-# Cuts are no closer to each other and to the ends of a panel than this share of it: it is cut there already.
+# Cuts are no closer to each other and to the ends of a panel than this fraction of it: it is cut there already.
 LEAST_CUT = 1e-7
 # Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error. Of their
-# error, which is that of all products but with the constants, fewer functions have the share of an even spread, times
-# a margin: measured on 37 walls, one product has a tenth in the root of the mean square.
+# error, which is that of all products but with the constants, fewer functions have the fraction of an even spread,
+# times a margin: measured on 37 walls, one product has a tenth in the root of the mean square.
 FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
 # Rounds in which rows are done again that have overlooked a piece.
 MOST_MENDINGS = 8
@@ -121,13 +122,13 @@ def row_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float,
     ASYMMETRY_FACTOR times the asymmetry of the result, which other errors than these would show, are the sides of
     right angles. The errors of the rows, which may all have one sign, are added.
     """
-    inner, share = basis, 1.0
+    inner, fraction = basis, 1.0
     if isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS:
         inner = Legendre(FEWEST_FUNCTIONS)
-        share = min(SPREAD_MARGIN * max(basis.size - 1, 1) / (FEWEST_FUNCTIONS - 1), 1.0)
-    scaled = replace(budget, tolerance=budget.tolerance / share, fallback=budget.fallback / share)
+        fraction = min(SPREAD_MARGIN * max(basis.size - 1, 1) / (FEWEST_FUNCTIONS - 1), 1.0)
+    scaled = replace(budget, tolerance=budget.tolerance / fraction, fallback=budget.fallback / fraction)
     matrix, error, rays = _Integrator(wall, inner, scaled).run()
-    return np.ascontiguousarray(matrix[: basis.size, : basis.size]), share * error, rays
+    return np.ascontiguousarray(matrix[: basis.size, : basis.size]), fraction * error, rays
 
 
 def panel_edges(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float]:
@@ -158,15 +159,15 @@ class _Integrator:
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
-        share = SHARE_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_SHARE
-        longest = max(int(share * budget.segments), LEAST_SEGMENTS)
+        fraction = FRACTION_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_FRACTION
+        longest = max(int(fraction * budget.segments), LEAST_SEGMENTS)
         self.rows = WallConditionals(wall, degree, inside, least, longest)
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
         stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
         self.first_tolerance = self.tolerance / STAGE_RATIO**stages
-        self.row_tolerance = ROW_SHARE * self.first_tolerance / self.scale
+        self.row_tolerance = ROW_FRACTION * self.first_tolerance / self.scale
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
         self._add_panels(edges[:-1], edges[1:])
 
@@ -206,9 +207,9 @@ class _Integrator:
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage; rows whose error is too large for its tolerance are done again."""
-        self.row_tolerance = max(ROW_SHARE * tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
-        coarse = self.panels.row_errors(self.basis) > 2.0 * ROW_SHARE * tolerance * np.maximum(
-            self.panels.mass, FAIR_SHARE
+        self.row_tolerance = max(ROW_FRACTION * tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
+        coarse = self.panels.row_errors(self.basis) > 2.0 * ROW_FRACTION * tolerance * np.maximum(
+            self.panels.mass, FAIR_FRACTION
         )
         self._fill(self.panels, np.broadcast_to(coarse[:, None], self.panels.angle.shape))
         self._mend()
@@ -284,7 +285,7 @@ class _Integrator:
         actual = np.linalg.norm(total - whole, axis=(1, 2))
         ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
         smooth = after < SMOOTH_SHRINKING * before[owner]
-        self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, KRONROD_SHARE * after)
+        self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, KRONROD_FRACTION * after)
 
     def _cuts(self, low: float, high: float) -> Floats:
         """Where a panel is divided: at critical angles, in its middle if none is known inside it."""
@@ -311,8 +312,8 @@ class _Integrator:
 
     def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
         """Compute the rows at these nodes, and from the panels' differences of the rules their errors."""
-        share = FAIR_SHARE / np.maximum(panels.mass, np.finfo(np.float64).tiny)
-        tolerance = np.minimum(self.row_tolerance * np.maximum(1.0, share), COARSEST_ROW)
+        fraction = FAIR_FRACTION / np.maximum(panels.mass, np.finfo(np.float64).tiny)
+        tolerance = np.minimum(self.row_tolerance * np.maximum(1.0, fraction), COARSEST_ROW)
         panel, node = np.nonzero(mask)
         for first in range(0, len(panel), ROWS_AT_ONCE):
             few = slice(first, first + ROWS_AT_ONCE)
@@ -322,4 +323,4 @@ class _Integrator:
             panels.image[panel[few], node[few]] = means_of_basis(self.basis, rows.nodes, rows.weights, rows.starts)
             panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)
         touched = np.unique(panel)
-        panels.error[touched] = KRONROD_SHARE * panels.kept(touched).differences(self.basis)
+        panels.error[touched] = KRONROD_FRACTION * panels.kept(touched).differences(self.basis)

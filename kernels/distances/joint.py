@@ -31,7 +31,7 @@ SOLVER_ROUNDING = 64.0 * EPS
 SMALL_DOUBT = 1e-6
 # Directions of the lower bound by projection.
 DIRECTIONS = 32
-# Masses below this share of the whole are rounding.
+# Masses below this fraction of the whole are rounding.
 NO_MASS = 1e-15
 
 

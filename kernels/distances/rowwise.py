@@ -30,7 +30,7 @@ FEWEST_LEVELS = 3
 MEMORY = 0.25
 # A supremum at grazing, behind infinitely many kinks, is approached with order 1 exactly.
 SUPREMUM_FACTOR = 2.0
-# The supremum is approached from inside the panels, to this share of their width.
+# The supremum is approached from inside the panels, to this fraction of their width.
 INSET = 1e-9
 # Rounding of some hundred sums of angles and probabilities.
 ROUNDING = 1e-13

@@ -11,7 +11,7 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.intervals import cell_among
 
-# Ends of a piece that agree to this share, over the order to the power 4/5, are integrated by two terms about the
+# Ends of a piece that agree to this fraction, over the order to the power 4/5, are integrated by two terms about the
 # middle: the divided difference below would lose more digits than the third term, 1/1920 of the fourth power, has.
 EQUAL_ENDS = (1920.0 * EPS) ** 0.2
 # A step of a cumulative distribution smaller than this is none.
@@ -51,9 +51,9 @@ class Distributions:
             return cls(corners, cumulative / cumulative[:, -1:])
         rows, count = cumulative.shape
         cell = cell_among(edges, position)
-        share = (position - edges[cell]) / (edges[cell + 1] - edges[cell])
+        fraction = (position - edges[cell]) / (edges[cell + 1] - edges[cell])
         low = np.take_along_axis(cumulative, cell, axis=1)
-        at_atom = low + share * (np.take_along_axis(cumulative, cell + 1, axis=1) - low)
+        at_atom = low + fraction * (np.take_along_axis(cumulative, cell + 1, axis=1) - low)
         # every atom is two corners with the same place: before the jump and after it
         corner = np.concatenate((np.broadcast_to(edges, (rows, count)), position, position), axis=1)
         base = np.concatenate((cumulative, at_atom, at_atom), axis=1)
@@ -63,16 +63,18 @@ class Distributions:
         level = np.maximum.accumulate(level, axis=1)
         return cls(np.take_along_axis(corner, order, axis=1), level / level[:, -1:])
 
-    def quantile(self, share: Floats) -> Floats:
-        """The inverse function at ``share``, shape (rows, any)."""
+    def quantile(self, fraction: Floats) -> Floats:
+        """The inverse function at ``fraction``, shape (rows, any)."""
         rows, corners = self.level.shape
         # one search in all rows at once: row i occupies the values from 2 i to 2 i + 1
         shift = 2.0 * np.arange(rows)[:, None]
-        place = np.searchsorted((self.level + shift).ravel(), (share + shift).ravel(), side="left").reshape(share.shape)
+        place = np.searchsorted((self.level + shift).ravel(), (fraction + shift).ravel(), side="left").reshape(
+            fraction.shape
+        )
         right = np.clip(place - corners * np.arange(rows)[:, None], 1, corners - 1)
         low, high = (np.take_along_axis(self.level, right - back, axis=1) for back in (1, 0))
         left_end, right_end = (np.take_along_axis(self.position, right - back, axis=1) for back in (1, 0))
-        part = np.clip((share - low) / np.maximum(high - low, SMALLEST_STEP), 0.0, 1.0)
+        part = np.clip((fraction - low) / np.maximum(high - low, SMALLEST_STEP), 0.0, 1.0)
         return np.asarray(left_end + part * (right_end - left_end))
 
 
@@ -97,7 +99,7 @@ def wasserstein(first: Distributions, second: Distributions, order: float = 1.0)
     late = first.quantile(three) - second.quantile(three)
     # steps of no width have no meaning at all
     start, end = (np.where(width > 0.0, side, 0.0) for side in (1.5 * early - 0.5 * late, 1.5 * late - 0.5 * early))
-    # powers of the share of the largest: those of angles leave the range of numbers at high orders
+    # powers of the fraction of the largest: those of angles leave the range of numbers at high orders
     largest = np.maximum(np.abs(start), np.abs(end)).max(axis=1, initial=0.0)
     unit = np.where(largest > 0.0, largest, 1.0)[:, None]
     power = np.sum(width * _mean_power(start / unit, end / unit, order), axis=1)

@@ -14,9 +14,9 @@ from ..bases.legendre import legendre_moments
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.panels import Panels
 
-# theta' moves by less than half a panel on pieces of this share of it or less: with half the nodes what Gauss's rule
-# misses of a polynomial falls by the share to the power of its degree.
-SHORT_SHARE = 0.1
+# theta' moves by less than half a panel on pieces of this fraction of it or less: with half the nodes what Gauss's rule
+# misses of a polynomial falls by the fraction to the power of its degree.
+SHORT_FRACTION = 0.1
 # sin(delta) on a piece, whose length is at most half of the widest panel, asks for this many nodes more than p/2 + 1.
 SINE_NODES = 2
 # Pieces held at a time.
@@ -120,7 +120,7 @@ def _add_moments(
 ) -> None:
     """Add the integrals of L_k(scale delta + shift) over (near, far), k = 0 ... degree, to the columns ``cell``."""
     full = degree // 2 + 1 + SINE_NODES
-    short = np.abs(scale) * (far - near) <= 2.0 * SHORT_SHARE
+    short = np.abs(scale) * (far - near) <= 2.0 * SHORT_FRACTION
     for chosen, nodes in ((short, full // 2 + 1), (~short, full)):
         if not chosen.any():
             continue
@@ -160,8 +160,8 @@ class ArcMeans:
     def __call__(self, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
         """The means, shape (rows, k), and how much the rays with more hits can be off in the worst of the functions."""
         lines = outgoing_lines(self.half_angle, self.pieces(theta, most_hits), theta)
-        single, share = lines.single, lines.mass
-        whole = lines.of_rows(share, theta.size)
+        single, fraction = lines.single, lines.mass
+        whole = lines.of_rows(fraction, theta.size)
         found = np.empty((len(single), self._polynomials.shape[2]))
         long = np.flatnonzero(~single)
         for start in range(0, long.size, PIECES_AT_ONCE):
@@ -169,10 +169,10 @@ class ArcMeans:
             found[part] = self._integrals(lines.offset[part], lines.slope[part], lines.lower[part], lines.upper[part])
         known = np.flatnonzero(single)
         angle = lines.angle[known]
-        here = self._moments(angle[:, None], cell_among(self.edges, angle), share[known, None])
+        here = self._moments(angle[:, None], cell_among(self.edges, angle), fraction[known, None])
         found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[cell_among(self.edges, angle)])
         total = np.stack([lines.of_rows(column, theta.size) for column in found.T], axis=1)
-        left = lines.of_rows(np.where(lines.rest, share, 0.0), theta.size)
+        left = lines.of_rows(np.where(lines.rest, fraction, 0.0), theta.size)
         return total / whole[:, None], left / whole * self._spread(most_hits)
 
     def _spread(self, most_hits: int) -> float:

@@ -26,7 +26,7 @@ MOST_BEAMS, RESOLVED = 3000, 1e-11
 CURVED_TOLERANCE = 1e-9
 # Depths of drawn vertices are DEEPEST times the 3/2-th power of a uniform number: shallow ones are more often of use.
 DEEPEST, SHALLOWEST, DEPTH_POWER = 2.0, 0.02, 1.5
-# Share of drawn polygons whose vertices stand in the order of x, without overhangs.
+# Fraction of drawn polygons whose vertices stand in the order of x, without overhangs.
 ORDERED = 0.7
 
 

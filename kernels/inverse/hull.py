@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.checks import Floats
 
-# Weights below this share of the largest are rounding of the solver.
+# Weights below this fraction of the largest are rounding of the solver.
 NO_WEIGHT = 1e-15
 # Points tried in the place of one, those first along which the distance falls most, and the least gain of an exchange.
 EXCHANGES, LEAST_GAIN = 8, 1e-3

@@ -15,7 +15,7 @@ from ..bases.measure import SINE
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Flat tops beside the hollow, as a share of its width.
+# Flat tops beside the hollow, as a fraction of its width.
 MARGIN = 0.05
 SAMPLES = 2**16
 
@@ -46,7 +46,7 @@ class TwoMirrorHollow:
     windows: tuple[tuple[float, float], tuple[float, float]]
 
     def loss(self, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> Estimate:
-        """The share of the flux through the opening in the two windows that does not leave in the other window.
+        """The fraction of the flux through the opening in the two windows that does not leave in the other window.
 
         By tracing ``samples`` rays in each window; the error is the half width of an interval of at least 95 %, from
         those of Clopper and Pearson for both windows.
@@ -62,20 +62,20 @@ class TwoMirrorHollow:
             x = self.opening[0] + (self.opening[1] - self.opening[0]) * source.random(number)
             traced = trace(self.wall, x, theta)
             missed = ~(traced.escaped & (traced.theta > other[0]) & (traced.theta < other[1]))
-            share, mass = float(np.mean(missed)), float(high - low)
-            lost, flux = lost + mass * share, flux + mass
-            square += (mass * _share_half_width(int(np.count_nonzero(missed)), number)) ** 2
+            fraction, mass = float(np.mean(missed)), float(high - low)
+            lost, flux = lost + mass * fraction, flux + mass
+            square += (mass * _fraction_half_width(int(np.count_nonzero(missed)), number)) ** 2
         return Estimate(lost / flux, float(np.sqrt(square)) / flux, "estimate", f"{2 * number} traced rays")
 
 
-def _share_half_width(count: int, number: int) -> float:
-    """The longer half of Clopper and Pearson's interval of 95 % of a share, ``count`` of ``number``."""
+def _fraction_half_width(count: int, number: int) -> float:
+    """The longer half of Clopper and Pearson's interval of 95 % of a fraction, ``count`` of ``number``."""
     from scipy.special import betaincinv
 
-    tail, share = 0.5 * (1.0 - LEVEL), count / number
+    tail, fraction = 0.5 * (1.0 - LEVEL), count / number
     low = float(betaincinv(count, number - count + 1, tail)) if count else 0.0
     high = float(betaincinv(count + 1, number - count, 1.0 - tail)) if count < number else 1.0
-    return max(high - share, share - low)
+    return max(high - fraction, fraction - low)
 
 
 def two_mirrors(a: float, b: float, half_width: float = 0.02, opening: float = 1e-4) -> TwoMirrorHollow:

@@ -35,16 +35,16 @@ if TYPE_CHECKING:
 DRAWN, MOST_VERTICES, ROUNDS = 60, 6, 14
 # ... and then moves the vertices of the best ones, this many at a time, each by so many trials.
 DESCENTS, MOVED, TRIALS = 16, 3, 80
-# Openings narrower than this share of the period are left out where the moments can be met without them.
+# Openings narrower than this fraction of the period are left out where the moments can be met without them.
 SMALLEST_OPENING = 1e-5
 # Moments of a law that is mirror-symmetric have no more than this between even and odd functions.
 SYMMETRIC = 1e-12
-# The moments of the wanted law are computed to this share of the tolerance.
-TARGET_SHARE = 0.01
+# The moments of the wanted law are computed to this fraction of the tolerance.
+TARGET_FRACTION = 0.01
 OUTSIDE = 1e3
 # Curved hollows take seconds each, and a wall that has one is traced: worth it for laws far from those of polygons.
 CURVED_FROM = 0.1
-# A step of the search that makes the defect smaller by less than this share is the last.
+# A step of the search that makes the defect smaller by less than this fraction is the last.
 LEAST_PROGRESS = 1e-3
 # Joint distances are of interest to two digits.
 DISTANCE_TOLERANCE = 1e-2
@@ -152,7 +152,7 @@ def wall_for(
     most_hollows : int, optional
         The wall has at most this many hollows, and a larger defect.
     smallest_opening : float
-        Hollows with a narrower opening, as a share of the period, are left out, if the defect allows it.
+        Hollows with a narrower opening, as a fraction of the period, are left out, if the defect allows it.
 
     Returns
     -------
@@ -287,7 +287,7 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
         law = law.in_specular_frame()
     if law.reversible is False:
         raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
-    matrix = discretise(law, Legendre(moments), tolerance=TARGET_SHARE * tolerance)
+    matrix = discretise(law, Legendre(moments), tolerance=TARGET_FRACTION * tolerance)
     defect = float(np.linalg.norm(matrix.symmetric - matrix.symmetric.T))
     if defect > 4.0 * float(matrix.error) + ROUNDED * moments:
         raise InputError(

@@ -25,7 +25,7 @@ DensityFunction = Callable[[Floats, Floats], Floats]
 ROW_TOLERANCE = 1e-7
 # Rounding may make a density that is 0 slightly negative, in proportion to its largest value.
 NEGATIVE_TOLERANCE = 1e-12
-# Two sides of detailed balance, or of the mirror symmetry, agree to this share of the largest flux: far above the
+# Two sides of detailed balance, or of the mirror symmetry, agree to this fraction of the largest flux: far above the
 # rounding of a formula, far below any asymmetry that is meant.
 SYMMETRY_TOLERANCE = 1e-9
 # Panels in theta' tried in turn when rows are integrated, with this number of Gauss nodes on each.
@@ -34,8 +34,8 @@ GAUSS_NODES = 16
 CHECK_NODES = 8
 # Gauss nodes on a cell of a grid, and on a panel of the law's own where those are narrower.
 CELL_NODES = 6
-# Means of functions are settled where two rules differ by no more than this share of the function's largest value; each
-# panel is cut into so many parts at most. A function that jumps is not settled by these.
+# Means of functions are settled where two rules differ by no more than this fraction of the function's largest value;
+# each panel is cut into so many parts at most. A function that jumps is not settled by these.
 SETTLED, MOST_PARTS = 1e-13, 8
 # Rows sampled from a tabulated cdf use this many cells on each panel.
 CELLS_PER_PANEL = 16
@@ -235,8 +235,8 @@ class DensityLaw(Law):
 
     def _cells(self) -> Floats:
         edges = self._grid(self._panel_count)
-        share = np.arange(CELLS_PER_PANEL) / CELLS_PER_PANEL
-        inner = (edges[:-1, None] + share * np.diff(edges)[:, None]).ravel()
+        fraction = np.arange(CELLS_PER_PANEL) / CELLS_PER_PANEL
+        inner = (edges[:-1, None] + fraction * np.diff(edges)[:, None]).ravel()
         # A jump of the density is approached from both sides.
         gap, jumps = 4.0 * EPS, self.outgoing_breakpoints
         return np.unique(np.concatenate([inner, [np.pi], jumps - gap, jumps + gap]))
@@ -293,15 +293,15 @@ def split_rows(edges: Floats, parts: int) -> Floats:
     >>> split_rows(np.array([0.0, 1.0, 3.0]), 2).tolist()
     [0.0, 0.5, 1.0, 2.0, 3.0]
     """
-    share = np.arange(parts) / parts
-    fine = (edges[..., :-1, None] + share * np.diff(edges, axis=-1)[..., None]).reshape(*edges.shape[:-1], -1)
+    fraction = np.arange(parts) / parts
+    fine = (edges[..., :-1, None] + fraction * np.diff(edges, axis=-1)[..., None]).reshape(*edges.shape[:-1], -1)
     return np.concatenate([fine, edges[..., -1:]], axis=-1)
 
 
 def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
     """The intervals into which edges and the panels of each row together cut (0, pi).
 
-    Returns the number of the row, both ends, and the width as a share of that of the panel.
+    Returns the number of the row, both ends, and the width as a fraction of that of the panel.
     """
     rows, count = len(panels), edges.size
     merged = np.concatenate((panels, np.broadcast_to(edges, (rows, count))), axis=1)
@@ -313,8 +313,8 @@ def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floa
     panel = np.maximum.accumulate(number[place], axis=1)[:, :-1]
     width = np.diff(merged, axis=1)
     row, column = np.nonzero(width > 0.0)
-    share = width[row, column] / widths[row, panel[row, column]]
-    return row, merged[row, column], merged[row, column + 1], share
+    fraction = width[row, column] / widths[row, panel[row, column]]
+    return row, merged[row, column], merged[row, column + 1], fraction
 
 
 def _probes() -> Floats:

@@ -38,7 +38,7 @@ class IntervalExchangeLaw(Law):
     Attributes
     ----------
     starts, widths : ndarray, shape (pieces,)
-        Pieces in increasing order, as shares of sin(theta)/2 d theta.
+        Pieces in increasing order, as fractions of sin(theta)/2 d theta.
     partner : ndarray of int, shape (pieces,)
         The piece with which each changes places.
 
@@ -50,8 +50,8 @@ class IntervalExchangeLaw(Law):
     Notes
     -----
     Any symmetric law is thus a limit of involutions, and those are limits of walls' laws: the first step from a law to
-    a wall. Images are computed from shares of the measure, so that within 1e-8 of 0 and pi they are good to 1e-8 only.
-    Source: A. Plakhov, "Exterior Billiards" (2012), ch. 4; Rudzis 2022, section 1.2.5.
+    a wall. Images are computed from fractions of the measure, so that within 1e-8 of 0 and pi they are good to 1e-8
+    only. Source: A. Plakhov, "Exterior Billiards" (2012), ch. 4; Rudzis 2022, section 1.2.5.
 
     Examples
     --------
@@ -90,9 +90,9 @@ class IntervalExchangeLaw(Law):
 
     def image(self, theta: Floats) -> Floats:
         """The outgoing angle of every incoming one."""
-        share = SINE.cdf(theta)
-        piece = np.clip(np.searchsorted(self.starts, share, side="right") - 1, 0, self.starts.size - 1)
-        moved = share + (self.starts[self.partner[piece]] - self.starts[piece])
+        fraction = SINE.cdf(theta)
+        piece = np.clip(np.searchsorted(self.starts, fraction, side="right") - 1, 0, self.starts.size - 1)
+        moved = fraction + (self.starts[self.partner[piece]] - self.starts[piece])
         angle = SINE.quantile(np.clip(moved, 0.0, 1.0))
         return clipped_inside(np.where(self.partner[piece] == piece, theta, angle))
 

@@ -22,8 +22,8 @@ PROBES = 4096
 PAIR_MASS = 1e-6
 SLOPE_TOLERANCE = 1e-5
 RETURN_TOLERANCE = 1e-9
-# Pairs that straddle a jump of the map: with fewer than 10^4 jumps their share stays below this.
-JUMP_SHARE = 0.01
+# Pairs that straddle a jump of the map: with fewer than 10^4 jumps their fraction stays below this.
+JUMP_FRACTION = 0.01
 # Equal cells of the probability are hit by equally many probes, up to one probe at each side of a jump.
 CELLS = 32
 CELL_TOLERANCE = 0.25
@@ -70,9 +70,9 @@ class InvolutionLaw(Law):
     def __post_init__(self) -> None:
         if not callable(self.map):
             raise InputError(f"map: expected a function from angles to angles, got {self.map!r}")
-        # An irrational offset keeps probes off jumps at rational shares.
-        share = (np.arange(PROBES) + np.sqrt(2.0) - 1.0) / PROBES
-        theta, beside = SINE.quantile(share), SINE.quantile(share - PAIR_MASS)
+        # An irrational offset keeps probes off jumps at rational fractions.
+        fraction = (np.arange(PROBES) + np.sqrt(2.0) - 1.0) / PROBES
+        theta, beside = SINE.quantile(fraction), SINE.quantile(fraction - PAIR_MASS)
         image = self._mapped(theta)
         self._check_return(theta, self._mapped(image))
         self._check_measure(theta, beside, image)
@@ -102,7 +102,7 @@ class InvolutionLaw(Law):
         stretch = np.abs(SINE.mass(self._mapped(beside), image)) / SINE.mass(beside, theta)
         wrong = np.abs(stretch - 1.0) > SLOPE_TOLERANCE
         cells = np.histogram(SINE.cdf(image), bins=CELLS, range=(0.0, 1.0))[0] * (CELLS / PROBES)
-        if np.mean(wrong) > JUMP_SHARE:
+        if np.mean(wrong) > JUMP_FRACTION:
             worst = int(np.argmax(np.where(wrong, np.abs(np.log(np.maximum(stretch, 1e-300))), -1.0)))
             raise InputError(
                 f"map: expected sin(theta) d theta to be preserved, got {stretch[worst]:.6g} times as much at theta = "

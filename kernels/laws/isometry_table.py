@@ -34,16 +34,16 @@ class Crevice:
 
     Parameters
     ----------
-    share : float
-        Its opening as a share of the period.
+    fraction : float
+        Its opening as a fraction of the period.
     height_to_width : float
-        Depth over width, r. With d = 2 r |cot theta|, retroreflection has probability ``share`` times the distance
-        from d to the nearest even number, specular reflection the rest of ``share``.
+        Depth over width, r. With d = 2 r |cot theta|, retroreflection has probability ``fraction`` times the distance
+        from d to the nearest even number, specular reflection the rest of ``fraction``.
     exchanged : bool
         Whether the two outcomes are exchanged: so it is in the specular frame.
     """
 
-    share: float
+    fraction: float
     height_to_width: float
     exchanged: bool = False
 
@@ -63,7 +63,7 @@ class IsometryTable:
         One entry a piece; no piece is longer than pi/2.
     crevices : tuple of Crevice
     unresolved : float
-        A bound of the share of the measure for which the table sends rays back without knowing where they go.
+        A bound of the fraction of the measure for which the table sends rays back without knowing where they go.
 
     Examples
     --------
@@ -122,23 +122,23 @@ class IsometryTable:
         return cls(np.tile(sign, 2), np.tile(offset, 2), lows, highs, start, end, unresolved=unresolved)
 
     @classmethod
-    def flat(cls, share: float) -> IsometryTable:
-        """Specular reflection with probability ``share``."""
-        return cls.of_pieces(-1.0, np.pi, 0.0, np.pi, share, 0.0)
+    def flat(cls, fraction: float) -> IsometryTable:
+        """Specular reflection with probability ``fraction``."""
+        return cls.of_pieces(-1.0, np.pi, 0.0, np.pi, fraction, 0.0)
 
     @classmethod
-    def sent_back(cls, share: float) -> IsometryTable:
-        """Retroreflection with probability ``share``."""
-        return cls.of_pieces(1.0, 0.0, 0.0, np.pi, share, 0.0)
+    def sent_back(cls, fraction: float) -> IsometryTable:
+        """Retroreflection with probability ``fraction``."""
+        return cls.of_pieces(1.0, 0.0, 0.0, np.pi, fraction, 0.0)
 
     @classmethod
-    def of_crevice(cls, share: float, height_to_width: float) -> IsometryTable:
+    def of_crevice(cls, fraction: float, height_to_width: float) -> IsometryTable:
         """One rectangular crevice."""
-        return cls(*(np.empty(0),) * 6, crevices=(Crevice(share, height_to_width),))
+        return cls(*(np.empty(0),) * 6, crevices=(Crevice(fraction, height_to_width),))
 
     @classmethod
     def joined(cls, tables: Iterable[IsometryTable]) -> IsometryTable:
-        """The sum of tables whose shares sum to 1."""
+        """The sum of tables whose fractions sum to 1."""
         parts = list(tables)
         if not parts:
             raise InputError("tables: expected at least one, got none")
@@ -146,15 +146,15 @@ class IsometryTable:
         crevices: dict[tuple[float, bool], float] = {}
         for crevice in (crevice for table in parts for crevice in table.crevices):
             key = crevice.height_to_width, crevice.exchanged
-            crevices[key] = crevices.get(key, 0.0) + crevice.share
-        kept = tuple(Crevice(share, *key) for key, share in crevices.items())
+            crevices[key] = crevices.get(key, 0.0) + crevice.fraction
+        kept = tuple(Crevice(fraction, *key) for key, fraction in crevices.items())
         return cls(*columns, crevices=kept, unresolved=sum(table.unresolved for table in parts))
 
-    def scaled(self, share: float) -> IsometryTable:
-        """The table with every probability multiplied by ``share``."""
-        crevices = tuple(replace(crevice, share=share * crevice.share) for crevice in self.crevices)
-        columns = [*self._columns()[:4], share * self.start, share * self.end]
-        return IsometryTable(*columns, crevices=crevices, unresolved=share * self.unresolved)
+    def scaled(self, fraction: float) -> IsometryTable:
+        """The table with every probability multiplied by ``fraction``."""
+        crevices = tuple(replace(crevice, fraction=fraction * crevice.fraction) for crevice in self.crevices)
+        columns = [*self._columns()[:4], fraction * self.start, fraction * self.end]
+        return IsometryTable(*columns, crevices=crevices, unresolved=fraction * self.unresolved)
 
     def mirrored(self) -> IsometryTable:
         """The table of the mirror image of the wall: both angles replaced by pi minus them."""
@@ -197,7 +197,7 @@ class IsometryTable:
     def mass(self) -> float:
         """The total measure of all pieces and crevices: 1 but for rounding where the table is complete."""
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
-        return float(np.sum(np.sin(half) * self.density(middle)) + sum(crevice.share for crevice in self.crevices))
+        return float(np.sum(np.sin(half) * self.density(middle)) + sum(crevice.fraction for crevice in self.crevices))
 
     def density(self, theta: Floats, piece: Whole | slice = slice(None)) -> Floats:
         """p(theta) sin(theta) of one piece for each angle."""
@@ -219,13 +219,13 @@ class IsometryTable:
         key, total = key[total > 0.0], total[total > 0.0]
         query, number = np.divmod(key, sign.size)
         whole = np.bincount(query, weights=total, minlength=flat.size)
-        share = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
+        fraction = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
         count = np.bincount(query, minlength=flat.size)
         _, slot = joined_lists(count)
         slots = int(count.max(initial=1))
         filled = np.zeros((flat.size, slots))
         which = np.zeros((flat.size, slots), dtype=np.int64)
-        filled[query, slot] = share
+        filled[query, slot] = fraction
         which[query, slot] = number
         which = np.where(filled > 0.0, which, which[:, :1])
         shape = (*incoming.shape, slots)
@@ -257,9 +257,9 @@ class IsometryTable:
             found.append((query, number[piece], self.density(at, piece) / np.sin(at)))
         everyone = np.arange(theta.size)
         for crevice in self.crevices:
-            retro = crevice.share * crevice_retro(crevice.height_to_width, theta)
+            retro = crevice.fraction * crevice_retro(crevice.height_to_width, theta)
             outcomes = (1, 0) if crevice.exchanged else (0, 1)
-            for isometry, probability in zip(outcomes, (crevice.share - retro, retro), strict=True):
+            for isometry, probability in zip(outcomes, (crevice.fraction - retro, retro), strict=True):
                 found.append((everyone, np.full(theta.size, isometry), probability))
         query, number, probability = (np.concatenate(column) for column in zip(*found, strict=True))
         return query, number, probability

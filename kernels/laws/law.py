@@ -218,7 +218,7 @@ class BranchLaw(Law):
         probability under sin(theta)/2 d theta of the angles, mostly near grazing, where more were left out."""
 
     def random_map(self) -> RandomMap:
-        """The branch in whose share of (0, 1) the number lies."""
+        """The branch in whose fraction of (0, 1) the number lies."""
         return lambda x, theta: (self._branch_taken(x, theta), None)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
@@ -257,7 +257,7 @@ class DrivenLaw(Law):
 
     @abstractmethod
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
-        """Outgoing angle for the entry point ``x`` in (0, 1), as a share of the period, and the angle ``theta``."""
+        """Outgoing angle for the entry point ``x`` in (0, 1), as a fraction of the period, and the angle ``theta``."""
 
     def random_map(self) -> RandomMap:
         """`reflect`."""
@@ -297,7 +297,7 @@ def entry_points(x: ArrayLike) -> Floats:
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         place = f" at index {where}" if where else ""
         raise InputError(
-            f"x: expected entry points in the open interval (0, 1), as shares of the period, got {array[where]!r}"
+            f"x: expected entry points in the open interval (0, 1), as fractions of the period, got {array[where]!r}"
             f"{place} ({int(bad.sum())} such)"
         )
     return array
@@ -388,7 +388,7 @@ class Combination(Law):
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         parts = [(weight, *law.branches(theta)) for weight, law in self.terms_checked() if weight > 0.0]
-        probability = np.concatenate([weight * share for weight, share, _ in parts], axis=-1)
+        probability = np.concatenate([weight * fraction for weight, fraction, _ in parts], axis=-1)
         return merged(probability, np.concatenate([angle for _, _, angle in parts], axis=-1))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:

@@ -146,11 +146,11 @@ def _bin_edges(basis: Basis, size: int) -> Floats:
     return basis.edges
 
 
-def _uniform_between(low: Floats, high: Floats, share: Floats) -> Floats:
+def _uniform_between(low: Floats, high: Floats, fraction: Floats) -> Floats:
     """The angle that splits the probability of (low, high) in the given ratio, accurate at both ends of (0, pi)."""
     upper = low >= 0.5 * np.pi
     low, high = np.where(upper, np.pi - high, low), np.where(upper, np.pi - low, high)
-    share = np.where(upper, 1.0 - share, share)
-    angle = SINE.quantile(SINE.cdf(low) + share * SINE.mass(low, high))
+    fraction = np.where(upper, 1.0 - fraction, fraction)
+    angle = SINE.quantile(SINE.cdf(low) + fraction * SINE.mass(low, high))
     angle = np.clip(angle, low, high)
     return clipped_inside(np.where(upper, np.pi - angle, angle))

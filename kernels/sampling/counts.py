@@ -29,9 +29,9 @@ Counts: TypeAlias = NDArray[np.int64]
 BATCHES = 32
 # Beyond this the replicates are not kept: they serve error estimates of eigenvalues, for which counts do as well.
 LARGEST_REPLICATES = 2**28
-# Over the degrees of freedom of the spread, the share of the dimensions that is not counted on: the estimate of their
-# number is too large where a few of them rule. The coverage of simulated normal parts, of eleven spectra, is 93.6 to
-# 96.4 % of 8 parts, and 94.6 to 95.8 % of 32.
+# Over the degrees of freedom of the spread, the fraction of the dimensions that is not counted on: the estimate of
+# their number is too large where a few of them rule. The coverage of simulated normal parts, of eleven spectra, is 93.6
+# to 96.4 % of 8 parts, and 94.6 to 95.8 % of 32.
 UNSURE_DIMENSIONS = 1.5
 # Entries of a part that are compared with those of the others; of larger arrays some rows, of fewer dimensions.
 MOST_COMPARED = 2**20
@@ -201,7 +201,7 @@ def _dimensions(differences: Floats) -> tuple[float, float]:
     gram = differences @ differences.T / freedom
     trace, square, cube = float(np.trace(gram)), float(np.sum(gram**2)), float(np.sum((gram @ gram) * gram))
     of_square = (square - trace**2 / freedom) * freedom**2 / ((freedom - 1) * (freedom + 2))
-    # a smaller share than that of rounding is none
+    # a smaller fraction than that of rounding is none
     of_square = max(of_square, EPS * trace**2)
     squared = max(trace**2 - 2.0 * of_square / freedom, of_square)
     of_trace = math.sqrt(squared)
@@ -250,15 +250,15 @@ def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Flo
     are 0 or 1, counts would be taken for normal.
     """
     number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs may be beyond int64
-    share = counts / number[:, None]
+    fraction = counts / number[:, None]
     # without bias, as p^2 alone matters where counts are small
-    square = np.maximum(share * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
-    spread = np.einsum("ij,j->i", share * (1.0 - share), weight)
+    square = np.maximum(fraction * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
+    spread = np.einsum("ij,j->i", fraction * (1.0 - fraction), weight)
     # a single pair says nothing about its spread, which is then taken as large
-    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * spread, share @ weight)
-    turned = weight * (1.0 - 2.0 * share)
-    own = np.einsum("ij,ij->i", share, turned**2) - np.einsum("ij,ij->i", share, turned) ** 2
-    other = np.einsum("ij,j->i", square * (1.0 - 2.0 * share), weight**2) + (square @ weight) ** 2
+    mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * spread, fraction @ weight)
+    turned = weight * (1.0 - 2.0 * fraction)
+    own = np.einsum("ij,ij->i", fraction, turned**2) - np.einsum("ij,ij->i", fraction, turned) ** 2
+    other = np.einsum("ij,j->i", square * (1.0 - 2.0 * fraction), weight**2) + (square @ weight) ** 2
     return mean, number * np.maximum(own, 0.0) + 2.0 * number * (number - 1.0) * np.maximum(other, 0.0)
 
 

@@ -57,22 +57,22 @@ class RaySums:
         self.lost += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
 
     def array(self, *, symmetrise: bool, mirrored: bool = False) -> tuple[SampledArray, int, float]:
-        """The matrix, the rays used, and the share of them that did not escape.
+        """The matrix, the rays used, and the fraction of them that did not escape.
 
-        Twice that share times sup |e|^2 is in the error. With ``mirrored`` every ray counts with its mirror image.
+        Twice that fraction times sup |e|^2 is in the error. With ``mirrored`` every ray counts with its mirror image.
 
         Raises
         ------
         AccuracyError
-            If more than a share of 1e-4 did not escape, or a bin has no ray.
+            If more than a fraction of 1e-4 did not escape, or a bin has no ray.
         """
         used = len(self.tables) * self.each
-        share = self.lost / used
-        if share > UNRESOLVED_TOLERANCE:
+        fraction = self.lost / used
+        if fraction > UNRESOLVED_TOLERANCE:
             raise AccuracyError(
-                f"{self.law!r}: {share:.2g} of {used} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
+                f"{self.law!r}: {fraction:.2g} of {used} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "
                 "geometry.trace(wall, x, theta).counts() says how they ended",
-                share,
+                fraction,
             )
         parts: list[Any] = [table + self._mirror_image(table) if mirrored else table for table in self.tables]
         if self.basis.is_partition:
@@ -81,10 +81,10 @@ class RaySums:
             means = [part / (2 * self.each if mirrored else self.each) for part in parts]
             keeps_measure = bool(self.law.reversible)
             array = array_from_sums(means, self.basis, symmetrise=symmetrise, keeps_measure=keeps_measure)
-        if share > 0.0:
-            extra = 2.0 * share * largest_square_sum(self.basis)
+        if fraction > 0.0:
+            extra = 2.0 * fraction * largest_square_sum(self.basis)
             array = SampledArray(array.symmetric, array.error + extra, array.replicates, array.raw_defect, array.counts)
-        return array, used, share
+        return array, used, fraction
 
     def _mirror_image(self, table: Any) -> Any:
         """The table of the rays (pi - theta, pi - theta')."""

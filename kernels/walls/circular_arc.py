@@ -19,8 +19,8 @@ from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entry_points
 
 # Rows jump where the number of hits N changes. Each of the first intervals gets its own Gauss rule; beyond MOST_HITS
-# hits, a share of rays of about 1/(4 N^2) and only for theta within xi/N of xi, the outgoing angle stays within xi/N of
-# pi - xi (or xi) and its mean within xi/N^2: for a smooth function what is neglected is below 1/(4 N^4) = 4e-12.
+# hits, a fraction of rays of about 1/(4 N^2) and only for theta within xi/N of xi, the outgoing angle stays within xi/N
+# of pi - xi (or xi) and its mean within xi/N^2: for a smooth function what is neglected is below 1/(4 N^4) = 4e-12.
 MOST_HITS = 500
 FEWEST_HITS = 8
 NODES = 16
@@ -205,7 +205,8 @@ class CircularArcLaw(DrivenLaw):
 def followed_hits(tolerance: float) -> int:
     """How many hits N to follow, so that integrals over theta of means of functions of slope 10 err by less.
 
-    Rays with more hits are a share of 1/(4 N^2), for theta within xi/N of xi, and leave within 2 xi/N of their place.
+    Rays with more hits are a fraction of 1/(4 N^2), for theta within xi/N of xi, and leave within 2 xi/N of their
+    place.
     """
     return int(np.clip(np.ceil((100.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))
 

@@ -142,12 +142,12 @@ class WallConditionals:
         return [HollowConditionals(self.wall.scene, k, *task) for k, _ in self._shapes]
 
     @property
-    def _shares(self) -> list[float]:
-        return [share for _, share in self._shapes]
+    def _fractions(self) -> list[float]:
+        return [fraction for _, fraction in self._shapes]
 
     @cached_property
     def _shapes(self) -> list[tuple[int, float]]:
-        """The number of one hollow of each shape, and the share of the period that all of this shape take."""
+        """The number of one hollow of each shape, and the fraction of the period that all of this shape take."""
         from ...geometry.cells.hollow_shape import distinct_hollows
 
         wall = self.wall
@@ -169,10 +169,10 @@ class WallConditionals:
         nodes: list[list[Floats]] = [[] for _ in incoming]
         weights: list[list[Floats]] = [[] for _ in incoming]
         error, lost = np.zeros(len(incoming)), np.zeros(len(incoming))
-        for rows, share in zip(self._hollows, self._shares, strict=True):
+        for rows, fraction in zip(self._hollows, self._fractions, strict=True):
             found, stale = rows.march(incoming, tolerances)
             self.stale |= stale
-            scale = share / rows.width
+            scale = fraction / rows.width
             for k, row in enumerate(found[angle] for angle in incoming.tolist()):
                 nodes[k].append(row.nodes)
                 weights[k].append(scale * row.widths)

@@ -121,13 +121,13 @@ def crevice_nodes(
     # the mean, up to grazing
     end = float(np.arctan2(2.0 * r, mean_from))
     edges = np.concatenate([[0.0], inside[inside < end], [end]])
-    far, share = SINE.quadrature(np.unique(edges), max(basis.nodes_per_interval, nodes))
+    far, fraction = SINE.quadrature(np.unique(edges), max(basis.nodes_per_interval, nodes))
     mean = 0.5
     if times is not None:
         retro, mean = 0.5 * (1.0 + (retro - 1.0) ** times), 0.5 * (1.0 + (-1.0) ** times / (times + 1.0))
     angle = np.concatenate([theta, far])
-    specular = np.concatenate([weight * (1.0 - retro), share * (1.0 - mean)])
-    return angle, specular, np.concatenate([weight * retro, share * mean]), float(omitted)
+    specular = np.concatenate([weight * (1.0 - retro), fraction * (1.0 - mean)])
+    return angle, specular, np.concatenate([weight * retro, fraction * mean]), float(omitted)
 
 
 def _cells(basis: Basis) -> tuple[Floats, int, int]:
@@ -159,9 +159,9 @@ def _periods(first: Floats, last: Floats, nodes: int, halves: int) -> tuple[Floa
     period = [first[index] + inner]
     weight = [np.ones(index.size)]
     if not few.all():
-        node, share = _sum_rules(tuple(count[~few].tolist()), nodes)
+        node, fraction = _sum_rules(tuple(count[~few].tolist()), nodes)
         period.append((first[~few][:, None] + node).ravel())
-        weight.append(share.ravel())
+        weight.append(fraction.ravel())
     start, number = 2.0 * np.concatenate(period), np.concatenate(weight)
     inside, gauss = gauss_on_intervals(np.array([0.0, 1.0]), np.array([1.0, 2.0]), halves)
     retro = np.where(inside <= 1.0, inside, 2.0 - inside)

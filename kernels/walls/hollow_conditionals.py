@@ -22,8 +22,8 @@ MOST_COLLISIONS, MOST_IN_RUNS = 100_000, 8
 NO_LIMIT = 2**62
 # Rounds in which rows are done again because a neighbour has a piece that they have overlooked.
 MOST_ROUNDS = 8
-# Critical angles looked for at a time, and the least width of their pieces as a share of the widest of them.
-MOST_CUTS, CUT_SHARE = 6, 0.1
+# Critical angles looked for at a time, and the least width of their pieces as a fraction of the widest of them.
+MOST_CUTS, CUT_FRACTION = 6, 0.1
 
 
 class Row(NamedTuple):
@@ -184,7 +184,7 @@ class HollowConditionals:
         found.sort(reverse=True)
         cuts = []
         for width, label, present, absent, k in found[:MOST_CUTS]:
-            if width < CUT_SHARE * found[0][0]:
+            if width < CUT_FRACTION * found[0][0]:
                 break
             angle = self._located(label, present, absent, k)
             if low < angle < high:

@@ -48,7 +48,7 @@ class PolygonLaw(BranchLaw):
     ----------
     unresolved : Estimate
         A bound of the flux whose way through the wall was not found. Such rays are sent back, theta' = theta: the law
-        stays Markov and reversible, and its distance in total variation is at most this share.
+        stays Markov and reversible, and its distance in total variation is at most this fraction.
     mirror_symmetric : bool or None
         True if the wall's cell is; otherwise not known.
 
@@ -128,9 +128,9 @@ class PolygonLaw(BranchLaw):
 
     @property
     def unresolved(self) -> Estimate:
-        """The share of the flux that is sent back because its way through the wall was not found."""
-        share = self._table.unresolved
-        return Estimate(share, share, "bound", f"beams of at most {self.max_beams} a hollow")
+        """The fraction of the flux that is sent back because its way through the wall was not found."""
+        fraction = self._table.unresolved
+        return Estimate(fraction, fraction, "bound", f"beams of at most {self.max_beams} a hollow")
 
     @cached_property
     def evaluations(self) -> int:  # type: ignore[override]
@@ -147,7 +147,7 @@ class PolygonLaw(BranchLaw):
         return self._table.breakpoints(limit)
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
-        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
+        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
         return traced_angles(self.wall, x, theta)
 
 

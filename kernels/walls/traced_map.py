@@ -14,15 +14,15 @@ from ..laws.law import entry_points
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Rays that end in a corner, at a tangency or at the bounce limit are sent back (see `WallLaw`). Their share bounds the
-# error in total variation; above this it would show in a kernel estimated from a million rays.
+# Rays that end in a corner, at a tangency or at the bounce limit are sent back (see `WallLaw`). Their fraction bounds
+# the error in total variation; above this it would show in a kernel estimated from a million rays.
 UNRESOLVED_TOLERANCE = 1e-4
 
 
 def traced_outcomes(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
     """Outgoing angles, and the mask of the rays that escaped; the others are sent back.
 
-    ``x`` in (0, 1) is the entry point as a share of the period. Never raises an AccuracyError.
+    ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
     """
     from ...geometry.tracing.tracing import trace
 
@@ -33,7 +33,7 @@ def traced_outcomes(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats,
 
 
 def traced_angles(wall: Wall, x: ArrayLike, theta: ArrayLike) -> Floats:
-    """Outgoing angles; raises an AccuracyError if more than a share of 1e-4 of the rays did not escape."""
+    """Outgoing angles; raises an AccuracyError if more than a fraction of 1e-4 of the rays did not escape."""
     outgoing, escaped = traced_outcomes(wall, x, theta)
     lost = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
     if lost > UNRESOLVED_TOLERANCE:

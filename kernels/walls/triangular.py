@@ -80,8 +80,8 @@ class TriangularTeethLaw(BranchLaw):
         left = np.sin(theta + 0.5 * (np.pi - self.angle)) / (2.0 * np.sin(theta) * np.sin(0.5 * self.angle))
         left = np.clip(left, 0.0, 1.0)
         most, most_mirror = self._most_hits(theta), self._most_hits(mirror)
-        fewer = np.clip(self._share_of_fewer(theta, most), 0.0, left)
-        fewer_mirror = np.clip(self._share_of_fewer(mirror, most_mirror), 0.0, 1.0 - left)
+        fewer = np.clip(self._fraction_of_fewer(theta, most), 0.0, left)
+        fewer_mirror = np.clip(self._fraction_of_fewer(mirror, most_mirror), 0.0, 1.0 - left)
         probability = np.stack([fewer, left - fewer, 1.0 - left - fewer_mirror, fewer_mirror], axis=-1)
         outgoing = np.stack(
             [
@@ -163,7 +163,7 @@ class TriangularTeethLaw(BranchLaw):
     def _most_hits(self, theta: Floats) -> Floats:
         return np.maximum(np.ceil(2.0 * theta / self.angle), 1.0)
 
-    def _share_of_fewer(self, theta: Floats, most: Floats) -> Floats:
+    def _fraction_of_fewer(self, theta: Floats, most: Floats) -> Floats:
         """The X below which a ray left of the bottom is hit N - 1 times: a product, so that nothing cancels."""
         return np.asarray(self._density_of_fewer(theta, most) / np.sin(theta))
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ...geometry.cells.hollow import Hollow
     from ...geometry.curves.curve import Curve
 
-# Widths add up to the period, and an arc is a semicircle, to this share: sums and angles of a handful of operations.
+# Widths add up to the period, and an arc is a semicircle, to this fraction: sums and angles of a handful of operations.
 ROUNDED = 64.0 * EPS
 # The hollows with closed forms have at most this many pieces.
 MOST_PIECES_KNOWN = 3
@@ -41,7 +41,7 @@ MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
 # Walls of more pieces are tried with fewer beams first; where what these leave is rounding, they do. Rough profiles of
 # 40 to 800 pieces resolved completely with 10 to 140 beams a piece, most with less than 50; cavities never do.
 FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
-# `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this share of their size.
+# `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this fraction of their size.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 # Error of the distribution function at the edges of cells.
 CELL_TOLERANCE = 1e-9
@@ -73,14 +73,14 @@ class WallLaw(DrivenLaw):
     Raises
     ------
     AccuracyError
-        By `reflect`, `sample` and `apply` if more than a share of 1e-4 of the rays did not escape; ``defect`` is the
-        share.
+        By `reflect`, `sample` and `apply` if more than a fraction of 1e-4 of the rays did not escape; ``defect`` is the
+        fraction.
 
     Notes
     -----
     A ray that does not escape (corner, grazing, bounce limit) is returned as retroreflected, theta' = theta: on a set
     of rays that the true map takes to itself the identity preserves sin(theta) dx d theta and is an involution, so
-    the law stays Markov and reversible, and its error in total variation is at most the share of these rays.
+    the law stays Markov and reversible, and its error in total variation is at most the fraction of these rays.
     `outcomes` says which they were.
 
     Examples
@@ -140,7 +140,7 @@ class WallLaw(DrivenLaw):
     def outcomes(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing angles by tracing, and the mask of the rays that escaped; the others are sent back.
 
-        ``x`` in (0, 1) is the entry point as a share of the period. Never raises an AccuracyError.
+        ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
         """
         return traced_outcomes(self.wall, x, theta)
 
@@ -149,7 +149,7 @@ class WallLaw(DrivenLaw):
         return self.outcomes
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
-        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a share of the period."""
+        """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
         return traced_angles(self.wall, x, theta)
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
@@ -225,7 +225,7 @@ class WallLaw(DrivenLaw):
         Raises
         ------
         AccuracyError
-            If more than a share of 1e-4 of the rays did not escape.
+            If more than a fraction of 1e-4 of the rays did not escape.
 
         Examples
         --------
@@ -244,7 +244,7 @@ class WallLaw(DrivenLaw):
 
 
 def _closed_form(wall: Wall) -> Law | None:
-    """The sum of the laws of flat tops and hollows, by their share of the period, or None."""
+    """The sum of the laws of flat tops and hollows, by their fraction of the period, or None."""
     if not wall.closes:
         return None
     wall = wall.cell

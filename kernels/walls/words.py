@@ -64,8 +64,8 @@ def _mixture(terms: Sequence[tuple[float, Sum | None]]) -> Sum | None:
     for weight, words in terms:
         if words is None:
             return None
-        for word, share in words.items():
-            total[word] = total.get(word, 0.0) + weight * share
+        for word, fraction in words.items():
+            total[word] = total.get(word, 0.0) + weight * fraction
     return total
 
 
@@ -76,9 +76,9 @@ def _chain(parts: Sequence[Sum | None]) -> Sum | None:
             return None
         product: Sum = {}
         for word, weight in total.items():
-            for other, share in words.items():
+            for other, fraction in words.items():
                 longer = reduced(word + other)
-                product[longer] = product.get(longer, 0.0) + weight * share
+                product[longer] = product.get(longer, 0.0) + weight * fraction
         if len(product) > MOST_WORDS:
             return None
         total = product

@@ -32,9 +32,9 @@ Label = Literal["indexed", "contains-spectrum"]
 # Trial functions beyond those asked for: the first ones of them show what comes next.
 LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
-# The squared residuals of adapted trial functions, and the errors of their quotients, may take this share of an
+# The squared residuals of adapted trial functions, and the errors of their quotients, may take this fraction of an
 # enclosure each. Rows that may be spent on the quotients: where they are traced, and where they have a closed form.
-TRIAL_SHARE, MOST_TRACED_ROWS, MOST_EXACT_ROWS = 0.3, 4_000, 40_000
+TRIAL_FRACTION, MOST_TRACED_ROWS, MOST_EXACT_ROWS = 0.3, 4_000, 40_000
 # Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
 QUOTIENT_ROUNDING = 4.0 * EPS
 # Laws whose images of polynomials are found to rounding.
@@ -218,13 +218,13 @@ def enclosed_trials(
     """`enclosures` of a law that is self-adjoint, with the trial functions."""
     known = law.expectations(ONE_PANEL) if basis is None else None
     if known is not None and known.has_errors:
-        trials = adapted_trials(law, k, TRIAL_SHARE * tolerance)
+        trials = adapted_trials(law, k, TRIAL_FRACTION * tolerance)
         basis, values, vectors, names = trials.basis, trials.values, trials.vectors, trials.parities
         # rows are what costs: the functions that come next are looked at in the same ones
         both = residuals(
             law, basis, np.column_stack([vectors, trials.following]), np.append(values, trials.following_values),
             MOST_TRACED_ROWS if known.is_traced else MOST_EXACT_ROWS,
-            mirrored=trials.mirrored, quotient_error=TRIAL_SHARE * tolerance, leading=len(values),
+            mirrored=trials.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
         )  # fmt: skip
         found, after = both.split(len(values))
         next_value = _reach(after)

@@ -25,8 +25,8 @@ from ...kernels.laws.structure import Rules, fold, holds_of_all
 from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.words import law_of, words_of
 
-# Squared residuals are wanted to this share of themselves, in at most MOST_ROWS rows of the law.
-SHARE, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
+# Squared residuals are wanted to this fraction of themselves, in at most MOST_ROWS rows of the law.
+FRACTION, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
 # Rows held at a time for few functions, and how many functions are few.
 CHUNK_ROWS, FEW_FUNCTIONS = 256, 16
 # Halves of (0, pi) overlap by no more.
@@ -111,19 +111,19 @@ def residuals(
         # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
         wanted = np.stack(
             [
-                np.maximum(SHARE * square + 4.0 * EPS, quotient_error),
-                np.maximum(SHARE * square + (8.0 * EPS) ** 2, SHARE * quotient_error),
+                np.maximum(FRACTION * square + 4.0 * EPS, quotient_error),
+                np.maximum(FRACTION * square + (8.0 * EPS) ** 2, FRACTION * quotient_error),
             ]
         )
-        share = (error / wanted)[..., :leading].max(axis=(1, 2))
+        fraction = (error / wanted)[..., :leading].max(axis=(1, 2))
         affordable = max(most_rows - rows, 0) // (2 * len(NODES))
-        worst = np.argsort(-share)[:affordable]
-        worst = worst[(share[worst] * len(share) > 1.0) & (np.diff(kept[:, worst], axis=0)[0] > NARROWEST)]
+        worst = np.argsort(-fraction)[:affordable]
+        worst = worst[(fraction[worst] * len(fraction) > 1.0) & (np.diff(kept[:, worst], axis=0)[0] > NARROWEST)]
         if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
             break
         middle = kept[:, worst].mean(axis=0)
         low, high = np.append(kept[0, worst], middle), np.append(middle, kept[1, worst])
-        rest = np.setdiff1d(np.arange(len(share)), worst)
+        rest = np.setdiff1d(np.arange(len(fraction)), worst)
         kept, total, error, doubt = kept[:, rest], total[rest], error[rest], doubt[rest]
     correction, square = total.sum(axis=0)
     correction_error, square_error = (error + doubt).sum(axis=0)
@@ -254,8 +254,8 @@ def _refusal(law: Law, reason: str) -> InputError:
 
 
 def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
-    """By `apply`; rays of a polygon whose way was not found, a share s, change P v by 2 s^(1/2) max|v| at most."""
-    unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda share: share))
+    """By `apply`; rays of a polygon whose way was not found, a fraction s, change P v by 2 s^(1/2) max|v| at most."""
+    unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda fraction: fraction))
     doubt = 2.0 * math.sqrt(unknown) * height_of(basis, vectors) if unknown else 0.0
 
     def means(theta: Floats) -> Floats:

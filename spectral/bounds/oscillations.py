@@ -20,9 +20,9 @@ AT_ONCE = 32
 FREQUENCIES = np.arange(0.5, 64.0, 0.1)
 # The least of so many quotients is 3 standard errors below its mean by chance.
 SIGMAS = 6.0
-# Trial functions of enclosures are slower than this frequency t: of a faster oscillation less than this share, which
+# Trial functions of enclosures are slower than this frequency t: of a faster oscillation less than this fraction, which
 # falls off like t^-4, is in them.
-FASTEST_SLOW, SLOW_SHARE = 40.0, 0.01
+FASTEST_SLOW, SLOW_FRACTION = 40.0, 0.01
 # What the law moves angles by, at least.
 LEAST_MOVE = 1e-6
 
@@ -38,7 +38,7 @@ def fast_top(law: Law) -> tuple[float, str] | None:
         frequency, quotient, spread = least_quotient(law, FASTEST_SLOW)
     except AccuracyError:
         return None
-    top = 1.0 - quotient - SIGMAS * spread - SLOW_SHARE
+    top = 1.0 - quotient - SIGMAS * spread - SLOW_FRACTION
     return top, f"by {RAYS} rays cos(t theta + phase), t = {frequency:.6g}, has a mean of {top:.6g} at least"
 
 

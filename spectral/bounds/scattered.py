@@ -1,6 +1,6 @@
 """Enclosures of the whole spectrum of sums of words that begin and end with a Henyey-Greenstein scattering.
 
-The scattering HG(g) leaves of polynomials of degree n and more at most the share |g|^n, so that such a word is its
+The scattering HG(g) leaves of polynomials of degree n and more at most the fraction |g|^n, so that such a word is its
 matrix in the first n Legendre polynomials but for an operator of norm 2 |g|^n and the matrix' own error. What else the
 sum may have, identity, specular and Lambertian reflection, is diagonal in these polynomials. By Weyl's theorem the
 eigenvalues off the essential spectrum are then those of the matrix within that distance, in order.
@@ -26,8 +26,8 @@ from ...kernels.walls.words import Sum, Word, words_of
 from ..eigenvalues.parity import Parity
 from ..eigenvalues.spectra import check_reversible
 
-# The largest matrices, where they are diagonal and where not, and the share of the tolerance that the tail may have.
-MOST_DIAGONAL, MOST_FUNCTIONS, TAIL_SHARE = 2048, 512, 0.1
+# The largest matrices, where they are diagonal and where not, and the fraction of the tolerance that the tail may have.
+MOST_DIAGONAL, MOST_FUNCTIONS, TAIL_FRACTION = 2048, 512, 0.1
 # Rounding of sums and powers of numbers below 1; of eigenvalues of a matrix with n rows n^(1/2) times as much.
 ROUNDING = 8.0 * EPS
 
@@ -81,7 +81,7 @@ def scattered_spectrum(law: Law, words: Sum, k: int, tolerance: float) -> Scatte
     """
     diagonal = all(map(_is_diagonal, words))
     most = MOST_DIAGONAL if diagonal else MOST_FUNCTIONS
-    wanted = EPS if diagonal else TAIL_SHARE * tolerance
+    wanted = EPS if diagonal else TAIL_FRACTION * tolerance
     degrees = k + 1
     while degrees < most and _tail(words, degrees) > wanted:
         degrees = min(2 * degrees, most)

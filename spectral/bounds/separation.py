@@ -59,9 +59,11 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
     found = _hilbert_schmidt(law, values, width)
     if found is not None:
         return found
-    share = lambertian_share(law)
-    if share > 0.0 and len(values) == 1:
-        return Separation(1.0 - share, "bound", f"a Lambertian share a = {share:.6g}: 1 - a beyond the constants")
+    fraction = lambertian_fraction(law)
+    if fraction > 0.0 and len(values) == 1:
+        return Separation(
+            1.0 - fraction, "bound", f"a Lambertian fraction a = {fraction:.6g}: 1 - a beyond the constants"
+        )
     edge = essential_edge(law)
     if edge.high >= next_value:
         reason = f"norm of the essential part, {edge.high:.6g}: " + "; ".join(edge.reasons)
@@ -86,7 +88,7 @@ def _of_matrix(law: MatrixLaw, listed: int) -> Separation:
     )
 
 
-def lambertian_share(law: Law) -> float:
+def lambertian_fraction(law: Law) -> float:
     r"""The a in P = a L + (1 - a) R with L Lambertian and R Markov: beyond the constants ||P|| <= 1 - a.
 
     Of sums and products it is found from their parts: (1 - a)(1 - b) is what is left of a product.
@@ -94,14 +96,14 @@ def lambertian_share(law: Law) -> float:
     Examples
     --------
     >>> from asperity import kernels as ker
-    >>> round(lambertian_share(ker.maxwell(0.25) ** 2), 12)
+    >>> round(lambertian_fraction(ker.maxwell(0.25) ** 2), 12)
     0.4375
     """
     rules: Rules[float] = Rules(
         lambda leaf: 1.0 if isinstance(leaf, LambertianLaw) else 0.0,
-        lambda terms: sum(weight * share for weight, share in terms),
-        lambda shares: 1.0 - float(np.prod([1.0 - share for share in shares])),
-        lambda share: share,
+        lambda terms: sum(weight * fraction for weight, fraction in terms),
+        lambda fractions: 1.0 - float(np.prod([1.0 - fraction for fraction in fractions])),
+        lambda fraction: fraction,
     )
     return min(fold(law, rules), 1.0)
 

@@ -23,8 +23,8 @@ DEGREE = 6
 FIRST_BREAKPOINTS, WIDEST = 40, np.pi / 10
 # Nearest distance of two edges.
 NARROWEST = 1e-7
-# A level divides the worst panels, those that hold this share of the squared residuals.
-SHARE = 0.9
+# A level divides the worst panels, those that hold this fraction of the squared residuals.
+FRACTION = 0.9
 # Levels at most; and panels beyond which none are divided, where rows are traced and where they are not.
 MOST_LEVELS, MOST_PANELS = 12, {True: 60, False: 200}
 # Trial functions that tell what comes next.
@@ -33,8 +33,8 @@ EXTRA = 2
 GUARD = 12
 MOST_ITERATIONS, SETTLED = 60, 0.02
 PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
-# Rows are as exact as this share of the residual that is wanted.
-ROW_SHARE = 0.03
+# Rows are as exact as this fraction of the residual that is wanted.
+ROW_FRACTION = 0.03
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def adapted_trials(law: Law, k: int, tolerance: float, most_levels: int = MOST_L
     history: list[tuple[int, float]] = []
     goal = np.sqrt(tolerance)
     while True:
-        level = _Level(law, edges, mirrored, ROW_SHARE * goal)
+        level = _Level(law, edges, mirrored, ROW_FRACTION * goal)
         with one_blas_thread():
             values, vectors, parity = level.leading(k + EXTRA, SETTLED * goal)
         squares = level.squared_residuals(values, vectors, parity)
@@ -231,7 +231,7 @@ def _first_edges(law: Law, mirrored: bool) -> Floats:
 
 def _divided(edges: Floats, squares: Floats) -> Floats:
     order = np.argsort(-squares)
-    enough = int(np.searchsorted(np.cumsum(squares[order]), SHARE * squares.sum())) + 1
+    enough = int(np.searchsorted(np.cumsum(squares[order]), FRACTION * squares.sum())) + 1
     chosen = order[:enough]
     chosen = chosen[np.diff(edges)[chosen] > 2.0 * NARROWEST]
     return np.union1d(edges, 0.5 * (edges[chosen] + edges[chosen + 1]))

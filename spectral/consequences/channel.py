@@ -134,7 +134,7 @@ def exit_times(
         target = x + shift
         crossing = np.flatnonzero(np.abs(target) >= levels[reached])
         while crossing.size:
-            # the flight is straight: the share of it up to |x| = L
+            # the flight is straight: the fraction of it up to |x| = L
             ahead = np.copysign(levels[reached[crossing]], target[crossing]) - x[crossing]
             moment = clock[crossing] + ahead / shift[crossing] * duration[crossing]
             times[inside[crossing], reached[crossing]] = moment

@@ -85,7 +85,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
 
     Examples
     --------
-    For Maxwell's walls with a diffuse share a, eta = (2 - a)/a:
+    For Maxwell's walls with a diffuse fraction a, eta = (2 - a)/a:
 
     >>> from asperity import kernels as ker, spectral as spec
     >>> found = spec.diffusivity(ker.maxwell(0.5))

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 TILE = 256
 Which = Literal["largest", "moduli"]
 _Pairs = tuple[Floats, Floats]
-# Below this size, and for more than this share of the spectrum, LAPACK's complete solver takes no longer.
-SMALL, LARGEST_SHARE = 512, 1.0 / 24.0
+# Below this size, and for more than this fraction of the spectrum, LAPACK's complete solver takes no longer.
+SMALL, LARGEST_FRACTION = 512, 1.0 / 24.0
 # Relative accuracy that is asked of Lanczos; and the vectors and restarts that it may take: some hundred products,
 # still less than LAPACK takes.
 LANCZOS_TOLERANCE, LEAST_SPACE, MOST_RESTARTS = 1e-13, 24, 16
@@ -133,7 +133,7 @@ def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "mod
     clusters may be cut: a copy that is not listed is not larger than those that are.
     """
     size = len(array)
-    if size < SMALL or k > LARGEST_SHARE * size:
+    if size < SMALL or k > LARGEST_FRACTION * size:
         return _by_lapack(array, constant, k, which, "all eigenvalues by LAPACK")
     found = _proved(Deflated.of(array, constant), k, which)
     if isinstance(found, str):
@@ -146,7 +146,7 @@ def end_values(array: Floats, constant: Floats | None, top: int, bottom: int) ->
 
     Without a proof: for the comparison of two grids, which is an estimate.
     """
-    if len(array) >= SMALL and max(top, bottom) <= LARGEST_SHARE * len(array):
+    if len(array) >= SMALL and max(top, bottom) <= LARGEST_FRACTION * len(array):
         matrix = Deflated.of(array, constant)
         upper = _more(matrix, _nothing(len(array)), top, "LA")
         lower = _more(matrix, _nothing(len(array)), bottom, "SA") if bottom else _nothing(len(array))

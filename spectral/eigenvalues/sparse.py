@@ -25,7 +25,7 @@ GUARD = 12
 # only, and values within it of each other are told apart by Rayleigh and Ritz.
 SHIFT = 1e-9
 MOST_ITERATIONS, SETTLED = 300, 64.0
-# Share of the widest gap below the k-th value that another must have to be cut in.
+# Fraction of the widest gap below the k-th value that another must have to be cut in.
 WIDE_GAP = 0.25
 # Gaps between neighbouring values must be this many rounding margins wide for a count between them to mean anything.
 MARGINS = 4.0

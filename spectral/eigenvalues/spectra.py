@@ -21,8 +21,8 @@ from .standard_errors import sampling_errors, sampling_quantile
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# With order 2, the lowest of the bases, the change by the last doubling is this share of the one before.
-EARLIER_SHARE = 0.25
+# With order 2, the lowest of the bases, the change by the last doubling is this fraction of the one before.
+EARLIER_FRACTION = 0.25
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 # A sampled matrix whose antisymmetric part has a z-score above this is not called reversible: under reversibility
 # the score is standard normal, and 5 is exceeded once in 3.5 million matrices.
@@ -39,15 +39,15 @@ EIGENVALUE = "eigenvalue with its total error"
 def two_grid_changes(matrix: KernelMatrix, found: ExtremalEigenvalues) -> Floats:
     """Change of every eigenvalue off the constants from the coarser basis, by its rank from its end of the spectrum.
 
-    A step of parity can leave an eigenvalue unchanged by accident; so a share of the change before counts too. ``inf``
-    where the coarser basis has no such eigenvalue.
+    A step of parity can leave an eigenvalue unchanged by accident; so a fraction of the change before counts too.
+    ``inf`` where the coarser basis has no such eigenvalue.
     """
     grids = _coarser_grids(matrix, found.top, len(found.values) - found.top, levels=2)
     changes = np.abs(np.diff([found.values, *grids], axis=0))
     if not len(changes):
         return np.full(len(found.values), np.inf)
     last = np.where(np.isnan(changes[0]), np.inf, changes[0])
-    return np.asarray(np.fmax(last, EARLIER_SHARE * changes[1]) if len(changes) > 1 else last)
+    return np.asarray(np.fmax(last, EARLIER_FRACTION * changes[1]) if len(changes) > 1 else last)
 
 
 def _coarser_grids(matrix: KernelMatrix, top: int, bottom: int, levels: int) -> list[Floats]:

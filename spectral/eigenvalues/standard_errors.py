@@ -48,13 +48,13 @@ def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
     weights = np.asarray(matrix.weights)
     phi = vectors / np.sqrt(weights)[:, None]
     if matrix.symmetrised:
-        shares = counts / counts.sum()
-        mean = np.sum(phi * (shares @ phi), axis=0)
-        spread = np.sum(phi**2 * (shares @ phi**2), axis=0) - mean**2
+        fractions = counts / counts.sum()
+        mean = np.sum(phi * (fractions @ phi), axis=0)
+        spread = np.sum(phi**2 * (fractions @ phi**2), axis=0) - mean**2
         return np.asarray(np.maximum(spread, 0.0) / counts.sum())
     totals = np.maximum(counts.sum(axis=1), 1.0)
-    shares = counts / totals[:, None]
-    spread = np.maximum(shares @ phi**2 - (shares @ phi) ** 2, 0.0)
+    fractions = counts / totals[:, None]
+    spread = np.maximum(fractions @ phi**2 - (fractions @ phi) ** 2, 0.0)
     return np.asarray(((weights[:, None] * phi) ** 2 * spread / totals[:, None]).sum(axis=0))
 
 

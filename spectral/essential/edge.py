@@ -60,7 +60,7 @@ class _Part:
     entry_error: float
     certain: bool
     notes: tuple[str, ...] = ()
-    share: float = 0.0
+    fraction: float = 0.0
 
 
 def essential_edge(law: Law) -> EssentialEdge:
@@ -133,18 +133,18 @@ def _leaf(law: Law) -> _Part:
     if isinstance(law, InvolutionLaw):
         reason = f"{law!r} is an involution: f + f o T is kept for every f"
         return _Part((0.0, 1.0), limit.matrix, *errors, True, (reason,))
-    kept, share = (0.0, 0.0), 0.0
+    kept, fraction = (0.0, 0.0), 0.0
     notes = [note]
     if isinstance(law, WallLaw):
         straight = straight_part(law)
-        kept, share = (straight.low, straight.high), straight.share
+        kept, fraction = (straight.low, straight.high), straight.fraction
         if straight.high > 0.0:
             reach = f"{kept[0]:.6g}" if kept[0] == kept[1] else f"{kept[0]:.6g} to {kept[1]:.6g}"
             notes.append(
-                f"a share {share:.4g} of the rays meets straight pieces only: isometries, whose part of the law has a "
-                f"spectrum up to {reach}"
+                f"a fraction {fraction:.4g} of the rays meets straight pieces only: isometries, whose part of the law "
+                f"has a spectrum up to {reach}"
             )
-    return _Part(kept, limit.matrix, *errors, False, tuple(notes), share)
+    return _Part(kept, limit.matrix, *errors, False, tuple(notes), fraction)
 
 
 def _ideal_limit(law: IsometryLaw) -> GrazingLimit:
@@ -152,21 +152,21 @@ def _ideal_limit(law: IsometryLaw) -> GrazingLimit:
 
 
 def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:
-    share = sum(w * part.share for w, part in terms)
+    fraction = sum(w * part.fraction for w, part in terms)
     return _Part(
-        # positive operators: the sum reaches as far as any term, and as its share
-        (max(share, *(w * part.kept[0] for w, part in terms)), sum(w * part.kept[1] for w, part in terms)),
+        # positive operators: the sum reaches as far as any term, and as its fraction
+        (max(fraction, *(w * part.kept[0] for w, part in terms)), sum(w * part.kept[1] for w, part in terms)),
         sum((w * part.grazing for w, part in terms), np.zeros((2, 2))),
         sum(w * part.error for w, part in terms),
         sum(w * part.entry_error for w, part in terms),
         all(part.certain for _, part in terms),
         tuple(note for _, part in terms for note in part.notes),
-        share,
+        fraction,
     )
 
 
 def _chain(parts: Sequence[_Part]) -> _Part:
-    whole = reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, 0.0, True, share=1.0))
+    whole = reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, 0.0, True, fraction=1.0))
     if parts and all(part is parts[0] for part in parts):
         # a power
         low, high = parts[0].kept
@@ -175,10 +175,10 @@ def _chain(parts: Sequence[_Part]) -> _Part:
 
 
 def _product(first: _Part, second: _Part) -> _Part:
-    share = first.share * second.share
+    fraction = first.fraction * second.fraction
     # what keeps all rays changes no norm
     low = {(True, True): 1.0, (True, False): second.kept[0], (False, True): first.kept[0]}.get(
-        (first.kept[0] == 1.0, second.kept[0] == 1.0), share
+        (first.kept[0] == 1.0, second.kept[0] == 1.0), fraction
     )
     return _Part(
         (low, first.kept[1] * second.kept[1]),
@@ -188,7 +188,7 @@ def _product(first: _Part, second: _Part) -> _Part:
         2.0 * (first.entry_error + second.entry_error + first.entry_error * second.entry_error),
         first.certain and second.certain,
         first.notes + second.notes,
-        share,
+        fraction,
     )
 
 

@@ -99,8 +99,10 @@ def without_identity(law: Law) -> tuple[float, Law]:
     rest = [(weight, term) for weight, term in terms if weight > 0.0 and not _keeps_angles(term)]
     if not rest or len(rest) == sum(weight > 0.0 for weight, _ in terms):
         return 1.0, law
-    share = math.fsum(weight for weight, _ in rest)
-    return share, rest[0][1] if len(rest) == 1 else Combination(tuple((weight / share, term) for weight, term in rest))
+    fraction = math.fsum(weight for weight, _ in rest)
+    return fraction, rest[0][1] if len(rest) == 1 else Combination(
+        tuple((weight / fraction, term) for weight, term in rest)
+    )
 
 
 def _keeps_angles(law: Law) -> bool:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Grazing angles, down to where the outgoing angle, good to some 1e-15, still has seven digits; for the ends of hollows
 # that keep their direction only to a small depth, times the ratio of this depth to the opening.
 ANGLES = 10.0 ** -np.arange(3.0, 9.0)
-# A tangent is taken as vertical if its horizontal part is below this share: the angles of some ten operations.
+# A tangent is taken as vertical if its horizontal part is below this fraction: the angles of some ten operations.
 VERTICAL = 64.0 * EPS
 # The end of a hollow keeps its direction until its tangent has turned by this angle; halvings that find the place.
 TURNED, HALVINGS = 0.1, 60
@@ -228,9 +228,9 @@ def _row(law: Law, angle: float, end: int, parts: tuple[tuple[float, float], ...
     theta = angle if end == 0 else np.pi - angle
 
     def ratio(outgoing: Floats) -> Floats:
-        share = np.sin(angle) / np.sin(outgoing)
+        fraction = np.sin(angle) / np.sin(outgoing)
         near = outgoing < 0.5 * np.pi
-        return np.stack([np.where(near, share, 0.0), np.where(near, 0.0, share)], axis=-1)
+        return np.stack([np.where(near, fraction, 0.0), np.where(near, 0.0, fraction)], axis=-1)
 
     reflect = law.random_map() if isinstance(law, DrivenLaw) else None
     if reflect is not None:

@@ -39,13 +39,13 @@ class StraightPart:
 
     Attributes
     ----------
-    share : float
+    fraction : float
         <1, Q 1>: the probability of these rays.
     low, high : float
         An interval that holds the top of Q's spectrum, which is all essential: estimated, unless they are equal.
     """
 
-    share: float
+    fraction: float
     low: float
     high: float
 
@@ -68,7 +68,7 @@ def straight_part(law: WallLaw) -> StraightPart:
     >>> bowl = geo.Bezier([(0, 0), (0.5, -1), (1, 0)])
     >>> wall = geo.Wall([bowl, geo.Segment((1, 0), (2, 0))], period=2.0)
     >>> straight_part(WallLaw(wall))
-    StraightPart(share=0.5, low=0.5, high=0.5)
+    StraightPart(fraction=0.5, low=0.5, high=0.5)
     """
     wall = law.wall
     flat = wall.flat_top / wall.period
@@ -76,10 +76,10 @@ def straight_part(law: WallLaw) -> StraightPart:
         return StraightPart(flat, flat, flat)
     angle = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
     found = _largest_of_orbits(law, angle, POINTS)
-    share = float(found.shares @ np.sin(angle) / np.sin(angle).sum())
-    if np.all(found.shares <= flat + 2.0 / POINTS):
-        # what more there is would need a share of rays below what is seen
-        return StraightPart(share, flat, min(flat + 2.0 / POINTS, 1.0))
+    fraction = float(found.fractions @ np.sin(angle) / np.sin(angle).sum())
+    if np.all(found.fractions <= flat + 2.0 / POINTS):
+        # what more there is would need a fraction of rays below what is seen
+        return StraightPart(fraction, flat, min(flat + 2.0 / POINTS, 1.0))
     spacing, best = np.pi / ANGLES, found
     places, values = angle, found.roots
     for look in range(LOOKS):
@@ -90,19 +90,19 @@ def straight_part(law: WallLaw) -> StraightPart:
         fine = look >= LOOKS - FINE_LOOKS
         before, best = best, _largest_of_orbits(law, places, FINE_POINTS if fine else POINTS, fine)
         values = best.roots
-    low = max(float(best.roots.max()), share, flat)
+    low = max(float(best.roots.max()), fraction, flat)
     change = abs(float(best.roots.max()) - float(before.roots.max()))
     high = low + BEYOND * (change + float(best.missing[np.argmax(best.roots)])) + ROUNDING
-    return StraightPart(share, low - ROUNDING, float(min(high, max(found.shares.max() + 2.0 / POINTS, low), 1.0)))
+    return StraightPart(fraction, low - ROUNDING, float(min(high, max(found.fractions.max() + 2.0 / POINTS, low), 1.0)))
 
 
 @dataclass(frozen=True)
 class _Orbits:
-    """Of every starting angle: the largest eigenvalue of its orbit's matrix, what the last layers added, the share."""
+    """For each starting angle: the largest eigenvalue of its orbit's matrix, the last layers' part, the fraction."""
 
     roots: Floats
     missing: Floats
-    shares: Floats
+    fractions: Floats
 
 
 def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, halved: bool = False) -> _Orbits:
@@ -126,8 +126,8 @@ def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, halved: bool =
                     orbit.append(node)
                 fresh += [node for node in new if node not in rows]
         fresh = list(dict.fromkeys(fresh))
-    shares = np.array([rows[_node(theta)][0].sum() for theta in starts])
-    return _Orbits(roots[-1], roots[-1] - roots[-2], shares)
+    fractions = np.array([rows[_node(theta)][0].sum() for theta in starts])
+    return _Orbits(roots[-1], roots[-1] - roots[-2], fractions)
 
 
 def _node(theta: float) -> int:

@@ -14,7 +14,7 @@ from ...kernels.bases.panels import ONE_PANEL
 from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewhere, what_is_true, why_not_self_adjoint
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
-from ..bounds.separation import lambertian_share
+from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trials
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge, essential_edge
@@ -28,8 +28,8 @@ from .verdict import SpectralGap, isolated, made_from
 # Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
 # exact the look is that counts them.
 ENCLOSED, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK = 3, 8, 1e-2, 2
-# Enclosures somewhat wider than the tolerance are sought once more, to this share of it; a gap whose error misses the
-# tolerance is handed over as it is where that is below the largest miss, a share of the gap.
+# Enclosures somewhat wider than the tolerance are sought once more, to this fraction of it; a gap whose error misses
+# the tolerance is handed over as it is where that is below the largest miss, a fraction of the gap.
 CLOSER, LARGEST_MISS = 0.25, 1e-3
 # From this tolerance on, small matrices by few rays may do for the gap of a traced wall: their sizes, with the errors
 # asked of them, and the rays allowed. What larger bases would change is at most this multiple of the last change where
@@ -218,8 +218,8 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | No
     if small is not None:
         return small
     upper = spectral_gap(law, tolerance, rng)
-    if upper.verdict == "no gap" or lambertian_share(law) == upper.value:
-        # of modulus 1, or as large as the rest of a law with a Lambertian share can be
+    if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
+        # of modulus 1, or as large as the rest of a law with a Lambertian fraction can be
         return upper
     listed = law_eigenvalues(law, MODULI, tolerance, rng)
     place = int(np.argmin(listed.values))
@@ -266,10 +266,10 @@ def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generato
 
 def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
     """By what is known best: of shallow walls the form of 1 - P, else enclosures and matrices."""
-    share, rest = without_identity(law)
-    if share < 1.0:
+    fraction, rest = without_identity(law)
+    if fraction < 1.0:
         own = SharedMatrices(matrices.rng)
-        return _scaled(gap_by_theorem(rest) or _by_refinement(rest, tolerance / share, own), share)
+        return _scaled(gap_by_theorem(rest) or _by_refinement(rest, tolerance / fraction, own), fraction)
     edge = essential_edge(law)
     small = shallow_gap(law, edge)
     if small is not None and small.error <= tolerance:
@@ -280,10 +280,12 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
     return small if small is not None and small.error < found.error else found
 
 
-def _scaled(found: SpectralGap, share: float) -> SpectralGap:
-    """The gap of (1 - share) + share R from that of R."""
-    reason = f"a share {share:.6g} of the law is R, the rest keeps all angles: the gap is {share:.6g} times that of R"
-    value, error = share * found.value, share * found.error + 4.0 * EPS * share * found.value
+def _scaled(found: SpectralGap, fraction: float) -> SpectralGap:
+    """The gap of (1 - fraction) + fraction R from that of R."""
+    reason = (
+        f"the law is R in a fraction {fraction:.6g} and the identity in the rest: its gap is that fraction of R's gap"
+    )
+    value, error = fraction * found.value, fraction * found.error + 4.0 * EPS * fraction * found.value
     return replace(found, value=value, error=error, evidence=(reason, *found.evidence), spectrum=None)
 
 
@@ -325,8 +327,8 @@ def _at_edge(
 
 
 def _lower_bound(law: Law) -> tuple[str, ...]:
-    share = lambertian_share(law)
-    return (f"the gap is at least {share:.6g}, the Lambertian share of the law",) if share > 0.0 else ()
+    fraction = lambertian_fraction(law)
+    return (f"the gap is at least {fraction:.6g}, the Lambertian fraction of the law",) if fraction > 0.0 else ()
 
 
 def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:

@@ -17,10 +17,10 @@ from ..essential.exact import ideal_spectrum
 
 # Legendre polynomials of laws that have no rows with known errors; the first is enough for ten eigenvalues of most.
 DEGREES = (48, 96)
-# Share of the tolerance that the entries of a matrix may spend.
-MATRIX_SHARE = 0.1
-# Enclosures are asked for to this share of the tolerance, for they come out somewhat wider; they are sought again, at
-# most so often and to no less than this share of what was asked, while that narrows them by this factor.
+# Fraction of the tolerance that the entries of a matrix may spend.
+MATRIX_FRACTION = 0.1
+# Enclosures are asked for to this fraction of the tolerance, for they come out somewhat wider; they are sought again,
+# at most so often and to no less than this fraction of what was asked, while that narrows them by this factor.
 FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 3, 1e-3, 0.5
 # Eigenvalues that are enclosed at most in the search of the largest off the constants.
 MOST_ENCLOSED = 24
@@ -46,7 +46,7 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: np.random.Generator
 def _by_matrices(law: Law, k: int, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
     best = None
     for degree in DEGREES:
-        found = matrix_spectrum(discretise(law, Legendre(degree), tolerance=MATRIX_SHARE * tolerance, rng=rng), k)
+        found = matrix_spectrum(discretise(law, Legendre(degree), tolerance=MATRIX_FRACTION * tolerance, rng=rng), k)
         if best is None or found.errors.total().max() < best.errors.total().max():
             best = found
         if made_of_isometries(law) or best.errors.total().max() <= tolerance:

@@ -24,15 +24,15 @@ FIRST_SAMPLES, LARGEST_SAMPLES = 2**17, 2**22
 SAMPLES_AT_EDGE, DEGREE_AT_EDGE, TOLERANCE_AT_EDGE = 2**19, 24, 1e-4
 # Quadratures with an error above this many standard errors of as many rays are given up.
 POOR = 4.0
-# Share of the tolerance that a matrix may spend.
-MATRIX_SHARE = 0.1
+# Fraction of the tolerance that a matrix may spend.
+MATRIX_FRACTION = 0.1
 FEWEST_LEVELS = 3
 # Two refinements in a row must each shrink the change of the eigenvalue by this factor before it converges: at an
 # essential edge the change falls only like a power of 1/log(n), by less than this a doubling.
 SHRINKAGE = 2.0
 # Changes that shrink by less than this do not tell where they lead.
 STALLED = 0.6
-# A change below this share of the gap does not matter, whatever it does.
+# A change below this fraction of the gap does not matter, whatever it does.
 NEGLIGIBLE = 1e-3
 # Changes below this many rounding errors say nothing about convergence.
 ROUNDING_FLOOR = 1e-12
@@ -142,7 +142,7 @@ def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essentia
     steps = Refinement((), False, ())
     near_edge = edge.low > NEGLIGIBLE
     for basis, samples in _steps(law):
-        wanted = max(MATRIX_SHARE * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
+        wanted = max(MATRIX_FRACTION * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
         matrix = matrices(law, basis, samples, wanted)
         found = matrix_spectrum(matrix, EIGENVALUES)
         levels.append(found)
@@ -187,7 +187,7 @@ def _noise(level: Spectrum) -> float:
 def _converges(levels: list[Spectrum], tolerance: float) -> bool:
     """Whether each of the last two refinements shrank the change, or left one that is negligible.
 
-    Negligible is what noise explains, or what is below the tolerance and a small share of the gap.
+    Negligible is what noise explains, or what is below the tolerance and a small fraction of the gap.
     """
     if len(levels) < FEWEST_LEVELS:
         return False

@@ -27,12 +27,13 @@ ONCE, WITHIN = 3.0, 5.0
 PANELS, NODES, DEGREES = 32, 12, 12
 # Panels in the incoming angle, with enough nodes for products of two polynomials.
 ANGLE_PANELS, ANGLE_NODES = 4, 24
-# The factor by which fast oscillations shrink is looked at in steps of this share of the fastest of them, up to so many
-# turns of the piece that turns least; pieces that turn more than this ratio less than the steepest slope are refused.
+# The factor by which fast oscillations shrink is looked at in steps of this fraction of the fastest of them, up to so
+# many turns of the piece that turns least; pieces that turn more than this ratio less than the steepest slope are
+# refused.
 STEP, TURNS, LEAST_TURN = 0.2, 30.0, 0.01
 # Fast oscillations must shrink by this multiple of the gap, and are those by so much faster than its eigenfunction.
 APART, FASTER = 1.25, 1.5
-# An error above this share of the gap is of no use.
+# An error above this fraction of the gap is of no use.
 LARGEST_ERROR = 0.01
 # Relative rounding of sums of squares with weights of one sign, from slopes that have all but the last few digits.
 ROUNDING = 1e-12
@@ -90,9 +91,9 @@ def shallow_gap(law: Law, edge: EssentialEdge) -> SpectralGap | None:
         <f, (1 - P_F) f> = 1/2 E (f(theta'_F) - f(theta))^2,  cos(theta'_F) - cos(theta) = 2 sin(theta - phi) sin(phi),
 
     is a sum of squares of small numbers that are known to full relative accuracy: the difference of two values of a
-    polynomial is its divided difference times that of the cosines. Less steep rays, a share of 9 s^2/2 for the
+    polynomial is its divided difference times that of the cosines. Less steep rays, a fraction of 9 s^2/2 for the
     steepest slope s, stay within 5 s of grazing, so that their part of the form is at most 1/2 |f'|^2 (25 s^2/2)^2
-    times this share. In the paper's convention P~ f = P_F f for even f, and the eigenvalues of odd functions are
+    times this fraction. In the paper's convention P~ f = P_F f for even f, and the eigenvalues of odd functions are
     near -1.
 
     The smallest value of the form on Legendre polynomials is an upper bound of the gap. By how much the gap is less is
@@ -164,13 +165,13 @@ class _Form:
             float(np.abs(vector) @ norms),
             float(np.abs(vector) @ (norms * degrees * (degrees + 1) / 2.0)),
         )
-        # grazing rays: their share of the flux, and how far they move in the cosine
-        share, moved = 2.0 * np.sin(0.5 * ONCE * steep) ** 2, 2.0 * np.sin(0.5 * WITHIN * steep) ** 2
-        self.grazing_error = 0.5 * share * (steepness * moved) ** 2
+        # grazing rays: their fraction of the flux, and how far they move in the cosine
+        fraction, moved = 2.0 * np.sin(0.5 * ONCE * steep) ** 2, 2.0 * np.sin(0.5 * WITHIN * steep) ** 2
+        self.grazing_error = 0.5 * fraction * (steepness * moved) ** 2
         local = float(slopes.shrinkage(_frequencies(slopes, 1.0 / (ONCE * steep))).min())
         # their residual, on oscillations of their scale and on slow functions
-        spread = 1.0 / local + 1.5 * share * np.log(1.0 / (ONCE * steep)) / slopes.mean_square
-        grazing = share * (steepness * moved + self.value * height) ** 2
+        spread = 1.0 / local + 1.5 * fraction * np.log(1.0 / (ONCE * steep)) / slopes.mean_square
+        grazing = fraction * (steepness * moved + self.value * height) ** 2
         steeper = float(mass @ alike**2) / float(values[1] - values[0]) + (0.0 if mirrored else float(mass @ other**2))
         self.missed = 2.0 * (grazing * spread + steeper)
 

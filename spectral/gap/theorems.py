@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...core.rounding import EPS
 from ...kernels import Bins, InvolutionLaw, Law, MatrixLaw, discretise
 from ...kernels.laws.structure import made_of_isometries
-from ..bounds.separation import lambertian_share
+from ..bounds.separation import lambertian_fraction
 from ..eigenvalues.spectra import Verdict, matrix_spectrum
 from ..essential.edge import essential_edge
 from ..essential.exact import ideal_spectrum
@@ -37,19 +37,17 @@ def gap_by_theorem(law: Law) -> SpectralGap | None:
             f"the spectrum off the constants consists of two isolated eigenvalues of infinite multiplicity, "
             f"{ideal.even:.12g} on even functions of cos(theta) and {ideal.odd:.12g} on odd ones"
         )
-        if lambertian_share(law) == 1.0:
+        if lambertian_fraction(law) == 1.0:
             reason = "the law is Lambertian: of rank 1, its spectrum off the constants is 0"
         return _stated(law, 1.0 - ideal.top, ideal.rounding, "isolated", reason)
     if isinstance(law, MatrixLaw):
         return _of_finite_rank(law)
-    share = lambertian_share(law)
-    if share > 0.0:
+    fraction = lambertian_fraction(law)
+    if fraction > 0.0:
         edge = essential_edge(law)
-        if edge.kind == "bound" and abs(edge.low - (1.0 - share)) <= 4.0 * EPS:
-            reason = (
-                f"a Lambertian share a = {share:.6g} makes the gap at least a, and the essential spectrum reaches 1 - a"
-            )
-            return _stated(law, share, 4.0 * EPS, "essential edge", reason, *edge.reasons)
+        if edge.kind == "bound" and abs(edge.low - (1.0 - fraction)) <= 4.0 * EPS:
+            reason = f"a Lambertian fraction a = {fraction:.6g}: the gap is at least a, and the essential spectrum reaches 1 - a"
+            return _stated(law, fraction, 4.0 * EPS, "essential edge", reason, *edge.reasons)
     return None
 
 

@@ -82,7 +82,7 @@ class WorkRow:
 
     @property
     def spread(self) -> float:
-        """Greatest minus least time of the repeats as a share of the least."""
+        """Greatest minus least time of the repeats as a fraction of the least."""
         return (max(self.seconds) - self.least) / self.least if self.seconds else 0.0
 
     def as_dict(self) -> dict[str, Any]:

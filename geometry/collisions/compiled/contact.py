@@ -73,8 +73,8 @@ V2, V4, V6, V8, V10 = 1.0 / 2.0, -1.0 / 24.0, 1.0 / 720.0, -1.0 / 40320.0, 1.0 /
 CLEAR = ESCAPED
 # numba compiles a function again for every literal that it is called with, but not for constants of these types
 NOTHING, ZERO, NO = np.int64(-1), np.int64(0), np.bool_(False)
-# Of the slack, 16 rounding errors, a root's own error may be this share.
-ROOT_SHARE = 1.0 / 16.0
+# Of the slack, 16 rounding errors, a root's own error may be this fraction.
+ROOT_FRACTION = 1.0 / 16.0
 # Incidences below 1e-6 radians are treated as that one, so that the slack stays far below the pieces' lengths.
 WIDEST_SLACK = 1e6
 # A near tangency halves its distance at every step at worst, from the wall's size to its rounding in about 100 steps.
@@ -259,7 +259,7 @@ def next_root(sign, leaving, line, conic, span, path, patience):
         t += step
         turned = turning(motion.spin * t)
         # what F may still be there is its gap to the parabola; far below the slack it counts as 0
-        if step < ahead and (doubt * step * step <= ROOT_SHARE * slack or t == before):
+        if step < ahead and (doubt * step * step <= ROOT_FRACTION * slack or t == before):
             return t, turned, CLEAR
     else:
         return t, turned, BOUNCE_LIMIT

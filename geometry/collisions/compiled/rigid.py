@@ -173,11 +173,11 @@ def surface(kind, index, x, y, ground):
     if kind == LINE:
         n1, n2 = lines[index, LINE_NORMAL_X], lines[index, LINE_NORMAL_Y]
         ex, ey, length = lines[index, EDGE_X], lines[index, EDGE_Y], lines[index, LENGTH]
-        share = ((x - joints[index, JOINT_X]) * ex + (y - joints[index, JOINT_Y]) * ey) / (length * length)
-        near = index if share <= 0.5 else index + 1
+        fraction = ((x - joints[index, JOINT_X]) * ex + (y - joints[index, JOINT_Y]) * ey) / (length * length)
+        near = index if fraction <= 0.5 else index + 1
         if near != index:
-            share -= 1.0
-        return joints[near, JOINT_X] + share * ex, joints[near, JOINT_Y] + share * ey, n1, n2
+            fraction -= 1.0
+        return joints[near, JOINT_X] + fraction * ex, joints[near, JOINT_Y] + fraction * ey, n1, n2
     curvature, stretch = arcs[index, CURVATURE], arcs[index, STRETCH]
     qx, qy = x - arcs[index, START_X], stretch * (y - arcs[index, START_Y])
     n1, n2 = arcs[index, NORMAL_X] - curvature * qx, arcs[index, NORMAL_Y] - curvature * qy

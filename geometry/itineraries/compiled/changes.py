@@ -35,8 +35,8 @@ allocating = njit(**{**_INNER, "_nrt": True})
 # Samples of one row at most; what is then still undecided counts as error.
 MOST_SAMPLES = 1 << 13
 MOST_ROUNDS = 200
-# Gaps that matter less than this share of the worst one wait for a later round.
-WORST_SHARE = 0.1
+# Gaps that matter less than this fraction of the worst one wait for a later round.
+WORST_FRACTION = 0.1
 # Labels below this are statuses of rays that did not escape.
 FIRST_LABEL = np.uint64(4)
 
@@ -224,7 +224,7 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
         if total <= goal:
             break
         # the worst first, so that an accumulation of changes does not use up all samples before the others are found
-        fair = max(0.25 * goal / gap_count, WORST_SHARE * worst)
+        fair = max(0.25 * goal / gap_count, WORST_FRACTION * worst)
         fresh_count = np.int64(0)
         moved = False
         for g in range(gap_count):

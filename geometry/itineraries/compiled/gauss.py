@@ -25,11 +25,11 @@ SPARE = 4
 # A Gauss rule's error is taken as the last difference times the last ratio of differences, at least this, twice: where
 # differences shrink by chance rather than regularly, smaller ratios have proved too hopeful.
 LEAST_RATIO = 0.03
-# Pieces are not halved below this share of the opening.
+# Pieces are not halved below this fraction of the opening.
 NARROWEST = 1e-9
 MOST_HALVINGS = 40
-# The share of what the rules of a row may spend that those of any piece may, however short it is.
-LEAST_SHARE = 0.02
+# The fraction of what the rules of a row may spend that those of any piece may, however short it is.
+LEAST_FRACTION = 0.02
 
 
 class Rules(NamedTuple):
@@ -119,7 +119,7 @@ def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     while depth > 0:
         depth -= 1
         low, high = low_stack[depth], high_stack[depth]
-        allowed = goal * max((high - low) / whole, LEAST_SHARE)
+        allowed = goal * max((high - low) / whole, LEAST_FRACTION)
         used, miss, other, spent = apply_rules((low, high), label, allowed, rules, task, nodes, filled, strict)
         rays += spent
         if not math.isnan(other):

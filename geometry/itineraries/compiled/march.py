@@ -31,14 +31,14 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 # Pieces of a row that its neighbours start from.
 MOST_SEEDS = 128
-# Rounding of the mean of a row, as a share of the opening, and of the place of a change, as one of the hollow's size.
-# Rays are good to a few units of EPS times the derivative of their map, seldom above some hundreds except next to a
-# change: measured, not proved.
+# Rounding of the mean of a row, as a fraction of the opening, and of the place of a change, as one of the hollow's
+# size. Rays are good to a few units of EPS times the derivative of their map, seldom above some hundreds except next to
+# a change: measured, not proved.
 ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
-# The share of the tolerance that the Gauss rules may spend, and that all undecided gaps may take.
-RULE_SHARE, GAP_SHARE = 0.5, 0.25
-# The share of what the gaps may take for those of a change that was overlooked.
-LATE_SHARE = 0.05
+# The fraction of the tolerance that the Gauss rules may spend, and that all undecided gaps may take.
+RULE_FRACTION, GAP_FRACTION = 0.5, 0.25
+# The fraction of what the gaps may take for those of a change that was overlooked.
+LATE_FRACTION = 0.05
 
 
 @allocating
@@ -70,7 +70,7 @@ def march_row(task, goal, rules, places, chain, nodes, pieces):
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
     task.flights[0] = 0
-    count, last = sample_row(places, task, chain, GAP_SHARE * goal)
+    count, last = sample_row(places, task, chain, GAP_FRACTION * goal)
     rays = np.int64(0)
     # the margins count with the first and the last sample
     node[0], mass[0] = outs[0], xs[0] - left
@@ -85,13 +85,13 @@ def march_row(task, goal, rules, places, chain, nodes, pieces):
             j = follow[j]
         if j != i:
             ready, miss, other, spent = integrate_piece(
-                (xs[i], xs[j]), (outs[i], labels[i]), RULE_SHARE * goal, rules, task, nodes, filled,
+                (xs[i], xs[j]), (outs[i], labels[i]), RULE_FRACTION * goal, rules, task, nodes, filled,
                 count < MOST_SAMPLES - 4 and not is_spent(task),
             )  # fmt: skip
             rays += spent
             if not math.isnan(other):
                 # an overlooked change: it joins the samples, and the piece is walked again
-                count = add_change(other, i, task, chain, count, LATE_SHARE * GAP_SHARE * goal)
+                count = add_change(other, i, task, chain, count, LATE_FRACTION * GAP_FRACTION * goal)
                 continue
             filled, error = ready, error + miss
             if labels[i] < FIRST_LABEL:

@@ -13,7 +13,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 # Near its end a piece is as wide as the distance to it or its square root; so many places, at most its last width away
 # from where its middle is expected, meet it in either case.
 PLACES_TRIED = 17
-# The ends of a piece are found to this share of its width, so that its middle can be followed.
+# The ends of a piece are found to this fraction of its width, so that its middle can be followed.
 EDGE_STEPS = 5
 MOST_STEPS = 80
 # Angles closer than this are the same cut: what a square root leaves of it is below rounding.
@@ -61,7 +61,7 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, setting, degre
 
 @inner
 def edge_from(x, step, label, task):
-    """An end of the piece around x, seen in the direction of ``step``: to a small share of its distance."""
+    """An end of the piece around x, seen in the direction of ``step``: to a small fraction of its distance."""
     left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
     inside, outside = x, x + step
     while left < outside < right and label_at(outside, task) == label:

@@ -84,7 +84,7 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
     g(s) = sigma (b2 sigma^2 + b1 sigma + b0).
     """
     _, a1, a2, a3 = g
-    share_slack = JOINT_ULPS * EPS
+    fraction_slack = JOINT_ULPS * EPS
     b0 = (3.0 * a3 * own_s + 2.0 * a2) * own_s + a1
     b1 = 3.0 * a3 * own_s + a2
     b2 = a3
@@ -103,7 +103,7 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
         if bottom == 0.0:
             continue
         s = own_s + top / bottom
-        if -share_slack <= s <= 1.0 + share_slack:
+        if -fraction_slack <= s <= 1.0 + fraction_slack:
             s = min(max(s, 0.0), 1.0)
             slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
             t = bezier_time(curve, s, px, py, vx, vy)

@@ -52,7 +52,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 def cross_bowl(form, place, angle, hits, moment, incidence):
     """Take rays through a bowl: place and angle become those of the exit, hits their number, 0 for a doubtful ray.
 
-    With d the angle of incidence from the arc, X the share of the opening to the left of the ray,
+    With d the angle of incidence from the arc, X the fraction of the opening to the left of the ray,
 
         sin^2(d/2) = (1 - X) sin^2((theta + xi)/2) + X sin^2((theta - xi)/2),
 
@@ -130,15 +130,15 @@ def cross_fan(form, place, angle, hits, vx, vy, turn):
         outside = (form[following + LINK_X] - place[i]) * vy[i] - form[following + LINK_Y] * vx[i]
         odd = count % 2 == 1
         goes_right = odd == (turn[i] > 0.0)
-        share = inside / (inside - outside)
+        fraction = inside / (inside - outside)
         near, far = (right, left) if goes_right else (left, right)
-        exit = near + share * (far - near)
+        exit = near + fraction * (far - near)
         incoming = angle[i]
         angle[i] = form[last + LINK_CONSTANT] + (-incoming if odd else incoming)
         # how closely the ray's line passes the apex, the ends of the opening where it enters, and where it leaves
         west, east = (left - place[i]) * vy[i], (place[i] - right) * vy[i]
         closest = min(min(abs(turn[i]), min(west, east)), min(abs(inside), abs(outside)))
-        hits[i] = hits[i] if closest > doubt and share > 0.0 else 0.0
+        hits[i] = hits[i] if closest > doubt and fraction > 0.0 else 0.0
         place[i] = exit
 
 

@@ -27,27 +27,29 @@ from ...scene.tolerances import NEARBY_SLACKS
 from .options import inlined
 from .records import LINE
 
-# The share from a line's end is negative even where the ray meets that end: it is at least the smallest of doubles.
-LEAST_SHARE = 5e-324
+# The fraction from a line's end is negative even where the ray meets that end: it is at least the smallest of doubles.
+LEAST_FRACTION = 5e-324
 
 
 @inlined
 def line_time(tables, j, sides, px, py, vx, vy):
-    """-> (t, share): flight time to the line that starts at joint j, and the share of it there, negative from its end.
+    """-> (t, fraction): flight time to the line that starts at joint j, and the position on it as a fraction.
+
+    The fraction is negative where it is counted from the line's end.
 
     ``sides`` are the numbers c of its joints.
     """
     joints, lines = tables.joints, tables.lines
     c_before, c_after = sides
-    share = c_before / (c_before - c_after)
+    fraction = c_before / (c_before - c_after)
     near = j
-    if share > 0.5:
+    if fraction > 0.5:
         # from the nearer joint, and negative to say so, so that both ends keep their digits
-        share = min(c_after / (c_before - c_after), -LEAST_SHARE)
+        fraction = min(c_after / (c_before - c_after), -LEAST_FRACTION)
         near = j + 1
-    hx = joints[near, JOINT_X] + share * lines[j, EDGE_X]
-    hy = joints[near, JOINT_Y] + share * lines[j, EDGE_Y]
-    return (hx - px) * vx + (hy - py) * vy, share
+    hx = joints[near, JOINT_X] + fraction * lines[j, EDGE_X]
+    hy = joints[near, JOINT_Y] + fraction * lines[j, EDGE_Y]
+    return (hx - px) * vx + (hy - py) * vy, fraction
 
 
 @inlined
@@ -65,14 +67,14 @@ def joint_side(joints, j, own, px, py, vx, vy, slack):
 
 @inlined
 def nearest_line(scope, own, px, py, vx, vy, time):
-    """-> (t, line, share, corner, nearby): the first line before ``time``, and the time to the first corner; or inf.
+    """-> (t, line, fraction, corner, nearby): the first line before ``time``, and the time to the first corner; or inf.
 
     ``nearby`` says that a line is met so close that the start's rounding may count; see `nearby`.
     """
     tables, slack = scope.tables, scope.slack
     joints = tables.joints
     close = NEARBY_SLACKS * slack
-    best, found, best_share, nearby = np.inf, -1, 0.0, False
+    best, found, best_fraction, nearby = np.inf, -1, 0.0, False
     first, end = scope.joints
     c_before, corner_time = joint_side(joints, first, own, px, py, vx, vy, slack)
     for j in range(first, end - 1):
@@ -81,19 +83,19 @@ def nearest_line(scope, own, px, py, vx, vy, time):
         if c_before >= 0.0 >= c_after and c_before > c_after and joints[j, STARTS_LINE] > 0.0:
             is_own = own.kind == LINE and own.number == j
             if not is_own:
-                t, share = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
+                t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
                 if t > close:
                     if t < min(best, time):
-                        best, found, best_share = t, j, share
+                        best, found, best_fraction = t, j, fraction
                 elif t >= -close:
                     nearby = True
         c_before = c_after
-    return best, found, best_share, corner_time, nearby
+    return best, found, best_fraction, corner_time, nearby
 
 
 @inlined
 def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
-    """-> (t, line, share, corner, nearby) as `nearest_line`, from the lines in the cells that the ray passes.
+    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the cells that the ray passes.
 
     Lines are listed in every cell that they nearly touch, so the walk's own rounding leaves out no line that the ray
     can meet; the signs at the joints are the same numbers in every cell.
@@ -109,7 +111,7 @@ def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
     step_y = hollow[CELL_HEIGHT] / abs(vy) if vy != 0.0 else np.inf
     leave_x = ((column + 1 if vx > 0.0 else column) - x) * (hollow[CELL_WIDTH] / vx) if vx != 0.0 else np.inf
     leave_y = ((row + 1 if vy > 0.0 else row) - y) * (hollow[CELL_HEIGHT] / vy) if vy != 0.0 else np.inf
-    best, found, best_share = np.inf, -1, 0.0
+    best, found, best_fraction = np.inf, -1, 0.0
     corner_time, nearby = np.inf, False
     while True:
         cell = base + row * columns + column
@@ -123,11 +125,11 @@ def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
             c_after, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
             corner_time = min(corner_time, ahead)
             if c_before >= 0.0 >= c_after and c_before > c_after and (own.kind != LINE or j != own.number):
-                t, share = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
+                t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
                 # of two lines at one distance the first in the order of the wall is hit, as without a grid
                 if t > close:
                     if t < best or (t == best and j < found):
-                        best, found, best_share = t, j, share
+                        best, found, best_fraction = t, j, fraction
                 elif t >= -close:
                     nearby = True
         if min(leave_x, leave_y) > min(best, time) + 2.0 * slack:
@@ -142,4 +144,4 @@ def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
             leave_y += step_y
             if row < 0 or row >= rows:
                 break
-    return best, found, best_share, corner_time, nearby
+    return best, found, best_fraction, corner_time, nearby

@@ -62,15 +62,15 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 
 @compiled
 def line_nearby(tables, j, px, py, vx, vy, slack):
-    """-> (t, share, is_clear): flight time to a line that is met close by, or inf; whether it is ahead for certain."""
+    """-> (t, fraction, is_clear): flight time to a line close by, or inf; whether it is ahead for certain."""
     joints = tables.joints
     c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
     c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
     if joints[j, STARTS_LINE] > 0.0 and c_before >= 0.0 >= c_after and c_before > c_after:
-        t, share = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
+        t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
         height, reach = t * (c_before - c_after), slack * tables.lines[j, LENGTH]
         if abs(t) <= NEARBY_SLACKS * slack and height >= -reach:
-            return t, share, height > reach
+            return t, fraction, height > reach
     return np.inf, 0.0, False
 
 

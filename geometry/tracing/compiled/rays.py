@@ -55,7 +55,7 @@ from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
 from .arcs import arc_incidence, arc_reflect, arc_time, near_end, on_arc_after
 from .beziers import bend_number, bezier_hit, bezier_reflect
 from .interruption import is_raised
-from .lines import LEAST_SHARE, nearest_line, nearest_line_in_grid
+from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_grid
 from .nearby import DOUBTFUL, hit_nearby
 from .options import compiled, inlined
 from .pointers import address_of, call_at
@@ -156,11 +156,11 @@ def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit of a piece, and the time to the first corner that is met within the slack."""
     hit, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_grid:
-        t, line, share, corner, near = nearest_line_in_grid(scope, own, px, py, vx, vy, hit.time)
+        t, line, fraction, corner, near = nearest_line_in_grid(scope, own, px, py, vx, vy, hit.time)
     else:
-        t, line, share, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
+        t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:
-        hit = Hit(t, LINE, line, share, 0)
+        hit = Hit(t, LINE, line, fraction, 0)
     if nearby or near:
         close_by = call_at(scope.nearby, hit, (scope, own, px, py, vx, vy))
         if close_by.time < hit.time:
@@ -215,7 +215,7 @@ def line_reflect(scope, hit, own, vx, vy):
     near = line if hit.s >= 0.0 else line + 1
     px, py = joints[near, JOINT_X] + hit.s * lines[line, EDGE_X], joints[near, JOINT_Y] + hit.s * lines[line, EDGE_Y]
     # a first hit below an end of the opening is as exact as the ray, at the smallest distance from that corner
-    room = LEAST_SHARE * lines[line, LENGTH] if own.bounces == 0 and joints[near, JOINT_Y] == 0.0 else scope.slack
+    room = LEAST_FRACTION * lines[line, LENGTH] if own.bounces == 0 and joints[near, JOINT_Y] == 0.0 else scope.slack
     at_corner = abs(hit.s) * lines[line, LENGTH] <= room and joints[near, IS_CORNER] > 0.0
     w = 2.0 * (vx * lines[line, LINE_NORMAL_X] + vy * lines[line, LINE_NORMAL_Y])
     return px, py, vx - w * lines[line, LINE_NORMAL_X], vy - w * lines[line, LINE_NORMAL_Y], at_corner

@@ -86,9 +86,9 @@ ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, LOST, UNSETTLED = 0, 1, 2, 3, 4, 5
 NO_PIECE, LID, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 # pi - math.pi
 PI_REST = 1.2246467991473532e-16
-# The first-order estimate of the width is trusted to this share.
+# The first-order estimate of the width is trusted to this fraction.
 WIDTH_MARGIN = 1.0 + 2.0**-20
-# Where the accumulated rounding exceeds this share of the cell, nothing is settled.
+# Where the accumulated rounding exceeds this fraction of the cell, nothing is settled.
 LARGEST_ERROR = 2.0**-50
 # Shorter runs are followed hit by hit, so that they check those of `compiled/runs`; of a longer one the last hits are.
 LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
@@ -179,7 +179,7 @@ def is_beside(joints, index, corner):
 
 @_compile
 def local_error(sizes):
-    """-> float: bound on the rounding error of the ray, as a share of the scale."""
+    """-> float: bound on the rounding error of the ray, as a fraction of the scale."""
     return LOCAL_ERROR * math.sqrt(sizes.errors * (sizes.c_jj + sizes.c_aa))
 
 
@@ -197,7 +197,7 @@ def amplification_of(sizes):
 
 @_compile
 def after_flight(sizes, flight):
-    """-> Sizes: those of a ray after a flight, whose time is a share of the scale."""
+    """-> Sizes: those of a ray after a flight, whose time is a fraction of the scale."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
     c_jj += flight * (2.0 * c_ja + flight * c_aa)
     return Sizes(j1 + flight * a1, a1, j2 + flight * a2, a2, c_jj, c_ja + flight * c_aa, c_aa, errors, half_ulp)
@@ -243,13 +243,13 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
         starts_here = j > first and joints[j - 1, STARTS_LINE] > 0.0
         is_own = own.kind == LINE and own.number == j - 1
         if starts_here and not is_own and before[0] >= 0.0 >= after[0] and before[0] > after[0]:
-            share = divide(before, subtract(before, after))
+            fraction = divide(before, subtract(before, after))
             x0, y0, x1, y1 = line_ends(joints, j - 1)
-            dx = subtract(add(wide(x0), multiply(share, two_sum(x1, -x0))), px)
-            dy = subtract(add(wide(y0), multiply(share, two_sum(y1, -y0))), py)
+            dx = subtract(add(wide(x0), multiply(fraction, two_sum(x1, -x0))), px)
+            dy = subtract(add(wide(y0), multiply(fraction, two_sum(y1, -y0))), py)
             t = dot(dx, dy, vx, vy)
             height = t[0] * (before[0] - after[0]) / tables.lines[j - 1, LENGTH]
-            hit = WideHit(t, LINE, j - 1, share)
+            hit = WideHit(t, LINE, j - 1, fraction)
             if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, (height, scope.slack, error)):
                 nearest = hit
         before = after

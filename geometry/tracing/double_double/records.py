@@ -69,7 +69,7 @@ class WideOwn(NamedTuple):
 
 
 class WideHit(NamedTuple):
-    """What a flight meets: its time, the piece, and where on it: the share of a line, or the parameter on a curve."""
+    """What a flight meets: its time, the piece, and the position on it: fraction of a line, parameter of a curve."""
 
     time: Wide
     kind: int
@@ -78,7 +78,7 @@ class WideHit(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """What accompanies a ray, see `rays`; displacements are shares of the scale.
+    """What accompanies a ray, see `rays`; displacements are fractions of the scale.
 
     Its Jacobi fields, of a displacement (j1, a1) and of a turn (j2, a2); the sum of M M^T, with entries for
     displacement and turn, and how many errors there are; and half an ulp of the incoming angle.

@@ -33,7 +33,7 @@ from .beziers import bezier_coefficients, bezier_place, cubic, cubic_slope
 LINE, ARC, BEZIER = 3, 4, 5
 # A double-double place that was put on a curve carries so much of the slack: 16 EPS against 64 of its own roundings.
 CURVE_NOISE = 2.0**-48
-# Rounding of (b - a) x (c - a), as a share of the sum of its two products: Shewchuk 1997, ccwerrboundA.
+# Rounding of (b - a) x (c - a), as a fraction of the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ROUNDING = (3.0 + 16.0 * EPS) * UNIT_ROUNDOFF
 # A ray whose last start lies further behind a face than so many slacks did not start between it and its own piece.
 BEHIND_SLACKS = 4.0

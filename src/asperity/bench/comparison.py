@@ -12,8 +12,8 @@ from ..core.tables import table
 from ..spectral import WorkReport, WorkRow
 from .run import BenchRun
 
-# A row is slower only if chance would show it in less than this share of the rows, and by more than machines drift in a
-# day. Four repeats that are all slower than four others, the fewest that are run, have the p-value 1/70.
+# A row is slower only if chance would show it in less than this fraction of the rows, and by more than machines drift
+# in a day. Four repeats that are all slower than four others, the fewest that are run, have the p-value 1/70.
 SIGNIFICANT, DRIFT = 0.02, 1.25
 # An error that grew by less than this is that of another rounding or another sample.
 GREW = 2.0

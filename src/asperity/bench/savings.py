@@ -176,11 +176,11 @@ def _alike(name: str, wall: Wall, repeats: int) -> Saving:
         return matrix.symmetric, matrix.error.value
 
     def one_by_one() -> tuple[Floats, float]:
-        shares = [part.period / wall.period for part in parts]
+        fractions = [part.period / wall.period for part in parts]
         laws = [_by_beams(part) for part in parts]
-        level = (1.0 - sum(shares)) * np.diag([1.0, -1.0])
-        total = sum((share * law.symmetric for share, law in zip(shares, laws, strict=True)), level)
-        return total, sum(share * law.error.value for share, law in zip(shares, laws, strict=True))
+        level = (1.0 - sum(fractions)) * np.diag([1.0, -1.0])
+        total = sum((fraction * law.symmetric for fraction, law in zip(fractions, laws, strict=True)), level)
+        return total, sum(fraction * law.error.value for fraction, law in zip(fractions, laws, strict=True))
 
     times = side_by_side(together, one_by_one, repeats)
     distance = float(np.linalg.norm(times.first[0] - times.second[0]))
@@ -265,7 +265,7 @@ def plan_words(wall: Wall) -> str:
     if plan.hollows > plan.distinct_hollows:
         words[0] += f", {plan.distinct_hollows} of them different"
     if plan.pieces_left_out:
-        words.append(f"{plan.pieces_left_out} flat tops of {plan.flat_share:.0%} of the period left out")
+        words.append(f"{plan.pieces_left_out} flat tops of {plan.flat_fraction:.0%} of the period left out")
     if plan.closed_forms:
         words.append(f"{plan.closed_forms} of two lines or one arc, in closed form")
     runs = {"arcs": plan.arcs_with_runs, "channels": plan.channels, "wedges": plan.wedges}

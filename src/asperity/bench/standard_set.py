@@ -103,20 +103,20 @@ def run_problems(
                     say(f"{name}: left out, no independent reference is known")
                     continue
                 if plan.remaining >= LEAST_SECONDS:
-                    # before the share is cut: the first process on a machine compiles for minutes
+                    # before the fraction is cut: the first process on a machine compiles for minutes
                     child.start()
-                report = _run(_problem(name), effort, folder, child, plan.next_share())
+                report = _run(_problem(name), effort, folder, child, plan.next_fraction())
                 say(f"{name}: {len(report.rows)} rows")
                 yield report
 
 
-def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: ChildProcess, share: float) -> WorkReport:
-    """The report of one problem, made within its share of the time."""
+def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: ChildProcess, fraction: float) -> WorkReport:
+    """The report of one problem, made within its fraction of the time."""
     scene, quantity = problem.name.split("/")
     entries = QUANTITIES[quantity].methods(wall_of(scene))
     methods = [method for method, _, _ in entries]
     ladders = {method.name: (quick if effort.quick else full) for method, quick, full in entries}
-    plan = TimePlan(share, len(methods))
+    plan = TimePlan(fraction, len(methods))
     ends: dict[str, TimePlan] = {}
 
     def runner(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
@@ -124,7 +124,7 @@ def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: Child
             if plan.remaining >= LEAST_SECONDS:
                 # its start counts to the problem, but not to the method
                 child.start()
-            ends[method.name] = TimePlan(plan.next_share(AUTO_WEIGHT if method.name == problem.auto else 1.0), 1)
+            ends[method.name] = TimePlan(plan.next_fraction(AUTO_WEIGHT if method.name == problem.auto else 1.0), 1)
         limit = min(effort.row_seconds, ends[method.name].remaining)
         if limit < LEAST_SECONDS:
             return WorkRow(method.name, budget, "left out", note="the time planned for this method was spent")

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 ErrorKind = Literal["bound", "estimate"]
 
-# The share of intervals of estimated width that hold the true value.
+# The fraction of intervals of estimated width that hold the true value.
 LEVEL = 0.95
 # Of how many standard deviations such an interval of a normal variable has on each side.
 NORMAL_95 = 1.959963984540054

@@ -10,10 +10,10 @@ import numpy as np
 ENTRIES = 1000
 HALVINGS = 40
 # An outcome changes at a handful of places, each known to (1/ENTRIES) 2^-HALVINGS and to the rounding of the tracer.
-SHARE_ERROR = 1e-10
+FRACTION_ERROR = 1e-10
 
 
-def share(occurs: Callable[[Any, Any], Any], theta: Any, low: float = 0.0) -> Any:
+def fraction(occurs: Callable[[Any, Any], Any], theta: Any, low: float = 0.0) -> Any:
     """How large a part of the entry points from ``low`` to 1 has an outcome, for every angle.
 
     ``occurs`` says so of arrays of entry points and angles. An outcome that comes and goes between two neighbours of

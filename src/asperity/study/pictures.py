@@ -114,8 +114,8 @@ def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:
     above.plot(outgoing[:, 0], outgoing[:, 1], ".", color="black", markersize=2.5, rasterized=True,
                label=f"{SAMPLES} samples")  # fmt: skip
     edges = np.linspace(allowed[:, 0].min(), allowed[:, 0].max(), VELOCITY_BINS + 1)
-    share = np.histogram(outgoing[:, 0], edges)[0] / SAMPLES
-    below.stairs(share, edges, fill=True, color="0.55")
+    fraction = np.histogram(outgoing[:, 0], edges)[0] / SAMPLES
+    below.stairs(fraction, edges, fill=True, color="0.55")
     for matrix, label, marker, colour in (
         (smooth_matrix(disk), "smooth disk", "o", SMOOTH), (no_slip_matrix(disk), "no-slip disk", "s", NO_SLIP),
     ):  # fmt: skip
@@ -126,7 +126,7 @@ def draw_outgoing_velocities(collision: CollisionLaw, figure: Figure) -> None:
     above.set_ylabel("outgoing v2 (radius / time)")
     above.legend(frameon=False, fontsize=8, loc="lower center", ncols=2)
     above.set_title("Disk in with v1 = 1, v2 = -1 (radius / time) and no spin", fontsize=11)
-    below.set_ylim(0.0, 1.08 * float(share.max()))
+    below.set_ylim(0.0, 1.08 * float(fraction.max()))
     below.set_ylabel("probability per bin")
     below.set_xlabel("outgoing v1 (radius / time)")
     spin = above.secondary_xaxis(

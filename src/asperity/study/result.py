@@ -24,7 +24,7 @@ class TracerCheck:
         Mean number of collisions of the rays that enter a hollow.
     expected_collisions : float
         |boundary of the hollows| / |openings|: Kac's formula for hollows all of whose boundary can be reached from the
-        opening. Where a part cannot, as in the caps of mushrooms, the mean is smaller, by that part's share.
+        opening. Where a part cannot, as in the caps of mushrooms, the mean is smaller, by that part's fraction.
     """
 
     counts: Mapping[str, int]

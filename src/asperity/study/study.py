@@ -30,8 +30,8 @@ BINS = 128
 TOLERANCE = 1e-3
 CHECK_RAYS = 2**16
 EIGENVALUES = 10
-# Share of the tolerance that eigenvalues may spend.
-MATRIX_SHARE = 0.1
+# Fraction of the tolerance that eigenvalues may spend.
+MATRIX_FRACTION = 0.1
 # Eigenvalues that are enclosed, the constants' included: some seconds on a traced wall.
 ENCLOSED = 3
 # Rays of a sampled matrix: enough to see how many more it takes, and as many as a few seconds allow.
@@ -210,14 +210,14 @@ def _spectrum(
         # whatever the basis, these are numbers of the grid; those of the matrix that is shown and saved
         return with_gap(spectrum(matrix, k=EIGENVALUES), gap)
     if gap is None:
-        return spectrum(law, EIGENVALUES, tolerance=MATRIX_SHARE * tolerance, rng=rng)
-    return with_gap(law_eigenvalues(law, EIGENVALUES, MATRIX_SHARE * tolerance, rng), gap)
+        return spectrum(law, EIGENVALUES, tolerance=MATRIX_FRACTION * tolerance, rng=rng)
+    return with_gap(law_eigenvalues(law, EIGENVALUES, MATRIX_FRACTION * tolerance, rng), gap)
 
 
 def _enclosures(law: WallLaw, gap: SpectralGap | None, tolerance: float) -> Enclosures:
     if gap is not None and gap.verdict == "no gap":
         raise AccuracyError("1 belongs to the essential spectrum, and no eigenvalue next to it is isolated", 0.0)
-    return enclosures(law, ENCLOSED, tolerance=MATRIX_SHARE * tolerance)
+    return enclosures(law, ENCLOSED, tolerance=MATRIX_FRACTION * tolerance)
 
 
 def _matrix(law: Law, basis: Bins, tolerance: float, rng: np.random.Generator) -> KernelMatrix:

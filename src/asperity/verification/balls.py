@@ -79,10 +79,10 @@ def _exactly(number: Any) -> Value | None:
     """The value of a sympy number that is kept exactly, None of another."""
     if number.is_Rational:
         return Value(arb(fmpq(int(number.p), int(number.q))), number)
-    share, rest = number.as_coeff_Mul(rational=True)
+    fraction, rest = number.as_coeff_Mul(rational=True)
     base, power = rest.as_base_exp()
     if base is sp.pi and power.is_Integer:
-        return Value(arb.pi() ** int(power) * fmpq(int(share.p), int(share.q)), number)
+        return Value(arb.pi() ** int(power) * fmpq(int(fraction.p), int(fraction.q)), number)
     return None
 
 

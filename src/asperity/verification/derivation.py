@@ -316,7 +316,7 @@ def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -
         return _equal_numbers(difference)
     if all(part.is_nonnegative(side) for side in (left, right)) and vanishes(left**2 - right**2, part.parameters):
         return SQUARES
-    if any(vanishes(difference - share * g, part.plain) for g in _zero(part) for share in _SHARES):
+    if any(vanishes(difference - fraction * g, part.plain) for g in _zero(part) for fraction in _FRACTIONS):
         return CONDITION
     if _equal_inside(left, right, part, differentiate):
         return INSIDE
@@ -330,7 +330,7 @@ def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -
     return None
 
 
-_SHARES = (1, -1, sp.S.Half, -sp.S.Half, 2, -2)
+_FRACTIONS = (1, -1, sp.S.Half, -sp.S.Half, 2, -2)
 
 
 def _zero(part: Part) -> list[Any]:

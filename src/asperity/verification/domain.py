@@ -342,8 +342,8 @@ def _between(low: float, high: float, rng: np.random.Generator) -> float:
         return low + _logarithmic(rng, FARTHEST)
     if np.isinf(low):
         return high - _logarithmic(rng, FARTHEST)
-    share = rng.random() if rng.random() < 0.5 else _logarithmic(rng, 0.5)
-    return low + (high - low) * (share if rng.random() < 0.5 else 1.0 - share)
+    fraction = rng.random() if rng.random() < 0.5 else _logarithmic(rng, 0.5)
+    return low + (high - low) * (fraction if rng.random() < 0.5 else 1.0 - fraction)
 
 
 def _logarithmic(rng: np.random.Generator, top: float) -> float:

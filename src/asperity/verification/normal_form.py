@@ -95,8 +95,8 @@ class Parameters:
         arguments |= {argument for f in e.atoms(sp.exp, sp.Pow) if (argument := self._exponent(f)) is not None}
         changed = False
         for argument in arguments:
-            for share, unit in _terms(argument):
-                divisor = lcm(self._divisors.get(unit, 1), int(share.q))
+            for fraction, unit in _terms(argument):
+                divisor = lcm(self._divisors.get(unit, 1), int(fraction.q))
                 changed |= divisor != self._divisors.get(unit, 1)
                 self._divisors[unit] = divisor
         if changed:
@@ -120,7 +120,7 @@ class Parameters:
             return sine if e.func is sp.sin else cosine
         exponent = self._exponent(e)
         if exponent is not None:
-            return sp.Mul(*(self._exponential(share, unit) for share, unit in _terms(exponent)))
+            return sp.Mul(*(self._exponential(fraction, unit) for fraction, unit in _terms(exponent)))
         if not e.args:
             return e
         if not _is_arithmetic(e):
@@ -154,12 +154,12 @@ class Parameters:
 
     def _sine_and_cosine(self, argument: Any) -> tuple[Any, Any]:
         terms = _terms(argument)
-        turn = sum(share for share, unit in terms if unit is sp.pi)
+        turn = sum(fraction for fraction, unit in terms if unit is sp.pi)
         sine, cosine = sp.sin(sp.pi * turn), sp.cos(sp.pi * turn)
-        for share, unit in terms:
+        for fraction, unit in terms:
             if unit is sp.pi:
                 continue
-            one = self._multiple(int(share * self._divisors[unit]), *self._unit_circle(unit))
+            one = self._multiple(int(fraction * self._divisors[unit]), *self._unit_circle(unit))
             sine, cosine = sine * one[1] + cosine * one[0], cosine * one[1] - sine * one[0]
         return sine, cosine
 
@@ -211,24 +211,24 @@ class Parameters:
     def _alternating(self, exponent: Any) -> Any:
         """(-1) to the power of an integer."""
         found = sp.Integer(1)
-        for share, unit in _terms(exponent):
-            if not (share.is_Integer and unit.is_integer):
+        for fraction, unit in _terms(exponent):
+            if not (fraction.is_Integer and unit.is_integer):
                 return self._opaque.setdefault(((-1), exponent), sp.Dummy("p"))
             if unit == 1:
-                found *= (-1) ** share
-            elif share % 2:
+                found *= (-1) ** fraction
+            elif fraction % 2:
                 # a pair (c, 0) with c^2 = 1
                 if unit not in self._alternations:
                     self._alternations[unit] = sp.Dummy("a", real=True)
                 found *= self._alternations[unit]
         return found
 
-    def _exponential(self, share: Any, unit: Any) -> Any:
+    def _exponential(self, fraction: Any, unit: Any) -> Any:
         if unit.func is sp.log:
             base = self._rebuilt(unit.args[0])
-            return base**share if share.is_Integer else _power(base, share)
+            return base**fraction if fraction.is_Integer else _power(base, fraction)
         symbol = self._exponentials.setdefault(unit, sp.Dummy("E", positive=True))
-        return symbol ** (share * self._divisors[unit])
+        return symbol ** (fraction * self._divisors[unit])
 
 
 def _is_arithmetic(e: Any) -> bool:

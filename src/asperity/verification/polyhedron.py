@@ -32,11 +32,11 @@ class Inequality:
         constant = sp.Integer(0)
         coefficients: dict[Any, Any] = {}
         for term in sp.Add.make_args(sp.expand(expression)):
-            share, unit = term.as_coeff_Mul(rational=True)
+            fraction, unit = term.as_coeff_Mul(rational=True)
             if not term.free_symbols:
                 constant += term
             elif unit.is_Symbol:
-                coefficients[unit] = coefficients.get(unit, 0) + share
+                coefficients[unit] = coefficients.get(unit, 0) + fraction
             else:
                 return None
         if constant.is_real is not True or constant.is_finite is not True:

@@ -133,25 +133,25 @@ class Part:
     def _of_root_and_rest(self, e: Any) -> Signs | None:
         """The sign of the root where it is larger than the rest."""
         for term in e.args:
-            share, root = term.as_coeff_Mul(rational=True)
+            fraction, root = term.as_coeff_Mul(rational=True)
             if root.is_Pow and root.exp == sp.S.Half:
                 rest = e - term
-                if self.signs(sp.expand(share**2 * root.base - rest**2)) == POSITIVE:
-                    return POSITIVE if share > 0 else NEGATIVE
+                if self.signs(sp.expand(fraction**2 * root.base - rest**2)) == POSITIVE:
+                    return POSITIVE if fraction > 0 else NEGATIVE
         return None
 
     def _bounds(self, term: Any) -> tuple[Any, Any, bool]:
         """Bounds of a term, and whether one of them, 0, is not reached."""
         if term.is_number:
             return term, term, False
-        share, rest = term.as_coeff_Mul(rational=True)
+        fraction, rest = term.as_coeff_Mul(rational=True)
         factors = [factor.as_base_exp() for factor in sp.Mul.make_args(rest)]
         if all(base.func in (sp.sin, sp.cos) and times.is_Integer and times > 0 for base, times in factors):
             low = 0 if all(times % 2 == 0 for _, times in factors) else -1
-            return *sorted([share * low, share]), False
+            return *sorted([fraction * low, fraction]), False
         if rest.func in _RANGES:
             low, high = _RANGES[rest.func]
-            return *sorted([share * low, share * high], key=float), rest.func is not sp.acos
+            return *sorted([fraction * low, fraction * high], key=float), rest.func is not sp.acos
         signs = self.signs(term)
         return (
             sp.Integer(0) if signs <= NOT_NEGATIVE else -sp.oo,

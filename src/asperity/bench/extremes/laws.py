@@ -58,7 +58,7 @@ def _collision(name: str, ratio: float, rays: int) -> ExtremeRow:
 
 
 def _gap(name: str, gap: float) -> ExtremeRow:
-    """Maxwell's law of a small diffuse share: 1 - gap on all that is even, its negative on what is odd."""
+    """Maxwell's law of a small diffuse fraction: 1 - gap on all that is even, its negative on what is odd."""
     found = spectrum(discretise(maxwell(gap), Legendre(GAP_SIZE)), k=GAP_SIZE)
     return ExtremeRow(name, "Maxwell's law, a", abs(found.gap - gap), 64.0 * EPS, "absolute", found.gap_error)
 

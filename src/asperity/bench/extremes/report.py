@@ -31,7 +31,7 @@ class ExtremeReport:
 
     def table(self) -> str:
         """A Markdown table and the number of cases by verdict."""
-        heads = "case | reference | error | may be | unit | share that escaped | seconds | verdict | "
+        heads = "case | reference | error | may be | unit | fraction that escaped | seconds | verdict | "
         verdicts = Counter(row.verdict for row in self.rows)
         numbers = ", ".join(f"{number} {verdict}" for verdict, number in verdicts.items())
         return f"{table(heads, map(_cells, self.rows))}\n\n{len(self.rows)} cases: {numbers}."

@@ -27,7 +27,7 @@ TRUE_DISKS = 2**18
 DISK_SCENES = tuple(name for name in standard_names() if name != "mixed")
 
 
-def velocity_share() -> tuple[float, float]:
+def velocity_fraction() -> tuple[float, float]:
     """Factors a, b of v1 = a cos(theta) sin(psi) + b cos(psi) at speed 1."""
     frame = np.asarray(DISK.frame)
     return float(frame[0, 0]), float(frame[2, 0])
@@ -35,7 +35,7 @@ def velocity_share() -> tuple[float, float]:
 
 def square_of_v1() -> float:
     """<v1, v1> in Lambda^2."""
-    along, roll = velocity_share()
+    along, roll = velocity_fraction()
     return along**2 * SINE_MEAN / 3.0 + roll**2 * COSINE_MEAN
 
 
@@ -44,7 +44,7 @@ def correlation_of(moment: float) -> float:
 
     v1 = a cos theta sin psi + b cos psi, and K keeps sin psi and turns the sign of cos psi.
     """
-    along, roll = (share**2 for share in velocity_share())
+    along, roll = (fraction**2 for fraction in velocity_fraction())
     return (along * SINE_MEAN / 3.0 * moment - roll * COSINE_MEAN) / square_of_v1()
 
 
@@ -73,7 +73,7 @@ def _collision_methods(wall: Wall) -> Methods:
 def by_operator(wall: Wall, **how: Any) -> Estimate:
     """From the matrix of K on polynomials of degree below 2 in either angle, which hold v1."""
     operator = CollisionLaw.from_wall(wall, DISK).operator(Legendre(2), Legendre(2, weight="sin2"), **how)
-    along, roll = velocity_share()
+    along, roll = velocity_fraction()
     # v1 in the orthonormal product basis: only the mean over psi of sin(psi) is not a polynomial, so split by hand
     moment = operator.theta_matrix.symmetric[1, 1]
     psi = operator.flip[1, 1]
@@ -92,7 +92,7 @@ def by_velocities(wall: Wall, number: int, rng: np.random.Generator) -> float:
 
 def by_action(wall: Wall, nodes: int) -> float:
     """From K v1 at Gauss nodes in cos(theta) and Gauss-Chebyshev nodes in psi."""
-    along, roll = velocity_share()
+    along, roll = velocity_fraction()
     cosines, weights = np.polynomial.legendre.leggauss(nodes)
     theta = np.arccos(cosines)[:, None]
     psi = np.pi * np.arange(1, 5) / 5.0

@@ -120,13 +120,13 @@ def _serve(pipe: Connection) -> None:
 class TimePlan:
     """Shares ``seconds``, counted from its making, among ``parts``.
 
-    If no part takes more than its share the sum is at most ``seconds``: a share is never more than what is left, and
+    If no part takes more than its part the sum is at most ``seconds``: a fraction is never more than what is left, and
     what a part leaves the later ones have.
 
     Examples
     --------
     >>> plan = TimePlan(10.0, 2)
-    >>> round(plan.next_share())
+    >>> round(plan.next_fraction())
     5
     """
 
@@ -143,8 +143,8 @@ class TimePlan:
         """Seconds that are left, at least 0."""
         return max(self.seconds - (time.monotonic() - self._begun), 0.0)
 
-    def next_share(self, weight: float = 1.0) -> float:
+    def next_fraction(self, weight: float = 1.0) -> float:
         """Seconds that the next part may take, if it counts as ``weight`` of the later ones."""
-        share = weight / (weight + self._left - 1) * self.remaining
+        fraction = weight / (weight + self._left - 1) * self.remaining
         self._left = max(self._left - 1, 1)
-        return share
+        return fraction

@@ -115,7 +115,7 @@ def wall_that_is_felt_as_given(point: Code) -> Verdict:
 @verified(
     id="S2.25",
     section="2.3.4",
-    statement="The smooth and the no-slip law are symmetric with respect to Λ² and keep the rolling direction's share.",
+    statement="The smooth and the no-slip law are symmetric with respect to Λ² and keep the rolling component.",
     printed=Formula(
         r"(\theta, \psi) \mapsto (\pi - \theta, \pi - \psi), \quad (\theta, \psi) \mapsto (\theta, \pi - \psi)",
         lambda theta, psi, xp: [(xp.pi - theta, xp.pi - psi), (theta, xp.pi - psi)],
@@ -149,8 +149,8 @@ def next_side(vertices: Any, point: Any, along: Any, last: int) -> tuple[float, 
         if index == last or cross == 0:
             continue
         when = (offset[0] * edge[1] - offset[1] * edge[0]) / cross
-        share = (offset[0] * along[1] - offset[1] * along[0]) / cross
-        if 0 <= when < time and 0 <= share <= 1:
+        fraction = (offset[0] * along[1] - offset[1] * along[0]) / cross
+        if 0 <= when < time and 0 <= fraction <= 1:
             time, side = when, index
     return time, side
 

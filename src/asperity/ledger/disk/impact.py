@@ -190,7 +190,7 @@ def energy_of_the_heavy_body(bound: Code) -> Verdict:
     s = 2 * np.sum(own * w * change, axis=0) / np.sum((own + own**2 / other) * change**2, axis=0)
     taken = s**2 * np.sum(own**2 / other * change**2, axis=0)
     whole = np.sum(own * w**2, axis=0)
-    # head on, w' = (own - other)/(own + other) w: the share taken is 4 ratio/(1 + ratio)^2
+    # head on, w' = (own - other)/(own + other) w: the fraction taken is 4 ratio/(1 + ratio)^2
     light = np.array([1e-7, 1e-6])
     head_on = 4 * light / (1 + light) ** 2
     return every(

@@ -12,19 +12,19 @@ from ...kernels.laws.crevice import crevice_retro
 from ...kernels.walls.rectangular import RectangularTeethLaw
 from ...verification import Formula, Verdict, agreement, erratum, verify
 from ...verification.entry import Code
-from ..entry_probability import SHARE_ERROR, share
+from ..entry_probability import FRACTION_ERROR, fraction
 
 HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
 
 
-def share_of_specular(height_to_width: float, theta: Any, low: float) -> Any:
+def fraction_of_specular(height_to_width: float, theta: Any, low: float) -> Any:
     """How many of the rays that enter between ``low`` and 1 leave specularly, by tracing."""
 
     def is_specular(x: Any, theta: Any) -> Any:
         out = trace(rectangular_teeth(height_to_width), x, theta).theta
         return np.abs(out + theta - np.pi) < np.abs(out - theta)
 
-    return share(is_specular, theta, low)
+    return fraction(is_specular, theta, low)
 
 
 def compared_with_tracing(probability: Code, low: float) -> Verdict:
@@ -32,8 +32,8 @@ def compared_with_tracing(probability: Code, low: float) -> Verdict:
     theta = np.linspace(0.15, 3.0, 40)
     ratios = np.array(HEIGHTS_TO_WIDTHS)
     found = [probability(ratio, theta) for ratio in ratios]
-    traced = [share_of_specular(ratio, theta, low) for ratio in ratios]
-    return agreement(found, traced, SHARE_ERROR, height_to_width=ratios[:, None], theta=theta)
+    traced = [fraction_of_specular(ratio, theta, low) for ratio in ratios]
+    return agreement(found, traced, FRACTION_ERROR, height_to_width=ratios[:, None], theta=theta)
 
 
 def crossings(height_to_width: float, theta: Any) -> Any:
@@ -71,7 +71,7 @@ def exchanged_cases_of_the_crevice(height_to_width: float, theta: Any) -> Any:
     "The two cases are exchanged.",
     kind="numeric",
 )
-def specular_share_of_rectangular_teeth(probability: Code) -> Verdict:
+def specular_fraction_of_rectangular_teeth(probability: Code) -> Verdict:
     return compared_with_tracing(probability, 0.0)
 
 
@@ -93,7 +93,7 @@ def specular_share_of_rectangular_teeth(probability: Code) -> Verdict:
     "number of sides makes it specular.",
     kind="numeric",
 )
-def specular_share_of_a_crevice(probability: Code) -> Verdict:
+def specular_fraction_of_a_crevice(probability: Code) -> Verdict:
     return compared_with_tracing(probability, 0.5)
 
 

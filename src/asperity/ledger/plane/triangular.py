@@ -11,7 +11,7 @@ from ...geometry.disk.disk import foreshortening
 from ...kernels.walls.triangular import TriangularTeethLaw
 from ...verification import Formula, Verdict, agreement, convention, erratum, every, holds, verified, verify
 from ...verification.entry import Code
-from ..entry_probability import SHARE_ERROR, share
+from ..entry_probability import FRACTION_ERROR, fraction
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
 ENTRIES = 2000
@@ -39,7 +39,7 @@ def most_hits(psi: float, theta: Any) -> Any:
     return np.ceil(2 * theta / psi)
 
 
-def share_of_fewer(psi: float, theta: Any, shift: float = 0.0) -> Any:
+def fraction_of_fewer(psi: float, theta: Any, shift: float = 0.0) -> Any:
     """p_psi, with N shifted for the comparison."""
     last = (most_hits(psi, theta) + shift - 0.5) * psi - theta
     return (np.cos(theta - psi / 2) - np.cos(last)) / (2 * np.sin(theta) * np.sin(psi / 2))
@@ -56,7 +56,7 @@ def outcomes(psi: float, theta: Any, half: Code) -> tuple[Any, Any]:
 
 def two_outcomes(psi: float, theta: Any) -> tuple[Any, Any]:
     """Probabilities and angles of the form with two outcomes, taken for all theta."""
-    fewer = np.clip(share_of_fewer(psi, theta), 0.0, 1.0)
+    fewer = np.clip(fraction_of_fewer(psi, theta), 0.0, 1.0)
     return np.stack([fewer, 1.0 - fewer], axis=-1), np.stack(outcomes(psi, theta, np.floor), axis=-1)
 
 
@@ -160,8 +160,8 @@ def number_of_hits(most: Code) -> Verdict:
         r"p_\psi(\theta) = \frac{\cos(\theta - \psi/2) - \cos((N - \frac12)\psi - \theta)}{2 \sin\theta \sin(\psi/2)}",
         lambda psi, theta: TriangularTeethLaw(psi).branches(theta)[0][..., 0],
     ),
-    perturbed=lambda psi, theta: np.clip(share_of_fewer(psi, theta, shift=1.0), 0.0, 1.0),
-    reason="This is the share of entry points left of the ray through the last corner, and it is positive by itself. "
+    perturbed=lambda psi, theta: np.clip(fraction_of_fewer(psi, theta, shift=1.0), 0.0, 1.0),
+    reason="This is the fraction of entry points left of the ray through the last corner, and it is positive. "
     "No shift of N makes the printed formula right; the check is shown to refute one with N + 1 for N.",
     kind="numeric",
 )
@@ -169,9 +169,9 @@ def probability_of_fewer_hits(probability: Code) -> Verdict:
     def check(psi: float) -> Verdict:
         theta = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)[1]
         wall = triangular_teeth(psi)
-        found = share(lambda x, theta: trace(wall, x, theta).collisions == most_hits(psi, theta) - 1, theta)
-        named = agreement(share_of_fewer(psi, theta), found, SHARE_ERROR, theta=theta)
-        return every(named, agreement(probability(psi, theta), found, SHARE_ERROR, theta=theta))
+        found = fraction(lambda x, theta: trace(wall, x, theta).collisions == most_hits(psi, theta) - 1, theta)
+        named = agreement(fraction_of_fewer(psi, theta), found, FRACTION_ERROR, theta=theta)
+        return every(named, agreement(probability(psi, theta), found, FRACTION_ERROR, theta=theta))
 
     return every_apex(check)
 
@@ -183,7 +183,7 @@ def probability_of_fewer_hits(probability: Code) -> Verdict:
     printed=Formula(
         r"\text{two outcomes, for all } \theta",
         lambda psi, x, theta: np.where(
-            x < share_of_fewer(psi, theta), outcomes(psi, theta, np.floor)[0], outcomes(psi, theta, np.floor)[1]
+            x < fraction_of_fewer(psi, theta), outcomes(psi, theta, np.floor)[0], outcomes(psi, theta, np.floor)[1]
         ),
     ),
     corrected=Formula(

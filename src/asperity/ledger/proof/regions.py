@@ -97,12 +97,12 @@ def _corrected_width(rho: np.ndarray, eps: np.ndarray, L: float) -> np.ndarray:
         r"\varepsilon^{-1}(\rho/2 - \delta_0) - (L\log(1/\rho) + 1) - \frac{L\log(1/\rho)^2}{4\log\log(1/\rho)}",
         _corrected_width,
     ),
-    reason="As printed it is negative for every ρ < 1 and L ≥ 1, so Ξ is empty. From the corrected edge, a share that "
-    "tends to 1, the flights of the iteration end at the gap; R'_ε is to be changed likewise.",
+    reason="As printed it is negative for every ρ < 1 and L ≥ 1, so Ξ is empty. From the corrected edge, a fraction "
+    "that tends to 1, the flights of the iteration end at the gap; R'_ε is to be changed likewise.",
 )
 def width_of_the_good_angles(width: Code) -> Verdict:
     rho = np.array([1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
-    eps = rho**2.5  # so that the gaps take a share of 2 rho^(1/2)
+    eps = rho**2.5  # so that the gaps take a fraction of 2 rho^(1/2)
 
     def check(L: float) -> Verdict:
         found = width(rho, eps, L)
@@ -191,7 +191,7 @@ def size_of_a_displacement(bound: Code) -> Verdict:
 @verified(
     id="S5.38",
     section="5.3.5",
-    statement="The zoomed rectangle R*_ε has the area ρ/ε, so ερ⁻¹ makes measures of parts of it shares.",
+    statement="The zoomed rectangle R*_ε has the area ρ/ε, so ερ⁻¹ makes measures of parts of it fractions.",
     printed=Formula(r"\varepsilon\rho^{-1}|R^*_\varepsilon| = 1", lambda eps, rho: eps / rho),
     perturbed=lambda eps, rho: eps**2 / rho,
     reason="R_ε has the sides ε and ρ, and both are divided by ε. Where the text has P × S² minus Ω* it means R*_ε × "
