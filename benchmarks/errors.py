@@ -19,7 +19,7 @@ import numpy as np
 from asperity import kernels as ker
 from asperity.core.tables import table
 from asperity.kernels.discretisation.method import Budget
-from asperity.kernels.discretisation.traced import row_matrix
+from asperity.kernels.discretisation.traced import traced_matrix
 from asperity.kernels.walls.conditionals import adaptive_conditionals
 
 TESTS = Path(__file__).parents[1] / "tests"
@@ -61,7 +61,7 @@ def references() -> list[dict[str, object]]:
 
 
 def outcomes(
-    kinds: Sequence[int], tolerances: Sequence[float], most_flights: int, moments: bool = True
+    kinds: Sequence[int], tolerances: Sequence[float], most_segments: int, moments: bool = True
 ) -> Iterator[Outcome]:
     """Rows and moments of these walls to these tolerances."""
     # of the tests, not of the library
@@ -78,7 +78,7 @@ def outcomes(
             for k, miss in enumerate(distance.tolist()):
                 yield Outcome("row", kind, tolerance, float(rows.error[k]), miss, entry["row_errors"][k])
             if within:
-                matrix, error, _ = row_matrix(wall, ker.Legendre(2), Budget(tolerance, segments=most_flights))
+                matrix, error, _ = traced_matrix(wall, ker.Legendre(2), Budget(tolerance, segments=most_segments))
                 miss = abs(float(matrix[1, 1]) - float.fromhex(entry["moment"]))
                 yield Outcome("moment", kind, tolerance, error, miss, entry["moment_error"])
                 # finer tolerances would end at the same number of flights

@@ -27,7 +27,7 @@ from asperity.bench.running.references import FILE
 from asperity.bench.standard_set import problem_names
 from asperity.core.checks import Floats
 from asperity.kernels.discretisation.method import Budget
-from asperity.kernels.discretisation.traced import row_matrix
+from asperity.kernels.discretisation.traced import traced_matrix
 
 from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
 from .reference_eigenvalues import reference_eigenvalue
@@ -69,7 +69,7 @@ def beam_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | 
     found = {}
     for name in names:
         exact = ker.discretise(ker.PolygonLaw(wall), BASES[name], "exact")
-        other, doubt, _ = row_matrix(wall, BASES[name], Budget(ROW_TOLERANCE, segments=MOST_ROW_RAYS))
+        other, doubt, _ = traced_matrix(wall, BASES[name], Budget(ROW_TOLERANCE, segments=MOST_ROW_RAYS))
         way = "adaptive rows"
         if doubt > ROWS_CONFIRM:
             rays = sampled_matrices(wall, (name,), RANDOM_RAYS)[name]

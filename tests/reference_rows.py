@@ -254,7 +254,7 @@ def main() -> None:
     for kind in kinds:
         rows = [row_of(random_curved_wall(kind), theta) for theta in ANGLES]
         found.setdefault(kind, {"kind": kind}).update(
-            angles=list(ANGLES), rows=[value.hex() for value, _ in rows], row_errors=[error for _, error in rows]
+            angles=list(ANGLES), rows=[value.hex() for value, _ in rows], mean_errors=[error for _, error in rows]
         )
         _write(found)
         print(kind, [f"{value:.12f}+-{error:.0e}" for value, error in rows], flush=True)

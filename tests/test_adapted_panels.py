@@ -12,7 +12,7 @@ from asperity.kernels.bases.measure import gauss_rule
 from asperity.kernels.bases.panels import ONE_PANEL
 from asperity.kernels.discretisation.arcs import arc_matrix
 from asperity.kernels.expectations.angle_panels import NODES
-from asperity.spectral.bounds.trial_space import adapted_trials
+from asperity.spectral.bounds.trial_space import adapted_trial_space
 
 ANGLES = np.concatenate([0.05 + 0.3 * np.arange(10.0), [1e-6, 1.2, np.pi - 1e-6]])
 EDGES = np.append(np.arange(0.0, 3.0, 0.3), np.pi)
@@ -119,7 +119,7 @@ def test_enclosures_of_a_traced_wall_hold_the_far_finer_run_of_the_benchmark():
 
 
 def test_trial_functions_are_orthonormal_and_of_one_parity():
-    found = adapted_trials(ker.CircularArcLaw(1.2), 3, 1e-6)
+    found = adapted_trial_space(ker.CircularArcLaw(1.2), 3, 1e-6)
     gram = found.vectors.T @ found.vectors
     assert np.allclose(gram, np.eye(3), atol=1e-4)
     assert found.mirrored and found.values[0] == 1.0

@@ -11,7 +11,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.bases.panels import ONE_PANEL
 from asperity.kernels.discretisation.method import Budget
-from asperity.kernels.discretisation.traced import KRONROD_FRACTION, row_matrix
+from asperity.kernels.discretisation.traced import KRONROD_FRACTION, traced_matrix
 from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from asperity.kernels.walls.conditionals import adaptive_conditionals
 from plain_tracer import trace_plainly
@@ -33,7 +33,7 @@ def test_rows_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(toler
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
 def test_the_first_moment_of_a_focusing_arc_lies_within_its_error(tolerance: float) -> None:
-    matrix, error, _ = row_matrix(ARCS, ker.Legendre(2), Budget(tolerance))
+    matrix, error, _ = traced_matrix(ARCS, ker.Legendre(2), Budget(tolerance))
     assert error <= tolerance
     assert abs(matrix[1, 1] - FIRST_MOMENT) <= error + LAST_DIGIT
 
@@ -41,7 +41,7 @@ def test_the_first_moment_of_a_focusing_arc_lies_within_its_error(tolerance: flo
 @pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(6), ker.Panels(np.linspace(0.0, np.pi, 4), 2)], ids=repr)
 def test_matrices_of_a_focusing_arc_lie_within_their_errors_in_every_basis(basis: ker.Basis) -> None:
     exact = ker.discretise(ker.CircularArcLaw(1.2), basis)
-    matrix, error, _ = row_matrix(ARCS, basis, Budget(1e-3))
+    matrix, error, _ = traced_matrix(ARCS, basis, Budget(1e-3))
     assert error <= 1e-3
     assert np.linalg.norm(matrix - exact.symmetric) <= error + float(exact.error)
 
@@ -57,7 +57,7 @@ def test_rows_of_random_walls_agree_with_a_plain_tracer(kind: int) -> None:
 
 
 def test_a_matrix_that_runs_out_of_rays_says_by_how_much_it_fell_short() -> None:
-    matrix, error, _ = row_matrix(ARCS, ker.Legendre(2), Budget(1e-12, segments=200_000))
+    matrix, error, _ = traced_matrix(ARCS, ker.Legendre(2), Budget(1e-12, segments=200_000))
     assert error > 1e-12
     assert abs(matrix[1, 1] - FIRST_MOMENT) <= error
 
@@ -123,7 +123,7 @@ def test_rows_of_channels_without_bottom_in_sight_are_those_of_the_closed_form()
 
 
 def test_rows_of_a_law_come_with_errors_that_hold():
-    rows = ker.WallLaw(ARCS).rows(ANGLES)
+    rows = ker.WallLaw(ARCS).conditionals(ANGLES)
     exact = ker.CircularArcLaw(1.2).apply(np.cos, ANGLES)
     assert np.all(np.abs(rows.mean(np.cos) - exact) <= rows.error) and np.all(rows.error < 1e-7)
 

@@ -133,7 +133,7 @@ def test_known_numbers_are_the_references():
 def test_every_sampled_route_is_within_its_reported_error(name):
     wall = wall_of(name)
     reference = known_reference(f"{name}/law")
-    for route in routes.routes_for(wall):
+    for route in routes.methods_for(wall):
         if route.is_random:
             found = route.matrix(wall, LAW_BASIS, 2**14, np.random.default_rng(1))
             distance = float(np.linalg.norm(found.symmetric - reference.value))

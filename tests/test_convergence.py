@@ -41,7 +41,7 @@ def test_the_fraction_of_collisions_with_two_satellites_is_of_the_order_of_scale
     # the paper's good set leaves out more angles than those at which two satellites do touch
     assert np.all(study.two_satellites < study.gap_fraction)
     # collisions in which one satellite takes part follow the modified law, but for a few near corners
-    assert np.all(study.strays < study.two_satellites)
+    assert np.all(study.outliers < study.two_satellites)
 
 
 def test_the_disk_comes_back_where_it_was_within_the_size_of_a_few_cells(study):

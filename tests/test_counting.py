@@ -276,8 +276,10 @@ def test_replicates_are_sparse_where_that_is_smaller_and_dropped_where_too_large
         found = counting._Replicates(base, 2)
         for mean in means:
             found.add(mean - base)
-        assert all(np.allclose(r.toarray() if issparse(r) else r, m) for r, m in zip(found.kept(), means, strict=False))
-        return found.kept()
+        assert all(
+            np.allclose(r.toarray() if issparse(r) else r, m) for r, m in zip(found.stored(), means, strict=False)
+        )
+        return found.stored()
 
     assert 2**26 <= counting.LARGEST_REPLICATES <= 2**30
     assert not any(issparse(part) for part in kept(np.ones((4, 4))))

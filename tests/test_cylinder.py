@@ -61,7 +61,7 @@ def test_the_flight_time_is_the_length_of_the_foreshortened_ray():
 def test_the_modified_law_follows_that_of_the_cylinder_with_order_one_in_the_spacing(name):
     disk, wall = geo.Disk(1.0, 0.6), WALLS[name]
     scales = np.array([1e-4, 1e-5, 1e-6, 1e-7])
-    spacings, errors, strays = [], [], []
+    spacings, errors, outliers = [], [], []
     for scale in scales:
         spacing = Satellites.around(scale, scale * wall.depth).spacing
         position, velocity = states(wall, scale, 2000, disk=disk)
@@ -72,10 +72,10 @@ def test_the_modified_law_follows_that_of_the_cylinder_with_order_one_in_the_spa
         error = np.abs(modified.velocity - straight.velocity).max(axis=1)
         spacings.append(spacing)
         errors.append(np.median(error))
-        strays.append(np.mean(error > 0.1))
+        outliers.append(np.mean(error > 0.1))
     slope = np.polyfit(np.log(spacings), np.log(errors), 1)[0]
     assert abs(slope - 1.0) < 0.1
-    assert strays[-1] < 0.5 * strays[0] and strays[-1] < 0.02
+    assert outliers[-1] < 0.5 * outliers[0] and outliers[-1] < 0.02
 
 
 @pytest.mark.parametrize("name", WALLS)

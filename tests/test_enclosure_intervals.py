@@ -364,6 +364,6 @@ def test_enclosures_are_read_as_a_sequence_and_as_text():
         "[0.25, 0.75] indexed 1 (bound: why)",
         "[-0.5, 0] contains-spectrum (bound: why)",
     ]
-    trials = enclosure.EnclosedTrials(both, ker.Legendre(2), np.eye(2))
+    trials = enclosure.EnclosedTrialSpace(both, ker.Legendre(2), np.eye(2))
     assert trials.worst == 0.25 and not trials.indexed
-    assert enclosure.EnclosedTrials(Enclosures((first,), REST, "paper", ""), ker.Legendre(2), np.eye(2)).indexed
+    assert enclosure.EnclosedTrialSpace(Enclosures((first,), REST, "paper", ""), ker.Legendre(2), np.eye(2)).indexed

@@ -38,7 +38,7 @@ def stochastic(n: int, rng: np.random.Generator) -> ker.KernelMatrix:
     basis = ker.Bins(n)
     array = rng.random((n, n)) + 0.1
     array /= array.sum(axis=1, keepdims=True)
-    return ker.KernelMatrix(array / basis.heights[:, None] * basis.heights, basis, NO_ERROR)
+    return ker.KernelMatrix(array / basis.normalisation[:, None] * basis.normalisation, basis, NO_ERROR)
 
 
 seeds = st.integers(0, 2**32 - 1).map(np.random.default_rng)

@@ -64,7 +64,7 @@ def test_one_segment_among_curves_reaches_as_far_as_its_best_pair_of_angles():
     x = (np.arange(4000) + 0.5) / 4000
 
     def fraction(angle):
-        out, _ = law.outcomes(x[None, :], angle[:, None])
+        out, _ = law.reflect_with_status(x[None, :], angle[:, None])
         traced = geo.trace(wall, np.broadcast_to(x, out.shape), np.broadcast_to(angle[:, None], out.shape))
         mirrored = np.abs(out - (np.pi + 2.0 * slope - angle)[:, None]) < 1e-9
         return np.mean(mirrored & (traced.collisions == 1), axis=1)

@@ -87,7 +87,7 @@ def test_traced_rays_go_where_the_closed_form_says(wall: geo.Wall) -> None:
     law = WallLaw(wall)
     rng = np.random.default_rng(8)
     x, theta = rng.uniform(0.001, 0.999, 20_000), SINE.sample(20_000, rng)
-    outgoing, escaped = law.outcomes(x, theta)
+    outgoing, escaped = law.reflect_with_status(x, theta)
     assert escaped.mean() > 1.0 - UNRESOLVED_TOLERANCE
     error = np.abs(outgoing - law.closed_form.reflect(x, theta))
     assert np.median(error) < 1e-15
@@ -108,7 +108,7 @@ def test_a_traced_law_applies_and_samples_alike() -> None:
 def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
     law = WallLaw(geo.triangular_teeth(math.pi / 2))
     # straight into the bottom, and beside it
-    outgoing, escaped = law.outcomes([0.5, 0.6], math.pi / 2)
+    outgoing, escaped = law.reflect_with_status([0.5, 0.6], math.pi / 2)
     assert escaped.tolist() == [False, True]
     assert np.allclose(outgoing, math.pi / 2)
     with pytest.raises(AccuracyError, match=r"0\.5 of 2 rays did not escape") as info:

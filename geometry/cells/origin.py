@@ -61,10 +61,10 @@ def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> 
     given = joints[1:][order] - joints[:-1][order]
     if np.any(np.all(vertices[1:] == vertices[:-1], axis=1) & np.any(given != 0.0, axis=1)):
         return None
-    places = [(px, py) for px, py in vertices.tolist()]
+    points = [(px, py) for px, py in vertices.tolist()]
     pieces = [
         Segment(start, end) if isinstance(path[k], Segment) else path[k].moved(float(shift), -y).pinned(start, end)
-        for k, shift, (start, end) in zip(order, shifts, pairwise(places), strict=True)
+        for k, shift, (start, end) in zip(order, shifts, pairwise(points), strict=True)
     ]
     seam = count - first
     if 0 < seam < count:

@@ -94,20 +94,20 @@ def check_crossings(
     found = find_crossing(pieces, period, depth, islands, numbers)
     if found is None:
         return
-    x, y = (found.place[0] + origin[0]) % period, found.place[1] + origin[1]
-    place = f"({x:.6g}, {y:.6g})"
+    x, y = (found.point[0] + origin[0]) % period, found.point[1] + origin[1]
+    point = f"({x:.6g}, {y:.6g})"
     if found.is_slit:
         raise WallError(
-            f"{found.labels[0]} and {found.labels[1]} run back on each other from {place} inside the solid: no ray "
+            f"{found.labels[0]} and {found.labels[1]} run back on each other from {point} inside the solid: no ray "
             "comes into a gap of zero width; end the path where it turns back, or give the gap a width (a plate of "
             "zero thickness has free space on both sides)"
         )
     if len(found.labels) < 2:
         one = found.labels[0] if found.labels else "a piece"
-        raise WallError(f"{one} crosses itself or the neighbouring period near {place}; pieces may touch, not cross")
+        raise WallError(f"{one} crosses itself or the neighbouring period near {point}; pieces may touch, not cross")
     names = f"{', '.join(found.labels[:-1])} and {found.labels[-1]}"
     raise WallError(
-        f"{names} cross (or leave the free side on the wrong side) near {place}; pieces may touch, not cross, "
+        f"{names} cross (or leave the free side on the wrong side) near {point}; pieces may touch, not cross, "
         "and the free side must be on the left of the path"
     )
 
@@ -146,16 +146,16 @@ def _check_left_and_right(starts: Floats, ends: Floats, rounding: Floats, period
     if abs(starts[0, 0]) > JOIN_TOLERANCE * size[0] + rounding[0]:
         backwards = abs(starts[0, 0] - period) <= JOIN_TOLERANCE * size[0] and abs(ends[-1, 0]) < 0.5 * period
         advice = "the pieces run from right to left: reverse them" if backwards else "move the wall to x = 0"
-        raise WallError(f"piece 0: expected the wall to start at x = 0, got {_place(starts[0])}; {advice}")
+        raise WallError(f"piece 0: expected the wall to start at x = 0, got {_coordinates(starts[0])}; {advice}")
     if abs(ends[-1, 0] - period) > JOIN_TOLERANCE * size[0] + rounding[-1]:
         raise WallError(
-            f"piece {last}: expected the wall to end at x = period = {period:g}, got {_place(ends[-1])}; "
+            f"piece {last}: expected the wall to end at x = period = {period:g}, got {_coordinates(ends[-1])}; "
             "pass the period or complete the path"
         )
     if abs(ends[-1, 1] - starts[0, 1]) > JOIN_TOLERANCE * size[1] + rounding[0] + rounding[-1]:
         raise WallError(
             f"pieces 0 and {last}: expected the wall to start and end at the same height, "
-            f"got {_place(starts[0])} and {_place(ends[-1])}; close the step with a vertical segment"
+            f"got {_coordinates(starts[0])} and {_coordinates(ends[-1])}; close the step with a vertical segment"
         )
 
 
@@ -169,8 +169,8 @@ def _joints(
         i = int(np.argmax(excess.max(axis=1)))
         j = i + 1 if not label else (i + 1) % len(ends)
         raise WallError(
-            f"pieces {i} and {j}{label} do not join: piece {i} ends at {_place(ends[i])}, "
-            f"piece {j} starts at {_place(following[i])}"
+            f"pieces {i} and {j}{label} do not join: piece {i} ends at {_coordinates(ends[i])}, "
+            f"piece {j} starts at {_coordinates(following[i])}"
         )
     joints = np.where((later_rounding < rounding)[:, np.newaxis], following, ends)
     return joints, np.minimum(later_rounding, rounding) + gaps.max(axis=1, initial=0.0)
@@ -247,5 +247,5 @@ def _signed_area(pieces: Pieces, size: Floats) -> float:
     return float(np.sum(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]))
 
 
-def _place(point: Floats) -> str:
+def _coordinates(point: Floats) -> str:
     return f"({point[0]:.10g}, {point[1]:.10g})"

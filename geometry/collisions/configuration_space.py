@@ -106,8 +106,8 @@ class ConfigurationSpace:
         # one k for both: two roundings of a tie would give the same satellite twice
         lowest = -self.charts.nearest(values[..., 2])
         beside = lowest + np.where(bar > 0.0, -1, 1)
-        places = (self.zoomed.satellite(zoomed, number) for number in (lowest, beside))
-        return np.asarray(~np.any([in_solid(self.wall, place) for place in places], axis=0))
+        centres = (self.zoomed.satellite(zoomed, number) for number in (lowest, beside))
+        return np.asarray(~np.any([in_solid(self.wall, centre) for centre in centres], axis=0))
 
     def cylinder_contains(self, configuration: ArrayLike) -> NDArray[np.bool_]:
         """Return whether configurations (..., 3) are in M_cyl: (x1 + alpha, x2) is not in the interior of the solid.
@@ -115,8 +115,8 @@ class ConfigurationSpace:
         Section 4.2; section 1.3.3 prints (x1 + alpha, alpha).
         """
         values = _configurations(configuration)
-        place = np.stack(rolling.straight_contact(*np.moveaxis(values, -1, 0)), axis=-1)
-        return ~in_solid(self.wall, place / self.scale)
+        centre = np.stack(rolling.straight_contact(*np.moveaxis(values, -1, 0)), axis=-1)
+        return ~in_solid(self.wall, centre / self.scale)
 
     def normal(self, alpha: ArrayLike, number: ArrayLike, wall_normal: ArrayLike) -> Floats:
         """Return the unit normals (..., 3) of M where satellite ``number`` touches the wall, into M.

@@ -12,10 +12,10 @@ from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk
 from ..tracing.threads import in_blocks
-from ..tracing.tracing import MAX_COLLISIONS, Outcomes
+from ..tracing.tracing import MAX_COLLISIONS, StatusCounts
 from ..walls.wall import Wall
 from .configuration_space import ConfigurationSpace
-from .records import Rolling, ground_of, mass_fractions, results_for, rounding_of_places
+from .records import Rolling, ground_of, mass_fractions, position_rounding, results_for
 from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops
 
 # Newton's method on a convex function halves its error at worst, and squares it soon.
@@ -23,7 +23,7 @@ LANDING_STEPS = 80
 
 
 @dataclass(frozen=True)
-class CylinderCollision(Outcomes):
+class CylinderCollision(StatusCounts):
     """What became of the disks, the first axis of every array running over them.
 
     Attributes
@@ -106,7 +106,7 @@ def collide_cylinder(
     start = at_the_tops(wall, eps, at, moving)
     n = len(at)
     results, ground, masses = results_for(n), ground_of(wall.scene), mass_fractions(disk)
-    rolling = Rolling(eps, wall.cell.depth, rounding_of_places(wall.scene, 0.0))
+    rolling = Rolling(eps, wall.cell.depth, position_rounding(wall.scene, 0.0))
 
     def run(part: slice) -> None:
         roll_disks(start[part], moving[part], masses, rolling, max_contacts, ground, results.part(part))
@@ -119,7 +119,7 @@ def collide_cylinder(
 
 
 @dataclass(frozen=True)
-class ModifiedCollision(Outcomes):
+class ModifiedCollision(StatusCounts):
     """What became of the disks, the first axis of every array running over them.
 
     Attributes

@@ -118,7 +118,7 @@ def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
         satellites.spacing,
         satellites.reach * (1.0 + ROOM),
         satellites.lowest / scale * (1.0 + ROOM),
-        rounding_of_places(scene, math.sin(satellites.reach) / scale),
+        position_rounding(scene, math.sin(satellites.reach) / scale),
         math.sin(half),
         math.cos(half),
     )
@@ -130,7 +130,7 @@ def mass_fractions(disk: Disk) -> tuple[float, float]:
     return disk.mass / total, disk.inertia / total
 
 
-def rounding_of_places(scene: Scene, farthest: float) -> float:
+def position_rounding(scene: Scene, farthest: float) -> float:
     """How far off a satellite may be by rounding: of the wall's size and of its distance from the disk's centre."""
     size = float(scene.hollows[:, SIZE].max()) if len(scene.hollows) else 0.0
     return SLACK * (size + scene.cell + farthest)

@@ -13,13 +13,13 @@ from ..curves.bezier import Bezier
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
 from ..tracing.threads import in_blocks
-from ..tracing.tracing import MAX_COLLISIONS, Outcomes, Status
+from ..tracing.tracing import MAX_COLLISIONS, Status, StatusCounts
 from ..walls.wall import Wall
 from .records import DiskResults, ground_of, mass_fractions, results_for, ring_of
 
 
 @dataclass(frozen=True)
-class RigidCollision(Outcomes):
+class RigidCollision(StatusCounts):
     """What became of the disks, the first axis of every array running over them.
 
     Attributes

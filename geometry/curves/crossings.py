@@ -33,14 +33,14 @@ CURVED_THICKNESS = 4.0 * FLATTENING
 STRAIGHT_THICKNESS = 4e-9
 
 # Coordinates this close are the same, relative to the wall's size (SNAP_TOLERANCE in conditions.py).
-SAME_PLACE = 64.0 * EPS
+SAME_POINT = 64.0 * EPS
 
 # Pieces this close to a crossing are named in the message.
 NEARBY = 1e-7
 
 # A path turns back where its directions before and after a joint are opposite to this, and for segments if their ends
 # are apart by no more than rounding of coordinates.
-TURNED_BACK = 1e-9
+REVERSED = 1e-9
 # Where on the shorter of two pieces that lie on each other it is asked whether free space is beside them.
 ASKED = np.array([0.125, 0.5, 0.875])
 
@@ -52,7 +52,7 @@ WINDING_BLOCK = 4_000_000
 class Crossing:
     """Where pieces cross, or make a slit: the place in the wall's coordinates and the labels of the pieces there."""
 
-    place: tuple[float, float]
+    point: tuple[float, float]
     labels: tuple[str, ...]
     is_slit: bool = False
 
@@ -61,7 +61,7 @@ class Crossing:
 class _Turn:
     """Where a path turns back along itself: the place, the two pieces, and points beside both, left, then right."""
 
-    place: tuple[float, float]
+    point: tuple[float, float]
     pieces: tuple[int, int]
     beside: Floats
 
@@ -110,7 +110,7 @@ def find_crossing(
     for turn in turns:
         beside = np.sum([_winding_numbers(loop.points, turn.beside) for loop in loops], axis=0)
         if np.any(beside.reshape(2, -1).max(axis=0) < 1):
-            return Crossing(turn.place, tuple(labels[k] for k in turn.pieces), True)
+            return Crossing(turn.point, tuple(labels[k] for k in turn.pieces), True)
     return None
 
 
@@ -121,7 +121,7 @@ def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[
         into, out = _directions(path)
         follower = np.roll(out, -1, axis=0)
         across = into[:, 0] * follower[:, 1] - into[:, 1] * follower[:, 0]
-        back = (np.sum(into * follower, axis=1) < 0.0) & (np.abs(across) <= TURNED_BACK)
+        back = (np.sum(into * follower, axis=1) < 0.0) & (np.abs(across) <= REVERSED)
         back[-1] &= number > 0
         for k in np.flatnonzero(back).tolist():
             before, after = path[k], path[(k + 1) % len(path)]
@@ -151,7 +151,7 @@ def _coincidence(before: Curve, after: Curve, across: float, size: tuple[float, 
     """How far apart two pieces may be that lie on each other from their joint on; 0 if they do not."""
     if isinstance(before, Segment) and isinstance(after, Segment):
         apart = across * min(before.length, after.length)
-        return STRAIGHT_THICKNESS if apart <= SAME_PLACE * max(size) else 0.0
+        return STRAIGHT_THICKNESS if apart <= SAME_POINT * max(size) else 0.0
     import shapely
 
     short, long = sorted((before, after), key=lambda piece: piece.length)
@@ -206,13 +206,13 @@ def _faces(loops: Sequence[_Loop]) -> tuple[NDArray[np.object_], Floats]:
     return faces[keep], thickness[keep]
 
 
-def _winding_numbers(points: Floats, places: Floats) -> NDArray[np.int64]:
+def _winding_numbers(points: Floats, points_tested: Floats) -> NDArray[np.int64]:
     """Count how often the closed polyline winds around each place, counterclockwise."""
     start, end = points[:-1], points[1:]
-    winding = np.zeros(len(places), dtype=np.int64)
+    winding = np.zeros(len(points_tested), dtype=np.int64)
     block = max(1, WINDING_BLOCK // len(start))
-    for low in range(0, len(places), block):
-        x, y = places[low : low + block, 0, np.newaxis], places[low : low + block, 1, np.newaxis]
+    for low in range(0, len(points_tested), block):
+        x, y = points_tested[low : low + block, 0, np.newaxis], points_tested[low : low + block, 1, np.newaxis]
         up = (start[:, 1] <= y) & (end[:, 1] > y)
         down = (start[:, 1] > y) & (end[:, 1] <= y)
         side = (end[:, 0] - start[:, 0]) * (y - start[:, 1]) - (x - start[:, 0]) * (end[:, 1] - start[:, 1])
@@ -244,5 +244,5 @@ def _describe(face: object, loops: Sequence[_Loop], labels: Sequence[str], size:
     most = int(np.argmax(np.bincount(corner_index, minlength=len(corners))))
     meeting = np.unique(owner[edge_index[corner_index == most]])
     x, y = (float(v) for v in corners[most] * size)
-    place = (x if 0.0 <= x <= size[0] else x % size[0], y)
-    return Crossing(place, tuple(labels[k] for k in meeting if k >= 0))
+    point = (x if 0.0 <= x <= size[0] else x % size[0], y)
+    return Crossing(point, tuple(labels[k] for k in meeting if k >= 0))

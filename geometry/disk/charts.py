@@ -82,8 +82,8 @@ class RollingCharts:
 
     def residual(self, alpha: ArrayLike) -> Floats:
         """Return alpha-bar = alpha - k-bar rho/scale, in [-rho/2, rho/2] over the scale."""
-        turned = finite_array("alpha", alpha)
-        return np.asarray(turned - self.nearest(turned) * (self.spacing / self.scale))
+        rotation = finite_array("alpha", alpha)
+        return np.asarray(rotation - self.nearest(rotation) * (self.spacing / self.scale))
 
     def satellite(self, configuration: ArrayLike, number: ArrayLike) -> Floats:
         """Return the places (..., 2) of the satellites S_k, k = ``number``, height 0 at the tops (eq. 1.38).
@@ -119,14 +119,14 @@ class RollingCharts:
         [3.0, -0.25]
         """
         s1, s2 = _split("point", point, 2)
-        turned = finite_array("alpha", alpha)
-        return _join((*rolling.roll(s1, s2, self.residual(turned), self.scale), turned))
+        rotation = finite_array("alpha", alpha)
+        return _join((*rolling.roll(s1, s2, self.residual(rotation), self.scale), rotation))
 
     def roll_linear(self, point: ArrayLike, alpha: ArrayLike) -> Floats:
         """Return (s1 - alpha, s2, alpha): f_lin, the linear part of `roll` at alpha = 0 and the chart of M_cyl."""
         s1, s2 = _split("point", point, 2)
-        turned = finite_array("alpha", alpha)
-        return _join(rolling.roll_linear(s1, s2, turned))
+        rotation = finite_array("alpha", alpha)
+        return _join(rolling.roll_linear(s1, s2, rotation))
 
     def bend(self, configuration: ArrayLike) -> Floats:
         """Return H_1 (eq. 4.43), or H_eps (eq. 3.54), of configurations (..., 3).

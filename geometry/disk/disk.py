@@ -152,9 +152,9 @@ class Disk:
         velocity = _velocities("w", w)
         if not np.all(velocity[..., 1] > 0.0):
             where = tuple(int(i) for i in np.argwhere(~(velocity[..., 1] > 0.0))[0])
-            place = f" at index {where}" if where else ""
+            index_text = f" at index {where}" if where else ""
             raise InputError(
-                f"w: expected velocities with v2 > 0, got v2 = {float(velocity[where][1])!r}{place}; "
+                f"w: expected velocities with v2 > 0, got v2 = {float(velocity[where][1])!r}{index_text}; "
                 "pass minus the velocity of an incoming disk"
             )
         across = (velocity[..., 0] + velocity[..., 2]) / math.sqrt(1.0 / self.mass + 1.0 / self.inertia)

@@ -70,10 +70,10 @@ def collision_path(
         first = _first_time(disk, wall, scale, start, moving, spacing, states[-1] if contacts == 1 else states[1])
         path.append((*(start[0] + moving[0, [0, 2]] * first), moving[0, 1] * first))
         height, before = moving[0, 1] * first, first
-        for place, w, at in states[1:]:
+        for configuration, w, at in states[1:]:
             height += w[1] * (at - before)
             before = at
-            path.append((*place, height))
+            path.append((*configuration, height))
     else:
         path.append((*whole.position[0], 0.0))
     return np.array([(x1, x2, alpha) for x1, alpha, x2 in path])
@@ -84,9 +84,9 @@ def _first_time(
     after: tuple[Floats, Floats, float],
 ) -> float:  # fmt: skip
     """When the first contact is: both velocities are known, and where the flight after it ends."""
-    place, w, end = after
+    configuration, w, end = after
     change = w[[0, 2]] - moving[0, [0, 2]]
-    reached = place - start[0] - end * w[[0, 2]]
+    reached = configuration - start[0] - end * w[[0, 2]]
     # start + v first + w (end - first) = place
     if not np.any(change):
         # only v2 changed: it came back to height 0, or touched again at a height that v2 alone does not tell
@@ -146,8 +146,8 @@ def draw_collision(
         colour = RAY_COLOURS[j % len(RAY_COLOURS)]
         for before, after in pairwise(path):
             fraction = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, None]
-            way = space.zoomed.satellite((before + fraction * (after - before)) / eps, number)
-            ax.plot(way[:, 0], way[:, 1], color=colour, linewidth=1.1)
+            track = space.zoomed.satellite((before + fraction * (after - before)) / eps, number)
+            ax.plot(track[:, 0], track[:, 1], color=colour, linewidth=1.1)
     _draw_rims(ax, space, path, numbers)
     ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":")
     ax.set_xlim(left * wall.period, right * wall.period)
@@ -161,8 +161,8 @@ def draw_collision(
 def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Floats) -> None:
     """The rim of the disk at start, contacts and end, with its satellites."""
     angles = np.linspace(-1.5 * space.spacing, 1.5 * space.spacing, 4 * FLIGHT_POINTS)
-    for place in path:
-        x1, x2, alpha = place / space.scale
+    for configuration in path:
+        x1, x2, alpha = configuration / space.scale
         x = x1 + np.sin(angles) / space.scale
         y = x2 + 2.0 * np.sin(0.5 * angles) ** 2 / space.scale
         ax.plot(x, y, color=LEVEL, linewidth=0.7, linestyle=(0, (4, 3)), zorder=1.5)

@@ -64,7 +64,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     >>> draw_wall(geo.triangular_teeth(3.1)).get_ylabel()
     'y (stretched 29.1 times against x)'
     """
-    places, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
+    entries, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     if ax is None:
         from matplotlib import pyplot
 
@@ -72,7 +72,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     free, floor = _heights(wall)
     rays = [
         _Ray(wall, float(place), float(angle), free)
-        for place, angle in zip(np.ravel(places), np.ravel(incoming), strict=True)
+        for place, angle in zip(np.ravel(entries), np.ravel(incoming), strict=True)
     ]
     inside = np.concatenate([[0.0, 1.0], *(ray.points[:, 0] / wall.period for ray in rays)])
     first = max(int(np.floor(inside.min())), -MOST_CELLS)

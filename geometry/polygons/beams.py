@@ -144,23 +144,23 @@ def beams_of(
     whole_number("max_beams", max_beams, 2)
     triangulation = triangulated(hollow_vertices)
     width = triangulation.width
-    halves = 1 if mirror_symmetric else 2
+    entrances = 1 if mirror_symmetric else 2
     corners, real, whole, used, rounding, _, status = interruptibly(
-        lambda: split_beams(triangulation.tables, tolerance, max_beams * halves // 2, halves)
+        lambda: split_beams(triangulation.tables, tolerance, max_beams * entrances // 2, entrances)
     )
     rows, tags = pieces_of(corners, real, whole, used, width)
     if mirror_symmetric:
         rows, tags, rounding = *_with_mirror_images(rows, tags), 2.0 * rounding
     out = tags[:, TAG_LEFT] == 1
-    kept, rest = rows[out], rows[~out]
+    leaving, rest = rows[out], rows[~out]
     unresolved = float(_flux_of(rest).sum())
     return Beams(
         sign=_fixed(tags[out, TAG_SIGN].astype(np.int8)),
-        offset=frozen(kept[:, PIECE_OFFSET]),
-        low=frozen(kept[:, PIECE_LOW]),
-        high=frozen(kept[:, PIECE_HIGH]),
-        sine=frozen(kept[:, PIECE_SINE]),
-        cosine=frozen(kept[:, PIECE_COSINE]),
+        offset=frozen(leaving[:, PIECE_OFFSET]),
+        low=frozen(leaving[:, PIECE_LOW]),
+        high=frozen(leaving[:, PIECE_HIGH]),
+        sine=frozen(leaving[:, PIECE_SINE]),
+        cosine=frozen(leaving[:, PIECE_COSINE]),
         leaf=_fixed(tags[out, TAG_LEAF]),
         bounces=_fixed(tags[out, TAG_BOUNCES]),
         unresolved=unresolved,

@@ -53,8 +53,8 @@ class ExactPoints:
     def sides(self, a: int, b: int, others: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int8]:
         """On which side of the line from a to b each other point lies: 1 left, -1 right, 0 on it."""
         start, (along, up) = self.points[a], self.points[b] - self.points[a]
-        place = self.points[others] - start
-        first, second = along * place[:, 1], up * place[:, 0]
+        offset = self.points[others] - start
+        first, second = along * offset[:, 1], up * offset[:, 0]
         cross = first - second
         signs: NDArray[np.int8] = np.sign(cross).astype(np.int8)
         doubtful = np.abs(cross) <= CROSS_ULPS * UNIT_ROUNDOFF * (np.abs(first) + np.abs(second))

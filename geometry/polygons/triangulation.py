@@ -148,14 +148,14 @@ def _clipped(chain: ExactPoints, slits_first: bool = False) -> tuple[Integers, I
     link = [FIRST_WALL - e for e in range(count - 1)] + [OPENING]
     corners = np.empty((count - 2, 3), np.int64)
     beyond = np.full(3 * (count - 2), OPENING, np.int64)
-    place = count - 1
+    first = count - 1
     for triangle in range(count - 2):
-        k = _next_ear(chain, ring, place, slits_first)
+        k = _next_ear(chain, ring, first, slits_first)
         if k < 0 and not slits_first:
             return _clipped(chain, slits_first=True)
         if k < 0:
             raise WallError(
-                f"hollow_vertices: no triangulation beyond vertex {ring[place % len(ring)]}; expected a chain that "
+                f"hollow_vertices: no triangulation beyond vertex {ring[first % len(ring)]}; expected a chain that "
                 "does not cross itself, with the hollow on its left"
             )
         a, b, c = ring[k - 1], ring[k], ring[(k + 1) % len(ring)]
@@ -171,11 +171,11 @@ def _clipped(chain: ExactPoints, slits_first: bool = False) -> tuple[Integers, I
             if link[c] >= 0:
                 beyond[link[c]] = 3 * triangle + 2
         del ring[k]
-        place = k + 1
+        first = k + 1
     return corners, beyond
 
 
-def _next_ear(chain: ExactPoints, ring: list[int], place: int, slits_first: bool) -> int:
+def _next_ear(chain: ExactPoints, ring: list[int], first: int, slits_first: bool) -> int:
     """Position in the ring of a vertex that can be cut off, or -1.
 
     A true ear, or else a vertex in line with its neighbours, or else the end of a slit of no width; or that first.
@@ -183,7 +183,7 @@ def _next_ear(chain: ExactPoints, ring: list[int], place: int, slits_first: bool
     size = len(ring)
     straight, slit = -1, -1
     for step in range(size):
-        k = (place + step) % size
+        k = (first + step) % size
         a, b, c = ring[k - 1], ring[k], ring[(k + 1) % size]
         turn = chain.turn(a, b, c)
         if turn > 0 and not slits_first and (size == 3 or _is_ear(chain, ring, k)):
@@ -196,7 +196,7 @@ def _next_ear(chain: ExactPoints, ring: list[int], place: int, slits_first: bool
                 if slits_first:
                     return k
     if slits_first:
-        return _next_ear(chain, ring, place, False)
+        return _next_ear(chain, ring, first, False)
     return straight if straight >= 0 else slit
 
 

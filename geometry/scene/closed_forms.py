@@ -19,15 +19,12 @@ from ...core.checks import Floats
 from ..curves.arc import Arc
 from ..curves.segment import Segment
 from .columns import (
-    BOWL,
-    BOWL_X,
-    BOWL_Y,
     CHAIN,
+    CIRCLE_X,
+    CIRCLE_Y,
+    CIRCULAR,
     COPIES,
     DOUBT,
-    FAN,
-    FAN_X,
-    FAN_Y,
     FORM,
     FORM_COLUMNS,
     FORM_LEFT,
@@ -39,6 +36,9 @@ from .columns import (
     LINK_Y,
     NO_FORM,
     RADIUS,
+    WEDGE,
+    WEDGE_X,
+    WEDGE_Y,
     row_of,
 )
 from .facing import WIDEST_WEDGE
@@ -51,19 +51,19 @@ if TYPE_CHECKING:
 # never disagree about a ray's number of hits or its status; and it is one ray in 10^8.
 DOUBT_FRACTION = 2.0**-30
 # Shallower arcs are left to the loop, which keeps the digits of positions along them.
-FLATTEST_BOWL = 0.05
+FLATTEST_ARC = 0.05
 # In a narrower fan the loop takes runs of hits in one step.
-NARROWEST_FAN = WIDEST_WEDGE
+NARROWEST_WEDGE = WIDEST_WEDGE
 
 
-def closed_row(pieces: Sequence[Curve], places: Sequence[Point], size: float) -> Floats:
-    """The row of one hollow; ``places`` are its joints from left to right."""
-    (left, top), (right, other) = places[0], places[-1]
+def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float) -> Floats:
+    """The row of one hollow; ``points`` are its joints from left to right."""
+    (left, top), (right, other) = points[0], points[-1]
     if top == other == 0.0 and left < right:
         if len(pieces) == 2 and all(isinstance(piece, Segment) for piece in pieces):
-            return _fan_row(left, right, places[1], size)
+            return _wedge_form(left, right, points[1], size)
         if len(pieces) == 1 and isinstance(pieces[0], Arc) and pieces[0].is_circular:
-            return _bowl_row(left, right, pieces[0])
+            return _arc_form(left, right, pieces[0])
     return row_of(FORM_COLUMNS, {FORM: NO_FORM})
 
 
@@ -77,13 +77,13 @@ def closed_table(rows: Sequence[Floats]) -> Floats | None:
     return table
 
 
-def _fan_row(left: float, right: float, apex: Point, size: float) -> Floats:
+def _wedge_form(left: float, right: float, apex: Point, size: float) -> Floats:
     x, y = apex
     # inclinations of the two lines, each measured from its own side of the horizontal
     west, east = atan2(-y, x - left), atan2(-y, right - x)
     angle = fsum([pi, -west, -east])
     # the chain of the openings' ends is convex if the apex lies below the opening
-    if not left <= x <= right or angle <= NARROWEST_FAN:
+    if not left <= x <= right or angle <= NARROWEST_WEDGE:
         return row_of(FORM_COLUMNS, {FORM: NO_FORM})
     # a straight ray turns by less than pi about the apex
     copies = ceil(pi / angle)
@@ -91,8 +91,8 @@ def _fan_row(left: float, right: float, apex: Point, size: float) -> Floats:
     row = row_of(
         CHAIN + 2 * links * LINK_COLUMNS,
         {
-            FORM: FAN, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION * size,
-            FAN_X: x, FAN_Y: y, COPIES: copies,
+            FORM: WEDGE, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION * size,
+            WEDGE_X: x, WEDGE_Y: y, COPIES: copies,
         },
     )  # fmt: skip
     lengths = hypot(x - left, y), hypot(right - x, y)
@@ -117,9 +117,9 @@ def _constant(hits: int, side: float, first: float, angle: float) -> float:
     return constant if side > 0.0 else 2.0 * pi - constant
 
 
-def _bowl_row(left: float, right: float, arc: Arc) -> Floats:
+def _arc_form(left: float, right: float, arc: Arc) -> Floats:
     half = 0.5 * (arc.end_angle - arc.start_angle)
-    if not FLATTEST_BOWL <= half <= 0.5 * pi:
+    if not FLATTEST_ARC <= half <= 0.5 * pi:
         return row_of(FORM_COLUMNS, {FORM: NO_FORM})
     radius = 0.5 * (right - left) / sin(half)
     # at pi/2 the centre lies on the opening
@@ -127,7 +127,7 @@ def _bowl_row(left: float, right: float, arc: Arc) -> Floats:
     return row_of(
         FORM_COLUMNS,
         {
-            FORM: BOWL, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION,
-            BOWL_X: 0.5 * (left + right), BOWL_Y: height, RADIUS: radius, HALF_ANGLE: half,
+            FORM: CIRCULAR, FORM_LEFT: left, FORM_RIGHT: right, DOUBT: DOUBT_FRACTION,
+            CIRCLE_X: 0.5 * (left + right), CIRCLE_Y: height, RADIUS: radius, HALF_ANGLE: half,
         },
     )  # fmt: skip

@@ -61,8 +61,8 @@ def facing_pairs(
     opposed = np.einsum("ij,ij->i", normals[first], normals[second]) < -cos(WIDEST_WEDGE)
     first, second = first[opposed], second[opposed]
     if len(first) * len(hulls) > MOST_WORK:
-        kept = MOST_WORK // len(hulls)
-        first, second = first[:kept], second[:kept]
+        affordable = MOST_WORK // len(hulls)
+        first, second = first[:affordable], second[:affordable]
     rows: list[tuple[int, PairRow]] = []
     for i, j in zip(first.tolist(), second.tolist(), strict=True):
         found = _facing(starts[i], ends[i], starts[j], ends[j], hulls, TOUCH_ULPS * EPS * size)

@@ -77,7 +77,7 @@ def cells_about(low, high, count):
 
 
 @njit(cache=True, nogil=True)
-def list_entries(starts, ends, frame, first, places, entries):
+def list_entries(starts, ends, frame, first, next_entry, entries):
     """List the lines of every cell in ``entries``, from the cell's place on; move the place behind them.
 
     ``frame`` is the lower left corner, the size of a cell, columns and rows. With no entries the lines are only
@@ -97,5 +97,5 @@ def list_entries(starts, ends, frame, first, places, entries):
                 if touches(ax, ay, bx, by, column, row):
                     cell = row * columns + column
                     if entries.size:
-                        entries[places[cell]] = first + k
-                    places[cell] += 1
+                        entries[next_entry[cell]] = first + k
+                    next_entry[cell] += 1

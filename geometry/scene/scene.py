@@ -22,7 +22,7 @@ from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
-from .closed_forms import closed_row, closed_table
+from .closed_forms import closed_form_of, closed_table
 from .columns import (
     ARC_COLUMNS,
     BEZIER_COLUMNS,
@@ -101,7 +101,7 @@ SHALLOW_ARC = 0.5
 # An arc of more than this span is cut in two, so that the side of its chord decides what belongs to it.
 LONGEST_ARC = 1.5 * pi
 # A run along an arc is worth its two arctangents and one sincos where it has at least this many hops.
-RUN_HOPS = 8.0
+RUN_CHORDS = 8.0
 OUTLINE_POINTS = 64
 # A grid pays from about so many lines a hollow: at 256 it was a third faster on a Koch curve; the place was not tuned.
 GRID_LINES = 96
@@ -261,22 +261,22 @@ class Scene:
 def scene_of(wall: Cell) -> Scene:
     """Build the tables of a wall."""
     tables = _Tables()
-    places = [(float(x), float(y)) for x, y in wall.vertices]
+    vertices = [(float(x), float(y)) for x, y in wall.vertices]
     corners = corners_of(list(wall.pieces))
     if wall.closes:
         for hollow in wall.hollows:
             chain = _Chain(
                 list(wall.pieces[hollow.first : hollow.last]),
-                places[hollow.first : hollow.last + 1],
+                vertices[hollow.first : hollow.last + 1],
                 corners[hollow.first : hollow.last + 1],
             )
             tables.add_hollow(
                 hollow.left, hollow.right, [chain], edges=(_edge(chain.corners[0]), _edge(chain.corners[-1]))
             )
     else:
-        chains = [_Chain(list(wall.pieces), places, corners)]
-        for island, island_places in zip(wall.islands, wall.island_vertices, strict=True):
-            loop = [(float(x), float(y)) for x, y in island_places]
+        chains = [_Chain(list(wall.pieces), vertices, corners)]
+        for island, island_vertices in zip(wall.islands, wall.island_vertices, strict=True):
+            loop = [(float(x), float(y)) for x, y in island_vertices]
             chains.append(_Chain(list(island), loop, corners_of(list(island))))
         tables.add_hollow(0.0, wall.period, chains, edges=(NO_EDGE, NO_EDGE))
     return tables.scene(wall.period, not wall.closes)
@@ -289,36 +289,36 @@ def _edge(is_corner: bool) -> float:
 def scene_in_one(wall: Cell) -> Scene:
     """The tables of a wall that closes as if its cell were one hollow: one list of all pieces, the flat tops too."""
     tables = _Tables()
-    places = [(float(x), float(y)) for x, y in wall.vertices]
-    chain = _Chain(list(wall.pieces), places, corners_of(list(wall.pieces)))
+    vertices = [(float(x), float(y)) for x, y in wall.vertices]
+    chain = _Chain(list(wall.pieces), vertices, corners_of(list(wall.pieces)))
     tables.add_hollow(0.0, wall.period, [chain], edges=(CORNER_EDGE, CORNER_EDGE))
     return tables.scene(wall.period, False)
 
 
 @dataclass
 class _Chain:
-    """Connected pieces with their joints; ``places`` and ``corners`` have one entry more than ``pieces``."""
+    """Connected pieces with their joints; ``vertices`` and ``corners`` have one entry more than ``pieces``."""
 
     pieces: list[Curve]
-    places: list[Point]
+    vertices: list[Point]
     corners: list[bool]
 
     def without_long_arcs(self) -> _Chain:
         """The same chain with every arc of more than LONGEST_ARC cut in two at a smooth joint."""
         pieces: list[Curve] = []
-        places, corners = [self.places[0]], [self.corners[0]]
-        for piece, place, corner in zip(self.pieces, self.places[1:], self.corners[1:], strict=True):
+        vertices, corners = [self.vertices[0]], [self.corners[0]]
+        for piece, vertex, corner in zip(self.pieces, self.vertices[1:], self.corners[1:], strict=True):
             if isinstance(piece, Arc) and abs(piece.end_angle - piece.start_angle) > LONGEST_ARC:
                 middle = 0.5 * (piece.start_angle + piece.end_angle)
                 first = Arc(piece.center, piece.semi_axes, piece.start_angle, middle)
                 pieces += [first, Arc(piece.center, piece.semi_axes, middle, piece.end_angle)]
-                places += [first.end, place]
+                vertices += [first.end, vertex]
                 corners += [False, corner]
             else:
                 pieces.append(piece)
-                places.append(place)
+                vertices.append(vertex)
                 corners.append(corner)
-        return _Chain(pieces, places, corners)
+        return _Chain(pieces, vertices, corners)
 
 
 class _Tables:
@@ -343,7 +343,7 @@ class _Tables:
         for chain in chains:
             self._add_chain(chain)
         after = self._sizes()
-        joints = np.array([place for chain in chains for place in chain.places])
+        joints = np.array([vertex for chain in chains for vertex in chain.vertices])
         size = float(np.max(np.ptp(joints, axis=0))) if len(joints) else right - left
         size = max(size, right - left)
         row = {LEFT: left, RIGHT: right, SIZE: size, LEFT_EDGE: edges[0], RIGHT_EDGE: edges[1]}
@@ -355,7 +355,7 @@ class _Tables:
         if inside or edges != (NO_EDGE, NO_EDGE):
             self._mark_pairs(before[0], chains, size)
         self._add_grid(before[0])
-        form = closed_row(chains[0].pieces, chains[0].places, size) if is_closed else None
+        form = closed_form_of(chains[0].pieces, chains[0].vertices, size) if is_closed else None
         self.closed.append(row_of(FORM_COLUMNS, {FORM: NO_FORM}) if form is None else form)
 
     def _sizes(self) -> tuple[int, int, int, int]:
@@ -363,7 +363,7 @@ class _Tables:
 
     def _add_chain(self, chain: _Chain) -> None:
         for i, piece in enumerate(chain.pieces):
-            start, end = chain.places[i], chain.places[i + 1]
+            start, end = chain.vertices[i], chain.vertices[i + 1]
             is_line = isinstance(piece, Segment)
             self._add_joint(start, chain.corners[i], is_line)
             self.lines.append(line_row(start, end) if is_line else np.zeros(LINE_COLUMNS))
@@ -375,21 +375,21 @@ class _Tables:
                 (self.circles if piece.is_circular else self.ellipses).append(arc_row(piece, ends))
             elif isinstance(piece, Bezier):
                 self.beziers.append(bezier_row(piece, ends))
-        self._add_joint(chain.places[-1], chain.corners[-1], False)
+        self._add_joint(chain.vertices[-1], chain.corners[-1], False)
         self.lines.append(np.zeros(LINE_COLUMNS))
 
-    def _add_joint(self, place: Point, is_corner: bool, starts_line: bool) -> None:
-        row = {JOINT_X: place[0], JOINT_Y: place[1], IS_CORNER: is_corner, STARTS_LINE: starts_line}
+    def _add_joint(self, vertex: Point, is_corner: bool, starts_line: bool) -> None:
+        row = {JOINT_X: vertex[0], JOINT_Y: vertex[1], IS_CORNER: is_corner, STARTS_LINE: starts_line}
         self.joints.append(row_of(JOINT_COLUMNS, row))
 
     def _mark_runs(self, first: int, last: int, chains: list[_Chain]) -> None:
         """Allow runs on the focusing circles whose circular segment no other piece of the hollow enters."""
         outlines = [
-            np.array([place]) if isinstance(piece, Segment) else piece.point(np.linspace(0.0, 1.0, OUTLINE_POINTS))
+            np.array([vertex]) if isinstance(piece, Segment) else piece.point(np.linspace(0.0, 1.0, OUTLINE_POINTS))
             for chain in chains
-            for piece, place in zip(chain.pieces, chain.places, strict=False)
+            for piece, vertex in zip(chain.pieces, chain.vertices, strict=False)
         ]
-        ends = [np.array([chain.places[-1]]) for chain in chains]
+        ends = [np.array([chain.vertices[-1]]) for chain in chains]
         points = np.concatenate(outlines + ends)
         for row in self.circles[first:last]:
             half, radius = 0.5 * row[SPAN], 1.0 / abs(row[CURVATURE])
@@ -404,7 +404,7 @@ class _Tables:
             slack = 1e-12 * self.hollows[-1][SIZE]
             foreign = (height < -slack) & (np.abs(own - radius) > slack)
             if row[CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
-                row[RUN_SINE] = sin(half / RUN_HOPS)
+                row[RUN_SINE] = sin(half / RUN_CHORDS)
 
     def _add_grid(self, first: int) -> None:
         """Lay a grid over the lines of the last hollow, which start at the joint ``first``, if they are many."""
@@ -427,7 +427,7 @@ class _Tables:
         numbers, starts, ends, hulls = [], [], [], []
         joint = first
         for chain in chains:
-            for piece, start, end in zip(chain.pieces, chain.places, chain.places[1:], strict=False):
+            for piece, start, end in zip(chain.pieces, chain.vertices, chain.vertices[1:], strict=False):
                 if isinstance(piece, Segment):
                     numbers.append(joint)
                     starts.append(start)

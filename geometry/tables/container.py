@@ -86,8 +86,8 @@ class Container:
         edges = np.roll(corners, -1, axis=0) - corners
         following = np.roll(edges, -1, axis=0)
         turns = edges[:, 0] * following[:, 1] - edges[:, 1] * following[:, 0]
-        turned = np.arctan2(turns, np.sum(edges * following, axis=1)).sum()
-        if not np.all(turns > 0.0) or turned > 3.0 * math.pi:
+        total_turn = np.arctan2(turns, np.sum(edges * following, axis=1)).sum()
+        if not np.all(turns > 0.0) or total_turn > 3.0 * math.pi:
             raise InputError("vertices: expected a convex polygon with its vertices counterclockwise")
         lengths = np.hypot(edges[:, 0], edges[:, 1])[:, None]
         # adding 0 makes 0 of -0
@@ -100,10 +100,10 @@ class Container:
 
     def distances(self, position: ArrayLike) -> Floats:
         """Return the distances (n, k) of places (n, 2) from the walls, negative outside."""
-        places = finite_array("position", position)
-        if places.ndim != 2 or places.shape[1] != 2:
-            raise InputError(f"position: expected shape (n, 2), got {places.shape}")
-        return np.asarray(np.einsum("nki,ki->nk", places[:, None, :] - self.points, self.normals))
+        positions = finite_array("position", position)
+        if positions.ndim != 2 or positions.shape[1] != 2:
+            raise InputError(f"position: expected shape (n, 2), got {positions.shape}")
+        return np.asarray(np.einsum("nki,ki->nk", positions[:, None, :] - self.points, self.normals))
 
     def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
         """Return which of the places (n, 2) are inside or on the boundary."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 # Double-double steps cost about twenty times a double one: a flagged ray that needs more flights than these keeps its
 # flag. Runs between vertical sides are one flight, runs along arcs and in wedges are not.
-REFINED_FLIGHTS = 40_000
+REFINED_SEGMENTS = 40_000
 _SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
 
 
@@ -84,7 +84,7 @@ def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 
         np.empty(count), np.empty(count),
     )  # fmt: skip
     starts, angles = np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(theta, dtype=np.float64)
-    refined_rays(starts, angles, tables, max_collisions, REFINED_FLIGHTS, results)
+    refined_rays(starts, angles, tables, max_collisions, REFINED_SEGMENTS, results)
     return RefinedTrace(*results)
 
 
@@ -109,7 +109,7 @@ def retrace(
     x, theta : array of float, shape (n,)
         The incoming rays.
     max_collisions : int
-        The limit that was asked for; no ray is followed for more than ``REFINED_FLIGHTS``.
+        The limit that was asked for; no ray is followed for more than ``REFINED_SEGMENTS``.
     out_x, out_theta, collisions, status : arrays of shape (n,)
         What double precision made of them.
     """

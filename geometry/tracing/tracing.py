@@ -45,7 +45,7 @@ class Status(IntEnum):
     BOUNCE_LIMIT = 3
 
 
-class Outcomes:
+class StatusCounts:
     """What a result with an array ``status`` says of it: of rays, or of disks."""
 
     status: NDArray[np.uint8]
@@ -69,7 +69,7 @@ class Outcomes:
 
 
 @dataclass(frozen=True)
-class Trace(Outcomes):
+class Trace(StatusCounts):
     """What became of the rays, each array in the broadcast shape of ``x`` and ``theta``.
 
     Attributes
@@ -249,13 +249,13 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     from .compiled.records import results_for
 
     _check_wall(wall)
-    place = finite_number("x", x)
+    position = finite_number("x", x)
     incoming = number_between("theta", theta, 0.0, np.pi)
     limit = whole_number("max_collisions", max_collisions, 1)
     scene = wall.scene
-    entry = place
+    entry = position
     if wall.origin != (0.0, 0.0):
-        entry = float(entries(wall, np.array([place]), np.array([incoming]))[0])
+        entry = float(entries(wall, np.array([position]), np.array([incoming]))[0])
     base = np.floor(entry / scene.cell) * scene.cell
     left, right = scene.hollows[:, LEFT], scene.hollows[:, RIGHT]
     inside = np.flatnonzero((left < entry - base) & (entry - base < right) | scene.is_open)
@@ -269,7 +269,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         interruptibly(lambda: trace_rays(start, angle, scene.tables, limit, stop, results, nearby_address()))
         points = results.path[np.isfinite(results.path[:, 0])]
         points[:, 0] += base
-    return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, place, incoming, limit)
+    return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, position, incoming, limit)
 
 
 def _in_coordinates_of(wall: Wall, points: Floats, x: float, theta: float, limit: int) -> Floats:
@@ -298,23 +298,23 @@ def entries(wall: Wall, x: Floats, theta: Floats) -> Floats:
     left, level = wall.origin
     if level == 0.0:
         return np.asarray(x - left)
-    way = -level / np.tan(theta)
+    travel = -level / np.tan(theta)
     small = np.minimum(theta, np.pi - theta)
-    far = np.flatnonzero((small < FLAT) & (np.abs(way) > FAR * wall.period))
+    far = np.flatnonzero((small < FLAT) & (np.abs(travel) > FAR * wall.period))
     for k in far.tolist():
-        way[k] = _reduced_way(-level, float(theta[k]), wall.period)
-    return np.asarray(x - way - left)
+        travel[k] = _reduced_travel(-level, float(theta[k]), wall.period)
+    return np.asarray(x - travel - left)
 
 
-def _reduced_way(height: float, theta: float, period: float) -> float:
+def _reduced_travel(height: float, theta: float, period: float) -> float:
     """height cot(theta) up to whole periods, for theta near 0 or pi: 1/theta is a quotient of whole numbers."""
     exact = Fraction(theta) if theta < 1.0 else PI - Fraction(theta)
     small = float(exact)
     # cot(t) = 1/t - t/3 - t^3/45 - 2 t^5/945 - ..., the next term is below 1e-18 where t < FLAT
     square = small * small
     rest = small * (1.0 / 3.0 + square * (1.0 / 45.0 + square * (2.0 / 945.0)))
-    way = float(Fraction(height) / exact % Fraction(period)) - height * rest
-    return way if theta < 1.0 else -way
+    travel = float(Fraction(height) / exact % Fraction(period)) - height * rest
+    return travel if theta < 1.0 else -travel
 
 
 def _climbs(wall: Wall, incoming: Floats, outgoing: Floats, escaped: NDArray[np.bool_]) -> Floats:

@@ -145,6 +145,6 @@ def _by_transport(n: int, which: str, cost: CostFunction, curvature: float | Non
 
 
 def _matrix(flux: Floats, cells: Bins, law: str) -> KernelMatrix:
-    symmetric = flux * cells.heights[:, None] * cells.heights
+    symmetric = flux * cells.normalisation[:, None] * cells.normalisation
     error = frobenius_error(ROUNDING * cells.size, "bound", "masses of intervals, to rounding")
     return KernelMatrix(symmetric, cells, error, method="exact", law=law, reversible=True)

@@ -59,7 +59,7 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
 def add_masses(total: Floats, basis: Basis, source: NDArray[np.int64], target: NDArray[np.int64], mass: Floats) -> None:
     """Add masses that go from cells to cells of a partition to the Galerkin matrix ``total``."""
     flux = np.bincount(source * basis.size + target, weights=mass, minlength=total.size).reshape(total.shape)
-    total += basis.heights[:, None] * flux * basis.heights
+    total += basis.normalisation[:, None] * flux * basis.normalisation
 
 
 def add_blocks(
@@ -79,7 +79,7 @@ def add_blocks(
 def largest_square_sum(basis: Basis) -> float:
     """sup over theta of the sum of e_i(theta)^2, from the nodes of the basis and points next to its edges."""
     if basis.is_partition:
-        return float(np.max(basis.heights**2))
+        return float(np.max(basis.normalisation**2))
     inside = np.clip(np.concatenate((basis.edges, basis.edges - 1e-12)), 0.0, np.pi)
     angle, _ = gauss_rule(basis.edges, basis.nodes_per_interval)
     return max(float(np.max(np.sum(basis.evaluate(part) ** 2, axis=-1))) for part in (inside, angle))

@@ -74,7 +74,7 @@ class Basis(ABC):
         return np.asarray(self.constant**2)
 
     @property
-    def heights(self) -> Floats:
+    def normalisation(self) -> Floats:
         """Value of each e_i on its cell for a partition, ones elsewhere: P.array = heights S / heights."""
         return np.ones(self.size)
 

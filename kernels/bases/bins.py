@@ -85,7 +85,7 @@ class Bins(Basis):
         return self._weights
 
     @property
-    def heights(self) -> Floats:
+    def normalisation(self) -> Floats:
         return np.asarray(1.0 / np.sqrt(self._weights))
 
     @property
@@ -114,7 +114,7 @@ class Bins(Basis):
     def evaluate(self, angle: ArrayLike) -> Floats:
         index = self.index(angle)
         values = np.zeros((*index.shape, self.size))
-        np.put_along_axis(values, index[..., None], self.heights[index][..., None], axis=-1)
+        np.put_along_axis(values, index[..., None], self.normalisation[index][..., None], axis=-1)
         return values
 
     def coarsened(self) -> tuple[Bins, Floats] | None:

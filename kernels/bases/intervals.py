@@ -46,8 +46,8 @@ def edges_inside(edges: Floats, low: Floats, high: Floats) -> tuple[NDArray[np.i
     [[0, 0], [1.0, 2.0]]
     """
     first = np.searchsorted(edges, low, side="right")
-    owner, place = joined_lists(np.maximum(np.searchsorted(edges, high, side="left") - first, 0))
-    return owner, edges[first[owner] + place]
+    owner, rank = joined_lists(np.maximum(np.searchsorted(edges, high, side="left") - first, 0))
+    return owner, edges[first[owner] + rank]
 
 
 def between_cuts(owner: NDArray[np.intp], cut: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
@@ -60,8 +60,8 @@ def between_cuts(owner: NDArray[np.intp], cut: Floats) -> tuple[NDArray[np.intp]
     """
     order = np.lexsort((cut, owner))
     owner, cut = owner[order], cut[order]
-    kept = np.flatnonzero((owner[1:] == owner[:-1]) & (cut[1:] > cut[:-1]))
-    return owner[kept], cut[kept], cut[kept + 1]
+    selected = np.flatnonzero((owner[1:] == owner[:-1]) & (cut[1:] > cut[:-1]))
+    return owner[selected], cut[selected], cut[selected + 1]
 
 
 def without_extremal(angles: Floats, number: int) -> tuple[Floats, float]:
@@ -69,12 +69,12 @@ def without_extremal(angles: Floats, number: int) -> tuple[Floats, float]:
 
     Examples
     --------
-    >>> kept, beyond = without_extremal(np.array([0.5, 1.0, 2.0]), 2)
-    >>> kept.tolist(), round(beyond, 12)
+    >>> selected, beyond = without_extremal(np.array([0.5, 1.0, 2.0]), 2)
+    >>> selected.tolist(), round(beyond, 12)
     ([1.0], 1.0)
     """
-    kept = angles[(number + 1) // 2 : angles.size - number // 2]
-    return kept, float(SINE.cdf(kept[0]) + SINE.mass(kept[-1], np.pi)) if kept.size else 1.0
+    selected = angles[(number + 1) // 2 : angles.size - number // 2]
+    return selected, float(SINE.cdf(selected[0]) + SINE.mass(selected[-1], np.pi)) if selected.size else 1.0
 
 
 def bisected(low: Floats, high: Floats, before: Callable[[Floats], NDArray[np.bool_]]) -> Floats:

@@ -149,8 +149,8 @@ class Panels(Basis):
         ``moments`` has shape (..., panels, degree + 1).
         """
         flat = moments.reshape(-1, *moments.shape[-2:])
-        turned = np.matmul(np.moveaxis(flat, 1, 0), self._coefficients)
-        return np.asarray(np.moveaxis(turned, 0, 1).reshape((*moments.shape[:-2], self.size)))
+        transformed = np.matmul(np.moveaxis(flat, 1, 0), self._coefficients)
+        return np.asarray(np.moveaxis(transformed, 0, 1).reshape((*moments.shape[:-2], self.size)))
 
     def legendre_series(self, vectors: Floats) -> Floats:
         """Coefficients in the panels' Legendre polynomials, (panels, degree + 1, k), from ``vectors``, (size, k)."""
@@ -166,8 +166,8 @@ class Panels(Basis):
     def coarsened(self) -> tuple[Panels, Floats] | None:
         if self.degree > 0:
             coarse = Panels(self.edges, (self.degree - 1) // 2, self.measure.name)
-            kept = np.arange(self.size).reshape(self._cells.size, -1)[:, : coarse.degree + 1].ravel()
-            return coarse, np.eye(self.size)[kept]
+            selected = np.arange(self.size).reshape(self._cells.size, -1)[:, : coarse.degree + 1].ravel()
+            return coarse, np.eye(self.size)[selected]
         merged = self._cells.coarsened()
         return None if merged is None else (Panels(merged[0].edges, 0, self.measure.name), merged[1])
 

@@ -84,8 +84,8 @@ class TensorBasis(Basis):
         return _kron([factor.weights for factor in self.factors])
 
     @property
-    def heights(self) -> Floats:
-        return _kron([factor.heights for factor in self.factors])
+    def normalisation(self) -> Floats:
+        return _kron([factor.normalisation for factor in self.factors])
 
     def key(self) -> tuple[object, ...]:
         return self.factors
@@ -115,8 +115,8 @@ class TensorBasis(Basis):
         parts = [factor.coarsened() for factor in self.factors]
         if all(part is None for part in parts):
             return None
-        kept = [part or (factor, np.eye(factor.size)) for part, factor in zip(parts, self.factors, strict=True)]
-        return TensorBasis(tuple(basis for basis, _ in kept)), _kron([table for _, table in kept])
+        coarse = [part or (factor, np.eye(factor.size)) for part, factor in zip(parts, self.factors, strict=True)]
+        return TensorBasis(tuple(basis for basis, _ in coarse)), _kron([table for _, table in coarse])
 
     def _refuse(self, what: str) -> NoReturn:
         raise InputError(f"{what}: a tensor basis has one for every angle; use basis.factors[k].{what}")

@@ -128,29 +128,29 @@ def play(
     disk = each[0].disk
     if any(law.disk != disk for law in each):
         raise InputError("laws: expected laws of the same disk")
-    place, moving = finite_array("position", position).copy(), finite_array("velocity", velocity).copy()
-    inside = container.contains(place)
-    if moving.shape != (len(place), 3):
-        raise InputError(f"velocity: expected shape ({len(place)}, 3) for (v1, v2, omega), got {moving.shape}")
+    located, moving = finite_array("position", position).copy(), finite_array("velocity", velocity).copy()
+    inside = container.contains(located)
+    if moving.shape != (len(located), 3):
+        raise InputError(f"velocity: expected shape ({len(located)}, 3) for (v1, v2, omega), got {moving.shape}")
     if not inside.all():
-        raise InputError(f"position: expected centres in the container, got {place[int(np.argmin(inside))].tolist()}")
-    n = len(place)
+        raise InputError(f"position: expected centres in the container, got {located[int(np.argmin(inside))].tolist()}")
+    n = len(located)
     time, angle, last = np.zeros(n), np.zeros(n), np.full(n, -1)
     made = np.zeros(n, dtype=np.int64)
-    states = [(time.copy(), place.copy(), angle.copy(), moving.copy(), last.copy())]
+    states = [(time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy())]
     for _ in range(collisions):
-        flight, wall = _next_wall(container, place, moving, last)
+        flight, wall = _next_wall(container, located, moving, last)
         hit = wall >= 0
         made[hit] += 1
         step = np.where(hit, flight, 0.0)
         time, angle = time + step, angle + moving[:, 2] * step
-        place = place + moving[:, :2] * step[:, None]
+        located = located + moving[:, :2] * step[:, None]
         last = np.where(hit, wall, last)
         for k, law in enumerate(each):
             here = wall == k
             if here.any():
                 moving[here] = _collide(container, k, law, moving[here], rng)
-        states.append((time.copy(), place.copy(), angle.copy(), moving.copy(), last.copy()))
+        states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
     columns = [np.stack(column) for column in zip(*states, strict=True)]
     for array in (*columns, made):
         array.setflags(write=False)
@@ -158,18 +158,18 @@ def play(
 
 
 def _next_wall(
-    container: Container, place: Floats, moving: Floats, last: NDArray[np.int64]
+    container: Container, located: Floats, moving: Floats, last: NDArray[np.int64]
 ) -> tuple[Floats, NDArray[np.int64]]:
     """Time to the next wall and its number, -1 where there is none."""
     approach = moving[:, :2] @ container.normals.T
-    distance = np.maximum(container.distances(place), 0.0)
+    distance = np.maximum(container.distances(located), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         times = np.where(approach < 0.0, distance / -approach, np.inf)
     # a disk that has just left a straight wall does not meet it next
     rows = np.flatnonzero(last >= 0)
     times[rows, last[rows]] = np.inf
     wall = np.argmin(times, axis=1)
-    first = times[np.arange(len(place)), wall]
+    first = times[np.arange(len(located)), wall]
     return first, np.where(np.isfinite(first), wall, -1)
 
 

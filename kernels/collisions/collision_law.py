@@ -129,9 +129,9 @@ class CollisionLaw:
             grid = self.law.apply(lambda outgoing: function(outgoing[..., None], rolled), theta_values)
             return np.asarray(grid[theta_index, psi_index].reshape(theta_all.shape))
         value = np.empty(theta_all.shape)
-        for k, turned in enumerate(rolled):
+        for k, angle in enumerate(rolled):
             here = psi_index.reshape(psi_all.shape) == k
-            value[here] = self.law.apply(partial(_with_psi, function, turned), theta_all[here])
+            value[here] = self.law.apply(partial(_with_psi, function, angle), theta_all[here])
         return value
 
     def branches(self, theta: ArrayLike) -> list[tuple[Floats, Floats]]:

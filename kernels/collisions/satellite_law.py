@@ -71,8 +71,8 @@ class SatelliteLaw:
         generator(rng)
         out, rest = np.empty(moving.shape), np.arange(len(moving))
         for _ in range(MOST_DRAWS):
-            place = rng.random((len(rest), 2)) * [self.scale * self.wall.period, self.spacing]
-            hit = collide(self.disk, self.wall, self.scale, place, moving[rest], self.spacing)
+            position = rng.random((len(rest), 2)) * [self.scale * self.wall.period, self.spacing]
+            hit = collide(self.disk, self.wall, self.scale, position, moving[rest], self.spacing)
             out[rest[hit.escaped]] = hit.velocity[hit.escaped]
             rest = rest[~hit.escaped]
             if not len(rest):

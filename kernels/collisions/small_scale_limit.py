@@ -69,7 +69,7 @@ class LimitStudy:
     floor: Floats
     psi_defect: Floats
     two_satellites: Floats
-    strays: Floats
+    outliers: Floats
     drift: Floats
     shift: Floats
     errors: dict[str, Floats]
@@ -212,13 +212,13 @@ def _measured(
     from ...geometry import collide, collide_cylinder, collide_modified, trace
 
     scale, spacing = size
-    angles, turns, places = samples
+    angles, turns, starts = samples
     u = -1.0 + 2.0 * _strata(angles, rng)
     theta = np.arccos(-u)
     alpha = spacing * (_strata(turns, rng, (angles,)) - 0.5)
-    x1 = scale * wall.period * _strata(places, rng, (angles, turns))
+    x1 = scale * wall.period * _strata(starts, rng, (angles, turns))
     position = np.stack([x1, np.broadcast_to(alpha[..., None], x1.shape)], axis=-1).reshape(-1, 2)
-    velocity = -np.repeat(disk.from_angles(theta, psi), turns * places, axis=0)
+    velocity = -np.repeat(disk.from_angles(theta, psi), turns * starts, axis=0)
     begin = time.process_time()
     true = collide(disk, wall, scale, position, velocity, spacing)
     spent = time.process_time() - begin
@@ -227,7 +227,7 @@ def _measured(
     # the same random numbers as straightened states
     modified = collide_modified(disk, wall, scale, position, velocity, spacing)
     cylinder = collide_cylinder(disk, wall, scale, position, velocity)
-    per_angle = turns * places
+    per_angle = turns * starts
     # the midpoints of equal parts of the cell: quantiles of the limit to the order of 1/per_angle
     entry = target.period * (np.arange(per_angle) + 0.5) / per_angle
     limit = np.sort(trace(target, entry, theta[:, None]).theta, axis=1)

@@ -81,7 +81,7 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
             difference = panels.differences(basis)
             done = last | (difference <= max(PANEL_FRACTION * tolerance, SETTLED))
             settled[start : start + step] = done
-            total += panels.kept(done).values(basis).sum(axis=0)
+            total += panels.selected(done).values(basis).sum(axis=0)
             error += float(difference[done].sum())
         middle = 0.5 * (low + high)[~settled]
         low, high = np.append(low[~settled], middle), np.append(middle, high[~settled])

@@ -131,10 +131,10 @@ def _polygons(half_angle: float) -> _Strips:
     low, high = corners[:-1], corners[1:]
     middle = 0.5 * (low + high)
     below, above = (side[0, :, None] * middle + side[1, :, None] for side in (lower, upper))
-    place, column = np.nonzero((below.max(axis=0) < above.min(axis=0)) & (high > low))
-    lowest, highest = below.argmax(axis=0)[place, column], above.argmin(axis=0)[place, column]
+    rank, column = np.nonzero((below.max(axis=0) < above.min(axis=0)) & (high > low))
+    lowest, highest = below.argmax(axis=0)[rank, column], above.argmin(axis=0)[rank, column]
     return _Strips(
-        hits[column], low[place, column], high[place, column], lower[:, lowest, column], upper[:, highest, column]
+        hits[column], low[rank, column], high[rank, column], lower[:, lowest, column], upper[:, highest, column]
     )
 
 
@@ -155,8 +155,8 @@ def _add_strips(
         for start in range(0, selected.size, step):
             part = strips.part(selected[start : start + step])
             theta, weight = gauss_on_intervals(part.low, part.high, order)
-            row = part.part(np.repeat(np.arange(part.hits.size), order))
-            mass += _add_rows(total, basis, edges, row, theta, weight / (4.0 * np.sin(half_angle)), mirrored)
+            strip = part.part(np.repeat(np.arange(part.hits.size), order))
+            mass += _add_cut_strips(total, basis, edges, strip, theta, weight / (4.0 * np.sin(half_angle)), mirrored)
     return mass
 
 
@@ -174,7 +174,7 @@ def _reach(strips: _Strips, edges: Floats) -> Floats:
     return reach
 
 
-def _add_rows(
+def _add_cut_strips(
     total: Floats, basis: Basis, edges: Floats, strips: _Strips, theta: Floats, weight: Floats, mirrored: bool
 ) -> float:
     lower, upper = (side[0] * theta + side[1] for side in (strips.lower, strips.upper))
@@ -183,28 +183,28 @@ def _add_rows(
     first = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * upper, side="right")
     last = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * lower, side="left")
     number = np.maximum(last - first, 0) + 1
-    row, place = joined_lists(number)
-    above = np.clip(last[row] - place, 0, edges.size - 1)
-    cut = (np.pi + theta[row] - edges[above]) / (2.0 * strips.hits[row])
-    low = np.where(place == 0, lower[row], np.clip(cut, lower[row], upper[row]))
-    high = np.where(place == number[row] - 1, upper[row], np.append(low[1:], 0.0))
+    strip, rank = joined_lists(number)
+    above = np.clip(last[strip] - rank, 0, edges.size - 1)
+    cut = (np.pi + theta[strip] - edges[above]) / (2.0 * strips.hits[strip])
+    low = np.where(rank == 0, lower[strip], np.clip(cut, lower[strip], upper[strip]))
+    high = np.where(rank == number[strip] - 1, upper[strip], np.append(low[1:], 0.0))
     # the difference of two cosines as a product, so that it keeps its digits
-    mass = 2.0 * weight[row] * np.sin(0.5 * (low + high)) * np.sin(0.5 * (high - low))
+    mass = 2.0 * weight[strip] * np.sin(0.5 * (low + high)) * np.sin(0.5 * (high - low))
     incoming = np.pi - theta if mirrored else theta
     if basis.is_partition:
         target = np.clip(above - 1, 0, basis.size - 1)
         target = basis.size - 1 - target if mirrored else target
-        add_masses(total, basis, basis.index(incoming)[row], target, mass)
+        add_masses(total, basis, basis.index(incoming)[strip], target, mass)
         return float(mass.sum())
     width = np.diff(edges)[np.clip(above - 1, 0, edges.size - 2)]
-    short = 2.0 * strips.hits[row] * (high - low) * basis.nodes_per_interval < width
+    short = 2.0 * strips.hits[strip] * (high - low) * basis.nodes_per_interval < width
     for chosen, order in ((short, NODES_SHORT), (~short, basis.nodes_per_interval)):
         selected = np.flatnonzero(chosen)
         step = max(1, CHUNK // (order * (basis.degree + 1 if isinstance(basis, Panels) else basis.size)))
         for start in range(0, selected.size, step):
             part = selected[start : start + step]
             chord, fraction = gauss_on_intervals(low[part], high[part], order)
-            owner = row[part]
+            owner = strip[part]
             each = np.repeat(owner, order)
             outgoing = np.pi + theta[each] - 2.0 * strips.hits[each] * chord
             outgoing = mirrored_angle(outgoing) if mirrored else clipped_inside(outgoing)

@@ -58,18 +58,18 @@ class AutoWall:
     def _quick(self, law: WallLaw, basis: Basis, budget: Budget) -> KernelMatrix:
         if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
             return IsometryTables().matrix(law.exact_law, basis, budget)
-        net = SobolSampler(law, basis, budget.rng)
-        found, predicted = _few_rays(law, net, basis, budget)
+        sampler = SobolSampler(law, basis, budget.rng)
+        found, predicted = _few_rays(law, sampler, basis, budget)
         if found is not None:
             return found
         if law.exact_law is not None:
             return IsometryTables().matrix(law.exact_law, basis, budget)
         if not Traced().accepts(law, basis):
-            return sobol_matrix(net, basis, budget)
-        return _traced_or_all_rays(law, net, basis, budget, predicted)
+            return sobol_matrix(sampler, basis, budget)
+        return _traced_or_all_rays(law, sampler, basis, budget, predicted)
 
 
-def _few_rays(law: WallLaw, net: SobolSampler, basis: Basis, budget: Budget) -> tuple[KernelMatrix | None, float]:
+def _few_rays(law: WallLaw, sampler: SobolSampler, basis: Basis, budget: Budget) -> tuple[KernelMatrix | None, float]:
     """The matrix within the tolerance by fewer rays than all, or None; and the error that all rays predict.
 
     The latter is infinite where a few rays do not tell.
@@ -80,7 +80,7 @@ def _few_rays(law: WallLaw, net: SobolSampler, basis: Basis, budget: Budget) -> 
         return None, predicted
     while number < budget.rays:
         try:
-            found = sobol_matrix(net, basis, replace(budget, rays=number))
+            found = sobol_matrix(sampler, basis, replace(budget, rays=number))
         except AccuracyError:
             # a bin without rays, or rays that do not escape: these few are no measure
             break
@@ -100,10 +100,10 @@ def _few_rays(law: WallLaw, net: SobolSampler, basis: Basis, budget: Budget) -> 
 
 
 def _traced_or_all_rays(
-    law: WallLaw, net: SobolSampler, basis: Basis, budget: Budget, predicted: float
+    law: WallLaw, sampler: SobolSampler, basis: Basis, budget: Budget, predicted: float
 ) -> KernelMatrix:
     """The more exact of the two; no rays where tracing angles predicts more, nor the reverse where rays will do."""
-    rays = _all_rays(net, basis, budget) if predicted <= budget.tolerance else None
+    rays = _all_rays(sampler, basis, budget) if predicted <= budget.tolerance else None
     if rays is not None:
         predicted = float(rays.error)
         if predicted <= budget.tolerance:
@@ -113,14 +113,14 @@ def _traced_or_all_rays(
     error = float(traced.error)
     if error <= budget.tolerance or error <= predicted < math.inf:
         return traced
-    rays = _all_rays(net, basis, budget) if rays is None else rays
+    rays = _all_rays(sampler, basis, budget) if rays is None else rays
     return traced if rays is None else _more_exact(traced, rays)
 
 
-def _all_rays(net: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix | None:
+def _all_rays(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix | None:
     """The matrix by rays; None if too many do not escape, where traced angles count theirs in their error."""
     try:
-        return sobol_matrix(net, basis, budget)
+        return sobol_matrix(sampler, basis, budget)
     except AccuracyError:
         return None
 

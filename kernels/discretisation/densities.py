@@ -32,14 +32,14 @@ MOST_DENSITY_VALUES, MOST_MAP_POINTS = 2**25, 2**20
 FRACTIONS, FRACTION_NODES = np.array([1 / 32, 1 / 4]), (4, 8, 16)
 # Gauss nodes in theta on each interval of the coarsest level by rows: the most that are affordable. Rows that still
 # cost more than some seconds are left to product rules.
-ROW_NODES = (6, 4, 2)
-MOST_ROW_VALUES = 2**27
+CONDITIONAL_NODES = (6, 4, 2)
+MOST_CONDITIONAL_VALUES = 2**27
 # Edges are their own mirror images within this.
 MIRROR_TOLERANCE = 4.0 * EPS * np.pi
 # Numbers held at a time.
 CHUNK = 2**21
 # Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.
-ROW_CHUNK = 2**17
+CONDITIONAL_CHUNK = 2**17
 # A map is mostly singular where it jumps, as a square root if it comes from grazing or goes there.
 GRADING = 0.25 ** np.arange(1.0, 17.0)
 
@@ -93,7 +93,7 @@ class LeastResistance:
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         flux = cast(LeastResistanceLaw, law).flux(cast(Bins, basis))
-        symmetric = basis.heights[:, None] * flux * basis.heights
+        symmetric = basis.normalisation[:, None] * flux * basis.normalisation
         return computed(symmetric, basis, self.name, rounding(basis), "masses of intervals, to rounding")
 
 
@@ -115,11 +115,11 @@ def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Flo
         if mirrored:
             outer = np.append(outer[outer < 0.5 * np.pi - MIRROR_TOLERANCE], 0.5 * np.pi)
         # two levels at least, or there is no estimate: the second has twice the nodes of the first
-        cost = [3 * _row_cost(law, edges, outer, order) for order in ROW_NODES]
-        affordable = [order for order, each in zip(ROW_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
-        order = affordable[0] if affordable else ROW_NODES[-1]
-        if min(cost) <= MOST_ROW_VALUES:
-            levels = _row_levels(law, basis, edges, outer, order)
+        cost = [3 * _conditional_cost(law, edges, outer, order) for order in CONDITIONAL_NODES]
+        affordable = [order for order, each in zip(CONDITIONAL_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
+        order = affordable[0] if affordable else CONDITIONAL_NODES[-1]
+        if min(cost) <= MOST_CONDITIONAL_VALUES:
+            levels = _conditional_levels(law, basis, edges, outer, order)
             return until_settled((_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance)
     return until_settled(_density_levels(law, basis, edges), tolerance)
 
@@ -128,29 +128,29 @@ def _with_mirror_image(half: Floats) -> Floats:
     return half + half[::-1, ::-1]
 
 
-def _row_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
+def _conditional_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
     """About how often the density is evaluated: most intervals between cell edges are small fractions of a panel."""
     panels: int = law.panels(outer[:1]).shape[-1]
     values: int = (outer.size - 1) * order * (FRACTION_NODES[0] * edges.size + FRACTION_NODES[-1] * panels)
     return values
 
 
-def _row_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:
+def _conditional_levels(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Iterator[Floats]:
     level, spent = 0, 0
-    while level < 2 or spent + _row_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
-        spent += _row_cost(law, edges, outer, order)
-        yield _row_rule(law, basis, edges, outer, order)
+    while level < 2 or spent + _conditional_cost(law, edges, outer, order) <= MOST_DENSITY_VALUES:
+        spent += _conditional_cost(law, edges, outer, order)
+        yield _conditional_rule(law, basis, edges, outer, order)
         order, level = 2 * order, level + 1
 
 
-def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
+def _conditional_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order: int) -> Floats:
     angle, mass = SINE.quadrature(outer, order)
     source = basis.index(angle)
     flux = np.zeros(basis.size**2)
-    step = max(1, ROW_CHUNK // (FRACTION_NODES[0] * edges.size))
+    step = max(1, CONDITIONAL_CHUNK // (FRACTION_NODES[0] * edges.size))
     for start in range(0, angle.size, step):
         part = slice(start, start + step)
-        row, low, high, nodes = row_intervals(law, edges, angle[part])
+        row, low, high, nodes = conditional_intervals(law, edges, angle[part])
         target = basis.index(0.5 * (low + high))
         for count in FRACTION_NODES:
             chosen = nodes == count
@@ -159,10 +159,10 @@ def _row_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Floats, order
             value = law.density(angle[part][row[chosen], None], outgoing.reshape(shape)) * inner.reshape(shape)
             cell = source[part][row[chosen]] * basis.size + target[chosen]
             flux += np.bincount(cell, weights=mass[part][row[chosen]] * value.sum(axis=1), minlength=flux.size)
-    return basis.heights[:, None] * flux.reshape(basis.size, basis.size) * basis.heights
+    return basis.normalisation[:, None] * flux.reshape(basis.size, basis.size) * basis.normalisation
 
 
-def row_intervals(
+def conditional_intervals(
     law: HasDensity, edges: Floats, theta: Floats
 ) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
     """Row, ends and number of Gauss nodes of the intervals into which cells and panels together cut (0, pi)."""
@@ -198,7 +198,7 @@ def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> F
         assert owner is not None  # a basis is a partition or has values
         block = block.reshape(-1, order, owner.size, order).sum(axis=(1, 3))
         np.add.at(total, (owner[start // order : start // order + block.shape[0], None], owner), block)
-    return total if values is not None else basis.heights[:, None] * total * basis.heights
+    return total if values is not None else basis.normalisation[:, None] * total * basis.normalisation
 
 
 def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: float) -> tuple[Floats, float]:

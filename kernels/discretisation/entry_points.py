@@ -62,7 +62,7 @@ def _product_rule(law: DrivenLaw, basis: Basis, samples: int, split: int) -> Flo
         else:
             image = _mean_values(basis, outgoing)
             total += basis.evaluate(angle[rows]).T @ (mass[rows, None] * image)
-    return basis.heights[:, None] * total * basis.heights
+    return basis.normalisation[:, None] * total * basis.normalisation
 
 
 def _add_masses(total: Floats, basis: Basis, angle: Floats, outgoing: Floats, mass: Floats) -> None:

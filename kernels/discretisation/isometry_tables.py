@@ -106,10 +106,10 @@ def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[
         ends = sign * low + offset, sign * high + offset
         bounds.append((np.minimum(*ends), np.maximum(*ends), sign, offset))
     for left, right, sign, offset in bounds:
-        place, edge = edges_inside(edges, left, right)
-        at = sign[place] * (edge - offset[place])
-        owner.append(piece[place])
-        cut.append(np.clip(at, low[place], high[place]))
+        owned, edge = edges_inside(edges, left, right)
+        at = sign[owned] * (edge - offset[owned])
+        owner.append(piece[owned])
+        cut.append(np.clip(at, low[owned], high[owned]))
     return between_cuts(np.concatenate(owner), np.concatenate(cut))
 
 

@@ -119,13 +119,13 @@ class Chain:
 class _Level:
     symmetric: Floats
     # fraction of the error of each panel, which is what the products between factors lose there
-    lost: Floats
+    truncated: Floats
     # errors of the factors' matrices
     factors: float
 
     @property
     def error(self) -> float:
-        return float(self.lost.sum()) + self.factors
+        return float(self.truncated.sum()) + self.factors
 
 
 def product_matrix(factors: Sequence[Factor], basis: Basis, budget: Budget) -> tuple[Floats, float]:
@@ -151,10 +151,10 @@ def product_matrix(factors: Sequence[Factor], basis: Basis, budget: Budget) -> t
         level = _level(factors, basis, _panels(edges, basis), of_each)
         if best is None or level.error < best.error:
             best = level
-        if level.lost.sum() <= max(0.5 * budget.tolerance, 0.1 * level.factors):
+        if level.truncated.sum() <= max(0.5 * budget.tolerance, 0.1 * level.factors):
             return best.symmetric, best.error
-        order = np.argsort(level.lost)[::-1]
-        marked = order[: 1 + int(np.searchsorted(np.cumsum(level.lost[order]), MARKED * level.lost.sum()))]
+        order = np.argsort(level.truncated)[::-1]
+        marked = order[: 1 + int(np.searchsorted(np.cumsum(level.truncated[order]), MARKED * level.truncated.sum()))]
         cuts = edges[marked] + np.arange(1, PARTS)[:, None] / PARTS * (edges[marked + 1] - edges[marked])
         finer = np.union1d(edges, cuts)
         if (finer.size - 1) * (_panels(edges, basis).degree + 1) > MOST_FUNCTIONS:
@@ -187,8 +187,8 @@ def _level(chain: Sequence[Factor], basis: Basis, panels: Panels, budget: Budget
         before, left = _passed_on(ends, [(factors[law], True) for law in laws], panels)
         _, right = _passed_on(ends, [(factors[law], False) for law in reversed(laws)], panels)
     # the functions on either side of the k-th place between the factors
-    lost = sum(one * other for one, other in zip(left, reversed(right), strict=True))
-    return _Level(before.T @ ends, np.asarray(lost), float(sum(factors[law].error for law in laws)))
+    truncated = sum(one * other for one, other in zip(left, reversed(right), strict=True))
+    return _Level(before.T @ ends, np.asarray(truncated), float(sum(factors[law].error for law in laws)))
 
 
 def _passed_on(

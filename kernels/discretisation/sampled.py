@@ -37,17 +37,17 @@ class MonteCarlo:
         return _sampled(self.name, found, basis, budget, spread)
 
 
-def sobol_matrix(net: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix:
+def sobol_matrix(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix by at least ``budget.rays`` rays of a net, which goes on where it was."""
-    found = net.sampled(budget.rays, symmetrise=budget.symmetrise)
+    found = sampler.sampled(budget.rays, symmetrise=budget.symmetrise)
     return _sampled("qmc", found, basis, budget, f"spread of {PARTS} nets")
 
 
 def _sampled(
     name: MethodName, found: tuple[SampledArray, int, float], basis: Basis, budget: Budget, how: str
 ) -> KernelMatrix:
-    array, used, lost = found
-    if lost:
+    array, used, unresolved = found
+    if unresolved:
         how += ", plus a bound for rays that did not escape"
     return KernelMatrix(
         array.symmetric,
@@ -58,6 +58,6 @@ def _sampled(
         replicates=array.replicates,
         symmetrised=budget.symmetrise,
         samples=used,
-        unresolved=lost,
+        unresolved=unresolved,
         raw_defect=array.raw_defect,
     )

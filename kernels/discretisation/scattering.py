@@ -135,7 +135,7 @@ def local_values(basis: Basis, angle: Floats) -> Any:
     rows = np.arange(angle.size)
     if basis.is_partition:
         cell = basis.index(angle)
-        return csr_array((basis.heights[cell], (rows, cell)), shape=(angle.size, basis.size))
+        return csr_array((basis.normalisation[cell], (rows, cell)), shape=(angle.size, basis.size))
     if isinstance(basis, Panels):
         panel, values = basis.local(angle)
         width = basis.degree + 1
@@ -183,8 +183,8 @@ def scattered_matrix(laws: Sequence[Law], basis: Basis, isometric: IsometricMatr
     size = basis.size
     if isinstance(basis, Legendre):
         # a scattering at an end of the chain sees the polynomials of the basis alone
-        for place, piece in ((0, pieces[0]), (-1, pieces[-1])):
-            needed[place] = needed[place] if piece else size
+        for slot, piece in ((0, pieces[0]), (-1, pieces[-1])):
+            needed[slot] = needed[slot] if piece else size
     degrees = min(max(needed), HIGHEST_DEGREE)
     joint: Basis
     if isinstance(basis, Legendre):
@@ -193,9 +193,9 @@ def scattered_matrix(laws: Sequence[Law], basis: Basis, isometric: IsometricMatr
         joint, inner = JointBasis(basis, degrees), slice(size, size + degrees)
     matrices = {piece: isometric(piece, joint) for piece in dict.fromkeys(pieces)}
     product = matrices[pieces[0]][0][:size, inner]
-    lost = 0.0
-    for place, (law, wanted) in enumerate(zip(scatterings, needed, strict=True), start=1):
-        columns = inner if place < len(scatterings) else slice(0, size)
-        product = (product * law.g ** np.arange(degrees)) @ matrices[pieces[place]][0][inner, columns]
-        lost += abs(law.g) ** degrees * np.sqrt(size) if degrees < wanted else 0.0
-    return product, float(lost + sum(matrices[piece][1] for piece in pieces))
+    truncated = 0.0
+    for slot, (law, wanted) in enumerate(zip(scatterings, needed, strict=True), start=1):
+        columns = inner if slot < len(scatterings) else slice(0, size)
+        product = (product * law.g ** np.arange(degrees)) @ matrices[pieces[slot]][0][inner, columns]
+        truncated += abs(law.g) ** degrees * np.sqrt(size) if degrees < wanted else 0.0
+    return product, float(truncated + sum(matrices[piece][1] for piece in pieces))

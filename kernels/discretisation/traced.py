@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 # in bottles with a neck of a hundredth of their width they have no end. If another method can take over, it is less.
 ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
 # For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
-ROWS_A_PIECE, FLIGHTS_A_CHANGE = 100, 400
+ANGLES_A_PIECE, SEGMENTS_A_CHANGE = 100, 400
 # The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
 # part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
 ASYMMETRY_FACTOR = 2.0
@@ -39,16 +39,16 @@ ASYMMETRY_FACTOR = 2.0
 # is 0.
 KRONROD_FRACTION = 0.5
 # Rows at a time, so that their nodes fit into memory.
-ROWS_AT_ONCE = 1500
+ANGLES_AT_ONCE = 1500
 # The rows together may spend this fraction of the tolerance.
-ROW_FRACTION = 0.1
-SMALLEST_ROW_TOLERANCE = 1e-14
+MEAN_FRACTION = 0.1
+SMALLEST_MEAN_TOLERANCE = 1e-14
 # Tolerances are approached in stages by this ratio, from one that is no coarser than this: where no more than a coarse
 # result can be had, its rows are coarse as well.
 STAGE_RATIO, COARSEST_STAGE = 1e-2, 0.1
 # The rows of a narrow panel may be coarser: the panel may spend this fraction of what all rows together may.
 FAIR_FRACTION = 0.02
-COARSEST_ROW = 1e-4
+COARSEST_MEAN = 1e-4
 # Where a half has this fraction of its panel's difference of the two rules, or more, the integrand is not smooth: a
 # kink leaves 1/8 or more of it, a smooth integrand 2^-14.
 SMOOTH_SHRINKING = 1e-3
@@ -88,7 +88,7 @@ class Traced:
         return isinstance(law, WallLaw) and (self.any_wall or is_affordable(law.wall, basis))
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, error, rays = row_matrix(cast(WallLaw, law).wall, basis, budget)
+        symmetric, error, rays = traced_matrix(cast(WallLaw, law).wall, basis, budget)
         how = (
             f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
             "plus undecided entry points"
@@ -107,12 +107,12 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     """
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
-    predicted = ROWS_A_PIECE * FLIGHTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
+    predicted = ANGLES_A_PIECE * SEGMENTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
     overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
     return bool(wall.closes) and not overhangs and predicted <= MOST_SEGMENTS
 
 
-def row_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
+def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
 
     If the first angles speak against an error below ``budget.fallback``, these are all.
@@ -132,7 +132,7 @@ def row_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float,
 
 
 def panel_edges(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float]:
-    """The cuts in theta that `row_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
+    """The cuts in theta that `traced_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
     integrator = _Integrator(wall, basis, budget)
     _, error, _ = integrator.run()
     edges = np.union1d(integrator.panels.low, integrator.panels.high)
@@ -145,7 +145,7 @@ class _Integrator:
     def __init__(self, wall: Wall, basis: Basis, budget: Budget) -> None:
         self.basis, self.budget = basis, budget
         self.tolerance = max(budget.tolerance, 8.0 * EPS * basis.size)
-        self.rays, self.segments, self.row_count = 0, 0, 0
+        self.rays, self.segments, self.angle_count = 0, 0, 0
         self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
@@ -161,13 +161,13 @@ class _Integrator:
             self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
         fraction = FRACTION_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_FRACTION
         longest = max(int(fraction * budget.segments), LEAST_SEGMENTS)
-        self.rows = WallConditionals(wall, degree, inside, least, longest)
+        self.conditionals = WallConditionals(wall, degree, inside, least, longest)
         edges = basis.edges
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
         stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
         self.first_tolerance = self.tolerance / STAGE_RATIO**stages
-        self.row_tolerance = ROW_FRACTION * self.first_tolerance / self.scale
+        self.mean_tolerance = MEAN_FRACTION * self.first_tolerance / self.scale
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
         self._add_panels(edges[:-1], edges[1:])
 
@@ -207,22 +207,22 @@ class _Integrator:
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage; rows whose error is too large for its tolerance are done again."""
-        self.row_tolerance = max(ROW_FRACTION * tolerance / self.scale, SMALLEST_ROW_TOLERANCE)
-        coarse = self.panels.row_errors(self.basis) > 2.0 * ROW_FRACTION * tolerance * np.maximum(
+        self.mean_tolerance = max(MEAN_FRACTION * tolerance / self.scale, SMALLEST_MEAN_TOLERANCE)
+        coarse = self.panels.mean_errors(self.basis) > 2.0 * MEAN_FRACTION * tolerance * np.maximum(
             self.panels.mass, FAIR_FRACTION
         )
         self._fill(self.panels, np.broadcast_to(coarse[:, None], self.panels.angle.shape))
-        self._mend()
+        self._recompute()
 
     def _meet(self, tolerance: float) -> None:
         """Divide panels until the error is below the tolerance, or no segments are left."""
         goal = tolerance
         while True:
-            error, panels, rows, hidden = self._measure()
+            error, panels, conditionals, hidden = self._measure()
             if error <= tolerance or self.segments >= self.budget.segments:
                 return
             # errors that only the asymmetry shows lie in panels whose rules agree by chance
-            goal = min(goal, max(tolerance - hidden, 0.25 * (panels + rows)))
+            goal = min(goal, max(tolerance - hidden, 0.25 * (panels + conditionals)))
             chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
             if not chosen.any():
                 return
@@ -230,11 +230,11 @@ class _Integrator:
 
     def _measure(self) -> tuple[float, float, float, float]:
         """The error now and its parts: that of the panels, that of the rows, and what the asymmetry tells."""
-        matrix, panels, rows, hidden = self._state()
-        error = rows + math.hypot(panels, hidden)
+        matrix, panels, conditionals, hidden = self._state()
+        error = conditionals + math.hypot(panels, hidden)
         if error < self.best[1]:
             self.best = matrix, error
-        return error, panels, rows, hidden
+        return error, panels, conditionals, hidden
 
     def _state(self) -> tuple[Floats, float, float, float]:
         """The matrix, the errors that its panels and its rows are known to have, and what its asymmetry tells."""
@@ -242,19 +242,21 @@ class _Integrator:
         step = max(1, VALUES_AT_ONCE // self.basis.size**2)
         for first in range(0, len(self.panels.low), step):
             matrix += (
-                self.panels.kept(np.arange(first, min(first + step, len(self.panels.low)))).values(self.basis).sum(0)
+                self.panels.selected(np.arange(first, min(first + step, len(self.panels.low))))
+                .values(self.basis)
+                .sum(0)
             )
         panels = float(np.linalg.norm(self.panels.error))
-        rows = float(np.sum(self.panels.row_errors(self.basis)))
+        conditionals = float(np.sum(self.panels.mean_errors(self.basis)))
         if self.halved:
             flip = reflection_matrix(self.basis)
-            matrix, panels, rows = matrix + flip @ matrix @ flip.T, 2.0 * panels, 2.0 * rows
-        return matrix, panels, rows, ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
+            matrix, panels, conditionals = matrix + flip @ matrix @ flip.T, 2.0 * panels, 2.0 * conditionals
+        return matrix, panels, conditionals, ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
 
     def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:
         """The worst panels: those beyond which the others together have less than a part of the goal."""
         panels = self.panels
-        able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.row_errors(self.basis))
+        able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.mean_errors(self.basis))
         order = np.argsort(panels.error)
         together = np.sqrt(np.cumsum(panels.error[order] ** 2))
         chosen = np.zeros(len(order), dtype=np.bool_)
@@ -262,23 +264,23 @@ class _Integrator:
         # a panel far below the worst waits for a later round
         chosen &= able & (panels.error > 0.02 * np.max(panels.error, where=able, initial=0.0))
         # no more than what is left of the budget buys, at the cost of a row so far
-        left = (self.budget.segments - self.segments) * self.row_count / max(1, self.segments)
+        left = (self.budget.segments - self.segments) * self.angle_count / max(1, self.segments)
         most = int(left) // (2 * len(NODES))
         worst = np.zeros(len(order), dtype=np.bool_)
         worst[order[max(0, len(order) - most) :]] = True
         return np.asarray(chosen & worst)
 
     def _divide(self, chosen: NDArray[np.bool_]) -> None:
-        parents = self.panels.kept(chosen)
+        parents = self.panels.selected(chosen)
         before, whole = parents.differences(self.basis), parents.values(self.basis)
         cuts = [self._cuts(low, high) for low, high in zip(parents.low.tolist(), parents.high.tolist(), strict=True)]
         parts = [
             np.concatenate(([low], cut, [high])) for low, cut, high in zip(parents.low, cuts, parents.high, strict=True)
         ]
         owner = np.repeat(np.arange(len(parts)), [len(part) - 1 for part in parts])
-        self.panels = self.panels.kept(~chosen)
+        self.panels = self.panels.selected(~chosen)
         self._add_panels(np.concatenate([p[:-1] for p in parts]), np.concatenate([p[1:] for p in parts]))
-        children = self.panels.kept(np.arange(-len(owner), 0))
+        children = self.panels.selected(np.arange(-len(owner), 0))
         after, value = children.differences(self.basis), children.values(self.basis)
         total = np.zeros_like(whole)
         np.add.at(total, owner, value)
@@ -290,7 +292,7 @@ class _Integrator:
     def _cuts(self, low: float, high: float) -> Floats:
         """Where a panel is divided: at critical angles, in its middle if none is known inside it."""
         margin = LEAST_CUT * (high - low)
-        cuts = self.rows.critical_angles(low + margin, high - margin)
+        cuts = self.conditionals.critical_angles(low + margin, high - margin)
         cuts = cuts[np.concatenate(([True], np.diff(cuts) > margin))[: len(cuts)]]
         return cuts if len(cuts) else np.array([0.5 * (low + high)])
 
@@ -299,28 +301,30 @@ class _Integrator:
         fresh = AnglePanels.between(low, high, self.basis.size)
         self._fill(fresh, np.ones(fresh.angle.shape, dtype=np.bool_))
         self.panels = self.panels.joined(fresh)
-        self._mend()
+        self._recompute()
 
-    def _mend(self) -> None:
+    def _recompute(self) -> None:
         """Do rows again that turned out to have overlooked a piece."""
         for _ in range(MOST_MENDINGS):
-            stale = np.isin(self.panels.angle, list(self.rows.stale))
-            self.rows.stale.clear()
-            if not stale.any():
+            outdated = np.isin(self.panels.angle, list(self.conditionals.outdated))
+            self.conditionals.outdated.clear()
+            if not outdated.any():
                 break
-            self._fill(self.panels, stale)
+            self._fill(self.panels, outdated)
 
     def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
         """Compute the rows at these nodes, and from the panels' differences of the rules their errors."""
         fraction = FAIR_FRACTION / np.maximum(panels.mass, np.finfo(np.float64).tiny)
-        tolerance = np.minimum(self.row_tolerance * np.maximum(1.0, fraction), COARSEST_ROW)
+        tolerance = np.minimum(self.mean_tolerance * np.maximum(1.0, fraction), COARSEST_MEAN)
         panel, node = np.nonzero(mask)
-        for first in range(0, len(panel), ROWS_AT_ONCE):
-            few = slice(first, first + ROWS_AT_ONCE)
-            rows = self.rows(panels.angle[panel[few], node[few]], tolerance[panel[few]])
-            self.rays, self.segments = self.rays + rows.rays, self.segments + rows.flights
-            self.row_count += len(rows.theta)
-            panels.image[panel[few], node[few]] = means_of_basis(self.basis, rows.nodes, rows.weights, rows.starts)
-            panels.row_error[panel[few], node[few]] = self.scale * (rows.error + 2.0 * rows.lost)
+        for first in range(0, len(panel), ANGLES_AT_ONCE):
+            few = slice(first, first + ANGLES_AT_ONCE)
+            conditionals = self.conditionals(panels.angle[panel[few], node[few]], tolerance[panel[few]])
+            self.rays, self.segments = self.rays + conditionals.rays, self.segments + conditionals.segments
+            self.angle_count += len(conditionals.theta)
+            panels.image[panel[few], node[few]] = means_of_basis(
+                self.basis, conditionals.nodes, conditionals.weights, conditionals.starts
+            )
+            panels.mean_error[panel[few], node[few]] = self.scale * (conditionals.error + 2.0 * conditionals.unresolved)
         touched = np.unique(panel)
-        panels.error[touched] = KRONROD_FRACTION * panels.kept(touched).differences(self.basis)
+        panels.error[touched] = KRONROD_FRACTION * panels.selected(touched).differences(self.basis)

@@ -142,8 +142,8 @@ def _largest_projection(basis: Basis, one: Floats, other: Floats, order: float) 
     points = cell_middles(basis.edges)
     largest = 0.0
     for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
-        place = (np.cos(angle) * points[:, None] + np.sin(angle) * points).reshape(1, -1)
-        first, second = (Distributions.of_atoms(place, flux.reshape(1, -1)) for flux in (one, other))
+        position = (np.cos(angle) * points[:, None] + np.sin(angle) * points).reshape(1, -1)
+        first, second = (Distributions.of_atoms(position, flux.reshape(1, -1)) for flux in (one, other))
         largest = max(largest, float(wasserstein(first, second, order)[0]))
     return largest
 

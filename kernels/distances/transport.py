@@ -68,10 +68,10 @@ class Distributions:
         rows, corners = self.level.shape
         # one search in all rows at once: row i occupies the values from 2 i to 2 i + 1
         shift = 2.0 * np.arange(rows)[:, None]
-        place = np.searchsorted((self.level + shift).ravel(), (fraction + shift).ravel(), side="left").reshape(
+        index = np.searchsorted((self.level + shift).ravel(), (fraction + shift).ravel(), side="left").reshape(
             fraction.shape
         )
-        right = np.clip(place - corners * np.arange(rows)[:, None], 1, corners - 1)
+        right = np.clip(index - corners * np.arange(rows)[:, None], 1, corners - 1)
         low, high = (np.take_along_axis(self.level, right - back, axis=1) for back in (1, 0))
         left_end, right_end = (np.take_along_axis(self.position, right - back, axis=1) for back in (1, 0))
         part = np.clip((fraction - low) / np.maximum(high - low, SMALLEST_STEP), 0.0, 1.0)

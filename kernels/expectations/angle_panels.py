@@ -35,7 +35,7 @@ GAUSS = np.array(list(_GAUSS[:-1]) + list(_GAUSS[::-1]))
 # theta = low + (high - low) s^2 (3 - 2 s): where pieces of a row are born or vanish, its means behave like a square
 # root, and cuts are made there.
 _S = 0.5 * (1.0 + NODES)
-PLACES, SLOPES = _S * _S * (3.0 - 2.0 * _S), 3.0 * _S * (1.0 - _S)
+STRETCHED, SLOPES = _S * _S * (3.0 - 2.0 * _S), 3.0 * _S * (1.0 - _S)
 
 
 @dataclass
@@ -56,14 +56,14 @@ class AnglePanels:
     low: Floats
     high: Floats
     angle: Floats
-    row_error: Floats
+    mean_error: Floats
     image: Floats
     error: Floats
 
     @staticmethod
     def between(low: Floats, high: Floats, size: int) -> AnglePanels:
         """Panels whose rows are not known yet."""
-        angle = low[:, None] + (high - low)[:, None] * PLACES
+        angle = low[:, None] + (high - low)[:, None] * STRETCHED
         shape = angle.shape
         return AnglePanels(low, high, angle, np.zeros(shape), np.zeros((*shape, size)), np.zeros(len(low)))
 
@@ -72,7 +72,7 @@ class AnglePanels:
         """Measure of every panel."""
         return SINE.mass(self.low, self.high)
 
-    def kept(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> AnglePanels:
+    def selected(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> AnglePanels:
         """Those chosen by a mask or by their numbers."""
         return AnglePanels(*(getattr(self, field.name)[mask] for field in fields(self)))
 
@@ -96,8 +96,8 @@ class AnglePanels:
         """The norms of the differences between the two rules."""
         return np.asarray(np.linalg.norm(self._integrals(KRONROD - GAUSS, basis), axis=(1, 2)))
 
-    def row_errors(self, basis: Basis) -> Floats:
+    def mean_errors(self, basis: Basis) -> Floats:
         """What the errors of the rows do to the integrals."""
         weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * KRONROD
         size = np.linalg.norm(basis.evaluate(self.angle), axis=2)
-        return np.asarray(np.sum(weight * size * self.row_error, axis=1))
+        return np.asarray(np.sum(weight * size * self.mean_error, axis=1))

@@ -44,7 +44,7 @@ class ArcPieces(NamedTuple):
 
 
 # From incoming angles and the hits up to which rays are followed.
-PiecesOfRows: TypeAlias = Callable[[Floats, int], ArcPieces]
+PiecesOfAngles: TypeAlias = Callable[[Floats, int], ArcPieces]
 
 
 class ArcLines(NamedTuple):
@@ -64,7 +64,7 @@ class ArcLines(NamedTuple):
     single: NDArray[np.bool_]
     rest: NDArray[np.bool_]
 
-    def of_rows(self, values: Floats, rows: int) -> Floats:
+    def of_angles(self, values: Floats, rows: int) -> Floats:
         """Sums of the values of pieces over each row."""
         return np.asarray(np.bincount(self.ray, weights=values, minlength=rows), dtype=np.float64)
 
@@ -95,9 +95,9 @@ def arc_images(lines: ArcLines, panels: Panels, theta: Floats) -> tuple[Floats, 
     first = cell_among(panels.edges, ends[0])
     last = np.clip(np.searchsorted(panels.edges, ends[1], side="left") - 1, first, len(panels.edges) - 2)
     gathered = np.zeros((panels.degree + 1, theta.size * (len(panels.edges) - 1)))
-    owner, place = joined_lists(np.where(single, 0, last - first + 1))
+    owner, rank = joined_lists(np.where(single, 0, last - first + 1))
     for start in range(0, owner.size, CHUNK):
-        own, panel = owner[start : start + CHUNK], (first[owner] + place)[start : start + CHUNK]
+        own, panel = owner[start : start + CHUNK], (first[owner] + rank)[start : start + CHUNK]
         low, high = panels.edges[panel], panels.edges[panel + 1]
         cuts = np.sort((np.stack([low, high]) - offset[own]) / slope[own], axis=0)
         near, far = np.clip(cuts, lower[own], upper[own])
@@ -108,9 +108,9 @@ def arc_images(lines: ArcLines, panels: Panels, theta: Floats) -> tuple[Floats, 
     cell = ray[single] * (len(panels.edges) - 1) + panel
     for column, values in zip(gathered, panels.legendre(angle, panel).T, strict=True):
         column += np.bincount(cell, weights=lines.mass[single] * values, minlength=column.size)
-    total = lines.of_rows(lines.mass, theta.size)
+    total = lines.of_angles(lines.mass, theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
-    left = lines.of_rows(np.where(lines.rest, lines.mass, 0.0), theta.size)
+    left = lines.of_angles(np.where(lines.rest, lines.mass, 0.0), theta.size)
     # two angles of a function of sup norm 1
     return panels.of_legendre(moments.transpose(1, 2, 0)), 2.0 * left / total
 
@@ -147,7 +147,7 @@ class ArcMeans:
     vectors : array of shape (n, k)
     """
 
-    def __init__(self, half_angle: float, pieces: PiecesOfRows, panels: Panels, vectors: Floats) -> None:
+    def __init__(self, half_angle: float, pieces: PiecesOfAngles, panels: Panels, vectors: Floats) -> None:
         self.half_angle, self.pieces, self.edges = half_angle, pieces, panels.edges
         self._polynomials = panels.legendre_series(vectors)
         self._orders = self._polynomials.shape[1] // 2 + 1 + MORE_NODES
@@ -161,7 +161,7 @@ class ArcMeans:
         """The means, shape (rows, k), and how much the rays with more hits can be off in the worst of the functions."""
         lines = outgoing_lines(self.half_angle, self.pieces(theta, most_hits), theta)
         single, fraction = lines.single, lines.mass
-        whole = lines.of_rows(fraction, theta.size)
+        whole = lines.of_angles(fraction, theta.size)
         found = np.empty((len(single), self._polynomials.shape[2]))
         long = np.flatnonzero(~single)
         for start in range(0, long.size, PIECES_AT_ONCE):
@@ -171,8 +171,8 @@ class ArcMeans:
         angle = lines.angle[known]
         here = self._moments(angle[:, None], cell_among(self.edges, angle), fraction[known, None])
         found[known] = np.einsum("pd,pdk->pk", here, self._polynomials[cell_among(self.edges, angle)])
-        total = np.stack([lines.of_rows(column, theta.size) for column in found.T], axis=1)
-        left = lines.of_rows(np.where(lines.rest, fraction, 0.0), theta.size)
+        total = np.stack([lines.of_angles(column, theta.size) for column in found.T], axis=1)
+        left = lines.of_angles(np.where(lines.rest, fraction, 0.0), theta.size)
         return total / whole[:, None], left / whole * self._spread(most_hits)
 
     def _spread(self, most_hits: int) -> float:

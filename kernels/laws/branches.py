@@ -88,9 +88,9 @@ def chained_breakpoints(laws: Sequence[Branching], limit: int) -> tuple[Floats, 
         return np.empty(0), math.inf
     found = each[0][0]
     try:
-        for place in range(1, len(laws)):
+        for index in range(1, len(laws)):
             between = np.concatenate([[0.0], found, [np.pi]])
-            sources = preimages(partial(chained, laws[:place]), between, each[place][0])
+            sources = preimages(partial(chained, laws[:index]), between, each[index][0])
             found = np.unique(np.concatenate([found, sources]))
     except InputError:
         # the laws before the last have no branches, or together too many

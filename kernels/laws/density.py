@@ -117,10 +117,10 @@ class DensityLaw(Law):
             ) from reason
         if value.size and value.min() < -NEGATIVE_TOLERANCE * max(1.0, float(value.max())):
             worst = np.unravel_index(int(np.argmin(value)), shape)
-            place = np.broadcast_to(theta, shape)[worst], np.broadcast_to(theta_out, shape)[worst]
+            where_worst = np.broadcast_to(theta, shape)[worst], np.broadcast_to(theta_out, shape)[worst]
             raise InputError(
-                f"density: expected values of at least 0, got {value[worst]:g} at theta = {place[0]:g}, "
-                f"theta' = {place[1]:g}"
+                f"density: expected values of at least 0, got {value[worst]:g} at theta = {where_worst[0]:g}, "
+                f"theta' = {where_worst[1]:g}"
             )
         return np.asarray(np.maximum(value, 0.0))
 
@@ -193,23 +193,23 @@ class DensityLaw(Law):
 
     def _apply_chunk(self, function: AngleFunction, theta: Floats) -> Floats:
         found, height = self._means(function, theta, 1)
-        open_rows, parts = np.arange(theta.size), 2
-        while open_rows.size and parts <= MOST_PARTS:
+        unsettled, parts = np.arange(theta.size), 2
+        while unsettled.size and parts <= MOST_PARTS:
             # as many values at a time as with the coarsest panels
             step = max(1, theta.size // parts)
-            starts = range(0, open_rows.size, step)
-            finer = [self._means(function, theta[open_rows[start : start + step]], parts) for start in starts]
+            starts = range(0, unsettled.size, step)
+            finer = [self._means(function, theta[unsettled[start : start + step]], parts) for start in starts]
             value = np.concatenate([one for one, _ in finer])
             height = max(height, *(most for _, most in finer))
-            change = np.abs(value - found[open_rows]).reshape(open_rows.size, -1).max(axis=1, initial=0.0)
-            found[open_rows] = value
-            open_rows = open_rows[change > SETTLED * height]
+            change = np.abs(value - found[unsettled]).reshape(unsettled.size, -1).max(axis=1, initial=0.0)
+            found[unsettled] = value
+            unsettled = unsettled[change > SETTLED * height]
             parts *= 2
         return found
 
     def _means(self, function: AngleFunction, theta: Floats, parts: int) -> tuple[Floats, float]:
         """The means with each panel cut into so many parts, and the largest modulus of the function there."""
-        outgoing, weight = self._row_quadrature(split_rows(self.panels(theta), parts), GAUSS_NODES)
+        outgoing, weight = self._conditional_quadrature(split_panels(self.panels(theta), parts), GAUSS_NODES)
         weight = weight * self.density(theta[:, None], outgoing)
         weight /= np.sum(weight, axis=1, keepdims=True)
         value = np.asarray(function(outgoing), dtype=np.float64)
@@ -241,7 +241,7 @@ class DensityLaw(Law):
         gap, jumps = 4.0 * EPS, self.outgoing_breakpoints
         return np.unique(np.concatenate([inner, [np.pi], jumps - gap, jumps + gap]))
 
-    def _row_quadrature(self, edges: Floats, order: int) -> tuple[Floats, Floats]:
+    def _conditional_quadrature(self, edges: Floats, order: int) -> tuple[Floats, Floats]:
         outgoing, weight = gauss_on_intervals(edges[..., :-1].ravel(), edges[..., 1:].ravel(), order)
         shape = (*edges.shape[:-1], -1)
         return outgoing.reshape(shape), weight.reshape(shape)
@@ -252,7 +252,7 @@ class DensityLaw(Law):
         for panels in PANEL_COUNTS:
             sums = []
             for order in (CHECK_NODES, GAUSS_NODES):
-                outgoing, weight = self._row_quadrature(self._grid(panels), order)
+                outgoing, weight = self._conditional_quadrature(self._grid(panels), order)
                 sums.append(self.density(probes[:, None], outgoing) @ weight)
             rows, difference = sums[1], float(np.max(np.abs(sums[1] - sums[0])))
             if difference <= ROW_TOLERANCE and np.all(np.abs(rows - 1.0) <= ROW_TOLERANCE):
@@ -278,19 +278,19 @@ class DensityLaw(Law):
 
     def _measured_sampling_error(self) -> float:
         edges, probes = self._cells(), _probes()
-        outgoing, weight = self._row_quadrature(edges, CHECK_NODES)
+        outgoing, weight = self._conditional_quadrature(edges, CHECK_NODES)
         mass = (self.density(probes[:, None], outgoing) * weight).reshape(PROBES, edges.size - 1, CHECK_NODES)
         exact = np.cumsum(mass.sum(axis=-1), axis=-1)
         table = np.cumsum(_cell_masses(edges, self.density(probes[:, None], clipped_inside(edges))), axis=-1)
         return float(np.max(np.abs(exact / exact[:, -1:] - table / table[:, -1:])))
 
 
-def split_rows(edges: Floats, parts: int) -> Floats:
+def split_panels(edges: Floats, parts: int) -> Floats:
     """Edges in the last axis, with each interval cut into so many equal parts.
 
     Examples
     --------
-    >>> split_rows(np.array([0.0, 1.0, 3.0]), 2).tolist()
+    >>> split_panels(np.array([0.0, 1.0, 3.0]), 2).tolist()
     [0.0, 0.5, 1.0, 2.0, 3.0]
     """
     fraction = np.arange(parts) / parts
@@ -308,9 +308,9 @@ def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floa
     # The panel of an interval is the one whose left edge came last.
     widths = np.concatenate((np.diff(panels, axis=1), np.zeros((rows, 1 + count))), axis=1)
     number = np.concatenate((np.arange(panels.shape[1]), np.zeros(count, dtype=np.int64)))
-    place = np.argsort(merged, axis=1, kind="stable")
-    merged = np.take_along_axis(merged, place, axis=1)
-    panel = np.maximum.accumulate(number[place], axis=1)[:, :-1]
+    order = np.argsort(merged, axis=1, kind="stable")
+    merged = np.take_along_axis(merged, order, axis=1)
+    panel = np.maximum.accumulate(number[order], axis=1)[:, :-1]
     width = np.diff(merged, axis=1)
     row, column = np.nonzero(width > 0.0)
     fraction = width[row, column] / widths[row, panel[row, column]]

@@ -81,9 +81,9 @@ class IntervalExchangeLaw(Law):
         first = np.searchsorted(row, np.arange(self.matrix.size))
         before = inside - widths
         starts = SINE.cdf(edges[:-1])[row] + before - before[first][row]
-        place = np.full(flux.shape, -1, dtype=np.int64)
-        place[row, column] = np.arange(row.size)
-        partner = place[column, row]
+        number = np.full(flux.shape, -1, dtype=np.int64)
+        number[row, column] = np.arange(row.size)
+        partner = number[column, row]
         partner.setflags(write=False)
         for name, value in (("starts", frozen(starts)), ("widths", frozen(widths)), ("partner", partner)):
             object.__setattr__(self, name, value)

@@ -21,7 +21,7 @@ Whole = NDArray[np.int64]
 # Offsets are sums of a few angles of the wall, found along different routes: dozens of roundings of numbers below 2 pi.
 SAME_OFFSET = 64.0 * np.pi * EPS
 # Rows of a table that misses nothing sum to 1 within the rounding of their many terms; below this it is made good.
-ROUNDED_ROW = 1e-9
+ROUNDED_SUM = 1e-9
 # Candidates a query looks at are held at a time.
 CHUNK = 2**21
 # Buckets of the index hold about this many entries a piece in all.
@@ -71,7 +71,7 @@ class IsometryTable:
 
     >>> import numpy as np
     >>> table = IsometryTable.flat(1.0)
-    >>> probability, sign, offset = table.rows(1.0)
+    >>> probability, sign, offset = table.conditionals(1.0)
     >>> probability.round(15).tolist(), sign.tolist(), (offset / np.pi).tolist()
     ([1.0], [-1.0], [1.0])
     """
@@ -147,8 +147,8 @@ class IsometryTable:
         for crevice in (crevice for table in parts for crevice in table.crevices):
             key = crevice.height_to_width, crevice.exchanged
             crevices[key] = crevices.get(key, 0.0) + crevice.fraction
-        kept = tuple(Crevice(fraction, *key) for key, fraction in crevices.items())
-        return cls(*columns, crevices=kept, unresolved=sum(table.unresolved for table in parts))
+        merged = tuple(Crevice(fraction, *key) for key, fraction in crevices.items())
+        return cls(*columns, crevices=merged, unresolved=sum(table.unresolved for table in parts))
 
     def scaled(self, fraction: float) -> IsometryTable:
         """The table with every probability multiplied by ``fraction``."""
@@ -205,7 +205,7 @@ class IsometryTable:
         raised = self.start[piece] * np.sin(high - theta) + self.end[piece] * np.sin(theta - low)
         return np.asarray(raised / np.sin(high - low))
 
-    def rows(self, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    def conditionals(self, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Probability, sign and offset of the branches at each angle, shape ``theta.shape + (branches,)``.
 
         Between two kinks every slot is one isometry. Unused slots have probability 0 and repeat the first isometry.
@@ -214,12 +214,12 @@ class IsometryTable:
         flat = incoming.ravel()
         sign, offset, _ = self.isometries
         owner, isometry, probability = self._entries(flat)
-        key, place = np.unique(owner * sign.size + isometry, return_inverse=True)
-        total = np.bincount(place, weights=probability, minlength=key.size)
+        key, group = np.unique(owner * sign.size + isometry, return_inverse=True)
+        total = np.bincount(group, weights=probability, minlength=key.size)
         key, total = key[total > 0.0], total[total > 0.0]
         query, number = np.divmod(key, sign.size)
         whole = np.bincount(query, weights=total, minlength=flat.size)
-        fraction = total / np.where(np.abs(whole - 1.0) < ROUNDED_ROW, whole, 1.0)[query]
+        fraction = total / np.where(np.abs(whole - 1.0) < ROUNDED_SUM, whole, 1.0)[query]
         count = np.bincount(query, minlength=flat.size)
         _, slot = joined_lists(count)
         slots = int(count.max(initial=1))
@@ -232,8 +232,8 @@ class IsometryTable:
         return filled.reshape(shape), sign[which].reshape(shape), offset[which].reshape(shape)
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        """Probabilities and outgoing angles, as `rows`."""
-        probability, sign, offset = self.rows(theta)
+        """Probabilities and outgoing angles, as `conditionals`."""
+        probability, sign, offset = self.conditionals(theta)
         return probability, clipped_inside(sign * np.asarray(theta, dtype=np.float64)[..., None] + offset)
 
     def _entries(self, theta: Floats) -> tuple[Whole, Whole, Floats]:
@@ -247,9 +247,9 @@ class IsometryTable:
         step = max(CHUNK // max(int(size.max(initial=1)), 1), 1)
         for begin in range(0, theta.size, step):
             part = slice(begin, begin + step)
-            owner, place = joined_lists(size[part])
+            owner, group = joined_lists(size[part])
             query = begin + owner
-            piece = members[first[bucket[query]] + place]
+            piece = members[first[bucket[query]] + group]
             at = theta[query]
             # a kink belongs to the piece on its right
             inside = (self.low[piece] <= at) & (at < self.high[piece])
@@ -258,8 +258,8 @@ class IsometryTable:
         everyone = np.arange(theta.size)
         for crevice in self.crevices:
             retro = crevice.fraction * crevice_retro(crevice.height_to_width, theta)
-            outcomes = (1, 0) if crevice.exchanged else (0, 1)
-            for isometry, probability in zip(outcomes, (crevice.fraction - retro, retro), strict=True):
+            pair = (1, 0) if crevice.exchanged else (0, 1)
+            for isometry, probability in zip(pair, (crevice.fraction - retro, retro), strict=True):
                 found.append((everyone, np.full(theta.size, isometry), probability))
         query, number, probability = (np.concatenate(column) for column in zip(*found, strict=True))
         return query, number, probability
@@ -271,8 +271,8 @@ class IsometryTable:
         buckets = int(np.clip(ENTRIES_PER_PIECE * self.low.size * np.pi / max(width, 1e-300), 1, 2**20))
         left = np.clip((self.low * (buckets / np.pi)).astype(np.int64) - 1, 0, buckets - 1)
         right = np.clip((self.high * (buckets / np.pi)).astype(np.int64) + 1, 0, buckets - 1)
-        piece, place = joined_lists(right - left + 1)
-        bucket = left[piece] + place
+        piece, group = joined_lists(right - left + 1)
+        bucket = left[piece] + group
         order = np.argsort(bucket, kind="stable")
         first = np.concatenate([[0], np.cumsum(np.bincount(bucket, minlength=buckets))])
         return np.asarray(first, dtype=np.int64), np.asarray(piece[order], dtype=np.int64)

@@ -283,9 +283,9 @@ def entry_inside(x: Floats) -> Floats:
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
 
 
-def set_properties(law: Law, **facts: object) -> None:
+def set_properties(law: Law, **properties: object) -> None:
     """Set attributes of a law under construction; afterwards it is immutable."""
-    for name, value in facts.items():
+    for name, value in properties.items():
         object.__setattr__(law, name, value)
 
 
@@ -295,10 +295,10 @@ def entry_points(x: ArrayLike) -> Floats:
     bad = ~((array > 0.0) & (array < 1.0))
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
-        place = f" at index {where}" if where else ""
+        index = f" at index {where}" if where else ""
         raise InputError(
             f"x: expected entry points in the open interval (0, 1), as fractions of the period, got {array[where]!r}"
-            f"{place} ({int(bad.sum())} such)"
+            f"{index} ({int(bad.sum())} such)"
         )
     return array
 
@@ -343,8 +343,8 @@ class Combination(Law):
         laws = [law for _, law in self.terms]
         set_properties(self, frame=common_frame(laws, "add"), evaluations=sum(law.evaluations for law in laws))
         used = [law for weight, law in self.terms if weight]
-        set_properties(self, reversible=_sum_promise([law.reversible for law in used]))
-        set_properties(self, mirror_symmetric=_sum_promise([law.mirror_symmetric for law in used]))
+        set_properties(self, reversible=_sum_property([law.reversible for law in used]))
+        set_properties(self, mirror_symmetric=_sum_property([law.mirror_symmetric for law in used]))
 
     @staticmethod
     def of(law: Law) -> Combination:
@@ -358,9 +358,9 @@ class Combination(Law):
 
     def terms_checked(self) -> tuple[tuple[float, Law], ...]:
         """The terms, or an InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
-        for place, (weight, law) in enumerate(self.terms):
+        for index, (weight, law) in enumerate(self.terms):
             if weight < 0.0:
-                raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {place}, {law!r}")
+                raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {index}, {law!r}")
         if not self.sums_to_one:
             total = math.fsum(weight for weight, _ in self.terms)
             raise InputError(
@@ -417,8 +417,8 @@ class Combination(Law):
         choice = np.searchsorted(cumulative, rng.random(theta.shape) * cumulative[-1], side="right")
         choice = np.minimum(choice, len(terms) - 1)
         outgoing = np.empty(theta.shape)
-        for place, (_, law) in enumerate(terms):
-            chosen = choice == place
+        for index, (_, law) in enumerate(terms):
+            chosen = choice == index
             if chosen.any():
                 outgoing[chosen] = law.sample(theta[chosen], rng)
         return outgoing
@@ -461,12 +461,12 @@ def common_frame(laws: Sequence[Law], verb: str) -> Frame:
     return laws[0].frame
 
 
-def _sum_promise(promises: Sequence[bool | None]) -> bool | None:
+def _sum_property(promises: Sequence[bool | None]) -> bool | None:
     """Whether a sum has a property that the terms have, have not, or are not known to have."""
     if all(promises):
         return True
     # One term without it spoils the sum only if no other term can make up for it.
-    certain = [promise for promise in promises if promise is True]
+    certain = [known for known in promises if known is True]
     return False if len(certain) == len(promises) - 1 and False in promises else None
 
 
@@ -518,9 +518,9 @@ class Composition(Law):
 
         A combination whose weights sum to 1 is kept whole.
         """
-        for place, law in enumerate((first, second)):
+        for index, law in enumerate((first, second)):
             if isinstance(law, Combination) and not law.sums_to_one:
-                pairs = [(term, second) if place == 0 else (first, term) for _, term in law.terms]
+                pairs = [(term, second) if index == 0 else (first, term) for _, term in law.terms]
                 weights = [weight for weight, _ in law.terms]
                 return Combination(tuple((w, Composition.of(*pair)) for w, pair in zip(weights, pairs, strict=True)))
         return Composition((first, second))
@@ -683,8 +683,10 @@ class SpecularFrame(Law):
         """(P J)* = J P*, written as J (P* J) J with J a law of this frame."""
         if self.reversible:
             return self
-        turned = SpecularFrame.of(self.law.adjoint())
-        return turned if self.mirror_symmetric else Composition((_flip(self.frame), turned, _flip(self.frame)))
+        transformed = SpecularFrame.of(self.law.adjoint())
+        return (
+            transformed if self.mirror_symmetric else Composition((_flip(self.frame), transformed, _flip(self.frame)))
+        )
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         probability, outgoing = self.law.branches(theta)

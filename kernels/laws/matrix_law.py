@@ -129,9 +129,9 @@ class MatrixLaw(DensityLaw):
         start, size = cell_among(self.edges, theta), self._masses.size
         # One search in all rows at once: row i occupies the values from i to i + 1, which costs log2(n) of 53 bits.
         rows = cumulative + np.arange(size)[:, None]
-        place = np.searchsorted(rows.ravel(), start + rng.random(theta.shape), side="right") - size * start
-        place = np.clip(place, 0, size - 1)
-        return _uniform_between(self.edges[place], self.edges[place + 1], rng.random(theta.shape))
+        cell = np.searchsorted(rows.ravel(), start + rng.random(theta.shape), side="right") - size * start
+        cell = np.clip(cell, 0, size - 1)
+        return _uniform_between(self.edges[cell], self.edges[cell + 1], rng.random(theta.shape))
 
     def __repr__(self) -> str:
         return f"MatrixLaw({self.array.shape[0]} bins)"

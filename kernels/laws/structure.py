@@ -36,7 +36,7 @@ class Rules(Generic[Fact]):
     leaf: Callable[[Law], Fact]
     mixture: Callable[[Sequence[tuple[float, Fact]]], Fact]
     chain: Callable[[Sequence[Fact]], Fact]
-    turned: Callable[[Fact], Fact]
+    mirrored: Callable[[Fact], Fact]
     whole: Callable[[Law, Fact], Fact] = lambda law, fact: fact
 
 
@@ -60,7 +60,7 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
     if isinstance(law, Power):
         return rules.whole(law, rules.chain([fold(law.law, rules)] * law.exponent))
     if isinstance(law, SpecularFrame):
-        return rules.whole(law, rules.turned(fold(law.law, rules)))
+        return rules.whole(law, rules.mirrored(fold(law.law, rules)))
     return rules.leaf(law) if law.closed_form is None else fold(law.closed_form, rules)
 
 
@@ -74,9 +74,9 @@ def has_chain(law: Law) -> bool:
     return fold(law, Rules(lambda _: False, lambda terms: any(fact for _, fact in terms), lambda _: True, lambda f: f))
 
 
-def holds_of_all(law: Law, promise: Callable[[Law], bool]) -> bool:
+def holds_of_all(law: Law, test: Callable[[Law], bool]) -> bool:
     """Whether every part of a law that is no combination of others keeps a promise."""
-    return fold(law, Rules(promise, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))
+    return fold(law, Rules(test, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))
 
 
 def made_of_isometries(law: Law) -> bool:

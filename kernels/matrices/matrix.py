@@ -149,7 +149,7 @@ def tensor_product(first: KernelMatrix, second: KernelMatrix) -> KernelMatrix:
     )
 
 
-def flipped_frame(matrix: KernelMatrix) -> KernelMatrix:
+def in_other_frame(matrix: KernelMatrix) -> KernelMatrix:
     """P J: the matrix in the other convention."""
     if not is_mirror_symmetric(matrix.basis):
         raise InputError(
@@ -295,8 +295,8 @@ class KernelMatrix:
     @property
     def array(self) -> Floats:
         """P[i, j] = P(bin i -> bin j) for partitions, <e_i, P e_j> for other bases; shape (n, n)."""
-        heights = self.basis.heights
-        return np.asarray(heights[:, None] * self.symmetric / heights)
+        normalisation = self.basis.normalisation
+        return np.asarray(normalisation[:, None] * self.symmetric / normalisation)
 
     @property
     def weights(self) -> Floats:
@@ -349,7 +349,7 @@ class KernelMatrix:
         """``mu @ P``: the measure after one step, from the masses of the cells (for other bases the integrals of
         the e_i), or from a density with respect to the invariant measure."""
         if callable(measure):
-            return np.asarray((self._coordinates(measure, "mu") / self.basis.heights**2) @ self.array)
+            return np.asarray((self._coordinates(measure, "mu") / self.basis.normalisation**2) @ self.array)
         return np.asarray(self._coordinates(measure, "mu", axis=-1) @ self.array)
 
     def __mul__(self, factor: float) -> KernelMatrix:
@@ -390,7 +390,7 @@ class KernelMatrix:
         Raises an InputError where J does not keep the span of the basis; discretise the law's own
         ``in_specular_frame()`` then.
         """
-        return flipped_frame(self)
+        return in_other_frame(self)
 
     def as_linear_operator(self) -> LinearOperator:
         """``array`` as a scipy LinearOperator, with its transpose."""
@@ -443,7 +443,7 @@ class KernelMatrix:
     # ---- internals -------------------------------------------------------------------------------------------
     def _coordinates(self, other: ArrayLike | AngleFunction, name: str, axis: int = 0) -> Floats:
         if callable(other):
-            return np.asarray(self.basis.heights * self.basis.project(other))
+            return np.asarray(self.basis.normalisation * self.basis.project(other))
         values = finite_array(name, other)
         if values.ndim == 0 or values.shape[axis] != self.size:
             raise InputError(f"{name}: expected {self.size} entries for {self.basis!r}, got shape {values.shape}")

@@ -92,7 +92,7 @@ def array_from_counts(
     counts = parts[0] if len(parts) == 1 else _summed(parts)
     number, rows = float(counts.sum()), counts.sum(axis=1)
     _check_occupied(rows + counts.sum(axis=0) if symmetrise else rows, basis)
-    scale = basis.heights[:, None] * basis.heights  # from fluxes to the orthonormal basis
+    scale = basis.normalisation[:, None] * basis.normalisation  # from fluxes to the orthonormal basis
     flux = (counts + counts.T) / (2.0 * number) if symmetrise else counts * (basis.weights / rows)[:, None]
     symmetric = scale * flux
     replicates = _Replicates(symmetric, len(parts))
@@ -113,7 +113,7 @@ def array_from_counts(
         z_score = replicate_z_score([(part[pairs] - part.T[pairs]) / root for part in parts])
     raw = relative_asymmetry(scale * counts / number)
     whole = np.asarray(counts, dtype=np.int64) if np.issubdtype(counts.dtype, np.integer) else None
-    return SampledArray(symmetric, error, replicates.kept(), SymmetryDefect(raw, z_score=z_score), whole)
+    return SampledArray(symmetric, error, replicates.stored(), SymmetryDefect(raw, z_score=z_score), whole)
 
 
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
@@ -133,7 +133,7 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
     for mean in fixed:
         replicates.add(mean - symmetric)
     defect = SymmetryDefect(relative_asymmetry(raw), z_score=z_score)
-    return SampledArray(symmetric, replicates.half_width(), replicates.kept(), defect, None)
+    return SampledArray(symmetric, replicates.half_width(), replicates.stored(), defect, None)
 
 
 def half_width(symmetric: Floats, replicates: Sequence[Replicate]) -> float:
@@ -187,7 +187,7 @@ class _Replicates:
         quantile = 1.0 + beyond * math.sqrt(skew / spread)
         return math.sqrt(quantile * self.squares / (self.number * freedom))
 
-    def kept(self) -> tuple[Replicate, ...]:
+    def stored(self) -> tuple[Replicate, ...]:
         return tuple(self.arrays)
 
 
@@ -225,16 +225,16 @@ def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:
 
 def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) -> tuple[float, float]:
     """Mean and variance of the squared Frobenius norm of the error, where counts are multinomial."""
-    weights, heights = basis.weights, basis.heights
+    weights, normalisation = basis.weights, basis.normalisation
     if not symmetrise:
         # an entry (i, j) of the array is C_ij times w_i h_i h_j / N_i, and each row a multinomial of its own
         rows = counts.sum(axis=1)
-        mean, variance = _squared_norms(counts, heights**2, rows)
-        scale = (weights * heights / rows) ** 2
+        mean, variance = _squared_norms(counts, normalisation**2, rows)
+        scale = (weights * normalisation / rows) ** 2
         return float(scale @ mean), float(scale**2 @ variance)
     # a pair is counted by half at each of its two places, or fully on the diagonal
     number = float(counts.sum())
-    squares = np.outer(heights, heights) ** 2 / number**2
+    squares = np.outer(normalisation, normalisation) ** 2 / number**2
     upper = np.triu_indices(len(weights), 1)
     pairs = np.concatenate([np.diagonal(counts), (counts + counts.T)[upper]])
     weight = np.concatenate([np.diagonal(squares), 0.5 * squares[upper]])
@@ -256,8 +256,8 @@ def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Flo
     spread = np.einsum("ij,j->i", fraction * (1.0 - fraction), weight)
     # a single pair says nothing about its spread, which is then taken as large
     mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * spread, fraction @ weight)
-    turned = weight * (1.0 - 2.0 * fraction)
-    own = np.einsum("ij,ij->i", fraction, turned**2) - np.einsum("ij,ij->i", fraction, turned) ** 2
+    tilted = weight * (1.0 - 2.0 * fraction)
+    own = np.einsum("ij,ij->i", fraction, tilted**2) - np.einsum("ij,ij->i", fraction, tilted) ** 2
     other = np.einsum("ij,j->i", square * (1.0 - 2.0 * fraction), weight**2) + (square @ weight) ** 2
     return mean, number * np.maximum(own, 0.0) + 2.0 * number * (number - 1.0) * np.maximum(other, 0.0)
 

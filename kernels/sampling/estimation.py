@@ -90,7 +90,7 @@ def estimate(
         means = _batch_means(basis, incoming, outgoing, follows)
         method = f"spread of {len(means)} batches"
         if counts is not None:
-            fluxes = [mean / (basis.heights[:, None] * basis.heights) for mean in means]
+            fluxes = [mean / (basis.normalisation[:, None] * basis.normalisation) for mean in means]
             array = array_from_counts(fluxes, basis, symmetrise=symmetrise, independent=False)
         else:
             array = array_from_sums(means, basis, symmetrise=symmetrise, keeps_measure=False)

@@ -39,7 +39,7 @@ class RaySums:
         self.law, self.basis = law, basis
         shape = parts, basis.size, basis.size
         self.tables = np.zeros(shape, dtype=np.int64 if basis.is_partition else np.float64)
-        self.each, self.lost = 0, 0
+        self.each, self.unresolved = 0, 0
 
     @property
     def chunk(self) -> int:
@@ -54,7 +54,7 @@ class RaySums:
 
     def count_unresolved(self, escaped: NDArray[np.bool_] | None) -> None:
         """Count the rays that did not escape."""
-        self.lost += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
+        self.unresolved += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
 
     def array(self, *, symmetrise: bool, mirrored: bool = False) -> tuple[SampledArray, int, float]:
         """The matrix, the rays used, and the fraction of them that did not escape.
@@ -67,7 +67,7 @@ class RaySums:
             If more than a fraction of 1e-4 did not escape, or a bin has no ray.
         """
         used = len(self.tables) * self.each
-        fraction = self.lost / used
+        fraction = self.unresolved / used
         if fraction > UNRESOLVED_TOLERANCE:
             raise AccuracyError(
                 f"{self.law!r}: {fraction:.2g} of {used} rays did not escape, more than {UNRESOLVED_TOLERANCE:g}; "

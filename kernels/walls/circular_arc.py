@@ -13,7 +13,7 @@ from ..bases.basis import AngleFunction, Basis
 from ..bases.intervals import joined_lists
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.panels import Panels
-from ..expectations.arcs import ArcMeans, ArcPieces, PiecesOfRows, arc_images, outgoing_lines
+from ..expectations.arcs import ArcMeans, ArcPieces, PiecesOfAngles, arc_images, outgoing_lines
 from ..expectations.basis_means import Expectations, Means
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entry_points
@@ -105,7 +105,7 @@ class CircularArcLaw(DrivenLaw):
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The masses between the edges, as integrals of a sine."""
-        return Distribution.of_cells(self.row_masses(theta, edges))
+        return Distribution.of_cells(self.conditional_masses(theta, edges))
 
     def expectations(self, basis: Basis) -> Expectations:
         """Of polynomials on panels piece by piece, with errors; of others by `apply`."""
@@ -134,7 +134,7 @@ class CircularArcLaw(DrivenLaw):
         return total.reshape(theta.shape + total.shape[1:])
 
     def _means(self, function: AngleFunction, theta: Floats, nodes: int, most_hits: int) -> Floats:
-        ray, mirrored, outgoing, weight = self._row_quadrature(theta, nodes, most_hits)
+        ray, mirrored, outgoing, weight = self._conditional_quadrature(theta, nodes, most_hits)
         angle = clipped_inside(np.where(mirrored[:, None], np.pi - outgoing, outgoing))
         value = np.asarray(function(angle), dtype=np.float64)
         piece = np.einsum("ij,ij...->i...", weight, value)
@@ -143,7 +143,7 @@ class CircularArcLaw(DrivenLaw):
         summed = np.add.reduceat(piece, starts, axis=0)
         return np.asarray(summed / total.reshape((-1,) + (1,) * (summed.ndim - 1)))
 
-    def row_masses(self, theta: Floats, edges: Floats) -> Floats:
+    def conditional_masses(self, theta: Floats, edges: Floats) -> Floats:
         """P(theta, (edges[j], edges[j + 1])) for increasing edges, shape (rays, cells): sums of integrals of a sine."""
         ray, mirror, lower, upper, hits, rest, alone = self.pieces(theta)
         lower = np.where(rest, lower, np.minimum(lower, upper))
@@ -163,7 +163,7 @@ class CircularArcLaw(DrivenLaw):
             np.add.at(found, ray[part], np.abs(np.diff(below, axis=1)))
         return np.asarray(found / found.sum(axis=1, keepdims=True))
 
-    def _row_quadrature(
+    def _conditional_quadrature(
         self, theta: Floats, nodes: int, most_hits: int
     ) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
         """Gauss rules in delta between the changes of N, for every theta and both sides.
@@ -215,7 +215,7 @@ def followed_hits(tolerance: float) -> int:
 class _OnPanels(Expectations):
     basis: Panels
     half_angle: float
-    pieces: PiecesOfRows
+    pieces: PiecesOfAngles
 
     @property
     def has_errors(self) -> bool:

@@ -22,9 +22,9 @@ MOST_PIECES = 64
 PANEL_LEVEL = 2
 # A look at some angles tells chaotic hollows: 31,000 and 71,000 flights an angle against 260 to 7,400 of 28 other
 # walls. One angle stops at so many.
-LOOK_ANGLES = np.linspace(0.13, 3.01, 12)
-LOOK_TOLERANCE = 1e-3
-MANY_FLIGHTS, MOST_FLIGHTS_OF_A_LOOK = 15_000, 400_000
+PILOT_ANGLES = np.linspace(0.13, 3.01, 12)
+PILOT_TOLERANCE = 1e-3
+MANY_SEGMENTS, MOST_PILOT_SEGMENTS = 15_000, 400_000
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ class AdaptiveConditionals:
     weights: Floats
     starts: NDArray[np.int64]
     error: Floats
-    lost: Floats
+    unresolved: Floats
     rays: int
-    flights: int
+    segments: int
 
     def mean(self, function: AngleFunction) -> Floats:
-        """E[f(Theta') | theta] for every row, shape ``(rows,) + extra`` for f with values ``theta.shape + extra``."""
+        """E[f(Theta') | theta] for every angle, shape ``(angles,) + extra`` if f has values ``theta.shape + extra``."""
         values = np.asarray(function(self.nodes), dtype=np.float64)
         weighted = self.weights.reshape((-1,) + (1,) * (values.ndim - 1)) * values
         return np.add.reduceat(weighted, self.starts[:-1], axis=0)
@@ -107,8 +107,8 @@ def adaptive_conditionals(
     --------
     >>> from math import cos
     >>> from asperity import geometry as geo
-    >>> rows = adaptive_conditionals(geo.flat(), [0.5])
-    >>> rows.weights.tolist(), bool(rows.mean(np.cos)[0] == cos(np.pi - 0.5))
+    >>> conditionals = adaptive_conditionals(geo.flat(), [0.5])
+    >>> conditionals.weights.tolist(), bool(conditionals.mean(np.cos)[0] == cos(np.pi - 0.5))
     ([1.0], True)
     """
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
@@ -122,23 +122,23 @@ class WallConditionals:
     """Rows of one wall for one kind of functions; what is the same for all calls is made once."""
 
     def __init__(
-        self, wall: Wall, degree: int, edges: Floats, least_level: int = 0, most_flights: int = NO_LIMIT
+        self, wall: Wall, degree: int, edges: Floats, least_level: int = 0, most_segments: int = NO_LIMIT
     ) -> None:
         self.wall = wall.cell
         self.degree = degree
         # of one row in one hollow; its error tells what it had to leave undone
-        self.most_flights = most_flights
+        self.most_segments = most_segments
         # the first of the Gauss rules on a piece that may be used
         self.least_level = least_level
         # a writable copy: for read-only arrays all would be compiled again
         self.edges = np.array(edges, dtype=np.float64)
         # angles of earlier calls whose rows are now known to have overlooked a piece; the owner may clear it
-        self.stale: set[float] = set()
+        self.outdated: set[float] = set()
 
     @cached_property
     def _hollows(self) -> list[HollowConditionals]:
         """The rows of one hollow of each shape."""
-        task = self.degree, self.edges, self.least_level, self.most_flights
+        task = self.degree, self.edges, self.least_level, self.most_segments
         return [HollowConditionals(self.wall.scene, k, *task) for k, _ in self._shapes]
 
     @property
@@ -161,44 +161,46 @@ class WallConditionals:
 
     def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveConditionals:
         """Rows at checked angles."""
-        incoming, place = np.unique(theta, return_inverse=True)
+        incoming, group = np.unique(theta, return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
-        np.minimum.at(tolerances, place, np.broadcast_to(tolerance, theta.shape))
+        np.minimum.at(tolerances, group, np.broadcast_to(tolerance, theta.shape))
         before = self._spent()
         flat = self.wall.flat_top / self.wall.period if self.wall.closes else 0.0
         nodes: list[list[Floats]] = [[] for _ in incoming]
         weights: list[list[Floats]] = [[] for _ in incoming]
-        error, lost = np.zeros(len(incoming)), np.zeros(len(incoming))
-        for rows, fraction in zip(self._hollows, self._fractions, strict=True):
-            found, stale = rows.march(incoming, tolerances)
-            self.stale |= stale
-            scale = fraction / rows.width
-            for k, row in enumerate(found[angle] for angle in incoming.tolist()):
-                nodes[k].append(row.nodes)
-                weights[k].append(scale * row.widths)
-                error[k] += scale * row.error
-                lost[k] += scale * row.lost
+        error, unresolved = np.zeros(len(incoming)), np.zeros(len(incoming))
+        for conditionals, fraction in zip(self._hollows, self._fractions, strict=True):
+            found, outdated = conditionals.march(incoming, tolerances)
+            self.outdated |= outdated
+            scale = fraction / conditionals.width
+            for k, conditional in enumerate(found[angle] for angle in incoming.tolist()):
+                nodes[k].append(conditional.nodes)
+                weights[k].append(scale * conditional.widths)
+                error[k] += scale * conditional.error
+                unresolved[k] += scale * conditional.unresolved
         if flat > 0.0:
             for k, angle in enumerate(incoming.tolist()):
                 nodes[k].append(np.array([np.pi - angle]))
                 weights[k].append(np.array([flat]))
         return AdaptiveConditionals(
             theta,
-            np.concatenate([part for k in place.tolist() for part in nodes[k]]),
-            np.concatenate([part for k in place.tolist() for part in weights[k]]),
-            np.cumsum([0, *(sum(map(len, nodes[k])) for k in place.tolist())]),
-            error[place],
-            lost[place],
+            np.concatenate([part for k in group.tolist() for part in nodes[k]]),
+            np.concatenate([part for k in group.tolist() for part in weights[k]]),
+            np.cumsum([0, *(sum(map(len, nodes[k])) for k in group.tolist())]),
+            error[group],
+            unresolved[group],
             *(now - then for now, then in zip(self._spent(), before, strict=True)),
         )
 
     def _spent(self) -> tuple[int, int]:
         """Rays and flights so far."""
-        return sum(rows.rays for rows in self._hollows), sum(rows.flights for rows in self._hollows)
+        return sum(conditionals.rays for conditionals in self._hollows), sum(
+            conditionals.segments for conditionals in self._hollows
+        )
 
     def critical_angles(self, low: float, high: float) -> Floats:
         """Angles in (low, high), increasing, where pieces of rows are born or vanish: the most important ones known."""
-        found = [cut for rows in self._hollows for cut in rows.critical_angles(low, high)]
+        found = [cut for conditionals in self._hollows for cut in conditionals.critical_angles(low, high)]
         return np.unique([angle for angle, _ in found])
 
 
@@ -228,11 +230,11 @@ class TracedExpectations(Expectations):
     def __call__(self, theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         found = self._rows(theta, tolerance)
         means = means_of_basis(self.basis, found.nodes, found.weights, found.starts)
-        return means, found.error + 2.0 * found.lost
+        return means, found.error + 2.0 * found.unresolved
 
     def are_costly(self) -> bool:
         """Whether a look at some angles takes very many flights."""
-        rows = WallConditionals(self.wall, 1, np.empty(0), most_flights=MOST_FLIGHTS_OF_A_LOOK)(
-            LOOK_ANGLES, LOOK_TOLERANCE
+        conditionals = WallConditionals(self.wall, 1, np.empty(0), most_segments=MOST_PILOT_SEGMENTS)(
+            PILOT_ANGLES, PILOT_TOLERANCE
         )
-        return rows.flights > MANY_FLIGHTS * LOOK_ANGLES.size
+        return conditionals.segments > MANY_SEGMENTS * PILOT_ANGLES.size

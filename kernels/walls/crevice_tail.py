@@ -54,8 +54,8 @@ def sum_rule(count: Floats, nodes: int) -> tuple[Floats, Floats]:
     # in units of the number of terms: numbers of order one, however many terms there are
     beta = degree**2 * (1.0 - (degree / count) ** 2) / (4.0 * (4.0 * degree**2 - 1.0))
     jacobi = np.zeros((count.shape[0], nodes, nodes))
-    place = np.arange(nodes - 1)
-    jacobi[:, place, place + 1] = jacobi[:, place + 1, place] = np.sqrt(beta)
+    group = np.arange(nodes - 1)
+    jacobi[:, group, group + 1] = jacobi[:, group + 1, group] = np.sqrt(beta)
     node, vector = np.linalg.eigh(jacobi)
     return 0.5 * (count - 1.0) + count * node, count * vector[:, 0, :] ** 2
 
@@ -108,13 +108,13 @@ def crevice_nodes(
     low, high = cuts[:-1], cuts[1:]
     first, last = np.ceil(0.5 * low), np.floor(0.5 * high)
     whole = last > first
-    halves = HALF_NODES + extra_half + (times or 0) // 2
+    half_nodes = HALF_NODES + extra_half + (times or 0) // 2
     nodes = BLOCK_NODES + extra_block
-    parts = [_periods(first[whole], last[whole], nodes, halves)]
+    parts = [_periods(first[whole], last[whole], nodes, half_nodes)]
     # what is left of a period at either end of a block, each within one period
     left = np.minimum(2.0 * first, high)
     right = np.maximum(2.0 * last, left)
-    parts.append(_pieces(np.concatenate([low, right]), np.concatenate([left, high]), halves))
+    parts.append(_pieces(np.concatenate([low, right]), np.concatenate([left, high]), half_nodes))
     at, weight, retro = (np.concatenate(column) for column in zip(*parts, strict=True))
     weight = weight * _density(at, r)
     theta = np.arctan2(2.0 * r, at)
@@ -150,7 +150,7 @@ def _density(crossing: Floats, r: float) -> Floats:
     return np.asarray(np.sin(np.arctan2(2.0 * r, crossing)) ** 3 / (4.0 * r))
 
 
-def _periods(first: Floats, last: Floats, nodes: int, halves: int) -> tuple[Floats, Floats, Floats]:
+def _periods(first: Floats, last: Floats, nodes: int, half_nodes: int) -> tuple[Floats, Floats, Floats]:
     """Nodes d, weights and values of q for sums over the periods (2 k, 2 k + 2), first <= k < last."""
     count = last - first
     few = count < nodes
@@ -163,7 +163,7 @@ def _periods(first: Floats, last: Floats, nodes: int, halves: int) -> tuple[Floa
         period.append((first[~few][:, None] + node).ravel())
         weight.append(fraction.ravel())
     start, number = 2.0 * np.concatenate(period), np.concatenate(weight)
-    inside, gauss = gauss_on_intervals(np.array([0.0, 1.0]), np.array([1.0, 2.0]), halves)
+    inside, gauss = gauss_on_intervals(np.array([0.0, 1.0]), np.array([1.0, 2.0]), half_nodes)
     retro = np.where(inside <= 1.0, inside, 2.0 - inside)
     shape = (start.size, inside.size)
     return (
@@ -175,9 +175,9 @@ def _periods(first: Floats, last: Floats, nodes: int, halves: int) -> tuple[Floa
 
 @lru_cache(maxsize=16)
 def _sum_rules(count: tuple[float, ...], nodes: int) -> tuple[Floats, Floats]:
-    different, place = np.unique(np.array(count), return_inverse=True)
+    different, group = np.unique(np.array(count), return_inverse=True)
     node, weight = sum_rule(different, nodes)
-    return node[place], weight[place]
+    return node[group], weight[group]
 
 
 def _pieces(low: Floats, high: Floats, nodes: int) -> tuple[Floats, Floats, Floats]:

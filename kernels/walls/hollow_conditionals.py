@@ -26,13 +26,13 @@ MOST_ROUNDS = 8
 MOST_CUTS, CUT_FRACTION = 6, 0.1
 
 
-class Row(NamedTuple):
+class Conditional(NamedTuple):
     """Outgoing angles with the widths of the opening that go there, the error of their integral, and the width lost."""
 
     nodes: Floats
     widths: Floats
     error: float
-    lost: float
+    unresolved: float
 
 
 class _Pieces(NamedTuple):
@@ -55,13 +55,13 @@ class HollowConditionals:
     degree: int
     edges: Floats
     least_level: int
-    most_flights: int = NO_LIMIT
+    most_segments: int = NO_LIMIT
 
     def __post_init__(self) -> None:
-        self.rays, self.flights = 0, 0
+        self.rays, self.segments = 0, 0
         self._theta = np.empty(0)
         self._pieces: dict[float, _Pieces] = {}
-        self._overlooked: dict[float, list[float]] = {}
+        self._missed: dict[float, list[float]] = {}
         self._critical: dict[tuple[int, float, float], float] = {}
 
     @property
@@ -79,51 +79,51 @@ class HollowConditionals:
         has_channels = scene.pairs is not None
         has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
-        limits = Limits(most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_flights)
+        limits = Limits(most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_segments)
         return setting_of(scene, self.hollow, limits, self.edges)
 
-    def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Row], set[float]]:
+    def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:
         """Rows at angles that increase, and those angles of earlier calls whose rows are now known to be wrong."""
-        rows: dict[float, Row] = {}
-        asked, stale = set(theta.tolist()), set[float]()
+        found_conditionals: dict[float, Conditional] = {}
+        asked, outdated = set(theta.tolist()), set[float]()
         pending = np.ones(len(theta), dtype=np.bool_)
         for _ in range(MOST_ROUNDS):
-            rows.update(self._march_once(theta[pending], tolerances[pending]))
-            overlooked = self._compare(theta[pending])
-            stale |= overlooked - asked
-            pending = np.isin(theta, list(overlooked & asked))
+            found_conditionals.update(self._march_once(theta[pending], tolerances[pending]))
+            missed = self._compare(theta[pending])
+            outdated |= missed - asked
+            pending = np.isin(theta, list(missed & asked))
             if not pending.any():
                 break
-        return rows, stale
+        return found_conditionals, outdated
 
-    def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Row]:
+    def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
         from ...geometry.itineraries.compiled.gauss import gauss_tables
-        from ...geometry.itineraries.compiled.march import march_rows
+        from ...geometry.itineraries.compiled.march import march_angles
         from ...geometry.tracing.threads import interruptibly
 
         seeds = [
             self._seeds(angle, least) for angle, least in zip(theta.tolist(), tolerances * self.width, strict=True)
         ]
         found = interruptibly(
-            lambda: march_rows(
+            lambda: march_angles(
                 theta, tolerances, self._setting, self.degree, gauss_tables(self.least_level),
                 np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
             )
         )  # fmt: skip
-        (nodes, widths), node_starts, pieces, piece_starts, errors, lost, rays, flights = found
+        (nodes, widths), node_starts, pieces, piece_starts, errors, unresolved, rays, segments = found
         self.rays += int(rays.sum())
-        self.flights += int(flights.sum())
-        rows = {}
+        self.segments += int(segments.sum())
+        found_conditionals = {}
         for k, angle in enumerate(theta.tolist()):
             own = slice(node_starts[k], node_starts[k + 1])
-            rows[angle] = Row(nodes[own], widths[own], float(errors[k]), float(lost[k]))
+            found_conditionals[angle] = Conditional(nodes[own], widths[own], float(errors[k]), float(unresolved[k]))
             own = slice(piece_starts[k], piece_starts[k + 1])
             low, high, label = (part[own].copy() for part in pieces)
             # a row without flights for all its pieces has overlooked some, and says so
-            matters = np.inf if flights[k] >= self.most_flights else float(tolerances[k] * self.width)
+            matters = np.inf if segments[k] >= self.most_segments else float(tolerances[k] * self.width)
             self._pieces[angle] = _Pieces(low, high, label, matters)
         self._theta = np.union1d(self._theta, theta)
-        return rows
+        return found_conditionals
 
     def _seeds(self, angle: float, least: float) -> Floats:
         """Where the samples of a row begin, in increasing order.
@@ -131,38 +131,39 @@ class HollowConditionals:
         Also in the pieces of the nearest rows that are known, and where this row has overlooked some.
         """
         from ...geometry.itineraries.compiled.march import wide_middles
-        from ...geometry.itineraries.entry_nodes import first_places
+        from ...geometry.itineraries.entry_nodes import first_nodes
 
         k = int(np.searchsorted(self._theta, angle))
         known = [self._pieces[near] for near in self._theta[max(0, k - 1) : k + 2].tolist()]
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]].tolist()
-        places = [first_places(angle, left, right, least), *(wide_middles(row.low, row.high, least) for row in known)]
+        entries = [
+            first_nodes(angle, left, right, least),
+            *(wide_middles(conditional.low, conditional.high, least) for conditional in known),
+        ]
         if angle in self._pieces:
             # its own changes are known already, up to the gaps that were left
-            places += [self._pieces[angle].low, self._pieces[angle].high]
-        return np.sort(np.concatenate([*places, np.array(self._overlooked.get(angle, []), dtype=np.float64)]))
+            entries += [self._pieces[angle].low, self._pieces[angle].high]
+        return np.sort(np.concatenate([*entries, np.array(self._missed.get(angle, []), dtype=np.float64)]))
 
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among these and their neighbours whose rows have overlooked pieces."""
-        from ...geometry.itineraries.compiled.neighbours import find_overlooked
+        from ...geometry.itineraries.compiled.neighbours import find_missed
         from ...geometry.tracing.threads import interruptibly
 
-        place = np.searchsorted(self._theta, theta)
-        near = np.unique(np.clip(np.concatenate((place - 1, place, place + 1)), 0, len(self._theta) - 1))
-        fresh = np.isin(near, place)
+        position = np.searchsorted(self._theta, theta)
+        near = np.unique(np.clip(np.concatenate((position - 1, position, position + 1)), 0, len(self._theta) - 1))
+        fresh = np.isin(near, position)
         linked = (np.diff(near) == 1) & (fresh[1:] | fresh[:-1])
         angles = self._theta[near]
-        rows = [self._pieces[angle] for angle in angles.tolist()]
-        pieces = tuple(np.concatenate([row[part] for row in rows]) for part in range(3))
-        starts = np.cumsum([0, *(len(row.low) for row in rows)])
-        least = np.array([row.width_that_matters for row in rows])
-        found = interruptibly(
-            lambda: find_overlooked(angles, least, pieces, starts, linked, self._setting, self.degree)
-        )
-        owner, places, rays, flights = found
-        self.rays, self.flights = self.rays + rays, self.flights + flights
-        for angle, x in zip(angles[owner].tolist(), places.tolist(), strict=True):
-            self._overlooked.setdefault(angle, []).append(x)
+        found_conditionals = [self._pieces[angle] for angle in angles.tolist()]
+        pieces = tuple(np.concatenate([conditional[part] for conditional in found_conditionals]) for part in range(3))
+        starts = np.cumsum([0, *(len(conditional.low) for conditional in found_conditionals)])
+        least = np.array([conditional.width_that_matters for conditional in found_conditionals])
+        found = interruptibly(lambda: find_missed(angles, least, pieces, starts, linked, self._setting, self.degree))
+        owner, entries, rays, segments = found
+        self.rays, self.segments = self.rays + rays, self.segments + segments
+        for angle, x in zip(angles[owner].tolist(), entries.tolist(), strict=True):
+            self._missed.setdefault(angle, []).append(x)
         return set(angles[owner].tolist())
 
     def critical_angles(self, low: float, high: float) -> list[tuple[float, float]]:
@@ -177,10 +178,10 @@ class HollowConditionals:
         for before, after in pairwise(angles):
             for present, absent in ((before, after), (after, before)):
                 there = set(self._pieces[absent].label.tolist())
-                row = self._pieces[present]
-                for k, label in enumerate(row.label.tolist()):
-                    if label not in there and row.high[k] - row.low[k] > row.width_that_matters:
-                        found.append((float(row.high[k] - row.low[k]), label, present, absent, k))
+                conditional = self._pieces[present]
+                for k, label in enumerate(conditional.label.tolist()):
+                    if label not in there and conditional.high[k] - conditional.low[k] > conditional.width_that_matters:
+                        found.append((float(conditional.high[k] - conditional.low[k]), label, present, absent, k))
         found.sort(reverse=True)
         cuts = []
         for width, label, present, absent, k in found[:MOST_CUTS]:
@@ -198,12 +199,12 @@ class HollowConditionals:
         for (name, low, high), angle in self._critical.items():
             if name == label and low <= angle <= high and key[1] <= angle <= key[2]:
                 return angle
-        row = self._pieces[present]
-        low, high = float(row.low[k]), float(row.high[k])
-        place = int(np.searchsorted(self._theta, present)) + (1 if absent < present else -1)
+        conditional = self._pieces[present]
+        low, high = float(conditional.low[k]), float(conditional.high[k])
+        position = int(np.searchsorted(self._theta, present)) + (1 if absent < present else -1)
         drift = 0.0
-        if 0 <= place < len(self._theta):
-            beyond = float(self._theta[place])
+        if 0 <= position < len(self._theta):
+            beyond = float(self._theta[position])
             other = np.flatnonzero(self._pieces[beyond].label == np.uint64(label))
             if len(other) == 1:
                 there = self._pieces[beyond]

@@ -40,7 +40,7 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     incoming = angles("theta", theta)
     table = law.isometry_table()
     if table is not None:
-        return table.rows(incoming)
+        return table.conditionals(incoming)
     edges = np.concatenate([[0.0], law.breakpoints(BREAKPOINTS)[0], [np.pi]])
     right = np.clip(np.searchsorted(edges, incoming, side="right"), 1, len(edges) - 1)
     low, high = edges[right - 1], edges[right]

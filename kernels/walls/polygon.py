@@ -137,7 +137,7 @@ class PolygonLaw(BranchLaw):
         """The largest number of branches at an angle, of up to a few hundred angles spread over (0, pi)."""
         edges = np.concatenate([[0.0], self._table.ends, [np.pi]])
         edges = edges[:: edges.size // MOST_PROBES + 1]
-        return int(self._table.rows(0.5 * (edges[:-1] + edges[1:]))[0].shape[-1])
+        return int(self._table.conditionals(0.5 * (edges[:-1] + edges[1:]))[0].shape[-1])
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles, merged by isometry, shape ``theta.shape + (branches,)``."""

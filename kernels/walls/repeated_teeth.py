@@ -85,12 +85,12 @@ def repeated_teeth_matrix(law: RepeatedTeethLaw, basis: Basis, exchanged: bool) 
     far, specular, retro, omitted = crevice_nodes(r, basis, law.times)
     # apart, because many small terms would be rounded like the large ones that they are added to
     for theta, mirrored, same in ((near, mass * (1.0 - back), mass * back), (far, specular, retro)):
-        ways = (
+        cases = (
             ((mirrored_angle(theta), same), (theta, mirrored))
             if exchanged
             else ((mirrored_angle(theta), mirrored), (theta, same))
         )
-        for outgoing, weight in ways:
+        for outgoing, weight in cases:
             add_products(total, basis, theta, outgoing, weight)
             add_products(total, basis, mirrored_angle(theta), mirrored_angle(outgoing), weight)
     return total, 4.0 * omitted * largest_square_sum(basis) if omitted else 0.0

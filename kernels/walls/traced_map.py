@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 UNRESOLVED_TOLERANCE = 1e-4
 
 
-def traced_outcomes(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+def traced_reflection(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
     """Outgoing angles, and the mask of the rays that escaped; the others are sent back.
 
     ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
@@ -34,13 +34,13 @@ def traced_outcomes(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats,
 
 def traced_angles(wall: Wall, x: ArrayLike, theta: ArrayLike) -> Floats:
     """Outgoing angles; raises an AccuracyError if more than a fraction of 1e-4 of the rays did not escape."""
-    outgoing, escaped = traced_outcomes(wall, x, theta)
-    lost = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
-    if lost > UNRESOLVED_TOLERANCE:
+    outgoing, escaped = traced_reflection(wall, x, theta)
+    unresolved = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
+    if unresolved > UNRESOLVED_TOLERANCE:
         raise AccuracyError(
-            f"WallLaw(wall={wall!r}): {lost:.2g} of {escaped.size} rays did not escape, more than "
+            f"WallLaw(wall={wall!r}): {unresolved:.2g} of {escaped.size} rays did not escape, more than "
             f"{UNRESOLVED_TOLERANCE:g}; geometry.trace(wall, x, theta).counts() says how they ended, "
             "WallLaw.outcomes() which they were",
-            lost,
+            unresolved,
         )
     return outgoing

@@ -85,10 +85,10 @@ class TriangularTeethLaw(BranchLaw):
         probability = np.stack([fewer, left - fewer, 1.0 - left - fewer_mirror, fewer_mirror], axis=-1)
         outgoing = np.stack(
             [
-                self._turned(theta, most - 1.0),
-                self._turned(theta, most),
-                np.pi - self._turned(mirror, most_mirror),
-                np.pi - self._turned(mirror, most_mirror - 1.0),
+                self._reflected(theta, most - 1.0),
+                self._reflected(theta, most),
+                np.pi - self._reflected(mirror, most_mirror),
+                np.pi - self._reflected(mirror, most_mirror - 1.0),
             ],
             axis=-1,
         )
@@ -143,7 +143,7 @@ class TriangularTeethLaw(BranchLaw):
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle of the ray that enters at ``x`` in (0, 1), measured from the left tip."""
         right, base, count = self._unfolded(entry_points(x), angles("theta", theta))
-        outgoing = clipped_inside(self._turned(base, count))
+        outgoing = clipped_inside(self._reflected(base, count))
         return np.where(right, mirrored_angle(outgoing), outgoing)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
@@ -171,6 +171,6 @@ class TriangularTeethLaw(BranchLaw):
         half = 0.5 * self.angle
         return np.asarray(np.sin((most - 1.0) * half) * np.sin(most * half - theta) / np.sin(half))
 
-    def _turned(self, theta: Floats, count: Floats) -> Floats:
+    def _reflected(self, theta: Floats, count: Floats) -> Floats:
         turn = count * self.angle
         return np.where(np.mod(count, 2.0) == 0.0, np.pi + theta - turn, turn - theta)

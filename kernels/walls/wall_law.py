@@ -24,7 +24,7 @@ from .circular_arc import CircularArcLaw
 from .conditionals import AdaptiveConditionals, TracedExpectations, WallConditionals, adaptive_conditionals, is_few
 from .polygon import PolygonLaw
 from .rectangular import RectangularTeethLaw
-from .traced_map import UNRESOLVED_TOLERANCE, traced_angles, traced_outcomes
+from .traced_map import UNRESOLVED_TOLERANCE, traced_angles, traced_reflection
 from .triangular import TriangularTeethLaw
 
 if TYPE_CHECKING:
@@ -51,8 +51,8 @@ CELL_TOLERANCE = 1e-9
 class WallLaw(DrivenLaw):
     """The law P~ of a wall: a ray enters at a uniform point of the period.
 
-    `reflect` and `outcomes` trace rays. `sample` and `apply` use the closed form if there is one, else they trace;
-    `branches`, `breakpoints` and `discretise` use the exact law if there is one.
+    `reflect` and `reflect_with_status` trace rays. `sample` and `apply` use the closed form if there is one, else they
+    trace; `branches`, `breakpoints` and `discretise` use the exact law if there is one.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class WallLaw(DrivenLaw):
     A ray that does not escape (corner, grazing, bounce limit) is returned as retroreflected, theta' = theta: on a set
     of rays that the true map takes to itself the identity preserves sin(theta) dx d theta and is an involution, so
     the law stays Markov and reversible, and its error in total variation is at most the fraction of these rays.
-    `outcomes` says which they were.
+    `reflect_with_status` says which they were.
 
     Examples
     --------
@@ -137,16 +137,16 @@ class WallLaw(DrivenLaw):
         law = PolygonLaw(wall, max_beams=MOST_BEAMS)
         return law if float(law.unresolved) <= EXACT_ENOUGH else None
 
-    def outcomes(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+    def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
         """Outgoing angles by tracing, and the mask of the rays that escaped; the others are sent back.
 
         ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
         """
-        return traced_outcomes(self.wall, x, theta)
+        return traced_reflection(self.wall, x, theta)
 
     def random_map(self) -> RandomMap:
-        """`outcomes`."""
-        return self.outcomes
+        """`reflect_with_status`."""
+        return self.reflect_with_status
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
         """Outgoing angle, by tracing, of the ray that enters at ``x`` in (0, 1), as a fraction of the period."""
@@ -200,13 +200,15 @@ class WallLaw(DrivenLaw):
         incoming = angles("theta", theta)
         if incoming.size == 0 or not is_few(self.wall):
             return super().apply(function, incoming)
-        mean = self.rows(incoming).mean(function)
+        mean = self.conditionals(incoming).mean(function)
         return mean.reshape(incoming.shape + mean.shape[1:])
 
-    def rows(
+    def conditionals(
         self, theta: ArrayLike, tolerance: float = APPLY_TOLERANCE, degree: int = APPLY_DEGREE
     ) -> AdaptiveConditionals:
-        """Rows of the traced law with an error each: ``rows.mean(f)`` is what `apply` gives, ``rows.error`` its error.
+        """Conditional distributions of the traced law, each with its error.
+
+        ``conditionals.mean(f)`` is what `apply` gives, and ``conditionals.error`` is its error.
 
         Parameters
         ----------
@@ -230,15 +232,15 @@ class WallLaw(DrivenLaw):
         Examples
         --------
         >>> from asperity import geometry as geo
-        >>> rows = WallLaw(geo.focusing_arcs(1.2)).rows([0.5, 1.5])
-        >>> rows.mean(np.cos).round(6).tolist(), bool(rows.error.max() < 1e-7)
+        >>> conditionals = WallLaw(geo.focusing_arcs(1.2)).conditionals([0.5, 1.5])
+        >>> conditionals.mean(np.cos).round(6).tolist(), bool(conditionals.error.max() < 1e-7)
         ([0.330126, 0.006489], True)
         """
         found = adaptive_conditionals(self.wall, angles("theta", theta).ravel(), tolerance, degree)
-        lost = float(np.mean(found.lost))
-        if lost > UNRESOLVED_TOLERANCE:
+        unresolved = float(np.mean(found.unresolved))
+        if unresolved > UNRESOLVED_TOLERANCE:
             raise AccuracyError(
-                f"{self!r}: {lost:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", lost
+                f"{self!r}: {unresolved:.2g} of the rays did not escape, more than {UNRESOLVED_TOLERANCE:g}", unresolved
             )
         return found
 

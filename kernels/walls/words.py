@@ -93,12 +93,12 @@ def reduced(word: Word) -> Word:
 def _forgotten(word: Word) -> Word:
     """Without identities, and without what the Lambertian law makes no difference to."""
     word = tuple(law for law in word if law != retroreflection())
-    places = [k for k, law in enumerate(word) if _is_lambertian(law)]
-    if not places:
+    diffuse = [k for k, law in enumerate(word) if _is_lambertian(law)]
+    if not diffuse:
         return word
-    after = word[places[-1] + 1 :]
-    kept = next((k for k, law in enumerate(after) if not law.reversible), len(after))
-    return (lambertian(), *after[kept:])
+    after = word[diffuse[-1] + 1 :]
+    irreversible = next((k for k, law in enumerate(after) if not law.reversible), len(after))
+    return (lambertian(), *after[irreversible:])
 
 
 def _mirrored_angle(word: Word) -> Word:
@@ -111,9 +111,9 @@ def _mirrored_angle(word: Word) -> Word:
             continue
         others = [one for one in run if not isinstance(one, IsometryLaw)]
         if (len(run) - len(others)) % 2:
-            place = next((k for k, one in enumerate(others) if isinstance(one, HenyeyGreensteinLaw)), None)
-            if place is not None:
-                others[place] = HenyeyGreensteinLaw(-others[place].g)  # type: ignore[attr-defined]
+            index = next((k for k, one in enumerate(others) if isinstance(one, HenyeyGreensteinLaw)), None)
+            if index is not None:
+                others[index] = HenyeyGreensteinLaw(-others[index].g)  # type: ignore[attr-defined]
             else:
                 others.append(specular())
         found += others
@@ -125,15 +125,15 @@ def _mirrored_angle(word: Word) -> Word:
 
 def _joined(word: Word) -> Word:
     """With neighbouring scatterings, or teeth, as one, and without involutions that undo each other."""
-    for place, (first, second) in enumerate(pairwise(word)):
+    for index, (first, second) in enumerate(pairwise(word)):
         if isinstance(first, InvolutionLaw) and first == second:
-            return reduced(word[:place] + word[place + 2 :])
+            return reduced(word[:index] + word[index + 2 :])
         if isinstance(first, HenyeyGreensteinLaw) and isinstance(second, HenyeyGreensteinLaw):
             joint = HenyeyGreensteinLaw(first.g * second.g)
-            return reduced((*word[:place], joint, *word[place + 2 :]))
+            return reduced((*word[:index], joint, *word[index + 2 :]))
         again = _repeated(first, second)
         if again is not None:
-            return reduced((*word[:place], again, *word[place + 2 :]))
+            return reduced((*word[:index], again, *word[index + 2 :]))
     return word
 
 

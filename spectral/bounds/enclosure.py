@@ -19,13 +19,13 @@ from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import made_of_isometries
-from ..eigenvalues.parity import Parity, extremal_by_parity, halves
+from ..eigenvalues.parity import Parity, extremal_by_parity, parity_basis
 from ..eigenvalues.spectra import check_reversible
 from .contraction import refuse_unless_self_adjoint
 from .operator_residuals import Residuals, image_rule, residuals
 from .scattered import ScatteredSpectrum, scattered_spectrum, scattered_words
 from .separation import Separation, rest_of_spectrum
-from .trial_space import adapted_trials
+from .trial_space import adapted_trial_space
 
 Label = Literal["indexed", "contains-spectrum"]
 
@@ -34,7 +34,7 @@ LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
 # The squared residuals of adapted trial functions, and the errors of their quotients, may take this fraction of an
 # enclosure each. Rows that may be spent on the quotients: where they are traced, and where they have a closed form.
-TRIAL_FRACTION, MOST_TRACED_ROWS, MOST_EXACT_ROWS = 0.3, 4_000, 40_000
+TRIAL_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 4_000, 40_000
 # Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
 QUOTIENT_ROUNDING = 4.0 * EPS
 # Laws whose images of polynomials are found to rounding.
@@ -115,8 +115,8 @@ class Enclosures:
     def __iter__(self) -> Iterator[Enclosure]:
         return iter(self.items)
 
-    def __getitem__(self, place: int) -> Enclosure:
-        return self.items[place]
+    def __getitem__(self, position: int) -> Enclosure:
+        return self.items[position]
 
     def __str__(self) -> str:
         return "\n".join([f"{self.convention} convention, {self.method}", *map(str, self.items)])
@@ -190,11 +190,11 @@ def enclosures(
     power = as_power(law)
     if power is not None:
         return _raised(enclosures(power[0], k, basis, tolerance / power[1]), power[1])
-    return enclosed_trials(law, k, basis, tolerance).enclosures
+    return enclosed_trial_space(law, k, basis, tolerance).enclosures
 
 
 @dataclass(frozen=True)
-class EnclosedTrials:
+class EnclosedTrialSpace:
     """Enclosures with their trial functions, coefficients in ``basis``, shape (n, k)."""
 
     enclosures: Enclosures
@@ -212,19 +212,19 @@ class EnclosedTrials:
         return all(item.label == "indexed" for item in self.enclosures)
 
 
-def enclosed_trials(
+def enclosed_trial_space(
     law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
-) -> EnclosedTrials:
+) -> EnclosedTrialSpace:
     """`enclosures` of a law that is self-adjoint, with the trial functions."""
     known = law.expectations(ONE_PANEL) if basis is None else None
     if known is not None and known.has_errors:
-        trials = adapted_trials(law, k, TRIAL_FRACTION * tolerance)
-        basis, values, vectors, names = trials.basis, trials.values, trials.vectors, trials.parities
+        space = adapted_trial_space(law, k, TRIAL_FRACTION * tolerance)
+        basis, values, vectors, names = space.basis, space.values, space.vectors, space.parities
         # rows are what costs: the functions that come next are looked at in the same ones
         both = residuals(
-            law, basis, np.column_stack([vectors, trials.following]), np.append(values, trials.following_values),
-            MOST_TRACED_ROWS if known.is_traced else MOST_EXACT_ROWS,
-            mirrored=trials.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
+            law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
+            MOST_TRACED_ANGLES if known.is_traced else MOST_EXACT_ANGLES,
+            mirrored=space.mirrored, quotient_error=TRIAL_FRACTION * tolerance, leading=len(values),
         )  # fmt: skip
         found, after = both.split(len(values))
         next_value = _reach(after)
@@ -235,11 +235,11 @@ def enclosed_trials(
         found = residuals(law, basis, vectors, values)
     order = np.argsort(-np.abs(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value)
-    method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.rows} rows"
+    method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.angles_used} rows"
     # images by quadratures that follow them to rounding, or by sums; else the difference of two rules is an estimate
     exact = isinstance(law, ROUNDED if isinstance(basis, Legendre) else MatrixLaw)
-    items = [_enclosed(found, apart, order, place, names, exact) for place in range(len(values))]
-    return EnclosedTrials(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
+    items = [_enclosed(found, apart, order, position, names, exact) for position in range(len(values))]
+    return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
 
 
 def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
@@ -310,13 +310,15 @@ def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:
     if found.essential > 0.0:
         reason += f", beyond them the essential spectrum of modulus {found.essential:.6g}"
     items = [Enclosure(1.0, 1.0, 1.0, "indexed", 0, 0.0, found.kind, f"P 1 = 1; {reason}", found.parities[0])]
-    for place in range(1, len(found.values)):
-        value, certain = float(found.values[place]), found.certain[place]
+    for position in range(1, len(found.values)):
+        value, certain = float(found.values[position]), found.certain[position]
         label: Label = "indexed" if certain else "contains-spectrum"
         why = reason if certain else f"not indexed: another value, or the essential spectrum, may be as large; {reason}"
         low, high = value - found.distance, min(value + found.distance, 1.0)
-        index = place if certain else None
-        items.append(Enclosure(value, low, high, label, index, found.distance, found.kind, why, found.parities[place]))
+        index = position if certain else None
+        items.append(
+            Enclosure(value, low, high, label, index, found.distance, found.kind, why, found.parities[position])
+        )
     items.sort(key=lambda item: (item.index != 0, -item.value))
     apart = Separation(found.essential + found.distance, found.kind, reason)
     return Enclosures(tuple(items), apart, convention, "eigenvalues of a matrix that the law is near to")
@@ -346,17 +348,17 @@ def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Fl
     """Pairs of largest modulus, descending, constants first, with their parities; what comes next with its residual."""
     symmetric = _galerkin(law, basis, tolerance)
     constant = np.asarray(basis.constant)
-    found, names = extremal_by_parity(symmetric, halves(basis, law), constant, len(symmetric), "largest")
+    found, names = extremal_by_parity(symmetric, parity_basis(basis, law), constant, len(symmetric), "largest")
     rest, inner = found.values, found.vectors
     order = np.argsort(-np.abs(rest), kind="stable")
     chosen = np.sort(order[: k - 1])
     values, vectors = np.append(1.0, rest[chosen]), np.column_stack([constant, inner[:, chosen]])
     first: Parity = "even" if law.mirror_symmetric and "none" not in names else "none"
-    listed = (first, *(names[place] for place in chosen))
+    listed = (first, *(names[position] for position in chosen))
     following = order[k - 1 : k - 1 + EXTRA]
     if not following.size:
         return values, vectors, listed, 0.0
-    after = residuals(law, basis, inner[:, following], rest[following], most_rows=0)
+    after = residuals(law, basis, inner[:, following], rest[following], most_angles=0)
     return values, vectors, listed, _reach(after)
 
 
@@ -381,24 +383,24 @@ def _enclosed(
     found: Residuals,
     known: tuple[int, Separation],
     order: NDArray[np.intp],
-    place: int,
+    position: int,
     names: tuple[Parity, ...],
     exact: bool,
 ) -> Enclosure:
     number, apart = known
-    own = names[place]
-    value, norm = float(found.quotients[place]), float(found.norms[place])
-    rank = int(np.flatnonzero(order == place)[0])
-    if rank == 0 and place == 0 and number:
+    own = names[position]
+    value, norm = float(found.quotients[position]), float(found.norms[position])
+    rank = int(np.flatnonzero(order == position)[0])
+    if rank == 0 and position == 0 and number:
         return Enclosure(1.0, 1.0, 1.0, "indexed", 0, norm, apart.kind, f"P 1 = 1; {apart.reason}", own)
     if rank < number:
         # the law maps even functions to even ones and odd ones to odd ones: neighbours are those of the same parity
         alike = np.array([other for other in order[:number] if names[other] == own], dtype=np.intp)
-        low, high = _temple(found, apart.radius, alike, place)
+        low, high = _temple(found, apart.radius, alike, position)
         kind: ErrorKind = "bound" if exact and apart.kind == "bound" else "estimate"
         reason = f"{apart.reason}: the rest is within {apart.radius:.6g}"
         return Enclosure(value, low, high, "indexed", rank, norm, kind, reason, own)
-    radius = norm + float(found.quotient_errors[place]) + QUOTIENT_ROUNDING
+    radius = norm + float(found.quotient_errors[position]) + QUOTIENT_ROUNDING
     reason = f"not indexed: the rest of the spectrum reaches {apart.radius:.6g} for all that is known ({apart.reason})"
     kind = "bound" if exact else "estimate"
     return Enclosure(
@@ -406,17 +408,17 @@ def _enclosed(
     )
 
 
-def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], place: int) -> tuple[float, float]:
+def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], position: int) -> tuple[float, float]:
     """Kato-Temple on both sides, with the distances to the neighbouring enclosures or to the rest."""
     doubt = found.quotient_errors + QUOTIENT_ROUNDING
     radius = found.norms + doubt
-    value, norm = found.quotients[place], found.norms[place]
-    others = listed[listed != place]
+    value, norm = found.quotients[position], found.norms[position]
+    others = listed[listed != position]
     near, spread = found.quotients[others], radius[others]
     above = np.concatenate([(near - spread)[near > value], [-rest] if value < -rest else []])
     below = np.concatenate([(near + spread)[near <= value], [rest] if value > rest else []])
     room_above = float(above.min()) - value if above.size else np.inf
     room_below = value - float(below.max()) if below.size else np.inf
-    up = min(norm**2 / room_below, radius[place]) if room_below > 0.0 else radius[place]
-    down = min(norm**2 / room_above, radius[place]) if room_above > 0.0 else radius[place]
-    return float(value - down - doubt[place]), float(min(value + up + doubt[place], 1.0))
+    up = min(norm**2 / room_below, radius[position]) if room_below > 0.0 else radius[position]
+    down = min(norm**2 / room_above, radius[position]) if room_above > 0.0 else radius[position]
+    return float(value - down - doubt[position]), float(min(value + up + doubt[position], 1.0))

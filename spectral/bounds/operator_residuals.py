@@ -18,7 +18,7 @@ from ...kernels.bases.mirror import mirror_refinement, reflection_matrix
 from ...kernels.discretisation.actions import GRAZING_EDGES
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.expectations.basis_means import Means, height_of, weighted_means
-from ...kernels.laws.density import GAUSS_NODES, split_rows
+from ...kernels.laws.density import GAUSS_NODES, split_panels
 from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import SpecularFrame
 from ...kernels.laws.structure import Rules, fold, holds_of_all
@@ -26,13 +26,13 @@ from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.words import law_of, words_of
 
 # Squared residuals are wanted to this fraction of themselves, in at most MOST_ROWS rows of the law.
-FRACTION, MOST_ROWS, NARROWEST = 0.1, 900, 1e-9
+FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
 # Rows held at a time for few functions, and how many functions are few.
-CHUNK_ROWS, FEW_FUNCTIONS = 256, 16
+CHUNK_ANGLES, FEW_FUNCTIONS = 256, 16
 # Halves of (0, pi) overlap by no more.
 HALF_ROUNDING = 1e-12
 # Errors of rows of which nothing is asked.
-ROW_TOLERANCE = 1e-8
+MEAN_TOLERANCE = 1e-8
 # A Gauss rule with n nodes on a panel of width h follows cos(l theta) to rounding for l h up to about this times n.
 NODES_PER_DEGREE = 1.2
 # Nodes beyond those that the basis asks for, of the two rules that are compared.
@@ -60,7 +60,7 @@ class Residuals:
     quotients: Floats
     quotient_errors: Floats
     norms: Floats
-    rows: int
+    angles_used: int
 
     def split(self, number: int) -> tuple[Residuals, Residuals]:
         """Those of the first functions, and of the others."""
@@ -68,7 +68,7 @@ class Residuals:
             (self.quotients[part], self.quotient_errors[part], self.norms[part])
             for part in (slice(None, number), slice(number, None))
         )
-        first, others = (Residuals(*arrays, self.rows) for arrays in both)
+        first, others = (Residuals(*arrays, self.angles_used) for arrays in both)
         return first, others
 
 
@@ -77,7 +77,7 @@ def residuals(
     basis: Basis,
     vectors: Floats,
     values: Floats,
-    most_rows: int = MOST_ROWS,
+    most_angles: int = MOST_ANGLES,
     *,
     mirrored: bool = False,
     quotient_error: float = 0.0,
@@ -98,14 +98,14 @@ def residuals(
     if mirrored:
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
-    kept = np.zeros((2, 0))
+    ends = np.zeros((2, 0))
     # integrals, the differences of the two rules, and what the errors of the rows do
     total, error, doubt = (np.zeros((0, 2, len(values))) for _ in range(3))
-    rows = 0
+    angles_used = 0
     while low.size:
         fresh = _integrals(function, values, low, high, 2.0 if mirrored else 1.0)
-        rows += low.size * len(NODES)
-        kept = np.concatenate([kept, [low, high]], axis=1)
+        angles_used += low.size * len(NODES)
+        ends = np.concatenate([ends, [low, high]], axis=1)
         total, error, doubt = (np.concatenate(both) for both in zip((total, error, doubt), fresh, strict=True))
         square = total[:, 1].sum(axis=0)
         # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
@@ -116,35 +116,37 @@ def residuals(
             ]
         )
         fraction = (error / wanted)[..., :leading].max(axis=(1, 2))
-        affordable = max(most_rows - rows, 0) // (2 * len(NODES))
+        affordable = max(most_angles - angles_used, 0) // (2 * len(NODES))
         worst = np.argsort(-fraction)[:affordable]
-        worst = worst[(fraction[worst] * len(fraction) > 1.0) & (np.diff(kept[:, worst], axis=0)[0] > NARROWEST)]
+        worst = worst[(fraction[worst] * len(fraction) > 1.0) & (np.diff(ends[:, worst], axis=0)[0] > NARROWEST)]
         if np.all((error.sum(axis=0) <= wanted)[:, :leading]):
             break
-        middle = kept[:, worst].mean(axis=0)
-        low, high = np.append(kept[0, worst], middle), np.append(middle, kept[1, worst])
+        middle = ends[:, worst].mean(axis=0)
+        low, high = np.append(ends[0, worst], middle), np.append(middle, ends[1, worst])
         rest = np.setdiff1d(np.arange(len(fraction)), worst)
-        kept, total, error, doubt = kept[:, rest], total[rest], error[rest], doubt[rest]
+        ends, total, error, doubt = ends[:, rest], total[rest], error[rest], doubt[rest]
     correction, square = total.sum(axis=0)
     correction_error, square_error = (error + doubt).sum(axis=0)
-    return Residuals(values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), rows)
+    return Residuals(
+        values + correction, correction_error, np.sqrt(np.maximum(square, 0.0) + square_error), angles_used
+    )
 
 
 def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -> Residuals:
     """The same for polynomials and a density, whose images are smooth: two Gauss rules that follow them."""
-    found, rows, rule = [], 0, image_rule(law, basis, vectors)
+    found, angles_used, rule = [], 0, image_rule(law, basis, vectors)
     for more in MORE_NODES:
         angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval + more)
-        rows += angle.size
+        angles_used += angle.size
         here = expansion(basis, vectors, angle)
-        image, errors = rule(angle, ROW_TOLERANCE)
+        image, errors = rule(angle, MEAN_TOLERANCE)
         rest = image - here * values
         found.append((weight @ (here * rest), weight @ (rest * rest)))
     (first, first_square), (second, second_square) = found
     norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
     # an error e of the images adds at most ||e|| to either, for the trial functions are unit vectors
     doubt = float(np.sqrt(weight @ errors**2))
-    return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, rows)
+    return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, angles_used)
 
 
 def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
@@ -162,9 +164,9 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
 class _TrialFunctions:
     """Trial functions and what the law makes of them."""
 
-    def __init__(self, law: Law, basis: Basis, vectors: Floats, row_tolerance: float) -> None:
+    def __init__(self, law: Law, basis: Basis, vectors: Floats, mean_tolerance: float) -> None:
         self.basis, self.vectors = basis, vectors
-        self.row_tolerance = row_tolerance or ROW_TOLERANCE
+        self.mean_tolerance = mean_tolerance or MEAN_TOLERANCE
         self.rule = image_rule(law, basis, vectors)
 
     def __call__(self, theta: Floats) -> Floats:
@@ -173,7 +175,7 @@ class _TrialFunctions:
 
     def images(self, theta: Floats) -> tuple[Floats, Floats]:
         """The values of P v, shape (angles, k), and their errors."""
-        found, errors = self.rule(theta, self.row_tolerance)
+        found, errors = self.rule(theta, self.mean_tolerance)
         if np.isnan(errors).any():
             raise AccuracyError("rows without a known error are no ground for an enclosure", float("nan"))
         return found, errors
@@ -190,9 +192,9 @@ def _integrals(
     half = 0.5 * (high - low)
     angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
     flat = angle.ravel()
-    image, row_error = function.images(flat)
+    image, mean_error = function.images(flat)
     here = function(flat)
-    rest, doubt = image - here * values, row_error[:, None]
+    rest, doubt = image - here * values, mean_error[:, None]
     shape = (*angle.shape, len(values))
     parts = np.stack([(here * rest).reshape(shape), (rest * rest).reshape(shape)], axis=2)
     doubts = np.stack([(np.abs(here) * doubt).reshape(shape), ((2.0 * np.abs(rest) + doubt) * doubt).reshape(shape)], 2)
@@ -275,11 +277,11 @@ def _of_rules(means: Callable[..., Floats], functions: int) -> Means:
         first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))
         error = _largest(second - first)
         # two rules that hardly differ may both miss a kink: one whose error is much less tells
-        open_rows = np.flatnonzero(error > SETTLED)
-        if open_rows.size:
-            finest = _in_chunks(partial(means, level=2), theta[open_rows], functions)
-            error[open_rows] = _largest(finest - first[open_rows]) + _largest(finest - second[open_rows])
-            second[open_rows] = finest
+        unsettled = np.flatnonzero(error > SETTLED)
+        if unsettled.size:
+            finest = _in_chunks(partial(means, level=2), theta[unsettled], functions)
+            error[unsettled] = _largest(finest - first[unsettled]) + _largest(finest - second[unsettled])
+            second[unsettled] = finest
         return second, error
 
     return rule
@@ -290,7 +292,7 @@ def _largest(values: Floats) -> Floats:
 
 
 def _in_chunks(means: Callable[[Floats], Floats], theta: Floats, functions: int) -> Floats:
-    step = max(1, CHUNK_ROWS // (1 + functions // FEW_FUNCTIONS))
+    step = max(1, CHUNK_ANGLES // (1 + functions // FEW_FUNCTIONS))
     return np.concatenate([means(theta[start : start + step]) for start in range(0, theta.size, step)])
 
 
@@ -299,11 +301,11 @@ def _means_of_density(law: DensityLaw, basis: Basis, vectors: Floats, theta: Flo
     edges = law.panels(theta)
     if isinstance(basis, Legendre):
         # a panel's Gauss rule follows polynomials in cos(theta) of a degree below its nodes over its width
-        edges = split_rows(edges, 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES)))
+        edges = split_panels(edges, 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES)))
     else:
         inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
         edges = np.sort(np.concatenate([edges, inner], axis=1), axis=1)
-    edges = split_rows(edges, PARTS[level])
+    edges = split_panels(edges, PARTS[level])
     nodes = GAUSS_NODES + MORE_NODES[level % 2]
     outgoing, weight = gauss_on_intervals(edges[:, :-1].ravel(), edges[:, 1:].ravel(), nodes)
     outgoing, weight = outgoing.reshape(theta.size, -1), weight.reshape(theta.size, -1)

@@ -58,13 +58,13 @@ def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
         lower = np.linalg.cholesky(variance)
         scaled = np.linalg.solve(lower, np.swapaxes(np.linalg.solve(lower, form), 1, 2))
         values, vectors = np.linalg.eigh(scaled)
-        place = int(np.argmin(values[:, 0]))
-        if values[place, 0] < best[1]:
-            real, imaginary = np.linalg.solve(lower[place].T, vectors[place, :, 0])
-            change = (there - here)[place]
+        worst = int(np.argmin(values[:, 0]))
+        if values[worst, 0] < best[1]:
+            real, imaginary = np.linalg.solve(lower[worst].T, vectors[worst, :, 0])
+            change = (there - here)[worst]
             # neighbouring angles in every part
             parts = (0.5 * (real * change.real + imaginary * change.imag) ** 2).reshape(-1, PARTS).mean(axis=0)
-            best = (float(t[place]), float(values[place, 0]), float(parts.std(ddof=1) / np.sqrt(PARTS)))
+            best = (float(t[worst]), float(values[worst, 0]), float(parts.std(ddof=1) / np.sqrt(PARTS)))
     return best
 
 

@@ -94,11 +94,11 @@ def scattered_spectrum(law: Law, words: Sum, k: int, tolerance: float) -> Scatte
         _diagonal(words, degrees) if diagonal else _checked(discretise(law, Legendre(degrees), tolerance=wanted))
     )
     distance = error + 2.0 * _tail(words, degrees)
-    even, odd = (sum(w * _kept(word, sign) for word, w in words.items()) for sign in (1.0, -1.0))
+    even, odd = (sum(w * _high_degree_value(word, sign) for word, w in words.items()) for sign in (1.0, -1.0))
     essential = max(abs(even), abs(odd))
     values, parities = _eigenvalues(symmetric, law.mirror_symmetric is True)
     listed = values[: k - 1]
-    certain = [_is_certain(values, place, k - 1, distance, essential) for place in range(len(listed))]
+    certain = [_is_certain(values, index, k - 1, distance, essential) for index in range(len(listed))]
     first: Parity = "even" if law.mirror_symmetric is True else "none"
     return ScatteredSpectrum(
         np.append(1.0, listed), (first, *parities[: k - 1]), (True, *certain), float(distance), essential, degrees,
@@ -129,7 +129,7 @@ def _tail(words: Sum, degrees: int) -> float:
     return float(sum(weight * _factor(word) ** degrees for word, weight in words.items()))
 
 
-def _kept(word: Word, sign: float) -> float:
+def _high_degree_value(word: Word, sign: float) -> float:
     """What the word makes of polynomials of high degree that are even, or odd: only isometries keep them."""
     if not word:
         return 1.0
@@ -164,7 +164,7 @@ def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parit
     if np.array_equal(inner, np.diag(np.diag(inner))):
         values = np.diag(inner)
         if mirrored:
-            names = ["odd" if place % 2 == 0 else "even" for place in range(len(values))]
+            names = ["odd" if index % 2 == 0 else "even" for index in range(len(values))]
     elif mirrored:
         # what the law has between polynomials of either parity is error
         odd, even = (np.linalg.eigvalsh(inner[start::2, start::2]) for start in (0, 1))
@@ -173,17 +173,17 @@ def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parit
     else:
         values = np.asarray(np.linalg.eigvalsh(inner), dtype=np.float64)
     order = np.argsort(-np.abs(values), kind="stable")
-    return values[order], tuple(names[place] for place in order)
+    return values[order], tuple(names[index] for index in order)
 
 
-def _is_certain(values: Floats, place: int, number: int, distance: float, essential: float) -> bool:
+def _is_certain(values: Floats, index: int, number: int, distance: float, essential: float) -> bool:
     """Whether a value's place is known: all that may have its modulus are near to it, and are listed."""
-    if abs(values[place]) - distance <= essential + distance:
+    if abs(values[index]) - distance <= essential + distance:
         return False
     # neighbours by modulus as far as no gap tells them apart
     modulus = np.abs(values)
     apart = np.flatnonzero(modulus[:-1] - modulus[1:] > 2.0 * distance) + 1
-    first = int(apart[apart <= place].max(initial=0))
-    last = int(apart[apart > place].min(initial=len(values)))
-    same_sign = bool(np.all(np.sign(values[first:last]) == np.sign(values[place])))
+    first = int(apart[apart <= index].max(initial=0))
+    last = int(apart[apart > index].min(initial=len(values)))
+    same_sign = bool(np.all(np.sign(values[first:last]) == np.sign(values[index])))
     return same_sign and last <= number and modulus[last - 1] - distance > essential + distance

@@ -34,11 +34,11 @@ GUARD = 12
 MOST_ITERATIONS, SETTLED = 60, 0.02
 PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
 # Rows are as exact as this fraction of the residual that is wanted.
-ROW_FRACTION = 0.03
+MEAN_FRACTION = 0.03
 
 
 @dataclass(frozen=True)
-class Trials:
+class TrialSpace:
     """Approximate eigenfunctions of a law, the constants first, then descending.
 
     Attributes
@@ -65,7 +65,7 @@ class Trials:
     levels: tuple[tuple[int, float], ...]
 
 
-def adapted_trials(law: Law, k: int, tolerance: float, most_levels: int = MOST_LEVELS) -> Trials:
+def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = MOST_LEVELS) -> TrialSpace:
     """Trial functions of the k eigenvalues of largest modulus, with Kato-Temple bounds of about the tolerance.
 
     Notes
@@ -80,7 +80,7 @@ def adapted_trials(law: Law, k: int, tolerance: float, most_levels: int = MOST_L
     history: list[tuple[int, float]] = []
     goal = np.sqrt(tolerance)
     while True:
-        level = _Level(law, edges, mirrored, ROW_FRACTION * goal)
+        level = _Level(law, edges, mirrored, MEAN_FRACTION * goal)
         with one_blas_thread():
             values, vectors, parity = level.leading(k + EXTRA, SETTLED * goal)
         squares = level.squared_residuals(values, vectors, parity)
@@ -93,7 +93,7 @@ def adapted_trials(law: Law, k: int, tolerance: float, most_levels: int = MOST_L
     first = np.arange(1, k)[np.argsort(-values[1:k], kind="stable")]
     chosen = np.append(0, first)
     whole = level.extended(vectors, parity)
-    return Trials(
+    return TrialSpace(
         level.panels, values[chosen], whole[:, chosen], values[k:], whole[:, k:],
         tuple(PARITIES[int(sign)] for sign in parity[chosen]), mirrored, tuple(history),
     )  # fmt: skip
@@ -105,14 +105,14 @@ class _Level:
     Coefficients are those on the panels that are kept; the others have them by parity.
     """
 
-    def __init__(self, law: Law, edges: Floats, mirrored: bool, row_tolerance: float) -> None:
+    def __init__(self, law: Law, edges: Floats, mirrored: bool, mean_tolerance: float) -> None:
         whole = np.concatenate([edges, np.pi - edges[-2::-1]]) if mirrored else edges.copy()
         whole[-1] = np.pi
         self.panels, self.mirrored = Panels(whole, DEGREE), mirrored
         half = 0.5 * np.diff(edges)
         angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
         self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
-        self._images, _ = law.expectations(self.panels)(angle.ravel(), row_tolerance)
+        self._images, _ = law.expectations(self.panels)(angle.ravel(), mean_tolerance)
         # values of each panel's own functions, shape (panels, nodes, degree + 1); of norm 1 on what is kept
         self.norm = np.sqrt(0.5) if mirrored else 1.0
         self.local = self.panels.local(angle)[1] * self.norm

@@ -17,7 +17,7 @@ from .diffusion import Arrangement, check_arrangement
 # pi - theta for a theta below half a spacing of pi would be pi itself.
 SMALLEST = float(np.spacing(np.pi))
 # Flights after which a particle that has not left is a sign of a law that goes back and forth.
-MOST_FLIGHTS = 1_000_000
+MOST_CROSSINGS = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def exit_times(
     x, clock, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
     # the angle at which a particle leaves a wall, in that wall's own frame, and the sign of its x axis in the channel's
     theta, sign = SINE.sample(particles, rng), 1.0
-    for _ in range(MOST_FLIGHTS):
+    for _ in range(MOST_CROSSINGS):
         shift = sign * width * np.cos(theta) / np.sin(theta)
         duration = width / (pace * np.sin(theta))
         target = x + shift
@@ -148,4 +148,4 @@ def exit_times(
         incoming = theta[stays] if arrangement == "half-turn" else np.pi - theta[stays]
         theta = paper.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
         sign = -sign if arrangement == "half-turn" else sign
-    raise InputError(f"law: {law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_FLIGHTS} flights")
+    raise InputError(f"law: {law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_CROSSINGS} flights")

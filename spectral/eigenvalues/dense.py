@@ -44,8 +44,8 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
     from scipy.linalg import eigh
 
     reflector = _householder(constant)
-    turned = _reflect(reflector, _reflect(reflector, array).T)
-    values, inner = eigh(0.5 * (turned + turned.T)[1:, 1:])
+    reflected = _reflect(reflector, _reflect(reflector, array).T)
+    values, inner = eigh(0.5 * (reflected + reflected.T)[1:, 1:])
     vectors = np.vstack([np.zeros((1, inner.shape[1])), inner])
     return np.asarray(values), _reflect(reflector, vectors)
 
@@ -193,8 +193,8 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
     joint = float(np.linalg.norm(residuals)) + rounding
     if joint > LARGEST_RESIDUAL:
         return f"Lanczos left a residual of {joint:.2g}"
-    places = wanted(values, k, which)
-    chosen = values[places]
+    indices = wanted(values, k, which)
+    chosen = values[indices]
     top = counted_from_above(chosen, which)
     if which == "largest":
         last = float(chosen[-1])
@@ -215,7 +215,7 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
     how = "Frobenius norms" if others <= min(ends.values()) else "Cholesky factorisations"
     sides = f"above {reach[1.0]:.12g}" + (f" or below {-reach[-1.0]:.12g}" if -1.0 in reach else "")
     return ExtremalEigenvalues(
-        chosen, vectors[:, places], top, residuals[places], 2.0 * joint + np.concatenate([upper, lower]),
+        chosen, vectors[:, indices], top, residuals[indices], 2.0 * joint + np.concatenate([upper, lower]),
         f"Lanczos, and by {how} no other eigenvalue is {sides}",
     )  # fmt: skip
 
@@ -259,8 +259,8 @@ def _by_lapack(array: Floats, constant: Floats | None, k: int, which: Which, met
 
     values, vectors = eigh(array) if constant is None else off_constants(array, constant)
     values, vectors = values[::-1], vectors[:, ::-1]
-    places = wanted(values, k, which)
-    values, vectors = values[places], vectors[:, places]
+    indices = wanted(values, k, which)
+    values, vectors = values[indices], vectors[:, indices]
     top = counted_from_above(values, which)
     norm = max(1.0, float(np.abs(values).max(initial=0.0)))
     residuals = np.linalg.norm(Deflated.of(array, constant) @ vectors - vectors * values, axis=0)

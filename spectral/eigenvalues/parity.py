@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from ...kernels import Basis, KernelMatrix, Law
 
-    Halves = tuple[csr_array[Any], csr_array[Any]]
+    ParityBasis = tuple[csr_array[Any], csr_array[Any]]
 
 Parity = Literal["even", "odd", "none"]
 
@@ -25,7 +25,7 @@ Parity = Literal["even", "odd", "none"]
 ENTRY = 0.5
 
 
-def halves(basis: Basis, law: Law | KernelMatrix) -> Halves | None:
+def parity_basis(basis: Basis, law: Law | KernelMatrix) -> ParityBasis | None:
     """Orthonormal even and odd functions of a mirror-symmetric law's basis: sparse, shapes (n, even) and (n, odd).
 
     None where the law is not known to be mirror-symmetric, or where the flip does not keep the basis.
@@ -33,7 +33,7 @@ def halves(basis: Basis, law: Law | KernelMatrix) -> Halves | None:
     Examples
     --------
     >>> from asperity.kernels import Legendre, lambertian
-    >>> [half.shape for half in halves(Legendre(5), lambertian())]
+    >>> [half.shape for half in parity_basis(Legendre(5), lambertian())]
     [(5, 3), (5, 2)]
     """
     if not law.mirror_symmetric or not is_mirror_symmetric(basis):
@@ -64,12 +64,12 @@ def halves(basis: Basis, law: Law | KernelMatrix) -> Halves | None:
 
 
 def extremal_by_parity(
-    array: Floats, split: Halves | None, constant: Floats | None, k: int, which: Which = "moduli"
+    array: Floats, split: ParityBasis | None, constant: Floats | None, k: int, which: Which = "moduli"
 ) -> tuple[ExtremalEigenvalues, tuple[Parity, ...]]:
     """`extremal` of the symmetric half of a matrix, with the parities of the eigenvectors.
 
     Of a mirror-symmetric law, even and odd functions do not mix: two matrices of half the size take a quarter of the
-    work, and what a sampled matrix mixes is left out as the noise that it is. ``split`` is what `halves` gives.
+    work, and what a sampled matrix mixes is left out as the noise that it is. ``split`` is what `parity_basis` gives.
     """
     if split is None:
         found = extremal(symmetric_half(array), constant, k, which)

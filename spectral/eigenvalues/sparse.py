@@ -13,7 +13,7 @@ from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix
 from .dense import ExtremalEigenvalues, extremal, symmetric_half
-from .parity import Parity, extremal_by_parity, halves
+from .parity import Parity, extremal_by_parity, parity_basis
 
 if TYPE_CHECKING:
     from scipy.sparse import csc_array
@@ -117,7 +117,7 @@ def leading_eigenvalues(
     whole_number("k", k, 1)
     source = np.random.default_rng(0) if rng is None else rng
     if isinstance(matrix, KernelMatrix):
-        found, parity = extremal_by_parity(matrix.symmetric, halves(matrix.basis, matrix), None, k, "largest")
+        found, parity = extremal_by_parity(matrix.symmetric, parity_basis(matrix.basis, matrix), None, k, "largest")
         return _listed(found, parity if "none" not in parity else ())
     if isinstance(matrix, LinearOperator):
         return _matrix_free(matrix, k, source)
@@ -151,8 +151,8 @@ def _sparse(matrix: csc_array[Any], k: int, rng: np.random.Generator) -> Leading
     top = float(np.max(abs(matrix).sum(axis=1)))
     inverse = _factorised(matrix, top * (1.0 + SHIFT), -1.0).solve
     values, vectors, number, gap = _block_iteration(matrix, inverse, k, rng)
-    kept = vectors[:, :number]
-    residuals = np.linalg.norm(matrix @ kept - kept * values[:number], axis=0)
+    leading = vectors[:, :number]
+    residuals = np.linalg.norm(matrix @ leading - leading * values[:number], axis=0)
     threshold = 0.5 * (values[number - 1] + values[number])
     counted, margin = _count_above(matrix, threshold)
     if MARGINS * margin > gap:
@@ -170,7 +170,7 @@ def _sparse(matrix: csc_array[Any], k: int, rng: np.random.Generator) -> Leading
     # as many values as the count has, each with an eigenvalue of its own within the joint residual
     error = float(np.linalg.norm(residuals)) + 8.0 * EPS * top
     return LeadingEigenvalues(
-        frozen(values[:number]), frozen(kept), frozen(residuals), error, True, counted, float(threshold), margin,
+        frozen(values[:number]), frozen(leading), frozen(residuals), error, True, counted, float(threshold), margin,
         f"block inverse iteration, {counted} eigenvalues above {threshold:.12g} by the signs of LDL^T",
     )  # fmt: skip
 
@@ -189,8 +189,8 @@ def _block_iteration(
         # cut below k at the first gap that is about as wide as any, so that no cluster is cut
         drops = (values[k - 1 : -1] - values[k:])[: GUARD - 2]
         number = k + int(np.argmax(drops >= WIDE_GAP * drops.max()))
-        kept = block[:, :number]
-        worst = float(np.linalg.norm(matrix @ kept - kept * values[:number], axis=0).max())
+        leading = block[:, :number]
+        worst = float(np.linalg.norm(matrix @ leading - leading * values[:number], axis=0).max())
         if worst <= SETTLED * EPS:
             return values, block, number, float(drops[number - k])
     if worst <= 1e-3 * float(drops[number - k]):

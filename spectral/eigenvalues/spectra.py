@@ -15,7 +15,7 @@ from ...core.rounding import EPS
 from ...kernels import Basis, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
 from .dense import ExtremalEigenvalues, compressed, end_values
-from .parity import Parity, extremal_by_parity, halves
+from .parity import Parity, extremal_by_parity, parity_basis
 from .standard_errors import sampling_errors, sampling_quantile
 
 if TYPE_CHECKING:
@@ -223,7 +223,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
     """
     check_reversible(matrix)
     constant = np.asarray(matrix.basis.constant)
-    rest, names = extremal_by_parity(matrix.symmetric, halves(matrix.basis, matrix), constant, max(k - 1, 1))
+    rest, names = extremal_by_parity(matrix.symmetric, parity_basis(matrix.basis, matrix), constant, max(k - 1, 1))
     chosen = np.sort(np.argsort(-np.abs(rest.values), kind="stable")[: k - 1])
     image = 0.5 * (matrix.symmetric @ constant + constant @ matrix.symmetric)
     first = float(constant @ image)
@@ -233,8 +233,8 @@ def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
     residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
     changes = np.append(0.0, two_grid_changes(matrix, rest))
 
-    def errors_of(places: NDArray[np.intp]) -> SpectrumErrors:
-        return _errors(matrix, values[places], vectors[:, places], algebraic[places], changes[places])
+    def errors_of(indices: NDArray[np.intp]) -> SpectrumErrors:
+        return _errors(matrix, values[indices], vectors[:, indices], algebraic[indices], changes[indices])
 
     # without a second function the gap is 1 by convention, and nothing is known of it
     unknown = frozen([np.inf])
@@ -242,12 +242,12 @@ def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
     if len(rest.values):
         gap_errors = errors_of(np.array([1]))
         gap, slem = float(1.0 - rest.values[0]), float(np.abs(rest.values).max())
-    places = np.append(0, 1 + chosen)
+    indices = np.append(0, 1 + chosen)
     return Spectrum(
-        values=frozen(values[places]),
-        vectors=frozen(vectors[:, places]),
-        residuals=frozen(residuals[places]),
-        errors=errors_of(places),
+        values=frozen(values[indices]),
+        vectors=frozen(vectors[:, indices]),
+        residuals=frozen(residuals[indices]),
+        errors=errors_of(indices),
         gap=gap,
         gap_errors=gap_errors,
         slem=slem,

@@ -54,7 +54,7 @@ class _Part:
     """What a law does to functions that oscillate fast, and to functions of grazing angles."""
 
     # an interval for the top of what its isometries make, and <1, Q 1> of these
-    kept: tuple[float, float]
+    modulus: tuple[float, float]
     grazing: Floats
     error: float
     entry_error: float
@@ -93,12 +93,12 @@ def essential_edge(law: Law) -> EssentialEdge:
     part = _taken_apart(law)
     matrix = part.grazing
     root = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
-    low = min(max(part.kept[0], root - part.error), 1.0)
-    high = min(max(part.kept[1], root + part.error, low), 1.0)
+    low = min(max(part.modulus[0], root - part.error), 1.0)
+    high = min(max(part.modulus[1], root + part.error, low), 1.0)
     notes = tuple(dict.fromkeys(part.notes))
-    if part.certain and part.kept[0] == part.kept[1] >= root - ROUNDING - part.error:
+    if part.certain and part.modulus[0] == part.modulus[1] >= root - ROUNDING - part.error:
         # fast oscillations reach as far as anything can: the norm of the part that is not compact
-        low = high = min(part.kept[0], 1.0)
+        low = high = min(part.modulus[0], 1.0)
     return EssentialEdge(low, high, "bound" if part.certain and low == high else "estimate", notes)
 
 
@@ -109,7 +109,7 @@ def grazing_symbol(law: Law) -> GrazingLimit:
 
 
 def _taken_apart(law: Law) -> _Part:
-    return fold(law, Rules(_leaf, _mixture, _chain, _turned))
+    return fold(law, Rules(_leaf, _mixture, _chain, _in_other_frame))
 
 
 def _leaf(law: Law) -> _Part:
@@ -133,18 +133,18 @@ def _leaf(law: Law) -> _Part:
     if isinstance(law, InvolutionLaw):
         reason = f"{law!r} is an involution: f + f o T is kept for every f"
         return _Part((0.0, 1.0), limit.matrix, *errors, True, (reason,))
-    kept, fraction = (0.0, 0.0), 0.0
+    modulus, fraction = (0.0, 0.0), 0.0
     notes = [note]
     if isinstance(law, WallLaw):
         straight = straight_part(law)
-        kept, fraction = (straight.low, straight.high), straight.fraction
+        modulus, fraction = (straight.low, straight.high), straight.fraction
         if straight.high > 0.0:
-            reach = f"{kept[0]:.6g}" if kept[0] == kept[1] else f"{kept[0]:.6g} to {kept[1]:.6g}"
+            reach = f"{modulus[0]:.6g}" if modulus[0] == modulus[1] else f"{modulus[0]:.6g} to {modulus[1]:.6g}"
             notes.append(
                 f"a fraction {fraction:.4g} of the rays meets straight pieces only: isometries, whose part of the law "
                 f"has a spectrum up to {reach}"
             )
-    return _Part(kept, limit.matrix, *errors, False, tuple(notes), fraction)
+    return _Part(modulus, limit.matrix, *errors, False, tuple(notes), fraction)
 
 
 def _ideal_limit(law: IsometryLaw) -> GrazingLimit:
@@ -155,7 +155,7 @@ def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:
     fraction = sum(w * part.fraction for w, part in terms)
     return _Part(
         # positive operators: the sum reaches as far as any term, and as its fraction
-        (max(fraction, *(w * part.kept[0] for w, part in terms)), sum(w * part.kept[1] for w, part in terms)),
+        (max(fraction, *(w * part.modulus[0] for w, part in terms)), sum(w * part.modulus[1] for w, part in terms)),
         sum((w * part.grazing for w, part in terms), np.zeros((2, 2))),
         sum(w * part.error for w, part in terms),
         sum(w * part.entry_error for w, part in terms),
@@ -169,19 +169,19 @@ def _chain(parts: Sequence[_Part]) -> _Part:
     whole = reduce(_product, parts, _Part((1.0, 1.0), np.eye(2), 0.0, 0.0, True, fraction=1.0))
     if parts and all(part is parts[0] for part in parts):
         # a power
-        low, high = parts[0].kept
-        whole = replace(whole, kept=(low ** len(parts), high ** len(parts)))
+        low, high = parts[0].modulus
+        whole = replace(whole, modulus=(low ** len(parts), high ** len(parts)))
     return whole
 
 
 def _product(first: _Part, second: _Part) -> _Part:
     fraction = first.fraction * second.fraction
     # what keeps all rays changes no norm
-    low = {(True, True): 1.0, (True, False): second.kept[0], (False, True): first.kept[0]}.get(
-        (first.kept[0] == 1.0, second.kept[0] == 1.0), fraction
+    low = {(True, True): 1.0, (True, False): second.modulus[0], (False, True): first.modulus[0]}.get(
+        (first.modulus[0] == 1.0, second.modulus[0] == 1.0), fraction
     )
     return _Part(
-        (low, first.kept[1] * second.kept[1]),
+        (low, first.modulus[1] * second.modulus[1]),
         first.grazing @ second.grazing,
         # sums of rows are at most 1 but for the errors
         first.error + second.error + first.error * second.error,
@@ -192,5 +192,5 @@ def _product(first: _Part, second: _Part) -> _Part:
     )
 
 
-def _turned(part: _Part) -> _Part:
+def _in_other_frame(part: _Part) -> _Part:
     return replace(part, grazing=part.grazing @ SWAP)

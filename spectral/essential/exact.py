@@ -44,7 +44,7 @@ def ideal_spectrum(law: Law) -> IdealSpectrum | None:
     >>> found.even, found.odd
     (0.75, -0.75)
     """
-    return fold(law, Rules(_leaf, _mixture, _chain, _turned))
+    return fold(law, Rules(_leaf, _mixture, _chain, _in_other_frame))
 
 
 def _leaf(law: Law) -> IdealSpectrum | None:
@@ -75,7 +75,7 @@ def _chain(parts: Sequence[IdealSpectrum | None]) -> IdealSpectrum | None:
     return IdealSpectrum(even, odd, rounding)
 
 
-def _turned(part: IdealSpectrum | None) -> IdealSpectrum | None:
+def _in_other_frame(part: IdealSpectrum | None) -> IdealSpectrum | None:
     return None if part is None else IdealSpectrum(part.even, -part.odd, part.rounding)
 
 
@@ -90,12 +90,12 @@ def without_identity(law: Law) -> tuple[float, Law]:
     >>> without_identity(0.75 * ker.retroreflection() + 0.25 * ker.henyey_greenstein(0.5))
     (0.25, henyey_greenstein(0.5))
     """
-    turned = isinstance(law, SpecularFrame)
+    in_frame = isinstance(law, SpecularFrame)
     inner = law.law if isinstance(law, SpecularFrame) else law
     inner = inner.closed_form or inner
     if not isinstance(inner, Combination):
         return 1.0, law
-    terms = [(weight, SpecularFrame.of(term) if turned else term) for weight, term in inner.terms_checked()]
+    terms = [(weight, SpecularFrame.of(term) if in_frame else term) for weight, term in inner.terms_checked()]
     rest = [(weight, term) for weight, term in terms if weight > 0.0 and not _keeps_angles(term)]
     if not rest or len(rest) == sum(weight > 0.0 for weight, _ in terms):
         return 1.0, law

@@ -25,7 +25,7 @@ ANGLES = 10.0 ** -np.arange(3.0, 9.0)
 # A tangent is taken as vertical if its horizontal part is below this fraction: the angles of some ten operations.
 VERTICAL = 64.0 * EPS
 # The end of a hollow keeps its direction until its tangent has turned by this angle; halvings that find the place.
-TURNED, HALVINGS = 0.1, 60
+TURN, HALVINGS = 0.1, 60
 # Adaptive quadrature in the entry point: first panels, error asked for, and rays that it may take.
 FIRST_PANELS, QUADRATURE_TOLERANCE, MOST_RAYS, NARROWEST = 8, 1e-9, 20_000, 1e-13
 # Shifted lattices where there are too many changes of itinerary: their spread is the error.
@@ -165,27 +165,27 @@ def _straight_depth(side: Curve) -> float:
     """How far from its start a curve keeps its direction."""
     start = _direction(side)
 
-    def turned(s: float) -> bool:
-        return bool(start @ side.tangent(s) < np.cos(TURNED))
+    def has_turned(s: float) -> bool:
+        return bool(start @ side.tangent(s) < np.cos(TURN))
 
     low, high = 0.0, 1.0
-    if turned(high):
+    if has_turned(high):
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if turned(middle) else (middle, high)
+            low, high = (low, middle) if has_turned(middle) else (middle, high)
     return float(np.hypot(*(side.point(high) - side.point(0.0))))
 
 
 def _limit(law: Law, where: Grazed) -> GrazingLimit:
     if not any(where.parts):
         return GrazingLimit(where.flat * SWAP, 0.0, 0.0)
-    rows: list[list[tuple[Floats, float]]] = []
+    limits: list[list[tuple[Floats, float]]] = []
     for angle in (1.0 if where.scale is None else where.scale) * ANGLES:
-        rows.append([_row(law, angle, end, where.parts[end]) for end in (0, 1)])
-        settled = len(rows) >= FEWEST_ANGLES and where.scale is not None
-        if settled and all(np.ptp([row[end][0].sum() for row in rows[-FEWEST_ANGLES:]]) <= SETTLED for end in (0, 1)):
+        limits.append([_at_angle(law, angle, end, where.parts[end]) for end in (0, 1)])
+        settled = len(limits) >= FEWEST_ANGLES and where.scale is not None
+        if settled and all(np.ptp([row[end][0].sum() for row in limits[-FEWEST_ANGLES:]]) <= SETTLED for end in (0, 1)):
             break
-    found = _extrapolated(rows)
+    found = _extrapolated(limits)
     matrix = found.matrix + where.flat * SWAP
     limit = GrazingLimit(matrix, found.error, found.entry_error, found.error < UNKNOWN)
     if limit.resolved and limit.root <= NORM + limit.error + EPS * NORM:
@@ -193,9 +193,9 @@ def _limit(law: Law, where: Grazed) -> GrazingLimit:
     return GrazingLimit(np.minimum(matrix, NORM), UNKNOWN, UNKNOWN, False)
 
 
-def _extrapolated(rows: list[list[tuple[Floats, float]]]) -> GrazingLimit:
-    values = np.array([[pair[end][0] for end in (0, 1)] for pair in rows])
-    noise = np.array([max(pair[0][1], pair[1][1]) for pair in rows])
+def _extrapolated(limits: list[list[tuple[Floats, float]]]) -> GrazingLimit:
+    values = np.array([[pair[end][0] for end in (0, 1)] for pair in limits])
+    noise = np.array([max(pair[0][1], pair[1][1]) for pair in limits])
     # of deep hollows only small angles are out of reach: the best-known angles decide
     known = noise <= max(4.0 * float(noise.min()), 1e-6)
     values, noise = values[known], noise[known]
@@ -221,7 +221,7 @@ def _aitken(first: Floats, second: Floats, third: Floats, noise: float) -> Float
     return np.maximum(third + step, 0.0)
 
 
-def _row(law: Law, angle: float, end: int, parts: tuple[tuple[float, float], ...]) -> tuple[Floats, float]:
+def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float], ...]) -> tuple[Floats, float]:
     """E[sin(theta)/sin(Theta'); x in parts] with Theta' nearer to 0 and to pi, and its error."""
     if not parts:
         return np.zeros(2), 0.0

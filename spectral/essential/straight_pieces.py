@@ -27,7 +27,7 @@ POINTS, FINE_POINTS, HALVINGS = 256, 2048, 40
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
 # The largest values are looked at again, so often and the last of these times with all entry points, between so many
 # angles that are nearer by this factor.
-PEAKS, LOOKS, FINE_LOOKS, LOOK_ANGLES, NEARER = 4, 5, 2, 9, 6.0
+PEAKS, LEVELS, FINE_LEVELS, NEARBY_ANGLES, NEARER = 4, 5, 2, 9, 6.0
 # Of what the last look, or the last layers, added: what may still be missing.
 BEYOND = 2.0
 ROUNDING = 1e-9
@@ -81,14 +81,14 @@ def straight_part(law: WallLaw) -> StraightPart:
         # what more there is would need a fraction of rays below what is seen
         return StraightPart(fraction, flat, min(flat + 2.0 / POINTS, 1.0))
     spacing, best = np.pi / ANGLES, found
-    places, values = angle, found.roots
-    for look in range(LOOKS):
-        peaks = places[np.argsort(-values)[: PEAKS if look == 0 else 2]]
+    candidates, values = angle, found.roots
+    for level in range(LEVELS):
+        peaks = candidates[np.argsort(-values)[: PEAKS if level == 0 else 2]]
         spacing /= NEARER
-        steps = spacing * np.linspace(-NEARER, NEARER, LOOK_ANGLES)
-        places = np.unique(np.clip((peaks[:, None] + steps).ravel(), 1e-6, np.pi - 1e-6))
-        fine = look >= LOOKS - FINE_LOOKS
-        before, best = best, _largest_of_orbits(law, places, FINE_POINTS if fine else POINTS, fine)
+        steps = spacing * np.linspace(-NEARER, NEARER, NEARBY_ANGLES)
+        candidates = np.unique(np.clip((peaks[:, None] + steps).ravel(), 1e-6, np.pi - 1e-6))
+        fine = level >= LEVELS - FINE_LEVELS
+        before, best = best, _largest_of_orbits(law, candidates, FINE_POINTS if fine else POINTS, fine)
         values = best.roots
     low = max(float(best.roots.max()), fraction, flat)
     change = abs(float(best.roots.max()) - float(before.roots.max()))
@@ -106,27 +106,27 @@ class _Orbits:
 
 
 def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, halved: bool = False) -> _Orbits:
-    rows: dict[int, tuple[Floats, Floats]] = {}
+    conditionals: dict[int, tuple[Floats, Floats]] = {}
     orbits = [[_node(theta)] for theta in starts]
     angles = {_node(theta): float(theta) for theta in starts}
     roots = np.zeros((LAYERS, len(starts)))
     fresh = list(dict.fromkeys(node for orbit in orbits for node in orbit))
     for layer in range(LAYERS):
-        rows |= _rows(law, [(node, angles[node]) for node in fresh], points, halved)
+        conditionals |= _conditionals(law, [(node, angles[node]) for node in fresh], points, halved)
         fresh = []
         for k, orbit in enumerate(orbits):
-            roots[layer, k] = _root(orbit, rows, angles)
+            roots[layer, k] = _root(orbit, conditionals, angles)
             if layer == LAYERS - 1:
                 continue
-            reached = {_node(out): float(out) for node in orbit for out in rows[node][1]}
+            reached = {_node(out): float(out) for node in orbit for out in conditionals[node][1]}
             new = [node for node in reached if not _near(node, orbit)]
             if len(orbit) + len(new) <= MOST_NODES:
                 for node in new:
                     angles.setdefault(node, reached[node])
                     orbit.append(node)
-                fresh += [node for node in new if node not in rows]
+                fresh += [node for node in new if node not in conditionals]
         fresh = list(dict.fromkeys(fresh))
-    fractions = np.array([rows[_node(theta)][0].sum() for theta in starts])
+    fractions = np.array([conditionals[_node(theta)][0].sum() for theta in starts])
     return _Orbits(roots[-1], roots[-1] - roots[-2], fractions)
 
 
@@ -138,11 +138,11 @@ def _near(node: int, orbit: list[int]) -> bool:
     return any(abs(node - other) <= 1 for other in orbit)
 
 
-def _root(orbit: list[int], rows: dict[int, tuple[Floats, Floats]], angles: dict[int, float]) -> float:
+def _root(orbit: list[int], conditionals: dict[int, tuple[Floats, Floats]], angles: dict[int, float]) -> float:
     """The largest eigenvalue on the nodes of an orbit, all of whose rows are known."""
     matrix = np.zeros((len(orbit), len(orbit)))
     for i, node in enumerate(orbit):
-        for weight, out in zip(*rows[node], strict=True):
+        for weight, out in zip(*conditionals[node], strict=True):
             target = _node(out)
             j = next((j for j, other in enumerate(orbit) if abs(other - target) <= 1), None)
             if j is not None:
@@ -150,7 +150,9 @@ def _root(orbit: list[int], rows: dict[int, tuple[Floats, Floats]], angles: dict
     return float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
 
 
-def _rows(law: WallLaw, nodes: list[tuple[int, float]], points: int, halved: bool) -> dict[int, tuple[Floats, Floats]]:
+def _conditionals(
+    law: WallLaw, nodes: list[tuple[int, float]], points: int, halved: bool
+) -> dict[int, tuple[Floats, Floats]]:
     """Weights and outgoing angles of the straight rays of each node's angle."""
     if not nodes:
         return {}
@@ -158,19 +160,19 @@ def _rows(law: WallLaw, nodes: list[tuple[int, float]], points: int, halved: boo
     x = np.broadcast_to((np.arange(points) + 0.5) / points, (len(nodes), points))
     out = _straight(law, x.ravel(), np.repeat(theta, points)).reshape(len(nodes), points)
     labels = np.rint(np.nan_to_num(out, nan=-1.0) / SAME_NODE).astype(np.int64)
-    row, place = np.nonzero(np.abs(np.diff(labels, axis=1)) > 1)
-    low, high = x[row, place], x[row, place + 1]
+    row, entry = np.nonzero(np.abs(np.diff(labels, axis=1)) > 1)
+    low, high = x[row, entry], x[row, entry + 1]
     if halved:
-        low, high = _changes(law, theta[row], low, high, labels[row, place])
+        low, high = _changes(law, theta[row], low, high, labels[row, entry])
     middle = 0.5 * (low + high)
     found = {}
     for k, (node, _) in enumerate(nodes):
         own = row == k
         ends = np.concatenate([[0.0], middle[own], [1.0]])
-        first = np.concatenate([[0], place[own] + 1])
+        first = np.concatenate([[0], entry[own] + 1])
         here = out[k, first]
-        kept = np.isfinite(here)
-        found[node] = (np.diff(ends)[kept], here[kept])
+        finite = np.isfinite(here)
+        found[node] = (np.diff(ends)[finite], here[finite])
     return found
 
 
@@ -188,7 +190,7 @@ def _straight(law: WallLaw, x: Floats, theta: Floats) -> Floats:
     """Outgoing angles of the rays that meet straight pieces only; nan of the others."""
     if not x.size:
         return np.empty(0)
-    here, there = (law.outcomes(place, theta)[0] for place in (x, np.minimum(x + STEP, 1.0 - 2.0**-53)))
+    here, there = (law.reflect_with_status(entry, theta)[0] for entry in (x, np.minimum(x + STEP, 1.0 - 2.0**-53)))
     return np.where(np.abs(here - there) <= SAME_ANGLE, here, np.nan)
 
 

@@ -15,7 +15,7 @@ from ..bounds.contraction import refuse_unless_self_adjoint, self_adjoint_elsewh
 from ..bounds.enclosure import as_power, enclosures
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
-from ..bounds.trial_space import adapted_trials
+from ..bounds.trial_space import adapted_trial_space
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import ideal_spectrum, without_identity
@@ -27,7 +27,7 @@ from .verdict import SpectralGap, isolated, made_from
 
 # Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
 # exact the look is that counts them.
-ENCLOSED, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK = 3, 8, 1e-2, 2
+ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
 # Enclosures somewhat wider than the tolerance are sought once more, to this fraction of it; a gap whose error misses
 # the tolerance is handed over as it is where that is below the largest miss, a fraction of the gap.
 CLOSER, LARGEST_MISS = 0.25, 1e-3
@@ -88,8 +88,8 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
 
     None where that value is not beyond the essential spectrum.
     """
-    look = adapted_trials(law, MOST_ENCLOSED, FIRST_LOOK, LEVELS_OF_LOOK)
-    values = look.values[np.argsort(-np.abs(look.values), kind="stable")]
+    pilot = adapted_trial_space(law, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS)
+    values = pilot.values[np.argsort(-np.abs(pilot.values), kind="stable")]
     found = np.flatnonzero(values[1:] > edge.high)
     return int(found[0]) + 2 if found.size else None
 
@@ -222,8 +222,8 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | No
         # of modulus 1, or as large as the rest of a law with a Lambertian fraction can be
         return upper
     listed = law_eigenvalues(law, MODULI, tolerance, rng)
-    place = int(np.argmin(listed.values))
-    least, error = -float(listed.values[place]), float(listed.errors.total()[place])
+    lowest = int(np.argmin(listed.values))
+    least, error = -float(listed.values[lowest]), float(listed.errors.total()[lowest])
     top = 1.0 - upper.value
     edge = essential_edge(law)
     if least + error < top - upper.error or least <= edge.high:
@@ -343,8 +343,8 @@ def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:
     """
     try:
         frequency, quotient, spread = least_quotient(law)
-    except AccuracyError as lost:
-        return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {lost}"))
+    except AccuracyError as failure:
+        return replace(found, evidence=(*found.evidence, f"not held against fast oscillations: {failure}"))
     most = quotient + SIGMAS * spread
     if most >= found.value - found.error:
         return found

@@ -96,12 +96,12 @@ def spectrum(
     refuse_unless_self_adjoint(kernel)
     if discretisation:
         basis = how.pop("basis", None) or Legendre(DEGREES[0])
-        return _judged(kernel, matrix_spectrum(discretise(kernel, basis, **how), k), tolerance or TOLERANCE, rng)
+        return _with_verdict(kernel, matrix_spectrum(discretise(kernel, basis, **how), k), tolerance or TOLERANCE, rng)
     wanted = tolerance or TOLERANCE
-    return _judged(kernel, law_eigenvalues(kernel, k, wanted, rng), wanted, rng)
+    return _with_verdict(kernel, law_eigenvalues(kernel, k, wanted, rng), wanted, rng)
 
 
-def _judged(law: Law, found: Spectrum, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
+def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
     """With the law's gap and its verdict: what a matrix shows short of the essential spectrum's edge is not the gap."""
     known = gap_by_theorem(law)
     if known is None:

@@ -11,7 +11,7 @@ from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, MatrixLaw, discretise
 from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.structure import made_of_isometries
-from ..bounds.enclosure import EnclosedTrials, as_power, enclosed_trials
+from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_space
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 from ..essential.exact import ideal_spectrum
 
@@ -58,7 +58,7 @@ def _by_matrices(law: Law, k: int, tolerance: float, rng: np.random.Generator | 
 def _enclosed(law: Law, k: int, tolerance: float) -> Spectrum:
     """Enclosures to the tolerance, of as many eigenvalues as it takes to have the largest off the constants."""
     number, asked = k, FIRST * tolerance
-    best = found = enclosed_trials(law, number, None, asked)
+    best = found = enclosed_trial_space(law, number, None, asked)
     for _ in range(ATTEMPTS):
         if not found.indexed:
             break
@@ -68,7 +68,7 @@ def _enclosed(law: Law, k: int, tolerance: float) -> Spectrum:
             asked *= max(FIRST * tolerance / found.worst, SMALLEST_STEP)
         else:
             break
-        before, found = found, enclosed_trials(law, number, None, asked)
+        before, found = found, enclosed_trial_space(law, number, None, asked)
         if len(found.enclosures) == len(before.enclosures) and found.worst > WORTHWHILE * before.worst:
             # the means are spent
             break
@@ -78,21 +78,21 @@ def _enclosed(law: Law, k: int, tolerance: float) -> Spectrum:
 
 def _of_density(law: DensityLaw, k: int, tolerance: float) -> Spectrum:
     first, *others = [Legendre(factor * max(DEGREES[0], 2 * k)) for factor in (1, 2, 4)]
-    best = enclosed_trials(law, k, first)
+    best = enclosed_trial_space(law, k, first)
     for basis in others:
         if best.worst <= tolerance:
             break
-        best = min(best, enclosed_trials(law, k, basis), key=lambda found: found.worst)
+        best = min(best, enclosed_trial_space(law, k, basis), key=lambda found: found.worst)
     return _spectrum_of(best, k)
 
 
-def _has_top(found: EnclosedTrials) -> bool:
+def _has_top(found: EnclosedTrialSpace) -> bool:
     """Whether the largest eigenvalue off the constants is known to be among those that are listed."""
     tops = [item.low for item in found.enclosures if item.index != 0]
     return bool(tops) and max(tops) > max(found.enclosures.separation.radius, 0.0)
 
 
-def _spectrum_of(found: EnclosedTrials, k: int) -> Spectrum:
+def _spectrum_of(found: EnclosedTrialSpace, k: int) -> Spectrum:
     """Enclosures as a spectrum: the errors are what the intervals reach beyond the values."""
     items = found.enclosures.items
     values = np.array([item.value for item in items])

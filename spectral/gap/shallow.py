@@ -66,9 +66,9 @@ class Slopes:
     def shrinkage(self, frequency: Floats) -> Floats:
         """1 - |E exp(2 i t angle)|: what a law leaves of cos(t theta + phase) of large t, without cancellation."""
         centred = self.angle - float(self.weight @ self.angle) / float(self.weight.sum())
-        lost = np.array([self.weight @ (2.0 * np.sin(t * centred) ** 2) for t in frequency.tolist()])
-        turned = np.array([self.weight @ np.sin(2.0 * t * centred) for t in frequency.tolist()])
-        square = lost * (2.0 - lost) - turned**2
+        decay = np.array([self.weight @ (2.0 * np.sin(t * centred) ** 2) for t in frequency.tolist()])
+        odd_part = np.array([self.weight @ np.sin(2.0 * t * centred) for t in frequency.tolist()])
+        square = decay * (2.0 - decay) - odd_part**2
         return np.asarray(square / (1.0 + np.sqrt(np.maximum(1.0 - square, 0.0))))
 
 
@@ -116,17 +116,17 @@ def shallow_gap(law: Law, edge: EssentialEdge) -> SpectralGap | None:
     parities = (1, 0) if law.frame == "specular" else (0,)
     found = min((_Form(slopes, parity, bool(law.mirror_symmetric)) for parity in parities), key=lambda form: form.value)
     slowest = found.first_degree + FASTER
-    kept = float(slopes.shrinkage(_frequencies(slopes, slowest)).min())
+    shrunk = float(slopes.shrinkage(_frequencies(slopes, slowest)).min())
     error = found.error
     beyond = 1.0 - edge.high > found.value + error
-    if error > LARGEST_ERROR * found.value or not beyond or kept < APART * found.value:
+    if error > LARGEST_ERROR * found.value or not beyond or shrunk < APART * found.value:
         return None
     evidence = (
         *edge.reasons,
         f"rays steeper than {ONCE * slopes.steepest:.3g} meet the wall once, its slopes have a mean square of "
         f"{slopes.mean_square:.6g}; what the others can change: {found.grazing_error:.2g}",
         f"polynomials of degree {DEGREES} may miss {found.missed:.2g}",
-        f"cos(t theta) with t above {slowest:g} shrinks by {kept:.3g} or more, {kept / found.value:.3g} times the gap",
+        f"cos(t theta) with t above {slowest:g} shrinks by {shrunk:.3g} or more, {shrunk / found.value:.3g} of the gap",
     )
     method = f"1 - lambda from E (f(theta') - f(theta))^2, Legendre polynomials up to degree {DEGREES}"
     return SpectralGap(found.value, error, "estimate", method, "isolated", evidence, law.frame)
@@ -145,12 +145,12 @@ class _Form:
         theta, weight = gauss_rule(np.linspace(ONCE * steep, np.pi - ONCE * steep, ANGLE_PANELS + 1), ANGLE_NODES)
         size = (theta.size, DEGREES)
         form, drift = np.zeros((DEGREES, DEGREES)), np.zeros(size)
-        for place, angle in enumerate(theta.tolist()):
+        for k, angle in enumerate(theta.tolist()):
             change = _changes(angle, slopes.angle)
             # 1 - tan(phi) cot(theta), and with the measure sin(theta)/2
             flux = slopes.weight * np.sin(angle - slopes.angle) / (np.cos(slopes.angle) * np.sin(angle))
-            form += 0.25 * weight[place] * np.sin(angle) * (change * flux[:, None]).T @ change
-            drift[place] = flux @ change
+            form += 0.25 * weight[k] * np.sin(angle) * (change * flux[:, None]).T @ change
+            drift[k] = flux @ change
         values, vectors = eigh(form[np.ix_(own, own)])
         self.value = float(values[0])
         vector = np.zeros(DEGREES)
@@ -258,8 +258,8 @@ def _slopes_of_wall(wall: Wall) -> Slopes | None:
 def _slopes_of_curve(piece: Curve) -> tuple[Floats, Floats]:
     """Slopes, with dx as weight, at the nodes of Gauss rules in the parameter, and at the ends with weights of 0."""
     edges = np.linspace(0.0, 1.0, PANELS + 1)
-    place, width = gauss_on_intervals(edges[:-1], edges[1:], NODES)
-    x = piece.point(place)[:, 0].reshape(PANELS, NODES)
+    parameter, width = gauss_on_intervals(edges[:-1], edges[1:], NODES)
+    x = piece.point(parameter)[:, 0].reshape(PANELS, NODES)
     ends = piece.point(edges)[:, 0]
     # dx/ds of the polynomials through the nodes of a panel
     nodes = np.polynomial.legendre.leggauss(NODES)[0]
@@ -268,9 +268,9 @@ def _slopes_of_curve(piece: Curve) -> tuple[Floats, Floats]:
     speed = (x - ends[:-1, None]) @ rise.T * (2.0 * PANELS)
     weight = speed * width.reshape(PANELS, NODES)
     weight *= (np.diff(ends) / weight.sum(axis=1))[:, None]
-    return np.append(_angles(piece, place), _angles(piece, edges)), np.append(weight.ravel(), np.zeros(edges.size))
+    return np.append(_angles(piece, parameter), _angles(piece, edges)), np.append(weight.ravel(), np.zeros(edges.size))
 
 
-def _angles(piece: Curve, place: Floats) -> Floats:
-    tangent = piece.tangent(place)
+def _angles(piece: Curve, parameter: Floats) -> Floats:
+    tangent = piece.tangent(parameter)
     return np.asarray(np.arctan2(tangent[..., 1], tangent[..., 0]))

@@ -46,7 +46,7 @@ def gap_by_theorem(law: Law) -> SpectralGap | None:
     if fraction > 0.0:
         edge = essential_edge(law)
         if edge.kind == "bound" and abs(edge.low - (1.0 - fraction)) <= 4.0 * EPS:
-            reason = f"a Lambertian fraction a = {fraction:.6g}: the gap is at least a, and the essential spectrum reaches 1 - a"
+            reason = f"a Lambertian fraction a = {fraction:.6g}: the gap is at least a, the essential edge is 1 - a"
             return _stated(law, fraction, 4.0 * EPS, "essential edge", reason, *edge.reasons)
     return None
 

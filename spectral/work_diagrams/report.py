@@ -102,15 +102,15 @@ def table_of(report: WorkReport) -> str:
     norms = " | ".join(f"{norm} error" for norm in report.norms)
     heads = f"method | budget | {norms} | reported | seconds | spread | "
     lines = [table(heads, (_cells(report, row, id(row) in front) for row in report.rows)), ""]
-    for name, facts in report.methods.items():
-        words = f"- {name}: against {facts.reference} (known to {facts.floor:.1e})"
+    for name, record in report.methods.items():
+        words = f"- {name}: against {record.reference} (known to {record.floor:.1e})"
         fitted = report.order(name)
         if fitted is not None:
             words += f"; fitted order {fitted}"
-        if facts.declared_order is not None:
-            words += f", declared {facts.declared_order:g}"
+        if record.declared_order is not None:
+            words += f", declared {record.declared_order:g}"
             if fitted is not None:
-                words += f": {fitted.verdict(facts.declared_order)}"
+                words += f": {fitted.verdict(record.declared_order)}"
         lines.append(words)
     choice = report.choice()
     if choice is not None:
@@ -130,7 +130,7 @@ def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
 
 
 @dataclass(frozen=True)
-class MethodFacts:
+class MethodRecord:
     """What a report says of a method besides its rows.
 
     Attributes
@@ -177,20 +177,20 @@ class WorkReport:
     problem: str
     norms: tuple[str, ...]
     auto: str
-    methods: Mapping[str, MethodFacts]
+    methods: Mapping[str, MethodRecord]
     machine: Machine
     rows: tuple[WorkRow, ...] = ()
 
     @classmethod
     def of(cls, problem: WorkProblem, methods: Sequence[WorkMethod], machine: Machine) -> WorkReport:
         """A report without rows."""
-        facts = {}
+        records = {}
         for method in methods:
             reference = problem.reference_for(method.name)
             size = float(np.max(np.abs(reference.value), initial=0.0))
             floor = max(reference.error, ROUNDED * size, ROUNDED * np.finfo(np.float64).tiny)
-            facts[method.name] = MethodFacts(method.order, method.is_random, reference.source, floor)
-        return cls(problem.name, tuple(problem.norms), problem.auto, MappingProxyType(facts), machine)
+            records[method.name] = MethodRecord(method.order, method.is_random, reference.source, floor)
+        return cls(problem.name, tuple(problem.norms), problem.auto, MappingProxyType(records), machine)
 
     def with_row(self, row: WorkRow) -> WorkReport:
         """The report with one row more."""
@@ -219,7 +219,7 @@ class WorkReport:
             return error
         return max(min(row.reported, error), min(floor, ROUNDED))
 
-    def kept_level(self, row: WorkRow, *, known: bool = False) -> float:
+    def lasting_level(self, row: WorkRow, *, known: bool = False) -> float:
         """The largest `level` at this and all larger budgets of the row's method.
 
         A rule that happens to hit, and misses again when it is refined, has not reached that error. With ``known``, of
@@ -251,12 +251,12 @@ class WorkReport:
     def choice(self, *, known: bool = False) -> float | None:
         """Time of the method that chooses over that of the best other one at equal error, the worst of its rows.
 
-        Between the rows of a method its time is interpolated in the logarithms. Errors are those of `kept_level`: true
-        ones or, with ``known``, those that who uses a method may count on. None without rows of both kinds.
+        Between the rows of a method its time is interpolated in the logarithms. Errors are those of `lasting_level`:
+        true ones or, with ``known``, those that who uses a method may count on. None without rows of both kinds.
         """
         ratios = []
         for row in self._done(self.auto):
-            error = self.kept_level(row, known=known)
+            error = self.lasting_level(row, known=known)
             others = (name for name in self.methods if name != self.auto)
             times = [time for name in others if (time := self._time_to(name, error, known)) is not None]
             if times:
@@ -278,7 +278,7 @@ class WorkReport:
             "problem": self.problem,
             "norms": list(self.norms),
             "auto": self.auto,
-            "methods": {name: dict(facts.__dict__) for name, facts in self.methods.items()},
+            "methods": {name: dict(record.__dict__) for name, record in self.methods.items()},
             "machine": self.machine.as_dict(),
             "rows": [row.as_dict() for row in self.rows],
         }
@@ -291,7 +291,7 @@ class WorkReport:
             data: dict[str, Any] = json.loads(text)
             if data["format"] != FORMAT:
                 raise InputError(f"JSON: expected format {FORMAT} of a report, got {data['format']!r}")
-            methods = {name: MethodFacts(**facts) for name, facts in data["methods"].items()}
+            methods = {name: MethodRecord(**record) for name, record in data["methods"].items()}
             rows = tuple(WorkRow.of_dict(row) for row in data["rows"])
             machine = Machine.of_dict(data["machine"])
             return cls(data["problem"], tuple(data["norms"]), data["auto"], MappingProxyType(methods), machine, rows)
@@ -305,7 +305,7 @@ class WorkReport:
         """The time after which a method has a finite error and keeps it, or None if it has not."""
         best: list[tuple[float, float]] = []
         for row in sorted(self._done(method), key=lambda row: row.least):
-            level = self.kept_level(row, known=known)
+            level = self.lasting_level(row, known=known)
             if level < (best[-1][1] if best else float("inf")):
                 best.append((row.least, level))
         if not best or best[-1][1] > error:
@@ -325,7 +325,7 @@ def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
     front = [(row.least, report.level(row)) for row in report.front()]
     if len(front) > 1:
         ax.plot(*zip(*front, strict=True), color="0.8", linewidth=6.0, solid_capstyle="round", zorder=0)
-    floors = {facts.floor for facts in report.methods.values()}
+    floors = {record.floor for record in report.methods.values()}
     for number, name in enumerate(report.methods):
         rows = sorted((row for row in report.rows if row.is_done and row.method == name), key=lambda row: row.least)
         if not rows:

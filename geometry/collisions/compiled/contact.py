@@ -104,7 +104,7 @@ class State(NamedTuple):
     cosine: float
 
 
-class Place(NamedTuple):
+class Touching(NamedTuple):
     """Where a satellite touches the wall: kind and number of the piece, and the hollow, -1 on the tops."""
 
     kind: int
@@ -130,7 +130,7 @@ class Span(NamedTuple):
 
     t: float
     end: float
-    turned: tuple[float, float]
+    rotation: tuple[float, float]
 
 
 class Touch(NamedTuple):
@@ -163,13 +163,13 @@ def turning(angle):
 
 
 @inlined
-def satellite_after(t, turned, turn, motion):
+def satellite_after(t, rotation, turn, motion):
     """Displacement (2) of a satellite after the time t, and the sine and cosine of its angle then.
 
-    ``turn`` is (sin a, cos a) at the start, and ``turned`` is the `turning` since then.
+    ``turn`` is (sin a, cos a) at the start, and ``rotation`` is the `turning` since then.
     """
     sine, cosine = turn
-    sin_d, versed_d = turned
+    sin_d, versed_d = rotation
     d_sine, fall = cosine * sin_d - sine * versed_d, sine * sin_d + cosine * versed_d
     dx, dy = motion.v1 * t + d_sine * motion.radius, motion.v2 * t + fall * motion.radius
     return State(dx, dy, sine + d_sine, cosine - fall)
@@ -184,20 +184,20 @@ def towards_line(level, g1, g2, turn, motion):
 
 
 @inlined
-def line_after(line, t, turned, motion):
+def line_after(line, t, rotation, motion):
     """F of a line after the time t and its first two derivatives."""
     level, rate, a, b = line
-    sin_d, versed_d = turned
+    sin_d, versed_d = rotation
     f1 = rate + motion.spin * (a + b * sin_d - a * versed_d)
     f2 = motion.spin * motion.spin * (b - b * versed_d - a * sin_d)
     return level + rate * t + a * sin_d + b * versed_d, f1, f2
 
 
 @inlined
-def conic_after(conic, t, turned, turn, motion):
+def conic_after(conic, t, rotation, turn, motion):
     """F of a conic after the time t, two derivatives, and b0 and b1: the third one up to t + s is at most b0 + b1 s."""
     level, g1, g2, curvature, stretch = conic
-    dx, dy, sine, cosine = satellite_after(t, turned, turn, motion)
+    dx, dy, sine, cosine = satellite_after(t, rotation, turn, motion)
     dy *= stretch
     n1, n2 = g1 - curvature * dx, g2 - curvature * dy
     u1, u2 = motion.v1 + motion.omega * cosine, stretch * (motion.v2 + motion.omega * sine)
@@ -228,22 +228,22 @@ def next_root(sign, leaving, line, conic, span, path, patience):
     ``patience`` is the longest time for which the bounds are worth having. Where the steps run out the time is the last
     one up to which there is no root, and the code `BOUNCE_LIMIT`.
     """
-    t, end, turned = span
+    t, end, rotation = span
     turn, motion, slack = path.turn, path.motion, path.slack
     third, growth = motion.spin * motion.spin * abs(motion.omega), 0.0
     for number in range(ROOT_STEPS):
         if conic is not None:
-            f, f1, f2, third, growth = conic_after(conic, t, turned, turn, motion)
+            f, f1, f2, third, growth = conic_after(conic, t, rotation, turn, motion)
         if line is not None:
-            f, f1, f2 = line_after(line, t, turned, motion)
+            f, f1, f2 = line_after(line, t, rotation, motion)
         f, f1, f2 = sign * f, sign * f1, sign * f2
         if number == 0 and leaving:
             if f1 <= 0.0:
-                return t, turned, GRAZING
+                return t, rotation, GRAZING
             f = 0.0
         elif f <= 0.0:
             # at the start: behind the piece by a rounding error
-            return t, turned, CLEAR if number > 0 else CORNER
+            return t, rotation, CLEAR if number > 0 else CORNER
         ahead = min(end - t, patience)
         doubt = (third + growth * ahead) * ahead
         step = safe_step(f, f1, f2 - doubt)
@@ -257,13 +257,13 @@ def next_root(sign, leaving, line, conic, span, path, patience):
             step = ahead
         before = t
         t += step
-        turned = turning(motion.spin * t)
+        rotation = turning(motion.spin * t)
         # what F may still be there is its gap to the parabola; far below the slack it counts as 0
         if step < ahead and (doubt * step * step <= ROOT_FRACTION * slack or t == before):
-            return t, turned, CLEAR
+            return t, rotation, CLEAR
     else:
-        return t, turned, BOUNCE_LIMIT
-    return np.inf, turned, CLEAR
+        return t, rotation, BOUNCE_LIMIT
+    return np.inf, rotation, CLEAR
 
 
 @inlined
@@ -312,7 +312,7 @@ def conic_form(number, is_own, path, ground):
 @inlined
 def stays_in_front(line, span, leaving, motion, slack):
     """-> bool: whether a line is certainly not met in the span."""
-    here, rate, bend = line_after(line, span.t, span.turned, motion)
+    here, rate, bend = line_after(line, span.t, span.rotation, motion)
     ahead = span.end - span.t
     # F lies above a parabola that is not convex, and so above the lower one of its ends
     doubt = motion.spin * motion.spin * abs(motion.omega) * ahead
@@ -341,44 +341,44 @@ def first_on_piece(kind, number, own, path, span, size, ground):
 
     ``own`` is the piece on which the flight starts, if any.
     """
-    t, end, turned = span
+    t, end, rotation = span
     motion, slack = path.motion, path.slack
     is_own = own.kind == kind and own.piece == number
     line, conic, patience = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 1.0), np.inf
     if kind == LINE:
         line = line_form(number, is_own, path, ground)
-        here, rate, _ = line_after(line, t, turned, motion)
+        here, rate, _ = line_after(line, t, rotation, motion)
         reach = slack
     else:
         conic = conic_form(number, is_own, path, ground)
-        here, rate, _, _, _ = conic_after(conic, t, turned, path.turn, motion)
+        here, rate, _, _, _ = conic_after(conic, t, rotation, path.turn, motion)
         reach = slack * max(1.0, ground.arcs[number, STRETCH])
         patience = 2.0 * size / motion.fastest
     leaving = is_own and t == 0.0
     if t == 0.0 and own.kind != NO_PIECE and not is_own and abs(here) <= reach:
         leaving = not is_in_front(kind, number, own, path.x, path.y, reach, ground)
     if kind == LINE and stays_in_front(line, span, leaving, motion, slack):
-        return np.inf, satellite_after(t, turned, path.turn, motion), CLEAR
+        return np.inf, satellite_after(t, rotation, path.turn, motion), CLEAR
     sign = 1.0 if here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
     if leaving:
         # to the front, or, from the back of a face, away from it
         sign = 1.0 if is_own or rate > 0.0 else -1.0
     while True:
-        rest = Span(t, end, turned)
+        rest = Span(t, end, rotation)
         if kind == LINE:
-            t, turned, code = next_root(sign, leaving, line, None, rest, path, patience)
+            t, rotation, code = next_root(sign, leaving, line, None, rest, path, patience)
         else:
-            t, turned, code = next_root(sign, leaving, None, conic, rest, path, patience)
-        state, inward = satellite_after(t, turned, path.turn, motion), 0.0
+            t, rotation, code = next_root(sign, leaving, None, conic, rest, path, patience)
+        state, inward = satellite_after(t, rotation, path.turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR
         if code == BOUNCE_LIMIT:
             return t, state, code
         if sign > 0.0:
             if kind == LINE:
-                _, inward, _ = line_after(line, t, turned, motion)
+                _, inward, _ = line_after(line, t, rotation, motion)
             else:
-                _, inward, _, _, _ = conic_after(conic, t, turned, path.turn, motion)
+                _, inward, _, _, _ = conic_after(conic, t, rotation, path.turn, motion)
             inside, corner = where_on_piece(kind, number, path, state, inward, ground)
             if inside:
                 return t, state, CORNER if corner else code
@@ -398,23 +398,23 @@ def first_in_hollow(h, own, came_from, path, span, ground):
     in through the left or the right one.
     """
     hollows, joints, motion = ground.hollows, ground.joints, path.motion
-    t, end, turned = span
+    t, end, rotation = span
     kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, SIZE]
-    where = satellite_after(t, turned, path.turn, motion)
+    where = satellite_after(t, rotation, path.turn, motion)
     ranges = (FIRST_JOINT, JOINTS_END), (FIRST_CIRCLE, CIRCLES_END), (FIRST_ELLIPSE, ELLIPSES_END)
     for first, end_of_range in ranges:
         tried = LINE if first == FIRST_JOINT else ARC
         for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
             if tried == ARC or joints[k, STARTS_LINE] > 0.0:
-                rest = Span(t, end, turned)
-                hit, place, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
+                rest = Span(t, end, rotation)
+                hit, there, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
                 if hit < end:
-                    end, kind, number, code, where = hit, tried, k, unclear, place
+                    end, kind, number, code, where = hit, tried, k, unclear, there
     if ground.is_open:
         for side in (-1, 1):
             edge = hollows[h, LEFT] if side < 0 else hollows[h, RIGHT]
             line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
-            rest = Span(t, end, turned)
+            rest = Span(t, end, rotation)
             hit, then, unclear = next_root(1.0, came_from == side, line, None, rest, path, np.inf)
             if hit < end:
                 end, kind, number, code = hit, SIDE, side, unclear

@@ -43,9 +43,9 @@ from .contact import (
     WIDEST_SLACK,
     ZERO,
     Path,
-    Place,
     Span,
     Touch,
+    Touching,
     first_in_hollow,
     flight,
     next_root,
@@ -59,7 +59,7 @@ TOP = 7
 MOST_CELLS = 1_000_000
 
 # Cells, or satellites, between two looks at the flag that tells a disk to end: a power of 2.
-CELLS_A_LOOK = 1024
+CELLS_A_CHECK = 1024
 
 # A time that no flight takes, but that is not infinite: bounds are multiplied by it.
 FOREVER = 1e30
@@ -83,19 +83,19 @@ class Chosen(NamedTuple):
 
 
 @inlined
-def hollow_at(hollows, place):
+def hollow_at(hollows, entry):
     """The hollow over which a place of the cell lies, or -1 over a flat top."""
-    h = last_hollow(place, hollows)
-    return h if h >= 0 and place < hollows[h, RIGHT] else -1
+    h = last_hollow(entry, hollows)
+    return h if h >= 0 and entry < hollows[h, RIGHT] else -1
 
 
 @inlined
-def near_edge(hollows, place, slack):
+def near_edge(hollows, entry, slack):
     """Whether a place at height 0 is within the slack of an end of a hollow that is a corner."""
     for h in range(hollows.shape[0]):
-        if abs(place - hollows[h, LEFT]) <= slack and hollows[h, LEFT_EDGE] == CORNER_EDGE:
+        if abs(entry - hollows[h, LEFT]) <= slack and hollows[h, LEFT_EDGE] == CORNER_EDGE:
             return True
-        if abs(place - hollows[h, RIGHT]) <= slack and hollows[h, RIGHT_EDGE] == CORNER_EDGE:
+        if abs(entry - hollows[h, RIGHT]) <= slack and hollows[h, RIGHT_EDGE] == CORNER_EDGE:
             return True
     return False
 
@@ -107,25 +107,25 @@ def descent(path, span, ground):
     With the turning until then, the hollow (-1 where it meets a flat top) and its cell's left end.
     """
     x, y, turn, motion, slack = path
-    t, end, turned = span
-    dx, dy, sine, _ = satellite_after(t, turned, turn, motion)
+    t, end, rotation = span
+    dx, dy, sine, _ = satellite_after(t, rotation, turn, motion)
     if y + dy > 0.0:
-        lid = towards_line(y, 0.0, 1.0, turn, motion)
-        t, turned, code = next_root(1.0, NO, lid, None, span, path, np.inf)
+        tops = towards_line(y, 0.0, 1.0, turn, motion)
+        t, rotation, code = next_root(1.0, NO, tops, None, span, path, np.inf)
         if t >= end or code == GRAZING:
-            return np.inf, turned, -1, 0.0, CLEAR
+            return np.inf, rotation, -1, 0.0, CLEAR
         if code != CLEAR:
-            return t, turned, -1, 0.0, code
-        dx, dy, sine, _ = satellite_after(t, turned, turn, motion)
+            return t, rotation, -1, 0.0, code
+        dx, dy, sine, _ = satellite_after(t, rotation, turn, motion)
     base = math.floor((x + dx) / ground.cell) * ground.cell
     if ground.is_open:
-        return t, turned, 0, base, CLEAR
-    place = x + dx - base
+        return t, rotation, 0, base, CLEAR
+    entry = x + dx - base
     rising = motion.v2 + motion.omega * sine
     # at a shallow incidence a rounding error of the height is a longer way along the tops
-    near = near_edge(ground.hollows, place, slack * max(1.0, motion.fastest / abs(rising)))
+    near = near_edge(ground.hollows, entry, slack * max(1.0, motion.fastest / abs(rising)))
     # one that rises from below the tops has not come in by a known way: it touches them together with another one
-    return t, turned, hollow_at(ground.hollows, place), base, CORNER if near or rising >= 0.0 else CLEAR
+    return t, rotation, hollow_at(ground.hollows, entry), base, CORNER if near or rising >= 0.0 else CLEAR
 
 
 @compiled
@@ -135,34 +135,34 @@ def first_contact(own, base, path, t, end, ground):
     The flight starts on ``own``, of which the hollow is in the cell that begins at ``base``; above the tops that is -1.
     """
     x, y, turn, motion, slack = path
-    turned = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
-    state = satellite_after(t, turned, turn, motion)
+    rotation = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
+    state = satellite_after(t, rotation, turn, motion)
     h = own.hollow
     if own.kind == TOP:
         # it rises, and its path bends upward
         return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
     if h < 0:
-        t, turned, h, base, code = descent(path, Span(t, end, turned), ground)
-        state = satellite_after(t, turned, turn, motion)
+        t, rotation, h, base, code = descent(path, Span(t, end, rotation), ground)
+        state = satellite_after(t, rotation, turn, motion)
         if t >= end:
             return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
         if h < 0 or code != CLEAR:
             return Touch(t, TOP, -1, state, code), -1, base
     came_from = ZERO
     for cell in range(MOST_CELLS):
-        if cell & (CELLS_A_LOOK - 1) == CELLS_A_LOOK - 1 and is_raised(ground.stop):
+        if cell & (CELLS_A_CHECK - 1) == CELLS_A_CHECK - 1 and is_raised(ground.stop):
             break
         shifted = Path(x - base, y, turn, motion, slack)
-        touch = first_in_hollow(h, own, came_from, shifted, Span(t, end, turned), ground)
+        touch = first_in_hollow(h, own, came_from, shifted, Span(t, end, rotation), ground)
         t, state = touch.time, touch.state
         if touch.kind != SIDE or touch.code == BOUNCE_LIMIT:
             return touch, h, base
         if y + state.dy > 0.0 and motion.v2 + motion.omega * state.sine > 0.0:
             return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
-        turned = turning(motion.spin * t)
+        rotation = turning(motion.spin * t)
         base += touch.piece * ground.cell
         came_from = -touch.piece
-        own = Place(ZERO, NOTHING, h)
+        own = Touching(ZERO, NOTHING, h)
     return Touch(t, NO_PIECE, -1, state, BOUNCE_LIMIT), h, base
 
 
@@ -237,7 +237,7 @@ def first_of_all(own, below, path, height, angle, end, ring, ground):
     passed = out_of_reach_after(angle, motion, ring)
     touch, hollow, base = first_contact(own, 0.0, path, 0.0, min(end, passed), ground)
     state, code = touch.state, touch.code
-    hit = Place(touch.kind, touch.piece, hollow)
+    hit = Touching(touch.kind, touch.piece, hollow)
     chosen = Chosen(0, x + state.dx, y + state.dy, (state.sine, state.cosine))
     time = min(touch.time, end)
     # the others in the order in which they come within reach of the wall
@@ -245,7 +245,7 @@ def first_of_all(own, below, path, height, angle, end, ring, ground):
     # numba's floor is a float
     j = -step * int(math.floor((reach + step * angle) / ring.spacing))  # noqa: RUF046
     for count in range(MOST_CELLS):
-        if count & (CELLS_A_LOOK - 1) == CELLS_A_LOOK - 1 and is_raised(ground.stop):
+        if count & (CELLS_A_CHECK - 1) == CELLS_A_CHECK - 1 and is_raised(ground.stop):
             break
         other = angle + j * ring.spacing
         away = other * motion.spin >= 0.0
@@ -263,10 +263,10 @@ def first_of_all(own, below, path, height, angle, end, ring, ground):
             if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * sine_other) * until < 0.0:
                 inside, left = (below.hollow, below.base) if j == below.number else (NOTHING, 0.0)
                 there = Path(x_other, y_other, turn_other, motion, slack)
-                touch, hollow, left = first_contact(Place(ZERO, NOTHING, inside), left, there, start, until, ground)
+                touch, hollow, left = first_contact(Touching(ZERO, NOTHING, inside), left, there, start, until, ground)
                 tied = hit.kind != NO_PIECE and abs(touch.time - time) <= tie
                 if touch.time < time:
-                    time, hit, base, code = touch.time, Place(touch.kind, touch.piece, hollow), left, touch.code
+                    time, hit, base, code = touch.time, Touching(touch.kind, touch.piece, hollow), left, touch.code
                     state = touch.state
                     chosen = Chosen(j, x_other + state.dx, y_other + state.dy, (state.sine, state.cosine))
                 if tied:
@@ -341,7 +341,7 @@ def longest_flight(height, motion, ring):
 
 
 @inlined
-def collide_disk(place, angle, velocity, disk, ring, limit, ground):
+def collide_disk(entry, angle, velocity, disk, ring, limit, ground):
     """-> (displacement, turn, time, velocity, contacts, two, status): one collision of a disk that comes down.
 
     It is at height 0, its lowest satellite at ``angle`` from the lowest point. ``disk`` is (m, J) with m + J = 1. The
@@ -349,10 +349,10 @@ def collide_disk(place, angle, velocity, disk, ring, limit, ground):
     """
     scale, spacing = ring.scale, ring.spacing
     v1, v2, omega = velocity
-    travel, turned, passed, contacts, two = 0.0, 0.0, 0.0, 0, False
+    travel, rotation, passed, contacts, two = 0.0, 0.0, 0.0, 0, False
     sine, versed = turning(angle)
-    x, y, height = place + sine / scale, versed / scale, 0.0
-    own, below = Place(ZERO, NOTHING, NOTHING), Below(ZERO, NOTHING, 0.0)
+    x, y, height = entry + sine / scale, versed / scale, 0.0
+    own, below = Touching(ZERO, NOTHING, NOTHING), Below(ZERO, NOTHING, 0.0)
     status = BOUNCE_LIMIT
     while not is_raised(ground.stop):
         path = Path(x, y, (sine, 1.0 - versed), flight(v1, v2, omega, scale), ring.slack)
@@ -361,7 +361,7 @@ def collide_disk(place, angle, velocity, disk, ring, limit, ground):
             break
         time, hit, base, chosen, code = first_of_all(own, below, path, height, angle, end, ring, ground)
         travel += v1 * time
-        turned += path.motion.spin * time
+        rotation += path.motion.spin * time
         passed += time
         if code != CLEAR:
             status = code
@@ -382,7 +382,7 @@ def collide_disk(place, angle, velocity, disk, ring, limit, ground):
             x, y, n1, n2 = surface(hit.kind, hit.piece, x, chosen.y, ground)
         height = y - versed / scale
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (sine, 1.0 - versed), disk)
-    return travel, turned, passed, (v1, v2, omega), contacts, two, status
+    return travel, rotation, passed, (v1, v2, omega), contacts, two, status
 
 
 @inlined
@@ -402,13 +402,13 @@ def collide_disks(position, velocity, disk, ring, limit, ground, results):
         if is_raised(ground.stop):
             break
         norm, unit = unit_velocity(velocity, i, disk)
-        place = (position[i, X1] - math.floor(position[i, X1] / width) * width) / scale
+        entry = (position[i, X1] - math.floor(position[i, X1] / width) * width) / scale
         angle = position[i, ALPHA] - spacing * round(position[i, ALPHA] / spacing)
-        travel, turned, time, (v1, v2, omega), results.contacts[i], results.two_satellites[i], results.status[i] = (
-            collide_disk(place, angle, unit, disk, ring, limit, ground)
+        travel, rotation, time, (v1, v2, omega), results.contacts[i], results.two_satellites[i], results.status[i] = (
+            collide_disk(entry, angle, unit, disk, ring, limit, ground)
         )
         results.position[i, X1] = position[i, X1] + scale * travel
-        results.position[i, ALPHA] = position[i, ALPHA] + turned
+        results.position[i, ALPHA] = position[i, ALPHA] + rotation
         results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
             norm * v1,
             norm * v2,
@@ -418,15 +418,15 @@ def collide_disks(position, velocity, disk, ring, limit, ground, results):
 
 
 @inlined
-def roll_disk(place, velocity, disk, rolling, limit, ground):
+def roll_disk(entry, velocity, disk, rolling, limit, ground):
     """-> (displacement, turn, time, velocity, contacts, status): one collision on the cylinder.
 
     The contact moves on a straight line with the velocity (v1 + omega, v2) and starts at (place, 0).
     """
     v1, v2, omega = velocity
-    travel, turned, passed, contacts = 0.0, 0.0, 0.0, 0
-    x, y = place, 0.0
-    own, status = Place(ZERO, NOTHING, NOTHING), BOUNCE_LIMIT
+    travel, rotation, passed, contacts = 0.0, 0.0, 0.0, 0
+    x, y = entry, 0.0
+    own, status = Touching(ZERO, NOTHING, NOTHING), BOUNCE_LIMIT
     while not is_raised(ground.stop):
         path = Path(x, y, (0.0, 1.0), flight(v1 + omega, v2, 0.0, 1.0), rolling.slack)
         end = FOREVER
@@ -438,7 +438,7 @@ def roll_disk(place, velocity, disk, rolling, limit, ground):
         kind, state, code = touch.kind, touch.state, touch.code
         time = min(touch.time, end)
         travel += v1 * time
-        turned += omega * time
+        rotation += omega * time
         passed += time
         if code != CLEAR:
             status = code
@@ -449,13 +449,13 @@ def roll_disk(place, velocity, disk, rolling, limit, ground):
         if contacts >= limit:
             break
         contacts += 1
-        own, x, y, n1, n2 = Place(kind, touch.piece, hollow), x + state.dx - base, y + state.dy, 0.0, 1.0
+        own, x, y, n1, n2 = Touching(kind, touch.piece, hollow), x + state.dx - base, y + state.dy, 0.0, 1.0
         if kind == TOP:
             y = 0.0
         else:
             x, y, n1, n2 = surface(kind, touch.piece, x, y, ground)
         v1, v2, omega = reflect(v1, v2, omega, n1, n2, (0.0, 1.0), disk)
-    return travel, turned, passed, (v1, v2, omega), contacts, status
+    return travel, rotation, passed, (v1, v2, omega), contacts, status
 
 
 @compiled
@@ -466,13 +466,13 @@ def roll_disks(position, velocity, disk, rolling, limit, ground, results):
         if is_raised(ground.stop):
             break
         norm, unit = unit_velocity(velocity, i, disk)
-        place = (position[i, X1] + position[i, ALPHA]) / scale
-        place -= math.floor(place / ground.cell) * ground.cell
-        travel, turned, time, (v1, v2, omega), results.contacts[i], results.status[i] = roll_disk(
-            place, unit, disk, rolling, limit, ground
+        entry = (position[i, X1] + position[i, ALPHA]) / scale
+        entry -= math.floor(entry / ground.cell) * ground.cell
+        travel, rotation, time, (v1, v2, omega), results.contacts[i], results.status[i] = roll_disk(
+            entry, unit, disk, rolling, limit, ground
         )
         results.position[i, X1] = position[i, X1] + scale * travel
-        results.position[i, ALPHA] = position[i, ALPHA] + scale * turned
+        results.position[i, ALPHA] = position[i, ALPHA] + scale * rotation
         results.velocity[i, V1], results.velocity[i, V2], results.velocity[i, OMEGA] = (
             norm * v1,
             norm * v2,

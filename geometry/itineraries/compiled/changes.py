@@ -53,7 +53,7 @@ class Limits(NamedTuple):
 
     collisions: int
     collisions_that_count: int
-    flights: int
+    segments: int
 
 
 class Tracer(NamedTuple):
@@ -66,7 +66,7 @@ class Tracer(NamedTuple):
     nearby: int
     angles: Floats
     results: Results
-    places: Floats
+    entries: Floats
     stop: NDArray[np.int64]
 
 
@@ -88,13 +88,13 @@ class Task(NamedTuple):
     setting: Setting
     theta: float
     degree: int
-    flights: NDArray[np.int64]
+    segments: NDArray[np.int64]
 
 
 class Chain(NamedTuple):
     """Samples in the order in which they were found, and two lists for gaps, each named by the sample on its left."""
 
-    places: Floats
+    entries: Floats
     angles: Floats
     labels: NDArray[np.uint64]
     successors: NDArray[np.int64]
@@ -125,18 +125,18 @@ def empty_chain():
 
 
 @allocating
-def task_of(setting, theta, degree, flights):
+def task_of(setting, theta, degree, segments):
     """-> Task: a row at an angle."""
     setting.tracer.angles[:] = theta
-    return Task(setting, theta, degree, flights)
+    return Task(setting, theta, degree, segments)
 
 
 @inlined
-def trace_block(places, task):
+def trace_block(entries, task):
     """Trace rays, no more than `BLOCK`, into the results of the tracer."""
     setting = task.setting
     tracer = setting.tracer
-    rays = places, tracer.angles[: places.shape[0]]
+    rays = entries, tracer.angles[: entries.shape[0]]
     limit = setting.limits.collisions
     call_at(tracer.address, None, (*rays, setting.tables, limit, tracer.stop, tracer.results, tracer.nearby))
 
@@ -150,7 +150,7 @@ def outcome(k, x, task):
     hollow, limits, edges = task.setting.hollow, task.setting.limits, task.setting.edges
     results = task.setting.tracer.results
     cells = np.int64(abs(results.x[k] - x) / (hollow[RIGHT] - hollow[LEFT]))
-    task.flights[0] += 1 + min(results.collisions[k], limits.collisions_that_count) + cells
+    task.segments[0] += 1 + min(results.collisions[k], limits.collisions_that_count) + cells
     if results.status[k] != ESCAPED:
         return task.theta, np.uint64(results.status[k])
     # a ray along y = 0 within rounding
@@ -170,16 +170,16 @@ def outcome(k, x, task):
 @inlined
 def probe(x, task):
     """-> (angle, label): `outcome` of one ray."""
-    places = task.setting.tracer.places[:1]
-    places[0] = x
-    trace_block(places, task)
+    entries = task.setting.tracer.entries[:1]
+    entries[0] = x
+    trace_block(entries, task)
     return outcome(np.int64(0), x, task)
 
 
 @inlined
 def is_spent(task):
     """Whether the row has taken as many flights as it may."""
-    return task.flights[0] >= task.setting.limits.flights
+    return task.segments[0] >= task.setting.limits.segments
 
 
 @inlined
@@ -256,7 +256,7 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
 
 
 @inner
-def sample_row(places, task, chain, goal):
+def sample_entries(entries, task, chain, goal):
     """Chain the samples at increasing places, and halve the gaps; returns the number of samples, and the last one.
 
     The last one is that with the largest place, not the one that was found last.
@@ -264,7 +264,7 @@ def sample_row(places, task, chain, goal):
     xs, outs, labels, follow, gaps, _ = chain
     left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
     count, gap_count = np.int64(0), np.int64(0)
-    for x in places:
+    for x in entries:
         if x <= left or x >= right or (count > 0 and x <= xs[count - 1]):
             continue
         xs[count] = x

@@ -35,7 +35,7 @@ LEAST_FRACTION = 0.02
 class Rules(NamedTuple):
     """Positions in (0, 1) and weights of all rules, one after the other, their starts, and the first rule to use."""
 
-    places: Floats
+    positions: Floats
     weights: Floats
     starts: NDArray[np.int64]
     least: int
@@ -43,14 +43,14 @@ class Rules(NamedTuple):
 
 def gauss_tables(least: int) -> Rules:
     """The rules after the substitution, from number ``least`` on."""
-    places, weights, starts = [], [], [0]
+    positions, weights, starts = [], [], [0]
     for order in ORDERS:
         node, weight = np.polynomial.legendre.leggauss(order)
         s = 0.5 * (1.0 + node)
-        places.append(s * s * (3.0 - 2.0 * s))
+        positions.append(s * s * (3.0 - 2.0 * s))
         weights.append(0.5 * weight * 6.0 * s * (1.0 - s))
         starts.append(starts[-1] + order)
-    return Rules(np.concatenate(places), np.concatenate(weights), np.array(starts), least)
+    return Rules(np.concatenate(positions), np.concatenate(weights), np.array(starts), least)
 
 
 @inner
@@ -61,7 +61,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     Without ``strict`` labels do not matter, and the difference of the rules has to show what the piece hides.
     """
     low, high = ends
-    places, weights, starts, least = rules
+    positions, weights, starts, least = rules
     node, mass = nodes
     degree = task.degree
     width = high - low
@@ -74,9 +74,9 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
         if last - first > MOST_NODES - filled - 2 or is_spent(task):
             break
         new0, new1, new2 = 0.0, 0.0, 0.0
-        block = task.setting.tracer.places[: last - first]
+        block = task.setting.tracer.positions[: last - first]
         for n in range(first, last):
-            block[n - first] = low + width * places[n]
+            block[n - first] = low + width * positions[n]
         trace_block(block, task)
         for n in range(first, last):
             x = block[n - first]

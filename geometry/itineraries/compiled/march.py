@@ -20,7 +20,7 @@ from .changes import (
     allocating,
     empty_chain,
     is_spent,
-    sample_row,
+    sample_entries,
     spread,
     task_of,
     undecided,
@@ -57,7 +57,7 @@ def merged(first, second):
 
 
 @allocating
-def march_row(task, goal, rules, places, chain, nodes, pieces):
+def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     """Nodes and masses of one row; returns their number, the error, the lost width, the number of pieces and of rays.
 
     What a row that has spent its flights leaves undone is in its error. ``pieces`` receives first and last
@@ -69,13 +69,13 @@ def march_row(task, goal, rules, places, chain, nodes, pieces):
     hollow, degree = task.setting.hollow, task.degree
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
-    task.flights[0] = 0
-    count, last = sample_row(places, task, chain, GAP_FRACTION * goal)
+    task.segments[0] = 0
+    count, last = sample_entries(entries, task, chain, GAP_FRACTION * goal)
     rays = np.int64(0)
     # the margins count with the first and the last sample
     node[0], mass[0] = outs[0], xs[0] - left
     node[1], mass[1] = outs[last], right - xs[last]
-    filled, number, lost = np.int64(2), np.int64(0), 0.0
+    filled, number, unresolved = np.int64(2), np.int64(0), 0.0
     error = ROUNDING * whole
     error += mass[0] * spread(outs[0], outs[1], degree) + mass[1] * spread(outs[last], outs[last - 1], degree)
     i = np.int64(0)
@@ -95,7 +95,7 @@ def march_row(task, goal, rules, places, chain, nodes, pieces):
                 continue
             filled, error = ready, error + miss
             if labels[i] < FIRST_LABEL:
-                lost += xs[j] - xs[i]
+                unresolved += xs[j] - xs[i]
                 error += 2.0 * (xs[j] - xs[i])
         lows[number], highs[number], names[number] = xs[i], xs[j], labels[i]
         number += 1
@@ -111,7 +111,7 @@ def march_row(task, goal, rules, places, chain, nodes, pieces):
                 error += width
             error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], degree)
         i = following
-    return filled, error, lost, number, rays + count
+    return filled, error, unresolved, number, rays + count
 
 
 @allocating
@@ -141,7 +141,7 @@ def wide_middles(lows, highs, least):
 
 
 @_compile
-def march_rows(thetas, tolerances, setting, degree, rules, seeds, seed_starts):
+def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts):
     """Rows at increasing angles.
 
     A row starts from its seeds, which increase, and from the
@@ -158,16 +158,18 @@ def march_rows(thetas, tolerances, setting, degree, rules, seeds, seed_starts):
     lows, highs, labels = pieces
     n = thetas.shape[0]
     node_starts, piece_starts = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
-    errors, lost, rays, flights = np.empty(n), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
+    errors, unresolved, rays, segments = np.empty(n), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
     all_angles, all_masses = np.empty(1024), np.empty(1024)
     all_lows, all_highs, all_labels = room_for_pieces(1024)
     previous = np.empty(0)
     for k in range(n):
         task = task_of(setting, thetas[k], degree, spent)
         goal = tolerances[k] * whole
-        places = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
-        filled, errors[k], lost[k], number, rays[k] = march_row(task, goal, rules, places, chain, nodes, pieces)
-        flights[k] = spent[0]
+        entries = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
+        filled, errors[k], unresolved[k], number, rays[k] = march_angle(
+            task, goal, rules, entries, chain, nodes, pieces
+        )
+        segments[k] = spent[0]
         previous = wide_middles(lows[:number], highs[:number], goal)
         begin, end = node_starts[k], node_starts[k] + filled
         if end > all_angles.shape[0]:
@@ -182,4 +184,4 @@ def march_rows(thetas, tolerances, setting, degree, rules, seeds, seed_starts):
         all_labels[begin:end] = labels[:number]
         piece_starts[k + 1] = end
     nodes, pieces = (all_angles, all_masses), (all_lows, all_highs, all_labels)
-    return nodes, node_starts, pieces, piece_starts, errors, lost, rays, flights
+    return nodes, node_starts, pieces, piece_starts, errors, unresolved, rays, segments

@@ -12,7 +12,7 @@ from .changes import inner, probe, task_of
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 # Near its end a piece is as wide as the distance to it or its square root; so many places, at most its last width away
 # from where its middle is expected, meet it in either case.
-PLACES_TRIED = 17
+POINTS_TRIED = 17
 # The ends of a piece are found to this fraction of its width, so that its middle can be followed.
 EDGE_STEPS = 5
 MOST_STEPS = 80
@@ -28,7 +28,7 @@ def label_at(x, task):
 
 
 @_compile
-def find_overlooked(thetas, least_widths, pieces, starts, linked, setting, degree):
+def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree):
     """Places in rows where a ray has another label than the piece that it belongs to: pieces of a neighbour say where.
 
     Rows ``k`` and ``k + 1`` are compared where ``linked[k]``. Pieces of the one no wider than the other's
@@ -36,7 +36,7 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, setting, degre
     """
     lows, highs, labels = pieces
     spent = np.zeros(1, np.int64)
-    rows, places = [0 for _ in range(0)], [0.0 for _ in range(0)]
+    owners, entries = [0 for _ in range(0)], [0.0 for _ in range(0)]
     rays = 0
     for k in range(thetas.shape[0] - 1):
         if not linked[k]:
@@ -54,9 +54,9 @@ def find_overlooked(thetas, least_widths, pieces, starts, linked, setting, degre
                 if labels[m] != labels[p] and lows[m] < x < highs[m]:
                     rays += 1
                     if label_at(x, task) != labels[m]:
-                        rows.append(there)
-                        places.append(x)
-    return np.array(rows, dtype=np.int64), np.array(places), rays, spent[0]
+                        owners.append(there)
+                        entries.append(x)
+    return np.array(owners, dtype=np.int64), np.array(entries), rays, spent[0]
 
 
 @inner
@@ -95,9 +95,9 @@ def find_critical(label, present, absent, low, high, drift, setting, degree):
         width, before = high - low, 0.5 * (low + high)
         centre = before + drift * (angle - present)
         found = np.nan
-        for n in range(PLACES_TRIED):
+        for n in range(POINTS_TRIED):
             # from the middle outwards, to either side in turn
-            x = centre + width * (1.0 - 2.0 * (n % 2)) * ((n + 1) // 2) / (PLACES_TRIED // 2)
+            x = centre + width * (1.0 - 2.0 * (n % 2)) * ((n + 1) // 2) / (POINTS_TRIED // 2)
             if left < x < right and label_at(x, task) == label:
                 found = x
                 break

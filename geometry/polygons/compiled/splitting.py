@@ -210,10 +210,10 @@ def enter(edge, slot, beams, mesh, distance):
 
 
 @inlined
-def entrance_beams(beams, mesh, halves):
-    """-> int: fill in the beams of the rays with theta < pi/2, of all if ``halves`` is 2; returns the heap's size."""
+def entrance_beams(beams, mesh, entrances):
+    """-> int: fill in the beams of rays with theta < pi/2, or of all if ``entrances`` is 2; return the heap's size."""
     width, queue = mesh.x[mesh.x.shape[0] - 1], 0
-    for half in range(halves):
+    for half in range(entrances):
         polygon = beams.corners[half]
         for i in range(3):
             for k in range(VERTEX_COLUMNS):
@@ -349,10 +349,11 @@ def cut_beam(slot, new, apex, values, room, beams, rounding):
 
 
 @_compile
-def split_beams(mesh, tolerance, max_beams, halves):
+def split_beams(mesh, tolerance, max_beams, entrances):
     """-> (corners, real, whole, used, rounding, splits, status): the beams of all rays, the largest divided first.
 
-    Of the rays with theta < pi/2 if ``halves`` is 1. The tables have ``used`` slots; ``rounding`` is a bound of flux.
+    Of the rays with theta < pi/2 if ``entrances`` is 1. The tables have ``used`` slots; ``rounding`` is a bound of
+    flux.
     """
     distance = wall_lines(mesh.x, mesh.y, mesh.turn_high)[:, WALL_DISTANCE]
     beams = BeamTables(
@@ -361,8 +362,8 @@ def split_beams(mesh, tolerance, max_beams, halves):
         np.zeros((ROOM, WHOLE_COLUMNS), np.int64),
         np.empty(ROOM, np.int64),
     )
-    used, queue = halves, entrance_beams(beams, mesh, halves)
-    total = beams.real[:halves, FLUX].sum()
+    used, queue = entrances, entrance_beams(beams, mesh, entrances)
+    total = beams.real[:entrances, FLUX].sum()
     open_flux = total
     rounding, splits, steps, status, slot = 0.0, 0, 0, DONE, -1
     values, polygons = np.empty(WIDE), (np.empty((WIDE, VERTEX_COLUMNS)), np.empty((WIDE, VERTEX_COLUMNS)))

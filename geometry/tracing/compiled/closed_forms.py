@@ -14,14 +14,11 @@ import numpy as np
 from numba import njit
 
 from ...scene.columns import (
-    BOWL_X,
-    BOWL_Y,
     CHAIN,
+    CIRCLE_X,
+    CIRCLE_Y,
     COPIES,
     DOUBT,
-    FAN,
-    FAN_X,
-    FAN_Y,
     FORM,
     FORM_LEFT,
     FORM_RIGHT,
@@ -34,6 +31,9 @@ from ...scene.columns import (
     NO_FORM,
     RADIUS,
     RIGHT,
+    WEDGE,
+    WEDGE_X,
+    WEDGE_Y,
 )
 from .rays import FLAT_TOP, TOP_CORNER, opening_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
@@ -49,7 +49,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 
 @_compile
-def cross_bowl(form, place, angle, hits, moment, incidence):
+def cross_arc(form, entry, angle, hits, moment, incidence):
     """Take rays through a bowl: place and angle become those of the exit, hits their number, 0 for a doubtful ray.
 
     With d the angle of incidence from the arc, X the fraction of the opening to the left of the ray,
@@ -60,74 +60,74 @@ def cross_bowl(form, place, angle, hits, moment, incidence):
     2 (pi - d) to the right, and the rest is counting. The angular momentum about the centre gives the exit.
     """
     left, right, doubt = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT]
-    middle, height, radius, half = form[BOWL_X], form[BOWL_Y], form[RADIUS], form[HALF_ANGLE]
+    middle, height, radius, half = form[CIRCLE_X], form[CIRCLE_Y], form[RADIUS], form[HALF_ANGLE]
     width = right - left
-    for i in range(place.shape[0]):
+    for i in range(entry.shape[0]):
         theta = angle[i]
-        east, west = (place[i] - left) / width, (right - place[i]) / width
+        east, west = (entry[i] - left) / width, (right - entry[i]) / width
         s0, c0 = sine_cosine(0.5 * (theta + half))
         inner = 0.5 * (theta - half)
         s1, c1 = sine_cosine(-inner if inner < 0.0 else inner)
         sine2, cosine2 = west * (s0 * s0) + east * (s1 * s1), west * (c0 * c0) + east * (c1 * c1)
         moment[i] = sine2 - cosine2
         incidence[i] = sine2 if sine2 < cosine2 else cosine2
-    for i in range(place.shape[0]):
+    for i in range(entry.shape[0]):
         incidence[i] = 2.0 * arcsine(math.sqrt(incidence[i]))
-    for i in range(place.shape[0]):
+    for i in range(entry.shape[0]):
         acute = moment[i] < 0.0
         # |theta - pi| where d is obtuse: the mirror image
         seen = angle[i] if acute else (PI - angle[i]) + PI_REST
-        hop = 2.0 * incidence[i]
-        ratio = ((half + seen) - incidence[i]) / hop
+        step = 2.0 * incidence[i]
+        ratio = ((half + seen) - incidence[i]) / step
         count = (ratio + ROUNDER) - ROUNDER
         # from the last hit on to the end, or from the end on to the hit that is none
-        off = (ratio - count) * hop
+        off = (ratio - count) * step
         count = count + 1.0 if off > 0.0 else count
         off = -off if off < 0.0 else off
         start = (half - seen) + incidence[i]
-        gone = ((seen - count * hop) + PI) + PI_REST
+        gone = ((seen - count * step) + PI) + PI_REST
         angle[i] = gone if acute else (PI - gone) + PI_REST
         # the lines of the first and the last flight pass the joints at 2 r sin(a/2) sin((hop - a)/2) with these a
-        passing = start * (hop - start)
-        passing = passing if passing < off * (hop - off) else off * (hop - off)
+        passing = start * (step - start)
+        passing = passing if passing < off * (step - off) else off * (step - off)
         hits[i] = count if passing > doubt else 0.0
-    for i in range(place.shape[0]):
+    for i in range(entry.shape[0]):
         sine, cosine = sine_cosine(angle[i])
-        place[i] = middle + (radius * moment[i] - height * cosine) / sine
+        entry[i] = middle + (radius * moment[i] - height * cosine) / sine
 
 
 @_compile
-def cross_fan(form, place, angle, hits, vx, vy, turn):
-    """Take rays through a fan, as `cross_bowl` does; the last three arrays are room to work in.
+def cross_wedge(form, entry, angle, hits, vx, vy, turn):
+    """Take rays through a fan, as `cross_arc` does; the last three arrays are room to work in.
 
     The sign of ``turn``, the moment of the apex about the ray, tells which line is met first. The number of hits is
     that of the unfolded ends of the opening, one after the other, that lie on the other side of the ray than the apex.
     """
-    left, right, doubt, apex_x, apex_y = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT], form[FAN_X], form[FAN_Y]
+    left, right, doubt, apex_x, apex_y = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT], form[WEDGE_X], form[WEDGE_Y]
     copies = int(form[COPIES])
     mirrored = LINK_COLUMNS * (copies + 2)
-    for i in range(place.shape[0]):
+    for i in range(entry.shape[0]):
         sine, cosine = sine_cosine(angle[i])
         vx[i], vy[i] = -cosine, -sine
-    for i in range(place.shape[0]):
-        turn[i] = (apex_x - place[i]) * vy[i] - apex_y * vx[i]
-    for i in range(place.shape[0]):
+    for i in range(entry.shape[0]):
+        turn[i] = (apex_x - entry[i]) * vy[i] - apex_y * vx[i]
+    for i in range(entry.shape[0]):
         hits[i] = 1.0
     for k in range(2, copies + 1):
         first = CHAIN + LINK_COLUMNS * k
         x0, y0 = form[first + LINK_X], form[first + LINK_Y]
         x1, y1 = form[first + mirrored + LINK_X], form[first + mirrored + LINK_Y]
         before, now = k - 1.0, float(k)
-        for i in range(place.shape[0]):
+        for i in range(entry.shape[0]):
             x, y = (x0, y0) if turn[i] > 0.0 else (x1, y1)
-            beyond = ((x - place[i]) * vy[i] - y * vx[i]) * turn[i] < 0.0
+            beyond = ((x - entry[i]) * vy[i] - y * vx[i]) * turn[i] < 0.0
             hits[i] = now if beyond and hits[i] == before else hits[i]
-    for i in range(place.shape[0]):
+    for i in range(entry.shape[0]):
         count = int(hits[i])
         last = CHAIN + LINK_COLUMNS * count + (0 if turn[i] > 0.0 else mirrored)
         following = last + LINK_COLUMNS
-        inside = (form[last + LINK_X] - place[i]) * vy[i] - form[last + LINK_Y] * vx[i]
-        outside = (form[following + LINK_X] - place[i]) * vy[i] - form[following + LINK_Y] * vx[i]
+        inside = (form[last + LINK_X] - entry[i]) * vy[i] - form[last + LINK_Y] * vx[i]
+        outside = (form[following + LINK_X] - entry[i]) * vy[i] - form[following + LINK_Y] * vx[i]
         odd = count % 2 == 1
         goes_right = odd == (turn[i] > 0.0)
         fraction = inside / (inside - outside)
@@ -136,20 +136,20 @@ def cross_fan(form, place, angle, hits, vx, vy, turn):
         incoming = angle[i]
         angle[i] = form[last + LINK_CONSTANT] + (-incoming if odd else incoming)
         # how closely the ray's line passes the apex, the ends of the opening where it enters, and where it leaves
-        west, east = (left - place[i]) * vy[i], (place[i] - right) * vy[i]
+        west, east = (left - entry[i]) * vy[i], (entry[i] - right) * vy[i]
         closest = min(min(abs(turn[i]), min(west, east)), min(abs(inside), abs(outside)))
         hits[i] = hits[i] if closest > doubt and fraction > 0.0 else 0.0
-        place[i] = exit
+        entry[i] = exit
 
 
 @_compile
-def cross(form, place, angle, hits, room):
+def cross(form, entry, angle, hits, room):
     """Take rays of one hollow through it."""
-    count = place.shape[0]
-    if form[FORM] == FAN:
-        cross_fan(form, place, angle, hits, room[0, :count], room[1, :count], room[2, :count])
+    count = entry.shape[0]
+    if form[FORM] == WEDGE:
+        cross_wedge(form, entry, angle, hits, room[0, :count], room[1, :count], room[2, :count])
     else:
-        cross_bowl(form, place, angle, hits, room[0, :count], room[1, :count])
+        cross_arc(form, entry, angle, hits, room[0, :count], room[1, :count])
 
 
 @_compile
@@ -175,14 +175,14 @@ def trace_closed(x, theta, hollows, closed, cell, limit, results):
         starts = x[first : first + count]
         if whole:
             # the only hollow: its rays need not be gathered, and are taken through it where their results are to stand
-            place, angle, hits = out_x[first : first + count], out_theta[first : first + count], room[3, :count]
+            entry, angle, hits = out_x[first : first + count], out_theta[first : first + count], room[3, :count]
             for j in range(count):
-                place[j] = starts[j] - cell_of(starts[j], cell)
+                entry[j] = starts[j] - cell_of(starts[j], cell)
             for j in range(count):
                 angle[j] = theta[first + j]
-            cross(closed[0], place, angle, hits, room)
+            cross(closed[0], entry, angle, hits, room)
             for j in range(count):
-                place[j] += cell_of(starts[j], cell)
+                entry[j] += cell_of(starts[j], cell)
             for j in range(count):
                 bounces[first + j] = int(hits[j])
                 status[first + j] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
@@ -209,12 +209,12 @@ def trace_closed(x, theta, hollows, closed, cell, limit, results):
                 rays[count] = first + j
                 count += 1
                 j = others[j]
-            place, angle, hits = room[4, :count], room[5, :count], room[3, :count]
+            entry, angle, hits = room[4, :count], room[5, :count], room[3, :count]
             for j in range(count):
-                place[j] = x[rays[j]] - cell_of(x[rays[j]], cell)
+                entry[j] = x[rays[j]] - cell_of(x[rays[j]], cell)
                 angle[j] = theta[rays[j]]
-            cross(closed[h], place, angle, hits, room)
+            cross(closed[h], entry, angle, hits, room)
             for j in range(count):
                 i = rays[j]
-                out_x[i], out_theta[i], bounces[i] = place[j] + cell_of(x[i], cell), angle[j], int(hits[j])
+                out_x[i], out_theta[i], bounces[i] = entry[j] + cell_of(x[i], cell), angle[j], int(hits[j])
                 status[i] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED

@@ -25,7 +25,7 @@ from .arcs import arc_time, on_arc
 from .beziers import bezier_hit
 from .lines import line_time
 from .options import allocating, compiled
-from .records import BEZIER, CIRCLE, ELLIPSE, LID, LINE, NO_PIECE, SIDE, Hit
+from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 
 # In place of a tangency.
 DOUBTFUL = 2
@@ -49,7 +49,7 @@ def face_of(tables, kind, number, s):
 @allocating
 def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
     """-> bool: whether the ray's start lies in front of a piece that is nearby, or may do so; see `sides`."""
-    if own.kind in (LID, SIDE):
+    if own.kind in (OPENING, SIDE):
         # no piece lies above the opening or beyond a side: one within rounding of them is met there
         return True
     return in_front(
@@ -117,7 +117,7 @@ def hit_nearby(scope, own, px, py, vx, vy):
     apex of a wedge.
     """
     tables, slack = scope.tables, scope.slack
-    from_piece = own.kind not in (LID, SIDE)
+    from_piece = own.kind not in (OPENING, SIDE)
     found = Hit(np.inf, NO_PIECE, -1, 0.0, 0)
     first_joint, joints_end = scope.joints
     for kind, (first, end) in (

@@ -59,8 +59,8 @@ from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_grid
 from .nearby import DOUBTFUL, hit_nearby
 from .options import compiled, inlined
 from .pointers import address_of, call_at
-from .records import BEZIER, CIRCLE, ELLIPSE, LID, LINE, NO_PIECE, SIDE, Hit, Own, Scope, results_for
-from .runs import skip_crossings, skip_hops
+from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, results_for
+from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
 # In place of a hollow's number: a flat top, and an end of one that is a corner.
@@ -75,12 +75,12 @@ BEND_SHIFT = 40
 
 
 @inlined
-def last_hollow(place, hollows):
+def last_hollow(entry, hollows):
     """-> int: number of the last hollow whose left end is not beyond a place of the cell, -1 where there is none."""
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if hollows[middle, LEFT] <= place:
+        if hollows[middle, LEFT] <= entry:
             low = middle + 1
         else:
             high = middle
@@ -88,13 +88,13 @@ def last_hollow(place, hollows):
 
 
 @inlined
-def opening_at(place, hollows):
+def opening_at(entry, hollows):
     """-> int: number of the hollow that opens at a place of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
-    h = last_hollow(place, hollows)
-    if h < 0 or place >= hollows[h, RIGHT] or (place == hollows[h, LEFT] and hollows[h, LEFT_EDGE] != NO_EDGE):
+    h = last_hollow(entry, hollows)
+    if h < 0 or entry >= hollows[h, RIGHT] or (entry == hollows[h, LEFT] and hollows[h, LEFT_EDGE] != NO_EDGE):
         # a flat top, or an edge of it; the edges between two hollows are corners
-        at_left = h >= 0 and place == hollows[h, LEFT] and hollows[h, LEFT_EDGE] == CORNER_EDGE
-        at_right = h >= 0 and place == hollows[h, RIGHT] and hollows[h, RIGHT_EDGE] == CORNER_EDGE
+        at_left = h >= 0 and entry == hollows[h, LEFT] and hollows[h, LEFT_EDGE] == CORNER_EDGE
+        at_right = h >= 0 and entry == hollows[h, RIGHT] and hollows[h, RIGHT_EDGE] == CORNER_EDGE
         return TOP_CORNER if at_left or at_right else FLAT_TOP
     return h
 
@@ -169,7 +169,7 @@ def nearest_piece(scope, own, px, py, vx, vy):
 
 
 @inlined
-def way_out(scope, own, px, py, vx, vy, time):
+def exit_time(scope, own, px, py, vx, vy, time):
     """-> (t, kind): time to the opening (LID) or to a side of an open wall (SIDE), if met before ``time``; or NO_PIECE.
 
     The opening is an edge from right to left. A piece that lies in it or in a side within rounding is met before.
@@ -179,11 +179,11 @@ def way_out(scope, own, px, py, vx, vy, time):
     if vy > 0.0:
         c_right, c_left = (right - px) * vy + py * vx, (left - px) * vy + py * vx
         t = max(-py / vy, 0.0)
-        if (c_right >= 0.0 >= c_left or is_open) and own.kind != LID and (time - t) * vy > slack:
-            time, kind = t, LID
+        if (c_right >= 0.0 >= c_left or is_open) and own.kind != OPENING and (time - t) * vy > slack:
+            time, kind = t, OPENING
     if is_open and vx != 0.0:
         t = ((right if vx > 0.0 else left) - px) / vx
-        if t < time and (kind == LID or (time - t) * abs(vx) > slack):
+        if t < time and (kind == OPENING or (time - t) * abs(vx) > slack):
             time, kind = max(t, 0.0), SIDE
     return time, kind
 
@@ -250,7 +250,7 @@ def skip_run(scope, hit, own, px, py, vx, vy, most):
     """-> (px, py, vx, vy, hits): the ray after the run of hits that follows one, if that is worth it."""
     tables, number = scope.tables, hit.number
     if hit.kind == CIRCLE and tables.circles[number, RUN_SINE] > 0.0:
-        return skip_hops(tables.circles[number], px, py, vx, vy, most)
+        return skip_chords(tables.circles[number], px, py, vx, vy, most)
     # the ray came from this line, to that one, and back
     if hit.kind == LINE and own.kind == LINE and own.before == number:
         lines, pairs = tables.lines, tables.pairs
@@ -272,15 +272,15 @@ def piece_label(tables, hit, vx):
 
 
 @inlined
-def trace_ray(scope, place, theta, limit, labelled, path):
+def trace_ray(scope, entry, theta, limit, labelled, path):
     """-> (x, vx, vy, bounces, status, label): follow one ray through one hollow.
 
     In an open wall x is unfolded. The label is that of
     `Results.itinerary`, if ``labelled``; ``path`` is that of `Results`.
     """
     sine, cosine = sine_cosine(theta)
-    px, py, vx, vy, shift = place, 0.0, -cosine, -sine, 0.0
-    own = Own(LID, -1, -1.0, 0.0, -1, 0)
+    px, py, vx, vy, shift = entry, 0.0, -cosine, -sine, 0.0
+    own = Own(OPENING, -1, -1.0, 0.0, -1, 0)
     steps, label, with_path = 0, np.uint64(0), path.shape[0] > 0
     if with_path:
         path[0, POINT_X], path[0, POINT_Y] = px, py
@@ -289,13 +289,13 @@ def trace_ray(scope, place, theta, limit, labelled, path):
         bounces = own.bounces
         if hit.doubt == DOUBTFUL:
             return shift + px, vx, vy, bounces, CORNER, label
-        time, kind = way_out(scope, own, px, py, vx, vy, hit.time)
+        time, kind = exit_time(scope, own, px, py, vx, vy, hit.time)
         if kind != NO_PIECE:
             hit = Hit(time, kind, hit.number, hit.s, hit.doubt)
         steps += 1
         if hit.kind == NO_PIECE or meets_corner(scope, hit, corner, px, py, vx, vy):
             return shift + px, vx, vy, bounces, CORNER, label
-        if hit.kind == LID:
+        if hit.kind == OPENING:
             if with_path:
                 path[bounces + 1, POINT_X], path[bounces + 1, POINT_Y] = shift + px + hit.time * vx, 0.0
             return shift + px + hit.time * vx, vx, vy, bounces, ESCAPED, label
@@ -367,7 +367,7 @@ def trace_rays(x, theta, tables, limit, stop, results, nearby):
 def nearby_address() -> int:
     """The address of `hit_nearby`, for all walls."""
     scope = Scope(NO_TABLES, np.empty(0), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, 0)
-    return address_of(hit_nearby, (scope, Own(LID, -1, -1.0, 0.0, -1, 0), 0.0, 0.0, 0.0, 0.0))
+    return address_of(hit_nearby, (scope, Own(OPENING, -1, -1.0, 0.0, -1, 0), 0.0, 0.0, 0.0, 0.0))
 
 
 @cache

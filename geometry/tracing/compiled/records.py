@@ -11,7 +11,7 @@ from ....core.checks import Floats
 from ...scene.scene import Tables
 
 # Kinds of what a ray meets; LID is the opening, SIDE a side of an open wall.
-NO_PIECE, LID, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
+NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
 
 class Scope(NamedTuple):

@@ -40,7 +40,7 @@ END_SLACKS = 2.0
 
 
 @compiled
-def skip_hops(arc, px, py, vx, vy, most):
+def skip_chords(arc, px, py, vx, vy, most):
     """-> (px, py, vx, vy, hops): carry a ray along a circular arc by all whole hops of its run, at most ``most``."""
     qx, qy = px - arc[START_X], py - arc[START_Y]
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
@@ -49,24 +49,24 @@ def skip_hops(arc, px, py, vx, vy, most):
     cosine = vx * ny - vy * nx
     if sine <= 0.0 or sine > arc[RUN_SINE]:
         return px, py, vx, vy, 0
-    hop = 2.0 * math.atan2(sine, abs(cosine))
+    chord_angle = 2.0 * math.atan2(sine, abs(cosine))
     # q = (sin(phi) t0 + (1 - cos(phi)) n0) / kappa with t0 = (n0y, -n0x)
     phi = 2.0 * math.atan2(qx * arc[NORMAL_X] + qy * arc[NORMAL_Y], qx * arc[NORMAL_Y] - qy * arc[NORMAL_X])
     if phi < 0.0:
         phi += 2.0 * math.pi
     room = arc[SPAN] - phi if cosine > 0.0 else phi
-    count = room / hop
+    count = room / chord_angle
     if count < 1.0 or most < 1:
         return px, py, vx, vy, 0
-    hops = most if count >= most else np.int64(count)
-    turn = hops * hop if cosine > 0.0 else -hops * hop
+    chords = most if count >= most else np.int64(count)
+    turn = chords * chord_angle if cosine > 0.0 else -chords * chord_angle
     phi += turn
     half = 0.5 * phi
     chord = 2.0 * math.sin(half) / arc[CURVATURE]
     along, inward = chord * math.cos(half), chord * math.sin(half)
     qx, qy = along * arc[NORMAL_Y] + inward * arc[NORMAL_X], -along * arc[NORMAL_X] + inward * arc[NORMAL_Y]
     c, s = math.cos(turn), math.sin(turn)
-    return arc[START_X] + qx, arc[START_Y] + qy, c * vx - s * vy, s * vx + c * vy, hops
+    return arc[START_X] + qx, arc[START_Y] + qy, c * vx - s * vy, s * vx + c * vy, chords
 
 
 @compiled

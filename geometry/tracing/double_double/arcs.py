@@ -172,7 +172,7 @@ def arc_height(arc, px, py):
 
 
 @_compile
-def arc_place(arc, t, px, py, vx, vy):
+def arc_point(arc, t, px, py, vx, vy):
     """-> (x, y, nx, ny, bent): place on the arc after the time t, unit normal, and curvature (a double)."""
     n0x, n0y, curvature, stretch = wide_arc(arc)
     qx = subtract(add(px, multiply(t, vx)), wide(arc[START_X]))

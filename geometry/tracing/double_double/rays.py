@@ -61,7 +61,7 @@ from ...scene.columns import (
     WIDE_STRETCH,
 )
 from ...scene.tolerances import JOINT_ULPS
-from .arcs import arc_hit, arc_place
+from .arcs import arc_hit, arc_point
 from .arithmetic import (
     LOCAL_ERROR,
     add,
@@ -78,12 +78,12 @@ from .arithmetic import (
     two_sum,
     wide,
 )
-from .beziers import bezier_hit, bezier_place
+from .beziers import bezier_hit, bezier_point
 from .records import Sizes, WideHit, WideOwn, WideScope
 from .sides import Arrival, Face, in_front, line_ends, orientation
 
-ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, LOST, UNSETTLED = 0, 1, 2, 3, 4, 5
-NO_PIECE, LID, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
+ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, UNRESOLVED, UNSETTLED = 0, 1, 2, 3, 4, 5
+NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 # pi - math.pi
 PI_REST = 1.2246467991473532e-16
 # The first-order estimate of the width is trusted to this fraction.
@@ -100,9 +100,9 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 def crossings(tables, index, other, py, vx, vy, most):
     """-> (hits, way, flight): an even number of hits between two facing vertical sides; way along y, and time."""
     joints, lines, pairs = tables.joints, tables.lines, tables.pairs
-    way, flight = (0.0, 0.0), 0.0
+    travel, flight = (0.0, 0.0), 0.0
     if joints[index, JOINT_X] != joints[index + 1, JOINT_X] or joints[other, JOINT_X] != joints[other + 1, JOINT_X]:
-        return 0, way, flight
+        return 0, travel, flight
     for row in range(int(lines[index, FIRST_PAIR]), int(lines[index, PAIRS_END])):
         if pairs[row, PARTNER] == other:
             gap = two_sum(joints[other, JOINT_X], -joints[index, JOINT_X])
@@ -115,7 +115,7 @@ def crossings(tables, index, other, py, vx, vy, most):
                 hits = 2 * np.int64(0.5 * count)
                 # beyond 2^53 there is no such double, and no double-double knows the ray's place
                 return hits, multiply((float(hits), 0.0), step), float(hits) * time[0]
-    return 0, way, flight
+    return 0, travel, flight
 
 
 @_compile
@@ -155,14 +155,14 @@ def face_of(tables, kind, number, s):
 
 
 @_compile
-def meets(tables, hit, own, px, py, vx, vy, heights):
+def meets(tables, hit, own, px, py, vx, vy, clearance):
     """-> bool: whether a ray meets a piece that it hits.
 
-    ``heights`` are that of its start in front of the piece, the slack of double precision, within which the pieces' own
-    places decide, so that both tracers go the same way, and the error of the ray.
+    ``clearance`` are that of its start in front of the piece, the slack of double precision, within which the pieces'
+    own places decide, so that both tracers go the same way, and the error of the ray.
     """
-    height, slack, error = heights
-    if height > slack or own.kind in (LID, SIDE):
+    height, slack, error = clearance
+    if height > slack or own.kind in (OPENING, SIDE):
         return height >= -error
     if height < -slack:
         return False
@@ -221,8 +221,8 @@ def with_new_error(sizes):
 @_compile
 def width_at(scope, sizes, ahead, error):
     """-> float: width of the ray, and its error, after the flight ``ahead``."""
-    turned = sizes.half_ulp * abs(scope.scale * sizes.j2 + ahead * sizes.a2)
-    return WIDTH_MARGIN * turned + (1.0 + ahead / scope.scale) * error
+    tilt = sizes.half_ulp * abs(scope.scale * sizes.j2 + ahead * sizes.a2)
+    return WIDTH_MARGIN * tilt + (1.0 + ahead / scope.scale) * error
 
 
 @_compile
@@ -267,8 +267,8 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
             is_own = own.kind == ARC and own.number == k
             t, undecided, height = arc_hit(tables.arcs[k], is_own, px, py, vx, vy, error)
             graze = min(graze, undecided)
-            hit, heights = WideHit(t, ARC, k, own.s), (height, slack * widest, error * widest)
-            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, heights):
+            hit, clearance = WideHit(t, ARC, k, own.s), (height, slack * widest, error * widest)
+            if earlier(t, nearest.time) and meets(tables, hit, own, px, py, vx, vy, clearance):
                 nearest = hit
     low, high = scope.beziers
     for k in range(low, high):
@@ -285,14 +285,14 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
 
 
 @_compile
-def way_out(scope, own, hit, px, py, vx, vy):
+def exit_time(scope, own, hit, px, py, vx, vy):
     """-> WideHit: the opening or a side of an open wall, if met before the hit, or that.
 
     A piece that lies in the opening or in a side within rounding is met before them.
     """
     left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
     time, kind = hit.time, hit.kind
-    if vy[0] > 0.0 and own.kind != LID and py[0] + time[0] * vy[0] > slack:
+    if vy[0] > 0.0 and own.kind != OPENING and py[0] + time[0] * vy[0] > slack:
         t = divide(negate(py), vy)
         inside = is_open
         if not is_open:
@@ -300,11 +300,11 @@ def way_out(scope, own, hit, px, py, vx, vy):
             c_left = add(multiply(subtract(wide(left), px), vy), multiply(py, vx))
             inside = c_right[0] >= 0.0 >= c_left[0]
         if inside:
-            time, kind = t, LID
+            time, kind = t, OPENING
     if is_open and vx[0] != 0.0:
         t = divide(subtract(wide(right if vx[0] > 0.0 else left), px), vx)
         beyond = abs(vx[0]) * (time[0] - t[0])
-        if beyond > slack or (kind == LID and earlier(t, time)):
+        if beyond > slack or (kind == OPENING and earlier(t, time)):
             time, kind = t, SIDE
     if time[0] < 0.0:
         time = (0.0, 0.0)
@@ -312,7 +312,7 @@ def way_out(scope, own, hit, px, py, vx, vy):
 
 
 @_compile
-def place_of(tables, hit, px, py, vx, vy):
+def point_of(tables, hit, px, py, vx, vy):
     """-> (qx, qy, nx, ny, bent): where a flight ends, the unit normal there, and the curvature, a double."""
     if hit.kind == LINE:
         x0, y0, x1, y1 = line_ends(tables.joints, hit.number)
@@ -321,10 +321,10 @@ def place_of(tables, hit, px, py, vx, vy):
         nx, ny = negate(divide(ey, size)), divide(ex, size)
         return add(wide(x0), multiply(hit.s, ex)), add(wide(y0), multiply(hit.s, ey)), nx, ny, 0.0
     if hit.kind == ARC:
-        return arc_place(tables.arcs[hit.number], hit.time, px, py, vx, vy)
+        return arc_point(tables.arcs[hit.number], hit.time, px, py, vx, vy)
     if hit.kind == BEZIER:
-        return bezier_place(tables.beziers[hit.number], hit.s)
-    nx, ny = (0.0, 0.0) if hit.kind == LID else (1.0, 0.0), (1.0, 0.0) if hit.kind == LID else (0.0, 0.0)
+        return bezier_point(tables.beziers[hit.number], hit.s)
+    nx, ny = (0.0, 0.0) if hit.kind == OPENING else (1.0, 0.0), (1.0, 0.0) if hit.kind == OPENING else (0.0, 0.0)
     return add(px, multiply(hit.time, vx)), add(py, multiply(hit.time, vy)), nx, ny, 0.0
 
 
@@ -375,21 +375,21 @@ def reflected(vx, vy, nx, ny, approach):
 
 
 @_compile
-def refined_ray(scope, place, theta, limit, most_flights):
+def refined_ray(scope, entry, theta, limit, most_segments):
     """-> (x, angle, bounces, status, amplification, rounding): follow one ray; x and angle are double-doubles.
 
-    ``place`` is a double-double in the hollow. The amplification is the norm of the map's derivative in the units
+    ``entry`` is a double-double in the hollow. The amplification is the norm of the map's derivative in the units
     (cell, radian).
     """
     tables, scale = scope.tables, scope.scale
-    px, py = place, (0.0, 0.0)
+    px, py = entry, (0.0, 0.0)
     sine, cosine = sine_cosine(theta)
     vx, vy = negate(cosine), negate(sine)
     _, exponent = math.frexp(theta)
     sizes = Sizes(1.0, 0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 1.0, math.ldexp(1.0, exponent - 54))
     norm, nowhere = 1.0, (0.0, 0.0)
     wraps, bounces, steps = 0, 0, 0
-    own = WideOwn(LID, -1, (-1.0, 0.0), 0.0)
+    own = WideOwn(OPENING, -1, (-1.0, 0.0), 0.0)
     while True:
         local = local_error(sizes)
         if not local <= LARGEST_ERROR:
@@ -397,22 +397,22 @@ def refined_ray(scope, place, theta, limit, most_flights):
         error = error_of(scope, sizes)
         hit, corner = nearest_line(scope, own, sizes, px, py, vx, vy)
         hit, graze = nearest_curve(scope, own, hit, px, py, vx, vy, error)
-        hit = way_out(scope, own, hit, px, py, vx, vy)
+        hit = exit_time(scope, own, hit, px, py, vx, vy)
         steps += 1
         if graze < np.inf and graze <= hit.time[0] + error:
             return px, nowhere, bounces, GRAZING, norm, local
         if hit.kind == NO_PIECE:
-            return px, nowhere, bounces, CORNER if corner < np.inf else LOST, norm, local
-        qx, qy, nx, ny, bent = place_of(tables, hit, px, py, vx, vy)
+            return px, nowhere, bounces, CORNER if corner < np.inf else UNRESOLVED, norm, local
+        qx, qy, nx, ny, bent = point_of(tables, hit, px, py, vx, vy)
         approach = dot(vx, vy, nx, ny)
         incidence = abs(approach[0])
         if corner < np.inf and meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
             return px, nowhere, bounces, CORNER, norm, local
         sizes = after_flight(sizes, hit.time[0] / scale)
-        if hit.kind == LID:
+        if hit.kind == OPENING:
             x = add(qx, two_product(float(wraps), scope.right - scope.left))
             return x, direction_angle(vx, vy), bounces, ESCAPED, amplification_of(sizes), local
-        if (bounces >= limit and hit.kind != SIDE) or steps >= most_flights:
+        if (bounces >= limit and hit.kind != SIDE) or steps >= most_segments:
             return px, nowhere, bounces, BOUNCE_LIMIT, norm, local
         flown = own.flown
         if hit.kind == SIDE:
@@ -428,9 +428,9 @@ def refined_ray(scope, place, theta, limit, most_flights):
             sizes = after_reflection(sizes, 2.0 * bent * scale / incidence)
             bounces += 1
             if hit.kind == LINE and own.kind == LINE:
-                hits, way, flight = crossings(tables, hit.number, own.number, py, vx, vy, limit - bounces)
+                hits, travel, flight = crossings(tables, hit.number, own.number, py, vx, vy, limit - bounces)
                 bounces += hits
-                py = add(py, way)
+                py = add(py, travel)
                 sizes = after_flight(sizes, flight / scale)
         norm = amplification_of(sizes)
         sizes = with_new_error(sizes)
@@ -455,18 +455,18 @@ def wide_scope(tables, h):
 
 
 @_compile
-def hollow_at(hollows, place):
+def hollow_at(hollows, entry):
     """-> (h, is_edge): the hollow that opens at a double-double place, or -1; whether that is a corner of the tops."""
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
-        if subtract(place, wide(hollows[middle, LEFT]))[0] >= 0.0:
+        if subtract(entry, wide(hollows[middle, LEFT]))[0] >= 0.0:
             low = middle + 1
         else:
             high = middle
     h = low - 1
-    at_left = h >= 0 and subtract(place, wide(hollows[h, LEFT]))[0] == 0.0 and hollows[h, LEFT_EDGE] != NO_EDGE
-    to_right = subtract(place, wide(hollows[h, RIGHT]))[0] if h >= 0 else 1.0
+    at_left = h >= 0 and subtract(entry, wide(hollows[h, LEFT]))[0] == 0.0 and hollows[h, LEFT_EDGE] != NO_EDGE
+    to_right = subtract(entry, wide(hollows[h, RIGHT]))[0] if h >= 0 else 1.0
     if h < 0 or to_right >= 0.0 or at_left:
         is_left = at_left and hollows[h, LEFT_EDGE] == CORNER_EDGE
         is_right = h >= 0 and to_right == 0.0 and hollows[h, RIGHT_EDGE] == CORNER_EDGE
@@ -475,19 +475,19 @@ def hollow_at(hollows, place):
 
 
 @_compile
-def refined_rays(x, theta, tables, limit, most_flights, results):
+def refined_rays(x, theta, tables, limit, most_segments, results):
     """Trace rays; fills the results with double-doubles."""
     out_x, out_theta, bounces, status, amplification, rounding = results
     cell = tables.cell
     for i in range(x.shape[0]):
         turns = math.floor(x[i] / cell)
         base = two_product(turns, cell)
-        place = subtract(wide(x[i]), base)
-        if place[0] < 0.0:
+        entry = subtract(wide(x[i]), base)
+        if entry[0] < 0.0:
             turns -= 1.0
             base = two_product(turns, cell)
-            place = subtract(wide(x[i]), base)
-        h, is_edge = hollow_at(tables.hollows, place)
+            entry = subtract(wide(x[i]), base)
+        h, is_edge = hollow_at(tables.hollows, entry)
         if h < 0:
             amplification[i], rounding[i] = 1.0, LOCAL_ERROR
             out_x[i, HIGH], out_x[i, LOW] = x[i], 0.0
@@ -499,7 +499,7 @@ def refined_rays(x, theta, tables, limit, most_flights, results):
             continue
         scope = wide_scope(tables, h)
         end, angle, bounces[i], status[i], amplification[i], rounding[i] = refined_ray(
-            scope, place, theta[i], limit, most_flights
+            scope, entry, theta[i], limit, most_segments
         )
         out_x[i, HIGH], out_x[i, LOW] = add(base, end)
         out_theta[i, HIGH], out_theta[i, LOW] = angle

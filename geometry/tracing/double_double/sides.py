@@ -28,7 +28,7 @@ from ....core.rounding import EPS, UNIT_ROUNDOFF
 from ...scene.columns import END_X, END_Y, JOINT_X, JOINT_Y, START_X, START_Y
 from .arcs import arc_height
 from .arithmetic import add, divide, dot, multiply, negate, square_root, subtract, two_product, two_sum, wide
-from .beziers import bezier_coefficients, bezier_place, cubic, cubic_slope
+from .beziers import bezier_coefficients, bezier_point, cubic, cubic_slope
 
 LINE, ARC, BEZIER = 3, 4, 5
 # A double-double place that was put on a curve carries so much of the slack: 16 EPS against 64 of its own roundings.
@@ -137,7 +137,7 @@ def bezier_height(curve, s, px, py):
         tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
         rx, ry = subtract(px, cubic(ax0, ax1, ax2, ax3, s)), subtract(py, cubic(ay0, ay1, ay2, ay3, s))
         s = add(s, divide(dot(rx, ry, tx, ty), dot(tx, ty, tx, ty)))
-    x, y, nx, ny, _ = bezier_place(curve, s)
+    x, y, nx, ny, _ = bezier_point(curve, s)
     return dot(subtract(px, x), subtract(py, y), nx, ny), nx, ny
 
 

@@ -117,7 +117,7 @@ def _change(report: WorkReport, row: WorkRow, old_report: WorkReport, old: WorkR
 
     side: Literal["greater", "less"] = "greater" if row.least > old.least else "less"
     p_value = float(mannwhitneyu(row.seconds, old.seconds, alternative=side, method="exact").pvalue)
-    floor = max(facts.floor for facts in (report.methods[row.method], old_report.methods[row.method]))
+    floor = max(record.floor for record in (report.methods[row.method], old_report.methods[row.method]))
     errors = [max(one.error(what), floor) for one, what in ((report, row), (old_report, old))]
     # a random error is known to its own spread only: a factor more for few repeats
     room = 1.0 + 2.0 / len(row.seconds) ** 0.5 if report.methods[row.method].is_random else 1.0

@@ -69,7 +69,7 @@ class BenchRun:
         rows = (
             f"{report.problem} | {source} | {floor:.1e}"
             for report in self.reports
-            for source, floor in dict.fromkeys((facts.reference, facts.floor) for facts in report.methods.values())
+            for source, floor in dict.fromkeys((record.reference, record.floor) for record in report.methods.values())
         )
         return table("problem | reference | known to", rows)
 
@@ -77,12 +77,12 @@ class BenchRun:
         """Declared orders that the fits agree with, that they contradict, and that they do not resolve."""
         groups: tuple[list[str], list[str], list[str]] = ([], [], [])
         for report in self.reports:
-            for name, facts in report.methods.items():
+            for name, record in report.methods.items():
                 fitted = report.order(name)
-                if facts.declared_order is None or fitted is None:
+                if record.declared_order is None or fitted is None:
                     continue
-                verdict = fitted.verdict(facts.declared_order)
-                line = f"{report.problem}, {name}: {fitted}, declared {facts.declared_order:g}"
+                verdict = fitted.verdict(record.declared_order)
+                line = f"{report.problem}, {name}: {fitted}, declared {record.declared_order:g}"
                 groups[("agrees", "differs", "not resolved").index(verdict)].append(line)
         return groups
 

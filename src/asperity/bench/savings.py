@@ -16,7 +16,7 @@ from ..geometry.scene.ablations import without_formulas, without_grid, without_p
 from ..geometry.scene.scene import Scene, scene_in_one
 from ..kernels import KernelMatrix, Legendre, PolygonLaw, WallLaw, discretise
 from ..kernels.discretisation.method import Budget
-from ..kernels.discretisation.traced import row_matrix
+from ..kernels.discretisation.traced import traced_matrix
 from .quantities.walls import standard_names, wall_of
 from .running.timing import SideBySide, side_by_side
 
@@ -29,7 +29,7 @@ SEED = 9
 # Rays differ by rounding where a run of hits is taken in one step.
 ROUNDED = 1e-9
 # Adaptive rows are compared on walls of so few pieces, to these tolerances.
-ROW_PIECES, ROW_TOLERANCES = 3, (1e-2, 3e-3, 1e-3)
+MIRROR_PIECES, MIRROR_TOLERANCES = 3, (1e-2, 3e-3, 1e-3)
 BASIS = Legendre(2)
 # Beams a hollow, where the hollows of one shape are resolved once.
 BEAMS = 1000
@@ -124,7 +124,7 @@ def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Savi
         found.append(_alike(name, wall, repeats))
     if WallLaw(wall).exact_law is not None or WallLaw(wall).closed_form is not None:
         found.append(_tracing(name, wall, rays, repeats))
-    if plan.mirror_symmetric and len(wall.pieces) <= ROW_PIECES:
+    if plan.mirror_symmetric and len(wall.pieces) <= MIRROR_PIECES:
         found.append(_half(name, wall))
     return found
 
@@ -227,7 +227,7 @@ def _half(name: str, wall: Wall) -> Saving:
     Both stop at errors of their own below the tolerance. So times are compared at the errors of the halved rows, those
     of the others interpolated between their tolerances in the logarithms.
     """
-    halved, whole = ([_rows(one, tolerance) for tolerance in ROW_TOLERANCES] for one in (wall, WithoutMirror(wall)))
+    halved, whole = ([_rows(one, tolerance) for tolerance in MIRROR_TOLERANCES] for one in (wall, WithoutMirror(wall)))
     errors, rays = (np.array([row[k] for row in whole], dtype=np.float64) for k in (1, 2))
     log_error, log_time = (np.log(part) for part in (errors, rays))
     slope, shift = np.polyfit(log_error, log_time, 1)
@@ -243,7 +243,7 @@ def _half(name: str, wall: Wall) -> Saving:
 
 def _rows(wall: Wall | WithoutMirror, tolerance: float) -> tuple[Floats, float, float]:
     """Matrix, error and rays of adaptive rows: their time is that of their rays, without its noise."""
-    symmetric, error, rays = row_matrix(wall, BASIS, Budget(tolerance))  # type: ignore[arg-type]
+    symmetric, error, rays = traced_matrix(wall, BASIS, Budget(tolerance))  # type: ignore[arg-type]
     return symmetric, error, float(rays)
 
 

@@ -21,8 +21,8 @@ def finite_array(name: str, value: ArrayLike) -> Floats:
     bad = ~np.isfinite(array)
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
-        place = f" at index {where}" if where else ""
-        raise InputError(f"{name}: expected finite numbers, got {array[where]}{place} ({int(bad.sum())} such)")
+        index_text = f" at index {where}" if where else ""
+        raise InputError(f"{name}: expected finite numbers, got {array[where]}{index_text} ({int(bad.sum())} such)")
     return array
 
 
@@ -80,9 +80,10 @@ def angles(name: str, value: ArrayLike) -> Floats:
     bad = ~((array > 0.0) & (array < np.pi))
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
-        place = f" at index {where}" if where else ""
+        index_text = f" at index {where}" if where else ""
         raise InputError(
-            f"{name}: expected angles in the open interval (0, pi), in radians, got {float(array[where])!r}{place} "
+            f"{name}: expected angles in the open interval (0, pi), in radians, got {float(array[where])!r}"
+            f"{index_text} "
             f"({int(bad.sum())} such)"
         )
     return array

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..core.checks import Floats
 
-TRIALS = 4000
+SAMPLES = 4000
 
 
 def generator() -> np.random.Generator:
@@ -15,7 +15,7 @@ def generator() -> np.random.Generator:
     return np.random.default_rng(2022)
 
 
-def masses(rng: np.random.Generator, count: int = TRIALS) -> tuple[Floats, Floats]:
+def masses(rng: np.random.Generator, count: int = SAMPLES) -> tuple[Floats, Floats]:
     """Random m and J between 1/10 and 10."""
     return np.exp(rng.uniform(-np.log(10), np.log(10), count)), np.exp(rng.uniform(-np.log(10), np.log(10), count))
 
@@ -27,7 +27,7 @@ def kinetic_norm(w: Floats, m: Floats | float, J: Floats | float) -> Floats:
 
 def unit_velocities(rng: np.random.Generator, m: Floats | float, J: Floats | float) -> Floats:
     """Random velocities (3, n) of kinetic norm 1 with v2 > 0; some graze, some nearly roll."""
-    w = rng.normal(size=(3, TRIALS)) * np.exp(rng.uniform(-4, 0, (3, TRIALS)))
+    w = rng.normal(size=(3, SAMPLES)) * np.exp(rng.uniform(-4, 0, (3, SAMPLES)))
     w[1] = np.abs(w[1])
     return w / kinetic_norm(w, m, J)
 
@@ -40,8 +40,8 @@ def tooth(x: Floats) -> Floats:
 def satellites(configuration: Floats, count: int) -> Floats:
     """The places (2, n, count) of all satellites as points of a turned circle, heights from where they touch."""
     x1, x2, alpha = configuration
-    turned = np.exp(1j * (alpha[:, np.newaxis] + 2 * np.pi * np.arange(count) / count)) * -1j
-    return np.stack([x1[:, np.newaxis] + turned.real, x2[:, np.newaxis] + 1.0 + turned.imag])
+    rotated = np.exp(1j * (alpha[:, np.newaxis] + 2 * np.pi * np.arange(count) / count)) * -1j
+    return np.stack([x1[:, np.newaxis] + rotated.real, x2[:, np.newaxis] + 1.0 + rotated.imag])
 
 
 def clearance(configuration: Floats, eps: float, count: int) -> Floats:

@@ -74,7 +74,7 @@ def latex_of(entries: Iterable[Entry]) -> str:
     return "\n\n".join(
         "\n".join(
             [
-                rf"\paragraph{{{entry.id} ({entry.status}, {_place(entry)}).}} {entry.statement}",
+                rf"\paragraph{{{entry.id} ({entry.status}, {_source(entry)}).}} {entry.statement}",
                 *(rf"{name}: \[ {latex} \]" for name, latex in _formulas(entry)),
                 entry.reason,
             ]
@@ -90,13 +90,13 @@ def page_of(entries: Sequence[Entry]) -> str:
         parts.append(f"## {heading}")
         for entry in entries:
             if entry.status == status:
-                parts += [f"({entry.id})=\n**{entry.id}** ({_place(entry)}; {entry.kind}) {entry.statement}"]
+                parts += [f"({entry.id})=\n**{entry.id}** ({_source(entry)}; {entry.kind}) {entry.statement}"]
                 parts += [f"*{name}*\n\n$$\n{latex}\n$$" for name, latex in _formulas(entry)]
                 parts.append(entry.reason)
     return "\n\n".join(parts) + "\n"
 
 
-def _place(entry: Entry) -> str:
+def _source(entry: Entry) -> str:
     return f"section {entry.section}" + (f", {_equation(entry.equation)}" if entry.equation else "")
 
 

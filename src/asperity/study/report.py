@@ -68,8 +68,9 @@ def _tracer_lines(tracer: TracerCheck) -> list[str]:
     if tracer.z_score < -KAC_Z:
         fraction = 1.0 - found.value / expected
         lines.append(
-            f"           Kac's formula presumes that every ray inside can come from the opening; {100.0 * fraction:.3g} "
-            "% of the boundary's rays cannot if the tracer is right, as those that stay in a mushroom's cap for ever"
+            f"           Kac's formula presumes that every ray inside can come from the opening; "
+            f"{100.0 * fraction:.3g} % of the boundary's rays cannot if the tracer is right, as those that "
+            "stay in a mushroom's cap for ever"
         )
     elif tracer.z_score > KAC_Z:
         lines.append("           more collisions than Kac's formula allows: do not trust this wall's numbers")

@@ -76,7 +76,7 @@ class Derivation:
     relation: str
     refute: Refute
     spreads: bool = True
-    routes: list[str] = field(default_factory=list, init=False)
+    methods: list[str] = field(default_factory=list, init=False)
     reason: str = field(default="no proof among the routes known", init=False)
     _parts: int = field(default=0, init=False)
     _failed: bool = field(default=False, init=False)
@@ -91,7 +91,7 @@ class Derivation:
             found = self._tried(cell, 0)
             if found is not None or self._failed:
                 return found
-        return Verdict("proved", "; ".join(dict.fromkeys(self.routes)) or "defined nowhere on the domain")
+        return Verdict("proved", "; ".join(dict.fromkeys(self.methods)) or "defined nowhere on the domain")
 
     def _give_up(self, reason: str | None = None) -> None:
         self._failed = True
@@ -131,27 +131,27 @@ class Derivation:
             return None
         part = Part(box)
         if self.relation == "==":
-            route = equal_as_written(left, right, part)
-            if route is not None:
-                self.routes.append(route)
+            method = equal_as_written(left, right, part)
+            if method is not None:
+                self.methods.append(method)
                 return None
         resolution = Resolution(part)
         try:
             left, right = resolution.resolved(left), resolution.resolved(right)
         except Nowhere:
             return None
-        route = self._route(left, right, part)
-        if route is not None:
-            self.routes.append(route)
+        method = self._method(left, right, part)
+        if method is not None:
+            self.methods.append(method)
             return None
-        places = [*resolution.undetermined, *resolution.limits]
+        expressions = [*resolution.undetermined, *resolution.limits]
         if self.relation != "==":
             # where the difference, or its slope, changes its sign
             difference = right - left
             slopes = [sp.diff(difference, symbol) for symbol in box.symbols]
             arguments = [f.args[0] for f in sorted(difference.atoms(sp.Function), key=str)]
-            places += [difference, *slopes, *arguments, *box.symbols]
-        pieces = self._pieces(box, places, resolution.undetermined) if depth < DEPTH else None
+            expressions += [difference, *slopes, *arguments, *box.symbols]
+        pieces = self._pieces(box, expressions, resolution.undetermined) if depth < DEPTH else None
         if pieces is None:
             if not self._is_proved_around(domain):
                 self._give_up()
@@ -180,11 +180,11 @@ class Derivation:
             there = Derivation(self.left, self.right, self.relation, lambda *_: None, spreads=False)
             there._tried(near, DEPTH - 1)
             if not there._failed:
-                self.routes += there.routes
+                self.methods += there.methods
                 return True
         return False
 
-    def _route(self, left: Any, right: Any, part: Part) -> str | None:
+    def _method(self, left: Any, right: Any, part: Part) -> str | None:
         if self.relation == "==":
             return derive_equality(left, right, part)
         difference = right - left
@@ -196,9 +196,9 @@ class Derivation:
         return None
 
     @staticmethod
-    def _pieces(domain: Domain, places: list[Any], undetermined: list[Any]) -> list[Domain] | None:
+    def _pieces(domain: Domain, expressions: list[Any], undetermined: list[Any]) -> list[Domain] | None:
         """The part cut at the zeros of the first of the places that can be cut at, or by the sign of what decides."""
-        for e in dict.fromkeys(factor for place in places for factor in sp.Mul.make_args(place)):
+        for e in dict.fromkeys(factor for point in expressions for factor in sp.Mul.make_args(point)):
             symbols = [s for s in domain.symbols if e.has(s)]
             if len(symbols) == 1 and e.free_symbols <= set(symbols):
                 (symbol,) = symbols
@@ -226,8 +226,8 @@ class Derivation:
                 ]
         for symbol in domain.symbols:
             if symbol.is_integer and symbol.is_even is None and not symbol.name.startswith(HALF):
-                halves = [(sp.Dummy(f"{HALF}{symbol}", integer=True), rest) for rest in (0, 1)]
-                return [domain.replaced(symbol, 2 * half + rest, half) for half, rest in halves]
+                even_and_odd = [(sp.Dummy(f"{HALF}{symbol}", integer=True), rest) for rest in (0, 1)]
+                return [domain.replaced(symbol, 2 * half + rest, half) for half, rest in even_and_odd]
         return None
 
 
@@ -308,9 +308,9 @@ def equal_as_written(left: Any, right: Any, part: Part) -> str | None:
 
 def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -> str | None:
     """The route by which two resolved sides are found equal on an open part, or None."""
-    route = equal_as_written(left, right, part)
-    if route is not None:
-        return route
+    method = equal_as_written(left, right, part)
+    if method is not None:
+        return method
     difference = left - right
     if not difference.free_symbols:
         return _equal_numbers(difference)
@@ -366,18 +366,18 @@ def _resolves_to_zero(slope: Any, part: Part) -> bool:
 def _vanishes_somewhere(difference: Any, symbol: Any, part: Part, differentiate: int) -> bool:
     """Whether the difference is 0 for one value of a symbol, inside or at an end up to which it is continuous."""
     low, high, *_ = part.domain.interval(symbol)
-    inside = [place for place in _PLACES if bool(low < place) and bool(place < high)][:4]
+    inside = [point for point in _POINTS if bool(low < point) and bool(point < high)][:4]
     if low.is_finite and high.is_finite:
         inside.append((low + high) / 2)
-    for place, is_end in [(end, True) for end in (low, high) if end.is_finite] + [(p, False) for p in inside]:
-        face = part.domain.face(symbol, place)
-        there = difference.xreplace({symbol: place})
+    for point, is_end in [(end, True) for end in (low, high) if end.is_finite] + [(p, False) for p in inside]:
+        face = part.domain.face(symbol, point)
+        there = difference.xreplace({symbol: point})
         if face is None or face.polyhedron.is_empty or is_muddled(there) or is_infinite(there):
             continue
         on_face = Part(face)
-        if not all(_is_met(condition, symbol, place, on_face) for condition in part.domain.conditions):
+        if not all(_is_met(condition, symbol, point, on_face) for condition in part.domain.conditions):
             continue
-        if is_end and not is_continuous(difference, part, (symbol, place)):
+        if is_end and not is_continuous(difference, part, (symbol, point)):
             continue
         try:
             resolved = Resolution(on_face).resolved(there)
@@ -388,15 +388,15 @@ def _vanishes_somewhere(difference: Any, symbol: Any, part: Part, differentiate:
     return False
 
 
-def _is_met(condition: Any, symbol: Any, place: Any, on_face: Part) -> bool:
+def _is_met(condition: Any, symbol: Any, point: Any, on_face: Part) -> bool:
     """Whether a condition holds at every point of a face."""
     values = dict(on_face.domain.values)
-    difference = (condition.lhs - condition.rhs).xreplace(values).xreplace({symbol: place})
+    difference = (condition.lhs - condition.rhs).xreplace(values).xreplace({symbol: point})
     bare = Part(replace(on_face.domain, conditions=()))
     return all(condition.func(sp.Integer(sign), 0) is sp.true for sign in bare.signs(difference))
 
 
-_PLACES = (
+_POINTS = (
     sp.Integer(0), sp.Integer(1), sp.Rational(1, 2), sp.Integer(-1), sp.Rational(-1, 2), sp.Integer(2), sp.pi / 4,
     sp.pi / 3, sp.pi / 6, sp.pi / 2, -sp.pi / 4,
 )  # fmt: skip

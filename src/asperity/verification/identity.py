@@ -171,7 +171,7 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
         raise InputError(f"assumptions: no point was found that meets {', '.join(map(str, relations))}")
     if found is None:
         found = derivation.verdict(domain)
-    if search.undefined == search.tried or (found is not None and found.answer == "proved" and not derivation.routes):
+    if search.undefined == search.tried or (found is not None and found.answer == "proved" and not derivation.methods):
         raise InputError(
             f"lhs, rhs: expected both to be defined and real somewhere on the domain; got {left} and {right}, and at "
             f"each of {search.tried} points one of them is not"
@@ -179,8 +179,8 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
     if found is None:
         found = Verdict("undecided", f"no counterexample among {search.tried} points, and {derivation.reason}")
     names = {str(stand_in): str(symbol) for symbol, stand_in in real.items()}
-    place = {names.get(name, name): value for name, value in found.counterexample.items()}
-    return Verdict(found.answer, found.evidence, place, found.values)
+    point = {names.get(name, name): value for name, value in found.counterexample.items()}
+    return Verdict(found.answer, found.evidence, point, found.values)
 
 
 def _as_real(sp: Any, symbol: Any) -> Any:

@@ -94,12 +94,12 @@ class Resolution:
 
     def _extreme(self, e: Any) -> Any:
         factor = 1 if e.func is sp.Max else -1
-        kept: list[Any] = []
+        remaining: list[Any] = []
         for one in e.args:
-            signs = {other: self._signs(factor * (other - one)) for other in kept}
+            signs = {other: self._signs(factor * (other - one)) for other in remaining}
             if not any(found <= NOT_NEGATIVE for found in signs.values()):
-                kept = [other for other in kept if not signs[other] <= NOT_POSITIVE] + [one]
-        return kept[0] if len(kept) == 1 else e.func(*kept)
+                remaining = [other for other in remaining if not signs[other] <= NOT_POSITIVE] + [one]
+        return remaining[0] if len(remaining) == 1 else e.func(*remaining)
 
     def _floor(self, e: Any) -> Any:
         found = self._piece(e.args[0], sp.Integer(0), sp.Integer(1))

@@ -53,7 +53,7 @@ class Part:
     def signs(self, e: Any) -> Signs:
         """The signs that e may have where it is defined; a superset of those that it has."""
         if e not in self._known:
-            self._known[e] = self._signs(e) & self._facts().get(e, ANY)
+            self._known[e] = self._signs(e) & self._assumed().get(e, ANY)
         return self._known[e]
 
     def is_nonnegative(self, e: Any) -> bool:
@@ -89,7 +89,7 @@ class Part:
             found = _of_product(_without_roots(self.parameters.factored(e)))
         return found
 
-    def _facts(self) -> dict[Any, Signs]:
+    def _assumed(self) -> dict[Any, Signs]:
         """The signs that conditions give, as they are written."""
         if self._given is None:
             self._given = {}
@@ -226,8 +226,8 @@ class Part:
             if signs == ANY:
                 if tried + len(waiting) > BOXES:
                     return ANY
-                halves = [[(a, (a + b) / 2), ((a + b) / 2, b)] for a, b in one.values()]
-                waiting += [dict(zip(one, half, strict=True)) for half in product(*halves)]
+                half_ranges = [[(a, (a + b) / 2), ((a + b) / 2, b)] for a, b in one.values()]
+                waiting += [dict(zip(one, half, strict=True)) for half in product(*half_ranges)]
             else:
                 found |= signs
             if {-1, 1} <= found:
@@ -250,14 +250,14 @@ class Part:
     def along(self, symbol: Any) -> Part:
         """The part without the conditions that may cut a line on which one symbol varies into pieces."""
         values = dict(self.domain.values)
-        kept = tuple(
+        remaining = tuple(
             condition
             for condition in self.domain.conditions
             if isinstance(condition, sp.Gt | sp.Ge | sp.Lt | sp.Le)
             and (difference := (condition.lhs - condition.rhs).xreplace(values)).is_polynomial(symbol)
             and sp.degree(difference, symbol) <= 1
         )
-        return self if kept == self.domain.conditions else Part(replace(self.domain, conditions=kept))
+        return self if remaining == self.domain.conditions else Part(replace(self.domain, conditions=remaining))
 
     def _by_derivative(self, e: Any, depth: int) -> Signs:
         """Positive at the lower end and growing, say, for every symbol in turn."""

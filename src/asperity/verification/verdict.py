@@ -103,7 +103,7 @@ def agreement(found: ArrayLike, expected: ArrayLike, allowed: float, **where: Ar
     0.2
     """
     left, right = np.broadcast_arrays(np.asarray(found, dtype=float), np.asarray(expected, dtype=float))
-    return _judged(left, right, np.abs(left - right), allowed, f"largest difference {{worst}} of {left.size}", where)
+    return _compared(left, right, np.abs(left - right), allowed, f"largest difference {{worst}} of {left.size}", where)
 
 
 def no_excess(small: ArrayLike, large: ArrayLike, allowed: float = 0.0, **where: ArrayLike) -> Verdict:
@@ -115,7 +115,7 @@ def no_excess(small: ArrayLike, large: ArrayLike, allowed: float = 0.0, **where:
     'refuted'
     """
     left, right = np.broadcast_arrays(np.asarray(small, dtype=float), np.asarray(large, dtype=float))
-    return _judged(left, right, left - right, allowed, f"largest excess {{worst}} in {left.size} trials", where)
+    return _compared(left, right, left - right, allowed, f"largest excess {{worst}} in {left.size} trials", where)
 
 
 def holds(condition: ArrayLike, of_what: str, **where: ArrayLike) -> Verdict:
@@ -131,24 +131,24 @@ def holds(condition: ArrayLike, of_what: str, **where: ArrayLike) -> Verdict:
     if right.all():
         return Verdict("agrees", evidence)
     return Verdict(
-        "refuted", evidence, _place(np.unravel_index(int(np.argmin(right)), right.shape), right.shape, where)
+        "refuted", evidence, _point(np.unravel_index(int(np.argmin(right)), right.shape), right.shape, where)
     )
 
 
-def _judged(
+def _compared(
     left: np.ndarray, right: np.ndarray, defect: np.ndarray, allowed: float, words: str, where: dict[str, ArrayLike]
 ) -> Verdict:
     broken = np.isnan(defect)
     index = np.unravel_index(int(np.argmax(np.where(broken, np.inf, defect))), defect.shape)
-    place = _place(index, defect.shape, where)
+    point = _point(index, defect.shape, where)
     if broken.any():
         # neither for the formula nor against it
-        return Verdict("undecided", f"not a number at {int(broken.sum())} of {defect.size} places", place)
+        return Verdict("undecided", f"not a number at {int(broken.sum())} of {defect.size} places", point)
     evidence = words.format(worst=f"{float(defect[index]):.2g}") + f", allowed {allowed:.2g}"
     if defect[index] <= allowed:
         return Verdict("agrees", evidence)
-    return Verdict("refuted", evidence, place, (f"{float(left[index]):.6g}", f"{float(right[index]):.6g}"))
+    return Verdict("refuted", evidence, point, (f"{float(left[index]):.6g}", f"{float(right[index]):.6g}"))
 
 
-def _place(index: tuple[np.intp, ...], shape: tuple[int, ...], where: dict[str, ArrayLike]) -> dict[str, float]:
+def _point(index: tuple[np.intp, ...], shape: tuple[int, ...], where: dict[str, ArrayLike]) -> dict[str, float]:
     return {name: float(np.broadcast_to(np.asarray(value), shape)[index]) for name, value in where.items()}

@@ -26,20 +26,20 @@ def zeros(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
     if not e.has(symbol):
         return [] if e.is_zero is False or (e.is_number and _differs_from_zero(e)) else None
     try:
-        places = _places(e, symbol, low, high)
-        if places is None or len(places) > MOST:
+        points = _points(e, symbol, low, high)
+        if points is None or len(points) > MOST:
             return None
-        inside = [place for place in places if sign_of(place - low) > 0 and sign_of(high - place) > 0]
+        inside = [point for point in points if sign_of(point - low) > 0 and sign_of(high - point) > 0]
     except (Undefined, Unclear):
         return None
-    return sorted(inside, key=lambda place: sp.N(place, 50))
+    return sorted(inside, key=lambda point: sp.N(point, 50))
 
 
-def _places(e: Any, symbol: Any, low: Any, high: Any) -> set[Any] | None:
+def _points(e: Any, symbol: Any, low: Any, high: Any) -> set[Any] | None:
     """Zeros and poles, and possibly other places, some of them outside."""
     if sp.count_ops(e) > LARGEST:
         return None
-    places: set[Any] = set()
+    points: set[Any] = set()
     numerator, denominator = sp.together(e).as_numer_denom()
     for factor in (*sp.Mul.make_args(sp.factor(numerator)), *sp.Mul.make_args(sp.factor(denominator))):
         base, exponent = factor.as_base_exp()
@@ -49,8 +49,8 @@ def _places(e: Any, symbol: Any, low: Any, high: Any) -> set[Any] | None:
         found = _of_factor(base, symbol, low, high)
         if found is None:
             return None
-        places.update(found)
-    return places
+        points.update(found)
+    return points
 
 
 def _differs_from_zero(number: Any) -> bool:
@@ -81,10 +81,10 @@ def _of_factor(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
         return None
     found: list[Any] = []
     for level in levels:
-        places = _where(function, level, symbol, low, high)
-        if places is None:
+        points = _where(function, level, symbol, low, high)
+        if points is None:
             return None
-        found += places
+        found += points
     return found
 
 
@@ -144,10 +144,10 @@ def _where(function: Any, level: Any, symbol: Any, low: Any, high: Any) -> list[
         return None
     found: list[Any] = []
     for solution in solutions:
-        places = _places(inner - solution, symbol, low, high)
-        if places is None:
+        points = _points(inner - solution, symbol, low, high)
+        if points is None:
             return None
-        found += places
+        found += points
     return found
 
 
@@ -188,8 +188,8 @@ def _of_sine_and_cosine(e: Any, pair: list[Any], symbol: Any, low: Any, high: An
         return None
     found: list[Any] = []
     for angle in angles:
-        places = _places(sine.args[0] - angle, symbol, low, high)
-        if places is None:
+        points = _points(sine.args[0] - angle, symbol, low, high)
+        if points is None:
             return None
-        found += places
+        found += points
     return found

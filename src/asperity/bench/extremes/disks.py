@@ -10,7 +10,7 @@ import numpy as np
 from ... import geometry as geo
 from ...core.rounding import EPS
 from ..quantities.collision import DISK, sampled_velocities
-from ..running.references import kept
+from ..running.references import stored
 from .row import ExtremeRow
 
 # Written by tests/precise_collision.py
@@ -30,7 +30,7 @@ def disk_cases(disks: int) -> dict[str, Callable[[], ExtremeRow]]:
 
 def _case(scale: float, disks: int) -> ExtremeRow:
     """The known disks, then as many random ones sent there and back."""
-    rows = kept(DATA)[f"{scale:g}"]
+    rows = stored(DATA)[f"{scale:g}"]
     start = np.array([[float.fromhex(number) for number in row[0]] for row in rows])
     exact = np.array([[float.fromhex(number) for number in row[1]] for row in rows])
     contacts, condition = (np.array([row[k] for row in rows]) for k in (2, 3))

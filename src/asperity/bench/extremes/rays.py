@@ -13,7 +13,7 @@ import numpy as np
 
 from ... import geometry as geo
 from ...core.rounding import EPS
-from ..running.references import kept
+from ..running.references import stored
 from .row import ExtremeRow
 from .walls import extreme_walls
 
@@ -83,7 +83,7 @@ def _case(name: str, build: Callable[[], geo.Wall]) -> ExtremeRow:
 
 def known_rays(name: str) -> tuple[str, tuple[KnownRay, ...]]:
     """What a case is measured against, and its rays."""
-    case = kept(DATA)[name]
+    case = stored(DATA)[name]
     return case["reference"], tuple(
         KnownRay(
             float.fromhex(x), float.fromhex(theta), float("nan") if out is None else float.fromhex(out), hits or 0,

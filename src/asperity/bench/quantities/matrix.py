@@ -12,7 +12,7 @@ from ...core.estimates import Estimate
 from ...kernels import Bins, KernelMatrix, Legendre
 from ...kernels.bases.momentum import MEAN_SINE, SINE_NORM, Directions
 from ...spectral import WorkMethod
-from .methods import RANDOM_ORDER, Route, declared_order, routes_for
+from .methods import RANDOM_ORDER, MatrixMethod, declared_order, methods_for
 from .quantity import Methods, Quantity
 from .walls import standard_names
 
@@ -23,17 +23,17 @@ if TYPE_CHECKING:
 LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS = Bins(32), Legendre(2), Directions()
 
 
-def _by_routes(basis: Basis, read: Callable[[KernelMatrix], Any], in_bins: bool = False) -> Callable[[Wall], Methods]:
+def _by_methods(basis: Basis, read: Callable[[KernelMatrix], Any], in_bins: bool = False) -> Callable[[Wall], Methods]:
     """Methods for what can be read off a matrix."""
 
-    def method(wall: Wall, route: Route) -> WorkMethod:
+    def method(wall: Wall, chosen: MatrixMethod) -> WorkMethod:
         # strata and nets do better than 3/4 where the integrand does not jump: declared for bins alone
-        order = declared_order(route, wall) if in_bins or route.order == RANDOM_ORDER else None
+        order = declared_order(chosen, wall) if in_bins or chosen.order == RANDOM_ORDER else None
         return WorkMethod(
-            route.name, lambda budget, *rng: read(route.matrix(wall, basis, budget, *rng)), route.is_random, order
+            chosen.name, lambda budget, *rng: read(chosen.matrix(wall, basis, budget, *rng)), chosen.is_random, order
         )
 
-    return lambda wall: [(method(wall, route), route.quick, route.full) for route in routes_for(wall)]
+    return lambda wall: [(method(wall, chosen), chosen.quick, chosen.full) for chosen in methods_for(wall)]
 
 
 def moment_of(matrix: KernelMatrix) -> Estimate:
@@ -54,11 +54,11 @@ def _resistance(matrix: KernelMatrix) -> Estimate:
 
 
 LAW = Quantity(
-    "law", "the matrix of the law in 32 bins", _by_routes(LAW_BASIS, lambda matrix: matrix, in_bins=True),
+    "law", "the matrix of the law in 32 bins", _by_methods(LAW_BASIS, lambda matrix: matrix, in_bins=True),
     standard_names(),
 )  # fmt: skip
-MOMENT = Quantity("moment", "<u, P u>/<u, u>", _by_routes(MOMENT_BASIS, moment_of), standard_names())
+MOMENT = Quantity("moment", "<u, P u>/<u, u>", _by_methods(MOMENT_BASIS, moment_of), standard_names())
 RESISTANCE = Quantity(
-    "resistance", "the mean resistance of a body with this wall", _by_routes(RESISTANCE_BASIS, _resistance),
+    "resistance", "the mean resistance of a body with this wall", _by_methods(RESISTANCE_BASIS, _resistance),
     ("triangular-teeth", "focusing-arc", "mixed"),
 )  # fmt: skip

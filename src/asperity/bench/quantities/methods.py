@@ -10,7 +10,7 @@ import numpy as np
 
 from ...kernels import KernelMatrix, PolygonLaw, WallLaw, discretise, estimate
 from ...kernels.discretisation.method import Budget
-from ...kernels.discretisation.traced import row_matrix
+from ...kernels.discretisation.traced import traced_matrix
 from ...kernels.matrices.matrix import frobenius_error
 from .quantity import QUICK_RAYS, RAYS
 
@@ -28,7 +28,7 @@ MANY_PIECES = 512
 
 
 @dataclass(frozen=True)
-class Route:
+class MatrixMethod:
     """One way to a matrix.
 
     Attributes
@@ -54,7 +54,7 @@ class Route:
     order: float | None = None
 
 
-def routes_for(wall: Wall) -> tuple[Route, ...]:
+def methods_for(wall: Wall) -> tuple[MatrixMethod, ...]:
     """The routes that a wall allows, the library's own choice first."""
     found = [AUTO]
     if WallLaw(wall).closed_form is not None:
@@ -65,20 +65,20 @@ def routes_for(wall: Wall) -> tuple[Route, ...]:
     return tuple(found)
 
 
-def declared_order(route: Route, wall: Wall) -> float | None:
+def declared_order(chosen: MatrixMethod, wall: Wall) -> float | None:
     """The order of a route for matrices in bins, at the numbers of rays of the ladders.
 
     >>> from asperity.bench.quantities.walls import wall_of
     >>> [declared_order(STRATIFIED, wall_of(name)) for name in ("cusps", "profile")]
     [0.75, 0.5]
     """
-    return RANDOM_ORDER if route.order == JUMPING_ORDER and len(wall.pieces) > MANY_PIECES else route.order
+    return RANDOM_ORDER if chosen.order == JUMPING_ORDER and len(wall.pieces) > MANY_PIECES else chosen.order
 
 
 def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelMatrix:
     """From the formula for the wall's hollows."""
     law = WallLaw(wall).closed_form
-    assert law is not None  # `routes_for` offers this route to no other wall
+    assert law is not None  # `methods_for` offers this route to no other wall
     return discretise(law, basis)
 
 
@@ -87,9 +87,9 @@ def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
     return discretise(PolygonLaw(wall, max_beams=int(budget)), basis, "exact")
 
 
-def adaptive_row_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
+def adaptive_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
     """By adaptive rows to the tolerance 1/budget, whatever the wall."""
-    symmetric, error, rays = row_matrix(wall, basis, Budget(1.0 / budget))
+    symmetric, error, rays = traced_matrix(wall, basis, Budget(1.0 / budget))
     how = frobenius_error(error, "estimate", f"adaptive rows, {rays} rays")
     return KernelMatrix(symmetric, basis, how, method="adaptive rows")
 
@@ -120,10 +120,10 @@ def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generato
     return discretise(WallLaw(wall), basis, tolerance=1.0 / budget, rng=rng)
 
 
-AUTO = Route("auto", auto_matrix, "1/tolerance", (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
-CLOSED_FORM = Route("closed form", closed_form_matrix, "-", (1.0,), (1.0,))
-BEAMS = Route("beams", beam_matrix, "beams a hollow", (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
-ROWS = Route("adaptive rows", adaptive_row_matrix, "1/tolerance", (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
-QMC = Route("randomised QMC", qmc_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
-STRATIFIED = Route("stratified", stratified_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
-MONTE_CARLO = Route("Monte Carlo", monte_carlo_matrix, "rays", QUICK_RAYS, RAYS, True, RANDOM_ORDER)
+AUTO = MatrixMethod("auto", auto_matrix, "1/tolerance", (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
+CLOSED_FORM = MatrixMethod("closed form", closed_form_matrix, "-", (1.0,), (1.0,))
+BEAMS = MatrixMethod("beams", beam_matrix, "beams a hollow", (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
+ROWS = MatrixMethod("adaptive rows", adaptive_matrix, "1/tolerance", (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
+QMC = MatrixMethod("randomised QMC", qmc_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+STRATIFIED = MatrixMethod("stratified", stratified_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
+MONTE_CARLO = MatrixMethod("Monte Carlo", monte_carlo_matrix, "rays", QUICK_RAYS, RAYS, True, RANDOM_ORDER)

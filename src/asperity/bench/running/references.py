@@ -15,12 +15,12 @@ FILE = Path(__file__).with_name("standard_references.json")
 
 
 @cache
-def kept(file: str) -> dict[str, Any]:
+def stored(file: str) -> dict[str, Any]:
     """The table in a JSON file of this folder, read once a process.
 
     Examples
     --------
-    >>> sorted(kept("extreme_disks.json"))[:2]
+    >>> sorted(stored("extreme_disks.json"))[:2]
     ['0.0001', '0.001']
     """
     table: dict[str, Any] = json.loads(Path(__file__).with_name(file).read_text(encoding="utf-8"))
@@ -29,7 +29,7 @@ def kept(file: str) -> dict[str, Any]:
 
 def known_reference(problem: str) -> ReferenceValue | None:
     """The reference of a problem SCENE/QUANTITY, or None where no independent one is known."""
-    entry = kept(FILE.name).get(problem)
+    entry = stored(FILE.name).get(problem)
     if entry is None:
         return None
     value = np.asarray(entry["value"], dtype=np.float64)

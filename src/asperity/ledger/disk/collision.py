@@ -155,14 +155,14 @@ def next_side(vertices: Any, point: Any, along: Any, last: int) -> tuple[float, 
     return time, side
 
 
-def bounce_on_the_cylinder(disk: Disk, wall: Wall, place: Any, velocity: Any) -> Any:
+def bounce_on_the_cylinder(disk: Disk, wall: Wall, at: Any, velocity: Any) -> Any:
     """The outgoing velocity of a disk on the cylinder over a polygonal wall, by reflections in three dimensions.
 
     The free configurations are those with (x1 + alpha, x2) outside the wall; at a side with unit normal k the velocity
     is reflected at n = `contact_normal` in the kinetic-energy metric. Not a number after too many bounces.
     """
     vertices, last = wall.vertices, -1
-    position, velocity = np.array(place, dtype=float), np.array(velocity, dtype=float)
+    position, velocity = np.array(at, dtype=float), np.array(velocity, dtype=float)
     for _ in range(MOST_BOUNCES):
         point = np.array([position[0] + position[2], position[1]])
         along = np.array([velocity[0] + velocity[2], velocity[1]])

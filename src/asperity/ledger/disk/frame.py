@@ -45,8 +45,8 @@ def sign_of_the_rolling_direction(chi: Code) -> Verdict:
     from ...geometry.disk import symbolic as sym
 
     frame = sp.Matrix([*frame_rows(sym.m, sym.J, sp)[:2], chi(sym.m, sym.J, sp)])
-    turned = verify((frame * sym.metric.applyfunc(sp.sqrt)).det(), 1)
-    return every(turned, verify(frame * sym.metric * frame.T, sp.eye(3)))
+    orientation = verify((frame * sym.metric.applyfunc(sp.sqrt)).det(), 1)
+    return every(orientation, verify(frame * sym.metric * frame.T, sp.eye(3)))
 
 
 @verified(
@@ -147,8 +147,8 @@ def invariant_measure(density: Code) -> Verdict:
     from ...geometry.disk import symbolic as sym
 
     y1, y3 = sp.symbols("y1 y3", real=True)
-    place = y1 * sym.chi_perp + y3 * sym.chi
-    area = sp.Matrix([place[0], place[2]]).jacobian([y1, y3]).det()
+    position = y1 * sym.chi_perp + y3 * sym.chi
+    area = sp.Matrix([position[0], position[2]]).jacobian([y1, y3]).det()
     sphere = sym.volume_density(sym.G, [sym.theta, sym.psi])
     return verify(area * sym.inner(sym.G, sym.e2) * sphere, density(sym.J, sym.theta, sym.psi, sp), sym.ANGLES)
 
@@ -203,8 +203,8 @@ def foreshortened_wall(image: Code) -> Verdict:
     from ...geometry.disk import symbolic as sym
 
     x1, x2, a = sp.symbols("x1 x2 a", real=True)
-    place = [x1 - a, x2, a]
-    projected = [sym.inner(place, sym.chi_perp), sym.inner(place, sym.e2_hat)]
+    position = [x1 - a, x2, a]
+    projected = [sym.inner(position, sym.chi_perp), sym.inner(position, sym.e2_hat)]
     return verify(projected, [sp.sqrt(sym.m) * x for x in image(x1, x2, sym.m, sym.J, sp)])
 
 

@@ -23,13 +23,13 @@ from ...verification.entry import Code
     reason="It is the satellite of the unturned disk, turned by the matrix of the rotation. Signs of angles that are "
     "half wrong still agree for k = 0.",
 )
-def satellites_of_the_turned_disk(satellite: Code) -> Verdict:
+def satellites_of_the_rotated_disk(satellite: Code) -> Verdict:
     import sympy as sp
 
     x1, x2, alpha, turn = sp.symbols("x1 x2 alpha krho", real=True)
     rotation = sp.Matrix([[sp.cos(alpha), -sp.sin(alpha)], [sp.sin(alpha), sp.cos(alpha)]])
-    turned = sp.Matrix([x1, x2]) + rotation * sp.Matrix([sp.sin(turn), -sp.cos(turn)])
-    return verify(satellite(x1, x2, alpha, turn, sp), list(turned))
+    rotated = sp.Matrix([x1, x2]) + rotation * sp.Matrix([sp.sin(turn), -sp.cos(turn)])
+    return verify(satellite(x1, x2, alpha, turn, sp), list(rotated))
 
 
 @verified(

@@ -54,25 +54,25 @@ def _angle_after(x: float, theta: float, psi: float, m: float, J: float) -> floa
 
     disk = Disk(m, J)
     w = -disk.from_angles(theta, psi)
-    place = np.array([x, 0.0, 0.0])
+    position = np.array([x, 0.0, 0.0])
     for _ in range(1000):
-        time, k = _next_contact(place, w)
+        time, k = _next_contact(position, w)
         if k is None:
             break
-        place = place + time * w
-        arm = k[0] * math.cos(EPS * place[2]) + k[1] * math.sin(EPS * place[2])
+        position = position + time * w
+        arm = k[0] * math.cos(EPS * position[2]) + k[1] * math.sin(EPS * position[2])
         impulse = -2.0 * (w[0] * k[0] + w[1] * k[1] + w[2] * arm) / (1 / m + arm * arm / J)
         w = w + impulse * np.array([k[0] / m, k[1] / m, arm / J])
     return float(disk.to_angles(w)[0])
 
 
-def _next_contact(place: np.ndarray, w: np.ndarray) -> tuple[float, tuple[float, float] | None]:
+def _next_contact(position: np.ndarray, w: np.ndarray) -> tuple[float, tuple[float, float] | None]:
     """The time to the next side that the satellite meets, and its unit normal; None where it leaves."""
 
     def satellite(t: float) -> tuple[float, float, float, float]:
-        turn = EPS * (place[2] + t * w[2])
-        x = place[0] + t * w[0] + math.sin(turn) / EPS
-        y = place[1] + t * w[1] + 2.0 * math.sin(0.5 * turn) ** 2 / EPS
+        turn = EPS * (position[2] + t * w[2])
+        x = position[0] + t * w[0] + math.sin(turn) / EPS
+        y = position[1] + t * w[1] + 2.0 * math.sin(0.5 * turn) ** 2 / EPS
         return x, y, w[0] + w[2] * math.cos(turn), w[1] + w[2] * math.sin(turn)
 
     x0, _, _, _ = satellite(0.0)

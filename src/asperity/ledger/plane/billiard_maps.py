@@ -188,8 +188,8 @@ def reflection_of_the_plane(image: Code) -> Verdict:
     def reflect(p: list[object]) -> list[object]:
         return list(image(p, k, p[0] * k[0] + p[1] * k[1]))
 
-    turned = reflect(at(theta))
-    return every(verify(turned, at(sp.pi - theta)), verify(reflect(turned), at(theta)))
+    reflected = reflect(at(theta))
+    return every(verify(reflected, at(sp.pi - theta)), verify(reflect(reflected), at(theta)))
 
 
 @erratum(

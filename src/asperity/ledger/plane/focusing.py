@@ -136,12 +136,12 @@ def hits_on_an_arc(step_and_number: Code) -> Verdict:
         decided = ~undecided(theta, gamma, xi)
         step, number = step_and_number(theta, gamma, xi)
         # the direction after the first hit, by reflection, and the other end of the chord along it
-        place, moving = np.exp(1j * gamma), -np.exp(1j * (theta + np.pi / 2))  # from the bottom, counter-clockwise
-        moving = moving - 2 * np.real(moving * np.conj(place)) * place
-        following = place - 2 * np.real(moving * np.conj(place)) * moving
+        at_circle, moving = np.exp(1j * gamma), -np.exp(1j * (theta + np.pi / 2))  # from the bottom, counter-clockwise
+        moving = moving - 2 * np.real(moving * np.conj(at_circle)) * at_circle
+        following = at_circle - 2 * np.real(moving * np.conj(at_circle)) * moving
         return every(
             agreement(number[decided], hits[decided], 0.0, x=x[decided]),
-            agreement(np.abs(following / place - np.exp(1j * step)), 0.0, TRACED, x=x, theta=theta),
+            agreement(np.abs(following / at_circle - np.exp(1j * step)), 0.0, TRACED, x=x, theta=theta),
             holds((np.abs(step) > 0) & (np.abs(step) <= np.pi), "steps are less than a turn"),
         )
 
@@ -153,11 +153,11 @@ def hits_on_an_arc(step_and_number: Code) -> Verdict:
     section="2.2.3",
     equation="2.17",
     statement="Focusing arcs: the outgoing angle.",
-    printed=Formula(r"\Theta' = \theta + N \Delta\gamma", lambda turned, forward: turned),
+    printed=Formula(r"\Theta' = \theta + N \Delta\gamma", lambda rotated, forward: rotated),
     corrected=Formula(
         r"\Theta' = \theta + N \Delta\gamma - \pi \ (\theta \ge \tfrac\pi2 + \gamma), \quad"
         r" \Theta' = \theta + N \Delta\gamma + \pi \text{ else}",
-        lambda turned, forward: turned + np.where(forward, -np.pi, np.pi),
+        lambda rotated, forward: rotated + np.where(forward, -np.pi, np.pi),
     ),
     reason="The incoming velocity has the angle π + θ, so the formula is right mod π, for unoriented lines. In "
     "(0, π) it needs the π, as in the law of the library.",

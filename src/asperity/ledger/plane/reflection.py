@@ -132,11 +132,11 @@ def period_of_rectangular_teeth(period: Code) -> Verdict:
     "one of the two velocities.",
     kind="numeric",
 )
-def rectangular_teeth_reverse_components(outcomes: Code) -> Verdict:
+def rectangular_teeth_reverse_components(outgoing: Code) -> Verdict:
     x, theta = rays()
     found = trace(rectangular_teeth(1.3), x, theta).theta
     distances = [
-        np.hypot(np.cos(found) - v1, np.sin(found) - v2) for v1, v2 in outcomes(-np.cos(theta), -np.sin(theta))
+        np.hypot(np.cos(found) - v1, np.sin(found) - v2) for v1, v2 in outgoing(-np.cos(theta), -np.sin(theta))
     ]
     return agreement(np.min(distances, axis=0), 0.0, REFLECTED, x=x, theta=theta)
 
@@ -152,7 +152,7 @@ spaces_of_convergence = by_reading(
     "three sections later.",
 )
 
-place_of_the_wall = by_reading(
+position_of_the_wall = by_reading(
     id="S1.11",
     section="1.3.1",
     equation="A3'",

@@ -45,7 +45,7 @@ def fraction_of_fewer(psi: float, theta: Any, shift: float = 0.0) -> Any:
     return (np.cos(theta - psi / 2) - np.cos(last)) / (2 * np.sin(theta) * np.sin(psi / 2))
 
 
-def outcomes(psi: float, theta: Any, half: Code) -> tuple[Any, Any]:
+def outgoing_angles(psi: float, theta: Any, half: Code) -> tuple[Any, Any]:
     """The two outgoing angles of eq. 2.10, for N - 1 hits and for N; ``half`` rounds N/2."""
     hits = most_hits(psi, theta)
     pairs = half(hits / 2)
@@ -54,10 +54,10 @@ def outcomes(psi: float, theta: Any, half: Code) -> tuple[Any, Any]:
     return np.where(even, forth - 2 * psi, back), np.where(even, back, forth)
 
 
-def two_outcomes(psi: float, theta: Any) -> tuple[Any, Any]:
+def two_outgoing_angles(psi: float, theta: Any) -> tuple[Any, Any]:
     """Probabilities and angles of the form with two outcomes, taken for all theta."""
     fewer = np.clip(fraction_of_fewer(psi, theta), 0.0, 1.0)
-    return np.stack([fewer, 1.0 - fewer], axis=-1), np.stack(outcomes(psi, theta, np.floor), axis=-1)
+    return np.stack([fewer, 1.0 - fewer], axis=-1), np.stack(outgoing_angles(psi, theta, np.floor), axis=-1)
 
 
 @erratum(
@@ -101,19 +101,19 @@ def tooth_function(function: Code) -> Verdict:
     printed=Formula(
         r"\text{the formulas below with } \lceil N/2 \rceil \text{ for } \lfloor N/2 \rfloor"
         r"\text{ and a stray } -\theta \quad\text{(described, not quoted)}",
-        lambda psi, theta: outcomes(psi, theta, np.ceil),
+        lambda psi, theta: outgoing_angles(psi, theta, np.ceil),
     ),
     corrected=Formula(
         r"\theta' = \begin{cases} \psi(N-1) - \theta,\ \pi + \theta - \psi N & N \text{ even} \\"
         r" \pi + \theta - \psi(N-1),\ \psi N - \theta & N \text{ odd} \end{cases}, \quad"
         r" N = \lceil 2\theta/\psi \rceil",
-        lambda psi, theta: outcomes(psi, theta, np.floor),
+        lambda psi, theta: outgoing_angles(psi, theta, np.floor),
     ),
     reason="N triangles are crossed by N − 1 reflections, not by N. With that, floors replace the ceilings, the stray "
     "term goes, and every angle lies in (0, π).",
     kind="numeric",
 )
-def outcomes_of_triangular_teeth(angles: Code) -> Verdict:
+def outgoing_angles_of_triangular_teeth(angles: Code) -> Verdict:
     def check(psi: float) -> Verdict:
         _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
         fewer, more = angles(psi, theta)
@@ -183,7 +183,9 @@ def probability_of_fewer_hits(probability: Code) -> Verdict:
     printed=Formula(
         r"\text{two outcomes, for all } \theta",
         lambda psi, x, theta: np.where(
-            x < fraction_of_fewer(psi, theta), outcomes(psi, theta, np.floor)[0], outcomes(psi, theta, np.floor)[1]
+            x < fraction_of_fewer(psi, theta),
+            outgoing_angles(psi, theta, np.floor)[0],
+            outgoing_angles(psi, theta, np.floor)[1],
         ),
     ),
     corrected=Formula(
@@ -197,10 +199,10 @@ def probability_of_fewer_hits(probability: Code) -> Verdict:
     "four outcomes. The corrected law agrees with traced rays for all ψ and θ.",
     kind="numeric",
 )
-def law_of_triangular_teeth(response: Code) -> Verdict:
+def law_of_triangular_teeth(reflection: Code) -> Verdict:
     def check(psi: float) -> Verdict:
         x, theta, traced = rays_between(psi, 0.05, np.pi - 0.05, 23)
-        return agreement(response(psi, x[:, None], theta), traced.theta, TRACED, x=x[:, None], theta=theta)
+        return agreement(reflection(psi, x[:, None], theta), traced.theta, TRACED, x=x[:, None], theta=theta)
 
     return every_apex(check)
 
@@ -209,7 +211,7 @@ def law_of_triangular_teeth(response: Code) -> Verdict:
     id="S2.08",
     section="2.2.2",
     statement="Triangular teeth: the law leaves sin θ dθ invariant.",
-    printed=Formula(r"\int E[\cos^2\theta'] \sin\theta\, d\theta = 1.039 \ne \tfrac23", two_outcomes),
+    printed=Formula(r"\int E[\cos^2\theta'] \sin\theta\, d\theta = 1.039 \ne \tfrac23", two_outgoing_angles),
     corrected=Formula(
         r"\int_0^\pi \tilde P f(\theta) \sin\theta\, d\theta = \int_0^\pi f(\theta) \sin\theta\, d\theta",
         lambda psi, theta: TriangularTeethLaw(psi).branches(theta),

@@ -240,8 +240,8 @@ def distance_of_satellites(distance: Code) -> Verdict:
 
     from ...geometry.disk import symbolic as sym
 
-    places = [rolling.satellite(0, 0, sym.alpha + k * sym.rho, 1, sp) for k in (0, 1)]
-    square = sum((a - b) ** 2 for a, b in zip(*places, strict=True))
+    centres = [rolling.satellite(0, 0, sym.alpha + k * sym.rho, 1, sp) for k in (0, 1)]
+    square = sum((a - b) ** 2 for a, b in zip(*centres, strict=True))
     found = distance(sym.rho, sp)
     return every(
         verify(sp.simplify(sp.expand_trig(square - found**2)), 0), verify(sp.limit(found / sym.rho, sym.rho, 0), 1)

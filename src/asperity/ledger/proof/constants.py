@@ -109,8 +109,8 @@ def splitting_of_a_reflection(first_term: Code) -> Verdict:
     left, right = [], []
     for i in range(3):
         left.append(_dot(w_new, n_new) * n_new[i] - _dot(w, n) * n[i])
-        turned = _dot(w, _change(n_new, n)) * n_new[i] + _dot(w, n) * (n_new[i] - n[i])
-        right.append(first_term((w_new, n_new), (w, n), i) + turned)
+        rotation_term = _dot(w, _change(n_new, n)) * n_new[i] + _dot(w, n) * (n_new[i] - n[i])
+        right.append(first_term((w_new, n_new), (w, n), i) + rotation_term)
     rng = generator()
     a, b, p, q = (unit_velocities(rng, 1.0, 1.0) for _ in range(4))
     b, q = a + 0.1 * b, p + 0.1 * q

@@ -22,7 +22,7 @@ from ...verification.entry import Code
     "raises the gradient of the satellite's distance.",
 )
 def normal_of_the_boundary(normal: Code) -> Verdict:
-    return _is_unit_normal(normal, turned=False)
+    return _is_unit_normal(normal, rotated=False)
 
 
 @erratum(
@@ -43,20 +43,20 @@ def normal_of_the_boundary(normal: Code) -> Verdict:
     "1.",
 )
 def normal_at_a_satellite(normal: Code) -> Verdict:
-    return _is_unit_normal(normal, turned=True)
+    return _is_unit_normal(normal, rotated=True)
 
 
-def _is_unit_normal(normal: Code, turned: bool) -> Verdict:
+def _is_unit_normal(normal: Code, rotated: bool) -> Verdict:
     """Whether it is the kinetic gradient of the satellite's distance from the wall, and of norm 1."""
     import sympy as sp
 
     from ...geometry.disk import symbolic as sym
 
     direction, x1, x2, angle = sp.symbols("direction x1 x2 angle", real=True)
-    turn = sp.Symbol("turn", real=True) if turned else sp.Integer(0)
+    turn = sp.Symbol("turn", real=True) if rotated else sp.Integer(0)
     k = sp.cos(direction), sp.sin(direction)
-    place = rolling.satellite(x1, x2, angle, 1, sp)
-    gradient = [sp.diff(k[0] * place[0] + k[1] * place[1], q) for q in (x1, x2, angle)]
+    centre = rolling.satellite(x1, x2, angle, 1, sp)
+    gradient = [sp.diff(k[0] * centre[0] + k[1] * centre[1], q) for q in (x1, x2, angle)]
     raised = [g / weight for g, weight in zip(gradient, (sym.m, sym.m, sym.J), strict=True)]
     n = normal(sym.m, sym.J, k, angle - turn, turn, sp)
     parallel = [verify(n[i] * raised[0], n[0] * raised[i]) for i in (1, 2)]

@@ -90,8 +90,8 @@ def components_of_the_straightening(claimed: Code) -> Verdict:
     k, bar = rng.integers(-2, 3, 4000), rng.uniform(-limit, limit, 4000)
     alpha = bar + k * spacing
     y1, y2 = rng.uniform(-1, 1, 4000), rng.uniform(-eps, 0, 4000)
-    place, height = rolling.straight_contact(y1, y2, alpha)
-    straight = height >= eps * tooth(place / eps)
+    contact, height = rolling.straight_contact(y1, y2, alpha)
+    straight = height >= eps * tooth(contact / eps)
     x1, x2 = rolling.bend(y1, y2, bar, 1.0)
     free = is_free(np.stack([x1, x2, alpha]), eps, count)
     components = np.arange(-2, 3)

@@ -220,11 +220,11 @@ def translation_along_the_rolling(shift: Code) -> Verdict:
     j, k = rng.integers(-20, 21, (2, m.size))
     ratio = rng.uniform(1, 50, m.size)  # rho / eps
     periods, along = shift(j, k, m, J, ratio)
-    turned = along / np.sqrt(m + J)  # in units of eps; the centre goes back as much
-    remainder = periods - turned - j
+    rotated = along / np.sqrt(m + J)  # in units of eps; the centre goes back as much
+    remainder = periods - rotated - j
     inside = (remainder > -1e-9) & (remainder < 1 + 1e-9)
     return every(
-        holds(np.abs(turned - k * ratio) < 1e-9, "turns by k rho", m=m, J=J), holds(inside, "remainders", j=j, k=k)
+        holds(np.abs(rotated - k * ratio) < 1e-9, "turns by k rho", m=m, J=J), holds(inside, "remainders", j=j, k=k)
     )
 
 
