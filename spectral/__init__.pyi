@@ -29,7 +29,7 @@ from .work_diagrams.order import fit_order as fit_order
 from .work_diagrams.problem import ReferenceValue as ReferenceValue
 from .work_diagrams.problem import WorkMethod as WorkMethod
 from .work_diagrams.problem import WorkProblem as WorkProblem
-from .work_diagrams.report import MethodRecord as MethodRecord
+from .work_diagrams.report import MethodFacts as MethodFacts
 from .work_diagrams.report import WorkReport as WorkReport
 from .work_diagrams.report import WorkRow as WorkRow
 from .work_diagrams.runs import work_precision as work_precision

@@ -130,7 +130,7 @@ def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
 
 
 @dataclass(frozen=True)
-class MethodRecord:
+class MethodFacts:
     """What a report says of a method besides its rows.
 
     Attributes
@@ -177,7 +177,7 @@ class WorkReport:
     problem: str
     norms: tuple[str, ...]
     auto: str
-    methods: Mapping[str, MethodRecord]
+    methods: Mapping[str, MethodFacts]
     machine: Machine
     rows: tuple[WorkRow, ...] = ()
 
@@ -189,7 +189,7 @@ class WorkReport:
             reference = problem.reference_for(method.name)
             size = float(np.max(np.abs(reference.value), initial=0.0))
             floor = max(reference.error, ROUNDED * size, ROUNDED * np.finfo(np.float64).tiny)
-            records[method.name] = MethodRecord(method.order, method.is_random, reference.source, floor)
+            records[method.name] = MethodFacts(method.order, method.is_random, reference.source, floor)
         return cls(problem.name, tuple(problem.norms), problem.auto, MappingProxyType(records), machine)
 
     def with_row(self, row: WorkRow) -> WorkReport:
@@ -291,7 +291,7 @@ class WorkReport:
             data: dict[str, Any] = json.loads(text)
             if data["format"] != FORMAT:
                 raise InputError(f"JSON: expected format {FORMAT} of a report, got {data['format']!r}")
-            methods = {name: MethodRecord(**record) for name, record in data["methods"].items()}
+            methods = {name: MethodFacts(**record) for name, record in data["methods"].items()}
             rows = tuple(WorkRow.of_dict(row) for row in data["rows"])
             machine = Machine.of_dict(data["machine"])
             return cls(data["problem"], tuple(data["norms"]), data["auto"], MappingProxyType(methods), machine, rows)
