@@ -201,7 +201,7 @@ MOST_TIMES = 30
 # ---- laws of isometries: probabilities of the branches s theta + c ------------------------------------------------
 @dataclass(frozen=True)
 class Isometries:
-    """Branches s theta + c with probabilities p(theta), shape (angles, branches), smooth between kinks."""
+    """Branches s theta + c with probabilities p(theta), shape (angles, branches), smooth between breakpoints."""
 
     sign: Floats
     offset: Floats
@@ -322,7 +322,8 @@ def joined(word: tuple[Operator, ...]) -> tuple[Operator, ...]:
     return tuple(found)
 
 
-# Rows of arcs are followed to so many times the hits whose kinks are followed in theta; so many nodes do for these.
+# Rows of arcs are followed to so many times the hits whose breakpoints are followed in theta; so many nodes do for
+# these.
 MORE_HITS, FEW_NODES = 16, 6
 
 
@@ -592,7 +593,7 @@ class Outcome:
 
 
 COARSE, FINE = Rule(40, 16, 400, 40), Rule(56, 20, 600, 64)
-# Crevices are followed less far where other teeth multiply the kinks.
+# Crevices are followed less far where other teeth multiply the breakpoints.
 FEWER_CROSSINGS = 3
 
 

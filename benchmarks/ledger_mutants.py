@@ -1,8 +1,8 @@
-"""Wrong formulas put in the place of the ledger's right ones: every check must refuse them.
+"""Wrong formulas put instead of the ledger's right ones: every check must refuse them.
 
-``python -m benchmarks.ledger_mutants`` changes every right formula, and the helpers beside it, in one place at a time:
-a constant by one or in its sign, + for -, * for /, sin for cos, floor for ceil, min for max, a comparison turned, a
-hypothesis that always or never holds. It also moves each argument and each part of the result, and changes its sign.
+``python -m benchmarks.ledger_mutants`` changes every right formula, and the helpers beside it, in one position at a
+time: a constant by one or in its sign, + for -, * for /, sin for cos, floor for ceil, min for max, a comparison turned,
+a hypothesis that always or never holds. It also moves each argument and each part of the result, and changes its sign.
 The formula alone sees the change, its check does not. ``--library`` changes the formulas of the library that rows use,
 for the whole ledger, checks included, and asks whether any row notices.
 """
@@ -67,7 +67,7 @@ Formula = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Change:
-    """A function changed in one place; ``label`` names it and has the changed line as it reads now."""
+    """A function changed in one position; ``label`` names it and has the changed line as it reads now."""
 
     label: str
     function: FunctionType
@@ -102,7 +102,7 @@ class Outcome:
 
 
 def changes(function: FunctionType) -> list[Change]:
-    """Every version of the function with one place changed."""
+    """Every version of the function with one position changed."""
     name, node = _parsed(function.__code__)
     if node is None:
         return []
@@ -155,7 +155,7 @@ def _compiled(node: ast.FunctionDef | ast.Lambda, like: CodeType) -> CodeType:
 
 
 def _changed(node: ast.FunctionDef | ast.Lambda) -> Iterator[tuple[Any, str]]:
-    """Copies of the function with one place changed, each with the changed line."""
+    """Copies of the function with one position changed, each with the changed line."""
     for number, (line, field) in enumerate(_lines(node)):
         start: Steps = ((field, None),)
         for path in _places(_at(line, start), start):
@@ -216,7 +216,7 @@ def _put(node: Any, path: Steps, new: ast.AST) -> None:
 
 
 def _replacements(node: ast.AST) -> Iterator[ast.AST]:
-    """What may stand in a place instead of what stands there."""
+    """What may stand in a position instead of what stands there."""
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
         yield ast.Constant(node.value + 1)
         if node.value:

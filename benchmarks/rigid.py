@@ -97,7 +97,7 @@ def check_involution() -> list[InvolutionCheck]:
             good = out.escaped
             back = geo.collide(DISK, wall, scale, out.position[good], -out.velocity[good])
             error = np.abs(back.velocity + velocity[good]).max(axis=1)
-            # places are computed from angles of up to the spacing, and keep the rounding error of that size
+            # positions are computed from angles of up to the spacing, and keep the rounding error of that size
             size = np.array([1e-3 * scale, Satellites.around(scale, scale * wall.depth).spacing])
             shaken = np.zeros(len(error))
             for _ in range(SHAKES):

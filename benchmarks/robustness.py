@@ -106,7 +106,7 @@ SHALLOWEST = 1e-3
 Point = tuple[float, float]
 # A wall and rays to the end, or to the judge's.
 Follow = Callable[[geo.Wall, Floats, Floats], RefinedTrace]
-# Rays of a kind: places and angles of so many on a wall.
+# Rays of a kind: positions and angles of so many on a wall.
 Rays = Callable[[geo.Wall, int, np.random.Generator], tuple[Floats, Floats]]
 COUNTED = ("rays", "lost", "flagged", "conditioned", "wrong")
 
@@ -164,7 +164,7 @@ def brute_force(wall: geo.Wall, x: Floats, theta: Floats) -> RefinedTrace:
 
 
 def rays_beside_corners(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Two thirds of the rays at places on the wall's segments next to their ends, the rest as `aimed_rays`."""
+    """Two thirds of the rays at positions on the wall's segments next to their ends, the rest as `aimed_rays`."""
     chains = [wall.vertices, *wall.island_vertices]
     start, end = (np.concatenate([chain[part] for chain in chains]) for part in (slice(-1), slice(1, None)))
     straight = 2 * count // 3
@@ -366,7 +366,7 @@ def _is_precise(wall: geo.Wall, traced: geo.Trace, k: int, x: float, theta: floa
 def _agree(wall: geo.Wall, traced: geo.Trace, twin: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:
     """Which rays end alike within conditioning, and how far apart in units of EPS times the derivative.
 
-    They are as far apart as their angles, or as their places seen from along the ray.
+    They are as far apart as their angles, or as their positions seen from along the ray.
     """
     gone = (traced.status == geo.Status.ESCAPED) & (twin.status == geo.Status.ESCAPED)
     difference = np.abs((traced.theta - twin.theta[:, 0]) - twin.theta[:, 1])

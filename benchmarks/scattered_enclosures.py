@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 DIAGONAL, TEETH, LISTED, DEGREES = 200, 12, 5, 3000
 # A tolerance so coarse that what the polynomials leave out shows.
 COARSE = 0.1
-# The judge's panels, nodes on each, and kinks; differences of roundings.
+# The judge's panels, nodes on each, and breakpoints; differences of roundings.
 PANELS, NODES, BREAKPOINTS, ROUNDING = 750, 4, 256, 1e-15
 # Laws in given bases, and eigenvalues of arcs of half angle 1.2 by a second method.
 GIVEN, REFUSED, ARC, ARC_ERROR = 120, 12, (1.0, 0.3670253152, -0.311346443), 5e-10
@@ -165,7 +165,7 @@ def refused_case(number: int) -> Case:
 
 def _judge(g: float, law: ker.Law, degrees: int, panels: int) -> Floats:
     node, fraction = np.polynomial.legendre.leggauss(NODES)
-    # kinks of the law as edges: they make the rule better, not its values others
+    # breakpoints of the law as edges: they make the rule better, not its values others
     edges = np.union1d(np.linspace(0.0, np.pi, panels + 1), law.breakpoints(BREAKPOINTS)[0])
     half = 0.5 * np.diff(edges)[:, None]
     angle = (0.5 * (edges[1:] + edges[:-1])[:, None] + half * node).ravel()

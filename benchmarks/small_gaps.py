@@ -10,8 +10,9 @@ distribution of slopes, of divided differences or of the form's bounds:
 - *rays*: for steeper walls a quarter of a million rays are followed by the tests' textbook tracer; the least value of
   the same form on polynomials is an upper bound of the gap but for its sampling error, and close to it.
 
-``--random FIRST LAST`` asks the same of random walls: polynomial curves of random heights between random places, depths
-from 1e-7 to 1e-2, with and without mirror axis and flat tops; every third is a mixture of the laws of two such walls.
+``--random FIRST LAST`` asks the same of random walls: polynomial curves of random heights between random positions,
+depths from 1e-7 to 1e-2, with and without mirror axis and flat tops; every third is a mixture of the laws of two such
+walls.
 """
 
 from __future__ import annotations

@@ -186,7 +186,7 @@ def resistance_found(scene: str) -> Found:
 
 def distance_found(scene: str) -> Found:
     """W_1 between the rows and Lambert's, averaged, from formulas of the rows."""
-    # slow where kinks are many
+    # slow where breakpoints are many
     tolerance = 1e-11 if scene == "triangular-teeth" else 1e-7
     value, error = mean_over_angles(
         lambda theta: np.array([ROWS[scene](theta).distance_to_lambert()]), 0.0, 0.5 * np.pi, tolerance

@@ -173,7 +173,7 @@ class Judge:
 
 
 def _interpolation(angle: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """The place on the grid below every angle, and the fraction of the one above."""
+    """The position on the grid below every angle, and the fraction of the one above."""
     place = np.clip(angle * ANGLES / np.pi - 0.5, 0.0, ANGLES - 1.0)
     low = np.minimum(place.astype(np.intp), ANGLES - 2)
     return low, place - low

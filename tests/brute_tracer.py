@@ -2,7 +2,7 @@
 
 It takes the vertices of the wall and of its islands, not the tables. Every flight is tested against every segment by
 Cramer's rule; the cells that the ray passes are taken one after the other, without sides; nothing is skipped. A hit is
-ahead if the segment's line lies more than ``NEAR`` in front of the place, far below any thickness that doubles can
+ahead if the segment's line lies more than ``NEAR`` in front of the position, far below any thickness that doubles can
 express and far above the rounding of 31 digits. So a coincident face of a plate without thickness, and the other side
 of a peak next to its tip, are behind the ray by what they are. Faces that cross by rounding are not for this judge.
 """
@@ -33,7 +33,7 @@ from asperity.geometry.tracing.double_double.arithmetic import (
 from asperity.geometry.tracing.refinement import RefinedTrace
 
 ESCAPED, CORNER, BOUNCE_LIMIT = 0, 1, 3
-# In front of a place, as a fraction of the cell and the depth: double-doubles carry some 1e-31, plates are 1e-17 at
+# In front of a position, as a fraction of the cell and the depth: double-doubles carry some 1e-31, plates are 1e-17 at
 # least.
 NEAR = 1e-25
 # What doubles may be off where they only sort out segments that the ray cannot meet.

@@ -169,7 +169,7 @@ def exact_row(
 ) -> Row:
     """Where a polygonal hollow sends the rays of one angle.
 
-    The ray just right of a place is followed through a triangulation of the hollow. It keeps the nearest vertex that
+    The ray just right of a position is followed through a triangulation of the hollow. It keeps the nearest vertex that
     it passes on the left; there its itinerary changes, and the next ray begins.
 
     Parameters

@@ -98,7 +98,7 @@ def collide_plainly(disk, wall, scale, spacing, position, velocity, most_contact
 
 
 class _Flight:
-    """One flight of several disks from their places, in units of the wall."""
+    """One flight of several disks from their positions, in units of the wall."""
 
     def __init__(self, wall, scale, spacing, x, alpha, height, velocity):
         self.wall, self.scale, self.spacing = wall, scale, spacing
@@ -106,7 +106,7 @@ class _Flight:
         self.fastest = np.hypot(velocity[:, 0], velocity[:, 1]) + np.abs(velocity[:, 2])
 
     def satellites(self, rows, time):
-        """Places (rows, 3, 2) and angles (rows, 3) of the three lowest satellites."""
+        """Positions (rows, 3, 2) and angles (rows, 3) of the three lowest satellites."""
         v = self.velocity[rows]
         alpha = self.alpha[rows] + self.scale * v[:, 2] * time
         lowest = alpha - self.spacing * np.round(alpha / self.spacing)

@@ -37,7 +37,7 @@ class Flight:
         self.v = list(velocity)
 
     def satellites(self, time):
-        """Places and angles of the three lowest ones."""
+        """Positions and angles of the three lowest ones."""
         alpha = self.alpha + self.scale * self.v[2] * time
         lowest = alpha - self.spacing * mp.nint(alpha / self.spacing)
         x, y = self.x + self.v[0] * time, self.height + self.v[1] * time

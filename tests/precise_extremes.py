@@ -3,9 +3,9 @@
 The stability report reads ``src/asperity/bench/running/extreme_rays.json``. Walls with a closed form are judged by it
 (`precise_rays`), the others by the tracer in 50 digits (`precise_tracer`); neither shares code with the library.
 
-Of each ray the file has the place, the angle, the outgoing angle rounded once, the number of hits, the condition (1 +
-the moduli of the derivatives of the outgoing state by the incoming one, places in cells), whether it is known to pass a
-corner too closely, and what becomes of it when it is moved by up to 32 ulps, where that is something else.
+Of each ray the file has the position, the angle, the outgoing angle rounded once, the number of hits, the condition (1
++ the moduli of the derivatives of the outgoing state by the incoming one, positions in cells), whether it is known to
+pass a corner too closely, and what becomes of it when it is moved by up to 32 ulps, where that is something else.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ MOST_FLIGHTS = 1_000_000
 
 
 def spread_rays(count, low, seed):
-    """Places in (0, 1); half the angles from the flux, half uniform in the logarithm from ``low``, from either side."""
+    """Positions in (0, 1); half the angles from the flux, half log-uniform from ``low``, from either side."""
     rng = np.random.default_rng(seed)
     grazing = 10.0 ** rng.uniform(np.log10(low), -2.0, count)
     grazing = np.where(rng.random(count) < 0.5, grazing, np.pi - grazing)
@@ -119,7 +119,7 @@ def judge_of(name, wall):
 
 
 def rays_of(name, wall):
-    """Places and angles of the rays of a case."""
+    """Positions and angles of the rays of a case."""
     if name.endswith("joints"):
         return aimed_rays(wall, RAYS, 3)
     low = ISLAND_ANGLE if name.startswith("floating") else LOWEST_ANGLE

@@ -1,6 +1,6 @@
 """Where single rays go, from closed forms in 50 digits: a second judge beside the tracer of `precise_tracer`.
 
-Each function returns a function of the place x in (0, 1) of the opening and of the angle. That gives the outgoing
+Each function returns a function of the position x in (0, 1) of the opening and of the angle. That gives the outgoing
 angle, the number of hits, and a tuple of integers that changes where the ray meets a corner.
 """
 

@@ -52,7 +52,7 @@ FEW = 4
 
 
 class PreciseRay(NamedTuple):
-    """Place and angle at the way out, or None, the number of bounces, and the pieces hit or the crossings left out."""
+    """Position and angle at the exit, or None, the number of bounces, and the pieces hit or the crossings left out."""
 
     x: mp.mpf | None
     theta: mp.mpf | None
@@ -166,7 +166,7 @@ def _faces(sides, joints):
 
 
 def trace_precisely(scene, x, theta, limit=2000):
-    """Follow one ray whose place and angle are numbers through the wall that the tables define."""
+    """Follow one ray whose position and angle are numbers through the wall that the tables define."""
     with mp.workdps(DIGITS + GUARD):
         base = mp.floor(mp.mpf(x) / mp.mpf(scene.cell)) * mp.mpf(scene.cell)
         p = (mp.mpf(x) - base, mp.mpf(0))

@@ -2,8 +2,8 @@
 
 Angle and edges of bins are the doubles that the library has, taken as exact; pi is pi. Where rays go is the closed form
 of Rudzis 2022, section 2.2.2, corrected: on the left of the bottom N - 1 or N hits with the probabilities below, on the
-right the mirror image. Between kinks, edges and the angles sent to edges every density is a sinusoid, whose integral is
-its value in the middle times 2 sin(width/2).
+right the mirror image. Between breakpoints, edges and the angles sent to edges every density is a sinusoid, whose
+integral is its value in the middle times 2 sin(width/2).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NOTHING = mp.mpf(10) ** -30
 
 
 def densities(psi, middle):
-    """Pairs of an isometry (sign, offset) and its density p(theta) sin(theta), valid between the kinks around there."""
+    """Pairs of an isometry (sign, offset) and its density p(theta) sin(theta), valid between the breakpoints around."""
     half = psi / 2
     most, most_mirror = (max(mp.ceil(2 * angle / psi), 1) for angle in (middle, mp.pi - middle))
 

@@ -39,7 +39,7 @@ GOAL, MOST_RAYS = 1e-10, 8_000_000
 CUT_FLIGHTS, CUT_TOLERANCE, ROUGH, ROUGH_ROW = 1_200_000, 1e-5, 1e-2, 1e-3
 # Sides of the grid of strata, and the number of replicates; in a row, of shifted midpoint sums.
 STRATA, REPLICATES, MIDPOINTS = 500, 8, 1 << 16
-# Walks along a row, each with the places at which the one before met a piece that it had not seen.
+# Walks along a row, each with the positions at which the one before met a piece that it had not seen.
 ATTEMPTS = 3
 # Pieces of a row at most.
 MOST_PIECES = 6000
@@ -75,7 +75,7 @@ def row_integral(table, theta, low, high, samples, exactness):
 
 @compiled
 def walk(table, theta, ladder, exactness):
-    """The integral from the first to the last place of the ladder, its error, places of other labels, and the rays."""
+    """Integral from the first to the last entry of the ladder, its error, positions of other labels, and the rays."""
     xs, outs, labels = np.empty(200), np.empty(200), np.empty(200, np.uint64)
     strange = [0.0 for _ in range(0)]
     last = ladder[0]
@@ -83,7 +83,7 @@ def walk(table, theta, ladder, exactness):
     start, total, error, gaps, pieces = last, 0.0, 0.0, 0.0, 0
     rays = ladder.shape[0]
     for k in range(1, ladder.shape[0]):
-        # the places still to be reached, the nearest one on top: the middle of a gap goes on top of its far end
+        # the positions still to be reached, the nearest one on top: the middle of a gap goes on top of its far end
         xs[0] = ladder[k]
         outs[0], labels[0] = follow(table, xs[0], theta)
         count = 1
@@ -119,7 +119,7 @@ def walk(table, theta, ladder, exactness):
 
 @compiled
 def piece_integral(table, theta, low, high, label, exactness):
-    """tanh-sinh over a piece, finer until two rules agree: with error, a place of another label (nan: none), and rays.
+    """tanh-sinh over a piece, finer until two rules agree; error, a position of another label (nan: none), rays.
 
     What such rays weigh counts as error.
     """

@@ -43,7 +43,7 @@ def test_means_by_tables_are_those_by_cutting_rows_at_edges(half_angle, panels):
 
 
 def test_rows_integrated_over_theta_give_the_matrix_of_polygons(panels):
-    """A Gauss rule in theta between the kinks that one panel's functions have, fine enough for 1e-3."""
+    """A Gauss rule in theta between the breakpoints that one panel's functions have, fine enough for 1e-3."""
     law = ker.CircularArcLaw(1.2)
     edges = np.unique(np.concatenate([panels.edges, np.linspace(0.0, np.pi, 200)]))
     theta, weight = gauss_rule(edges, 3)

@@ -48,7 +48,7 @@ def test_the_strip_is_filled_up_to_its_bound_where_the_angle_is_irrational(ratio
 def test_the_strip_has_finite_orbits_where_the_angle_is_rational(p, q):
     record, widths = in_a_strip(math.tan(math.pi * p / q) ** 2, 240)
     # seen from the strip's other side every time, each collision turns the tangential velocity by pi - 2 pi p/q: the
-    # places are the corners of a regular polygon, seen from the side
+    # positions are the corners of a regular polygon, seen from the side
     corners = Fraction(q - 2 * p, 2 * q).denominator
     places = {round(float(x), 8) for x in record.position[1:, 0, 0]}
     assert len(places) <= corners
@@ -61,7 +61,8 @@ def test_the_strip_has_finite_orbits_where_the_angle_is_rational(p, q):
 @pytest.mark.parametrize(("ratio", "q"), [(1.0, 5), (1.0, 7), (0.5, 7), (3.0, 5)])
 def test_bounded_orbits_of_the_no_slip_wedge_are_periodic_at_rational_angles(ratio, q):
     # two reflections turn velocities by twice the angle between both walls' chi, whose cosine is
-    # (J - m cos(opening))/(m + J); where that angle is 2 pi/q, velocities return after 2 q collisions, and places too
+    # (J - m cos(opening))/(m + J); where that angle is 2 pi/q, velocities return after 2 q collisions, and positions
+    # too
     opening = math.acos((1 - (1 + ratio) * math.cos(2 * math.pi / q)) / ratio)
     disk, rng, n = geo.Disk(ratio, 1.0), np.random.default_rng(1), 150
     start = np.tile([math.cos(opening / 2), math.sin(opening / 2)], (n, 1))

@@ -1,4 +1,4 @@
-"""What closed-form laws must fulfil: detailed balance, kinks, mirror images, published and derived numbers."""
+"""What closed-form laws must fulfil: detailed balance, breakpoints, mirror images, published and derived numbers."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_triangular_branches_are_smooth_between_kinks(angle: float) -> None:
 
 
 def rule_by_slot(law: BranchLaw, edges: np.ndarray, order: int) -> np.ndarray:
-    """The integral of every slot's probability between every two kinks."""
+    """The integral of every slot's probability between every two breakpoints."""
     angle, weight = SINE.quadrature(edges, order)
     probability, _ = law.branches(angle)
     return (weight[:, None] * probability).reshape(edges.size - 1, order, -1).sum(axis=1)

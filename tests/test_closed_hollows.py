@@ -91,7 +91,8 @@ def test_closed_forms_agree_with_the_loop(name, make):
     for traced in (closed, loop):
         miss = np.abs(traced.theta[:TWIN_RAYS] - twin.theta[:, 0] - twin.theta[:, 1])
         assert np.all(miss[same] <= UNITS * unit[same])
-        # the place at the opening is as uncertain as the ray's distance from a fixed point, over the sine of its angle
+        # the position at the opening is as uncertain as the ray's distance from a fixed point, over the sine of its
+        # angle
         miss = np.abs(traced.x[:TWIN_RAYS] - twin.x[:, 0] - twin.x[:, 1]) * np.sin(twin.theta[:, 0]) / wall.period
         assert np.all(miss[same] <= UNITS * unit[same] + EPS * np.abs(x[:TWIN_RAYS][same]) / wall.period)
 

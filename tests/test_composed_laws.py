@@ -86,7 +86,7 @@ def test_errors_of_composed_laws_hold(seed: int) -> None:
 
 
 def test_panels_report_what_dense_kinks_leave_out() -> None:
-    # kinks without number near grazing on both sides of the product: no number of panels follows them
+    # breakpoints without number near grazing on both sides of the product: no number of panels follows them
     deep, shallow = (leaf(ker.RectangularTeethLaw(r), Rectangular({r: 1})) for r in (2.5, 1.3))
     exact, error = reference(deep @ shallow, ker.Bins(3))
     found = ker.discretise((deep @ shallow).law, ker.Bins(3), method="quadrature")

@@ -124,7 +124,7 @@ def test_errors_of_symmetrised_counts_are_those_of_a_multinomial() -> None:
     n = 10**8
     counts = np.array([[3 * n, n], [2 * n, 4 * n]])
     found = array_from_counts([counts], UNEVEN, symmetrise=True, independent=True)
-    fraction = np.array([0.3, 0.3, 0.4])  # first diagonal place, both others together, second diagonal place
+    fraction = np.array([0.3, 0.3, 0.4])  # first diagonal position, both others together, second diagonal position
     covariance = (np.diag(fraction) - np.outer(fraction, fraction)) / (10 * n)
     # entries 4 p_1, (4/sqrt 3) p_2 / 2 twice, (4/3) p_3
     form = np.diag([16.0, 16.0 / 3.0 / 4.0 * 2.0, 16.0 / 9.0])

@@ -61,7 +61,7 @@ def test_rectangular_teeth_are_exact_up_to_grazing() -> None:
 
 @dataclass(frozen=True)
 class Swap(ker.BranchLaw):
-    """Specular reflection for steep angles, retroreflection for others: two kinks."""
+    """Specular reflection for steep angles, retroreflection for others: two breakpoints."""
 
     steep: float
     evaluations = 2

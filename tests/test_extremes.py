@@ -138,7 +138,7 @@ def test_deep_channels_follow_the_law_of_rectangular_teeth(theta, height_to_widt
 
 
 def test_flags_in_deep_channels_are_settled_where_half_an_ulp_of_the_angle_meets_no_corner():
-    # some 10^13 crossings down to the bottom; the place there is known to a hundredth of the width
+    # some 10^13 crossings down to the bottom; the position there is known to a hundredth of the width
     depth, width = 5e3, 0.5
     rng = np.random.default_rng(7)
     theta, place = 10.0 ** rng.uniform(-9.4, -8.8, RAYS), rng.random(RAYS)

@@ -106,7 +106,7 @@ def test_every_relative_link_on_a_page_leads_to_a_file():
 @pytest.fixture(scope="module")
 def distributions(tmp_path_factory):
     """The sdist, and the wheel built from it, made from a copy so that the tree stays as it is."""
-    # not "build" alone: a folder of that name, left by an earlier build, would be imported in its place
+    # not "build" alone: a folder of that name, left by an earlier build, would be imported instead
     pytest.importorskip("build.__main__")
     copy = tmp_path_factory.mktemp("tree") / "asperity"
     written = {".git", "build", "dist", "study", "bench-results", ".hypothesis"}

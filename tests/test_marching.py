@@ -10,8 +10,8 @@ from asperity.geometry.polygons.beams import beams_of
 from interval_marching import exact_row, exact_rows
 from random_hollows import random_hollow, wall_with
 
-# Shares of a row that two methods may see differently: rounding of a vertex's place over sin(theta), for a hundred
-# reflections each.
+# Fractions of a row that two methods may see differently: rounding of a vertex's position over sin(theta), for a
+# hundred reflections each.
 ROW_DEFECT = 1e-12
 
 

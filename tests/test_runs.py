@@ -110,7 +110,7 @@ def test_wedges_of_triangular_teeth_count_every_hit(angle):
     clear = np.minimum(outgoing, np.pi - outgoing) > 1e-12
     assert clear.mean() > 0.999
     same = traced.collisions == hits
-    # rays within rounding of one hit more or less: the fraction of starts that lie within 64 ulp of such a place
+    # rays within rounding of one hit more or less: the fraction of starts that lie within 64 ulp of such a position
     assert np.mean(~same) <= 1e-4
     assert traced.counts()["escaped"] >= len(x) - np.sum(~clear)
     assert np.max(np.abs(traced.theta - outgoing)[same & traced.escaped]) <= 64 * EPS

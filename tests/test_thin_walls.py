@@ -60,7 +60,7 @@ def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
 
 @pytest.mark.parametrize("theta", [1e-4, 1e-6, np.pi - 1e-7, 1e-9])
 def test_double_doubles_count_the_cells_that_a_ray_passes_without_a_hit(theta):
-    """To the floor and out again, with the place by mpmath."""
+    """To the floor and out again, with the position by mpmath."""
     lying = [geo.Segment((0.2, -0.9), (0.7, -0.9)), geo.Segment((0.7, -0.9), (0.2, -0.9))]
     wall = geo.Wall(FLOOR, period=1.0, islands=[lying])
     twin = refined_trace(wall.scene, np.array([0.3]), np.array([theta]), COLLISIONS)

@@ -43,7 +43,7 @@ def main(disks: int = 20, collisions: int = 1000) -> dict[str, float]:
 def strip_widths(
     disk: geo.Disk, law: ker.CollisionLaw | None, disks: int, collisions: int, rng: np.random.Generator
 ) -> np.ndarray:
-    """Widths of the places of collision in a strip, as fractions of the no-slip bound of the initial velocity."""
+    """Widths of the positions of collision in a strip, as fractions of the no-slip bound of the initial velocity."""
     velocity = disk.from_angles(rng.uniform(0.3, 2.8, disks), rng.uniform(0.3, 2.8, disks))
     walls = no_slip(disk) if law is None else law
     record = ker.play(geo.Container.strip(), walls, np.zeros((disks, 2)), velocity, collisions, rng)

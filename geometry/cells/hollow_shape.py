@@ -13,7 +13,7 @@ from ..curves.segment import Segment
 from .cell import Cell
 from .hollow import Hollow
 
-# Shapes are equal, and sides level or vertical, to this fraction of the size of the numbers: places are rounded once
+# Shapes are equal, and sides level or vertical, to this fraction of the size of the numbers: positions are rounded once
 # each, and named walls compute them by some ten operations.
 SHAPE_TOLERANCE = 64.0 * EPS
 # Besides its ends three inner points tell a piece: circles need three points, ellipses and cubics five.

@@ -24,8 +24,8 @@ PARAMETERS = np.array([0.25, 0.5, 0.75, 1.0])
 def has_mirror_axis(wall: Cell) -> bool:
     """Whether the periodic wall has a mirror axis x = const; with islands only x = period/2 is tried.
 
-    A wall without islands is compared with its mirror image as a cycle of pieces, from every place at which the first
-    piece of the one can be the first of the other; so the cell may start anywhere.
+    A wall without islands is compared with its mirror image as a cycle of pieces, from every position at which the
+    first piece of the one can be the first of the other; so the cell may start anywhere.
     """
     tolerance = MIRROR_TOLERANCE * max(wall.period, float(np.abs(wall.vertices).max()), wall.depth)
     if wall.islands:

@@ -149,7 +149,7 @@ def at_the_tops(wall: Wall, scale: float, position: Floats, velocity: Floats) ->
 def from_the_tops(
     wall: Wall, scale: float, position: Floats, start: Floats, velocity: Floats, results: DiskResults
 ) -> None:
-    """Turn places and times that began at ``start`` into those of disks that begin and end at x2 = 0."""
+    """Turn positions and times that began at ``start`` into those of disks that begin and end at x2 = 0."""
     level = scale * wall.origin[1]
     if wall.origin == (0.0, 0.0):
         return

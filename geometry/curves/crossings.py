@@ -50,7 +50,7 @@ WINDING_BLOCK = 4_000_000
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where pieces cross, or make a slit: the place in the wall's coordinates and the labels of the pieces there."""
+    """Where pieces cross, or make a slit: the point in the wall's coordinates and the labels of the pieces there."""
 
     point: tuple[float, float]
     labels: tuple[str, ...]
@@ -59,7 +59,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class _Turn:
-    """Where a path turns back along itself: the place, the two pieces, and points beside both, left, then right."""
+    """Where a path turns back along itself: the point, the two pieces, and points beside both, left, then right."""
 
     point: tuple[float, float]
     pieces: tuple[int, int]
@@ -207,7 +207,7 @@ def _faces(loops: Sequence[_Loop]) -> tuple[NDArray[np.object_], Floats]:
 
 
 def _winding_numbers(points: Floats, points_tested: Floats) -> NDArray[np.int64]:
-    """Count how often the closed polyline winds around each place, counterclockwise."""
+    """Count how often the closed polyline winds around each point, counterclockwise."""
     start, end = points[:-1], points[1:]
     winding = np.zeros(len(points_tested), dtype=np.int64)
     block = max(1, WINDING_BLOCK // len(start))

@@ -86,7 +86,7 @@ class RollingCharts:
         return np.asarray(rotation - self.nearest(rotation) * (self.spacing / self.scale))
 
     def satellite(self, configuration: ArrayLike, number: ArrayLike) -> Floats:
-        """Return the places (..., 2) of the satellites S_k, k = ``number``, height 0 at the tops (eq. 1.38).
+        """Return the positions (..., 2) of the satellites S_k, k = ``number``, height 0 at the tops (eq. 1.38).
 
         Examples
         --------
@@ -98,7 +98,7 @@ class RollingCharts:
         return _join(rolling.satellite(x1, x2, bar, self.scale))
 
     def contact(self, configuration: ArrayLike) -> Floats:
-        """Return the place (..., 2) of the lowest satellite: G_eps (eq. 3.60', as the map of M* to the plane)."""
+        """Return the position (..., 2) of the lowest satellite: G_eps (eq. 3.60', as the map of M* to the plane)."""
         x1, x2, alpha = _split("configuration", configuration, 3)
         return _join(rolling.satellite(x1, x2, self.residual(alpha), self.scale))
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...core.checks import Floats
 
-# Samples that a row starts from, at irregular places so that no symmetry of the wall hides a piece from all of them.
+# Samples that a row starts from, at irregular positions so that no symmetry of the wall hides a piece from all of them.
 FIRST_SAMPLES = 32
 GOLDEN = 0.6180339887498949
-# Neighbouring rows have other places: any large number without pattern does.
+# Neighbouring rows have other positions: any large number without pattern does.
 ANGLE_SHIFT = 12345.6789
 # More of them at either end, each nearer to it by this ratio.
 END_SAMPLES, END_RATIO = 10, 0.3
@@ -21,7 +21,7 @@ _ENDS = END_RATIO ** np.arange(1, END_SAMPLES + 1) / FIRST_SAMPLES
 
 
 def first_nodes(theta: float, left: float, right: float, goal: float) -> Floats:
-    """Places of the samples that a row starts from, in any order.
+    """Positions of the samples that a row starts from, in any order.
 
     They lie elsewhere in every row, so that the rows together leave no large part of all rays unseen, and crowd at the
     ends of the opening, where the pieces of a smooth hollow become ever narrower.

@@ -87,7 +87,7 @@ def _first_time(
     configuration, w, end = after
     change = w[[0, 2]] - moving[0, [0, 2]]
     reached = configuration - start[0] - end * w[[0, 2]]
-    # start + v first + w (end - first) = place
+    # start + v first + w (end - first) = position
     if not np.any(change):
         # only v2 changed: it came back to height 0, or touched again at a height that v2 alone does not tell
         return float(end * w[1] / (w[1] - moving[0, 1]))

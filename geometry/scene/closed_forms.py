@@ -1,8 +1,8 @@
 """The table of the hollows that are reflected in closed form: of two lines, or of one circular arc.
 
-`tracing/compiled/closed_forms` reads its rows. A *fan* is a hollow of two lines: unfolded about its apex, the copies
+`tracing/compiled/closed_forms` reads its rows. A *wedge* is a hollow of two lines: unfolded about its apex, the copies
 of its triangle are a fan, a ray is straight, and it leaves through the copy of the opening that it meets first. A
-*bowl* is a hollow of one circular arc of at most a half circle: all hops of a ray are equal.
+*circular hollow* is a hollow of one circular arc of at most a half circle: all chords of a ray are equal.
 
 The columns are in `columns`.
 """
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 DOUBT_FRACTION = 2.0**-30
 # Shallower arcs are left to the loop, which keeps the digits of positions along them.
 FLATTEST_ARC = 0.05
-# In a narrower fan the loop takes runs of hits in one step.
+# In a narrower wedge the loop takes runs of hits in one step.
 NARROWEST_WEDGE = WIDEST_WEDGE
 
 

@@ -128,7 +128,7 @@ WIDE_ARC_COLUMNS = 18
 FORM = 0  # NO_FORM, FAN or BOWL
 FORM_LEFT = 1  # x of the ends of the opening
 FORM_RIGHT = 2
-DOUBT = 3  # a ray that passes a joint more closely is left to the loop: a length for a fan, an angle for a bowl
+DOUBT = 3  # a ray that passes a joint more closely is left to the loop: length in wedges, angle in circular hollows
 CIRCLE_X = 4  # the centre
 CIRCLE_Y = 5
 RADIUS = 6
@@ -137,10 +137,10 @@ WEDGE_X = 4  # the apex
 WEDGE_Y = 5
 COPIES = 6  # number K of copies of the triangle that a straight ray can meet
 CHAIN = 7  # K + 2 links for rays that first meet the right line, then as many for the others
-FORM_COLUMNS = 8  # of a bowl
+FORM_COLUMNS = 8  # of a circular hollow
 # Kinds of closed forms.
 NO_FORM, WEDGE, CIRCULAR = 0.0, 1.0, 2.0
-# A link of a fan's chain, from its first column on: the unfolded end of the opening, and the constant c in
+# A link of a wedge's chain, from its first column on: the unfolded end of the opening, and the constant c in
 # theta' = +-theta + c after as many hits as links came before. Link 0 is the end of the opening on the other side.
 LINK_X = 0
 LINK_Y = 1

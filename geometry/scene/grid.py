@@ -15,7 +15,7 @@ from .columns import POINT_X, POINT_Y
 CELLS_PER_PIECE = 2.0
 # Long pieces lie in many cells each; the grid is coarsened until a piece lies in no more than this many on average.
 MOST_ENTRIES = 16
-# A piece is listed in every cell that it comes this close to, in cells. A ray's walk through the cells and its place
+# A piece is listed in every cell that it comes this close to, in cells. A ray's walk through the cells and its position
 # there are wrong by some rounding errors of the hollow's size, a millionth of this where cells are 1e-3 of the size.
 MARGIN = 1e-6
 
@@ -34,7 +34,7 @@ def grid_of(starts: Floats, ends: Floats, first: int, base: int) -> tuple[list[f
     Returns
     -------
     list of 7 floats, array of int
-        Lower left corner, width and height of a cell, columns, rows, place of the first cell; then for every cell
+        Lower left corner, width and height of a cell, columns, rows, position of the first cell; then for every cell
         where its entries begin, the end of the last one, and the entries: numbers of lines
         and of joints where no line starts.
     """
@@ -78,10 +78,10 @@ def cells_about(low, high, count):
 
 @njit(cache=True, nogil=True)
 def list_entries(starts, ends, frame, first, next_entry, entries):
-    """List the lines of every cell in ``entries``, from the cell's place on; move the place behind them.
+    """List the lines of every cell in ``entries``, from the cell's position on; move the position behind them.
 
     ``frame`` is the lower left corner, the size of a cell, columns and rows. With no entries the lines are only
-    counted: places that begin at 0 become their numbers.
+    counted: positions that begin at 0 become their numbers.
     """
     low, size, columns, rows = frame
     for k in range(starts.shape[0]):

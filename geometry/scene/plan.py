@@ -31,12 +31,12 @@ class TracePlan:
         computed in one step. Wedges of more than 0.3 radians have no long runs and are not among them.
     closed_forms : int
         Hollows of two lines or of one circular arc whose rays are followed by a formula from the opening to the exit:
-        fans (lines that meet at more than 0.3 radians, their apex below the opening) and bowls (half angles from 0.05
-        to pi/2). Rays within 1e-9 of a corner are followed flight by flight there, too.
+        wedges (lines that meet at more than 0.3 radians, their apex below the opening) and circular hollows (half
+        angles from 0.05 to pi/2). Rays within 1e-9 of a corner are followed flight by flight there, too.
     hollows_with_grid : int
         Hollows of so many lines that rays walk through the cells of a grid; in the others every piece is tested.
     distinct_hollows : int
-        Hollows that remain when those equal to another but for their place and size, to 64 rounding errors, are left
+        Hollows that remain when those equal to another but for their position and size, to 64 rounding errors, are left
         out. The law of the wall is a mixture of theirs.
     mirror_symmetric : bool
         Whether the wall has a mirror axis: half of the angles then give the other half.

@@ -100,10 +100,11 @@ SMOOTH_JOINT = 1e-9
 SHALLOW_ARC = 0.5
 # An arc of more than this span is cut in two, so that the side of its chord decides what belongs to it.
 LONGEST_ARC = 1.5 * pi
-# A run along an arc is worth its two arctangents and one sincos where it has at least this many hops.
+# A run along an arc is worth its two arctangents and one sincos where it has at least this many chords.
 RUN_CHORDS = 8.0
 OUTLINE_POINTS = 64
-# A grid pays from about so many lines a hollow: at 256 it was a third faster on a Koch curve; the place was not tuned.
+# A grid pays from about so many lines a hollow: at 256 it was a third faster on a Koch curve; the position was not
+# tuned.
 GRID_LINES = 96
 
 

@@ -99,12 +99,12 @@ class Container:
         return frozen(np.stack([self.normals[:, 1], -self.normals[:, 0]], axis=1))
 
     def distances(self, position: ArrayLike) -> Floats:
-        """Return the distances (n, k) of places (n, 2) from the walls, negative outside."""
+        """Return the distances (n, k) of points (n, 2) from the walls, negative outside."""
         positions = finite_array("position", position)
         if positions.ndim != 2 or positions.shape[1] != 2:
             raise InputError(f"position: expected shape (n, 2), got {positions.shape}")
         return np.asarray(np.einsum("nki,ki->nk", positions[:, None, :] - self.points, self.normals))
 
     def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
-        """Return which of the places (n, 2) are inside or on the boundary."""
+        """Return which of the points (n, 2) are inside or on the boundary."""
         return np.asarray(np.all(self.distances(position) >= 0.0, axis=1))

@@ -46,7 +46,7 @@ class RefinedTrace:
     Attributes
     ----------
     x, theta : array of float, shape (n, 2)
-        Place and angle of rays that escaped, as double-doubles.
+        Position and angle of rays that escaped, as double-doubles.
     collisions : array of int, shape (n,)
     status : array of int, shape (n,)
         Values of `Status`; 4 where no piece was met, which no ray should show, and 5 where rounding decides.

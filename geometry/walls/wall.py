@@ -51,14 +51,14 @@ class Wall(Cell):
     ------
     WallError
         If pieces do not join, have no length, rise above y = 0 or cross, or if the path does not span the period. The
-        message names the pieces and the place.
+        message names the pieces and the position.
 
     Notes
     -----
     The conditions are those of Rudzis 2022, section 1.3.1, except that any depth is allowed. A wall without islands
     ``closes`` (conditions B5 and B5'): every excursion below the level of its highest points stays in one of its
     ``hollows``. Its period may begin anywhere and its highest points may lie below y = 0: all that depends on the law
-    alone uses its ``cell``, which begins at one of them; places and angles of rays, pictures and files are in the
+    alone uses its ``cell``, which begins at one of them; positions and angles of rays, pictures and files are in the
     coordinates in which the wall was given.
 
     Examples

@@ -15,7 +15,7 @@ BISECTIONS = 60
 
 
 def joined_lists(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The row that each entry belongs to, and its place there, of rows with so many entries.
+    """The row that each entry belongs to, and its position there, of rows with so many entries.
 
     Examples
     --------

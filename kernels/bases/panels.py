@@ -24,7 +24,7 @@ EXTRA_NODES = 11
 # A function that behaves like theta^s at grazing is then missed by SMALLEST^(s + 1) in L^2(sin theta d theta).
 RATIO, SMALLEST = 0.35, 1e-4
 WIDEST = np.pi / 24
-# Kinks xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this fraction of xi.
+# Breakpoints xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this fraction of xi.
 BREAKPOINT_SPACING = 0.05
 
 
@@ -82,7 +82,7 @@ class Panels(Basis):
 
         Notes
         -----
-        The rows of the law of a circular arc of half angle xi have kinks at theta = xi (1 +- 1/N) and at their
+        The rows of the law of a circular arc of half angle xi have breakpoints at theta = xi (1 +- 1/N) and at their
         mirror images; they accumulate at xi, towards which the panels are graded instead of following them all.
         """
         return cls.for_arc(_single_arc_half_angle(wall), degree, smallest)
@@ -202,7 +202,7 @@ def _graded_edges(special: list[float], followed: list[float], smallest: float) 
     """Edges at all given angles, graded geometrically on both sides of the special ones, at most WIDEST apart.
 
     Grazing (the first two special angles, 0 and pi) is approached down to ``smallest``, the others to its root:
-    the eigenfunctions are singular at grazing and have ever weaker kinks towards the others.
+    the eigenfunctions are singular at grazing and have ever weaker breakpoints towards the others.
     """
     marks = np.unique(special)
     edges = [marks, np.asarray(followed)]

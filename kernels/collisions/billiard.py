@@ -68,7 +68,7 @@ class BilliardRecord:
         return np.asarray(self.disk.mass * orbital + self.disk.inertia * v[..., 2])
 
     def extent(self, direction: ArrayLike = (1.0, 0.0)) -> Floats:
-        """Full width, shape (n,), of the places of collision along a direction; the start does not count."""
+        """Full width, shape (n,), of the positions of collision along a direction; the start does not count."""
         along = self.position[1:] @ finite_array("direction", direction)
         return np.asarray(np.ptp(along, axis=0))
 

@@ -34,7 +34,7 @@ VelocityFunction = Callable[[Floats, Floats], Floats]
 class CollisionLaw:
     r"""K: the collision law of a rough disk with a rough wall, in the limit of small roughness.
 
-    K keeps the place, maps theta by P~, and psi to pi - psi. It takes minus the incoming velocity,
+    K keeps the position, maps theta by P~, and psi to pi - psi. It takes minus the incoming velocity,
     w = cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi, to the outgoing one. It conserves the kinetic
     energy and the rolling momentum -m v1 + J omega, and is symmetric with respect to
     Lambda^2 = sin(theta) sin(psi)^2 d theta d psi. Because the input is *minus* the incoming velocity, K composed with

@@ -62,7 +62,7 @@ class SatelliteLaw:
         Raises
         ------
         AccuracyError
-            If some disk does not come back, whatever its place.
+            If some disk does not come back, whatever its position.
         """
         from ...geometry import collide
 
@@ -78,7 +78,7 @@ class SatelliteLaw:
             if not len(rest):
                 return out
         raise AccuracyError(
-            f"{len(rest)} disks did not come back from the wall in {MOST_DRAWS} draws of their place; row "
+            f"{len(rest)} disks did not come back from the wall in {MOST_DRAWS} draws of their position; row "
             f"{int(rest[0])} has the velocity {moving[rest[0]].tolist()}",
             len(rest) / len(moving),
         )

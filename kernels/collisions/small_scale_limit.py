@@ -129,7 +129,7 @@ def limit_study(
     samples: tuple[int, int, int] = (16, 32, 32),
     repetitions: int = 4,
 ) -> LimitStudy:
-    """Collide true disks of random place and angle at each scale, and compare them with the limit law K.
+    """Collide true disks of random position and angle at each scale, and compare them with the limit law K.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def limit_study(
     limit : Wall, optional
         The wall whose foreshortened law the samples are compared with; by default ``wall``.
     samples : (int, int, int)
-        Numbers of incoming angles theta, of disk angles alpha for each, and of places x1 for each of these. All are
+        Numbers of incoming angles theta, of disk angles alpha for each, and of positions x1 for each of these. All are
         stratified: theta for sin(theta), alpha in one spacing, x1 in one cell.
     repetitions : int
         Independent repetitions, at least 2, from which the standard errors come.

@@ -21,7 +21,8 @@ from .method import Budget, MethodName, computed, rounding
 MOST_VALUES = 2**26
 # Numbers held at a time.
 CHUNK = 2**21
-# Kinks that panels begin with; the fraction of the tolerance that one of them may spend, and what rounding leaves.
+# Breakpoints that panels begin with; the fraction of the tolerance that one of them may spend, and what rounding
+# leaves.
 FIRST_BREAKPOINTS, PANEL_FRACTION, SETTLED = 32, 0.02, 1e-15
 # Angles are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
@@ -61,8 +62,8 @@ class Actions:
 def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """<e_i, P e_j> by Kronrod's rule in theta with P e_j from ``law.apply``, and an estimate of its Frobenius error.
 
-    Panels between edges and kinks are halved until each is settled or the work exceeds about a second. The error is the
-    sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
+    Panels between edges and breakpoints are halved until each is settled or the work exceeds about a second. The error
+    is the sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
     """
     breaks = law.breakpoints(FIRST_BREAKPOINTS)[0]
     edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, breaks)))

@@ -39,7 +39,7 @@ def discretise(
         Bins, Legendre or Panels for theta.
     method : {"auto", "exact", "quadrature", "qmc", "monte-carlo"}
         ``"exact"``: laws of isometries, to rounding, plus a bound for beams of a polygonal wall that were not
-        resolved, or for kinks of a composition left out near grazing. ``"quadrature"``:
+        resolved, or for breakpoints of a composition left out near grazing. ``"quadrature"``:
         Gauss rules, refined until their error meets the tolerance or the work exceeds some seconds; what the error is
         estimated from stands in its ``method``. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random
         shifts of one; the error is from their spread; in a basis that is mirror-symmetric, as the law is, each ray

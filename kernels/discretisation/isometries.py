@@ -23,8 +23,8 @@ from .method import Budget, MethodName
 # misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
 # scale of the distance to grazing; NARROW is measured in both, and 6 nodes leave (0.05)^12 / 12! there.
 NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
-# Kinks that accumulate at grazing are followed until the omitted fraction is negligible or listing and using them would
-# take more than about a second.
+# Breakpoints that accumulate at grazing are followed until the omitted fraction is negligible or listing and using them
+# would take more than about a second.
 FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
 # Nodes times branches held at a time.
 CHUNK = 2**22
@@ -40,7 +40,7 @@ class Branching(Protocol):
 
 
 class Isometries:
-    """Laws that list their isometries, by Gauss rules between the kinks of these."""
+    """Laws that list their isometries, by Gauss rules between the breakpoints of these."""
 
     name: MethodName = "exact"
 
@@ -50,8 +50,8 @@ class Isometries:
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, omitted = isometric_matrix(law, basis, budget.tolerance)
-        how = "Gauss rules between the kinks of isometries, to rounding"
-        return bounded(symmetric, basis, omitted, how + (", plus omitted kinks" if omitted else ""))
+        how = "Gauss rules between the breakpoints of isometries, to rounding"
+        return bounded(symmetric, basis, omitted, how + (", plus omitted breakpoints" if omitted else ""))
 
 
 def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
@@ -77,10 +77,10 @@ REPEATED_TEETH: Rules[tuple[RepeatedTeethLaw, bool] | None] = Rules(
 def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """<e_i, P e_j> for a law of isometries, and a bound of its Frobenius error apart from rounding.
 
-    The interval (0, pi) is cut at the kinks of the law, the edges of the basis and the angles that a branch maps to
-    edges. On each piece every integrand is smooth. Where the law leaves kinks near grazing out, a fraction m of the
-    measure, both the integral and its approximation are averages of e(theta) e(theta')^T over a measure of mass m, so
-    they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
+    The interval (0, pi) is cut at the breakpoints of the law, the edges of the basis and the angles that a branch maps
+    to edges. On each piece every integrand is smooth. Where the law leaves breakpoints near grazing out, a fraction m
+    of the measure, both the integral and its approximation are averages of e(theta) e(theta')^T over a measure of mass
+    m, so they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
     """
     worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_BREAKPOINTS

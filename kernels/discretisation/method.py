@@ -82,7 +82,7 @@ class Budget:
 
 
 class Method(Protocol):
-    """One way to the matrices of some laws; a new one takes its place in `methods.METHODS`, or in `methods.SAMPLED`.
+    """One way to the matrices of some laws; a new one is entered in `methods.METHODS`, or in `methods.SAMPLED`.
 
     A method sees a law that is no wall with a closed form, but it may be a sum, a chain, or in the specular frame.
     """

@@ -31,15 +31,15 @@ WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
 # Functions in all: a product of two matrices of this size takes about a second. A basis with more cells than this gets
 # panels of the lowest degree whose last two show how the rest falls off.
 MOST_FUNCTIONS, LOWEST_DEGREE = 1600, 2
-# Kinks of a factor that edges are put at from the start, and edges nearer than this to each other.
+# Breakpoints of a factor that edges are put at from the start, and edges nearer than this to each other.
 BREAKPOINTS, SAME_EDGE = 16, 1e-10
 # Matrices of that size held at a time, and what they may take.
 MATRICES, MOST_GIGABYTES = 5, 4.0
 # Coefficients of a function that jumps on a panel fall off like 1/k, so that what a panel of degree 9 leaves out is
 # about twice what its last two functions hold; half as much again for singularities that are worse.
 TAIL = 3.0
-# Images under isometries are compared with their projections at these fractions of a panel, as kinks may be too dense
-# for the last coefficients to show them; the norm from so few angles is taken this many times.
+# Images under isometries are compared with their projections at these fractions of a panel, as breakpoints may be too
+# dense for the last coefficients to show them; the norm from so few angles is taken this many times.
 PROBES, PROBED = np.array([0.0711, 0.2939, 0.5387, 0.8123]), 2.0
 # Panels that together make up this fraction of the error are cut in so many: every time all factors are made again.
 MARKED, PARTS = 0.9, 4
@@ -106,7 +106,7 @@ class Chain:
             return symmetric, omitted + isometric_rounding(joint)
 
         symmetric, error = scattered_matrix(self.laws, basis, isometric)
-        how = "eigenvalues of scatterings between isometries, to rounding, plus omitted kinks and polynomials"
+        how = "eigenvalues of scatterings between isometries, to rounding, plus omitted breakpoints and polynomials"
         return computed(symmetric, basis, "quadrature", error, how)
 
     def _through_panels(self, basis: Basis, budget: Budget) -> KernelMatrix:
@@ -186,7 +186,7 @@ def _level(chain: Sequence[Factor], basis: Basis, panels: Panels, budget: Budget
     with one_blas_thread():
         before, left = _passed_on(ends, [(factors[law], True) for law in laws], panels)
         _, right = _passed_on(ends, [(factors[law], False) for law in reversed(laws)], panels)
-    # the functions on either side of the k-th place between the factors
+    # the functions on either side of the k-th position between the factors
     truncated = sum(one * other for one, other in zip(left, reversed(right), strict=True))
     return _Level(before.T @ ends, np.asarray(truncated), float(sum(factors[law].error for law in laws)))
 

@@ -40,7 +40,7 @@ class MonteCarlo:
 def sobol_matrix(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix by at least ``budget.rays`` rays of a net, which goes on where it was."""
     found = sampler.sampled(budget.rays, symmetrise=budget.symmetrise)
-    return _sampled("qmc", found, basis, budget, f"spread of {PARTS} nets")
+    return _sampled("qmc", found, basis, budget, f"spread of {PARTS} scrambled sequences")
 
 
 def _sampled(

@@ -35,8 +35,8 @@ ANGLES_A_PIECE, SEGMENTS_A_CHANGE = 100, 400
 # part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
 ASYMMETRY_FACTOR = 2.0
 # The error of Kronrod's rule as a fraction of its difference from Gauss's, in the root of the mean square over the
-# places in a panel where it may be: .38 at the root with which a piece is born, .26 at a kink. Its mean over the places
-# is 0.
+# positions in a panel where it may be: .38 at the root with which a piece appears, .26 at a breakpoint. Its mean over
+# the positions is 0.
 KRONROD_FRACTION = 0.5
 # Rows at a time, so that their nodes fit into memory.
 ANGLES_AT_ONCE = 1500
@@ -100,8 +100,8 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     """Whether adaptive rows are likely to beat the sampling of rays: few pieces, and few functions with edges.
 
     A row has several changes of itinerary a piece, each found by about 30 rays, and a matrix needs about a thousand
-    rows for an error of 1e-6 and as many kinks in theta as pieces: the cost grows like the square of the pieces. A
-    change of cell costs as much as one of itinerary, in each row, and the rows of each cell are integrated anew.
+    rows for an error of 1e-6 and as many breakpoints in theta as pieces: the cost grows like the square of the pieces.
+    A change of cell costs as much as one of itinerary, in each row, and the rows of each cell are integrated anew.
     Where the wall overhangs, rays stay in its cavities for long, and rows have changes without end. Where it does not
     close, rays near grazing pass cells without number: measured on three walls with islands, rows were behind rays.
     """

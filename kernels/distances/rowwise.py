@@ -15,8 +15,8 @@ from .distributions import cells_error, on_cells, outgoing_distributions
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean, wasserstein
 
-# Gauss nodes on a panel in the incoming angle, panels without kinks, kinks and cells of the outgoing angle on the
-# coarsest level; every level doubles all of them.
+# Gauss nodes on a panel in the incoming angle, panels without breakpoints, breakpoints and cells of the outgoing angle
+# on the coarsest level; every level doubles all of them.
 NODES, PANELS, BREAKPOINTS, CELLS = 4, 12, 24, 64
 # Rows times cells of a level: some seconds. Rows without cells count as these many atoms.
 MOST_CORNERS, FEW_ATOMS = 2**22, 32
@@ -25,10 +25,10 @@ PROBE = 1.0
 # Corners held at a time, counting every row with as many atoms as those of walls of many pieces have.
 CORNERS_AT_ONCE, MOST_ATOMS = 2**21, ENTRY_POINTS
 FEWEST_LEVELS = 3
-# A level halves the error at least where the distance jumps as a function of the incoming angle, at places unknown.
+# A level halves the error at least where the distance jumps as a function of the incoming angle, at positions unknown.
 # The difference of two levels is then the error of the finer one; chance may make it smaller, the one before it not.
 MEMORY = 0.25
-# A supremum at grazing, behind infinitely many kinks, is approached with order 1 exactly.
+# A supremum at grazing, behind infinitely many breakpoints, is approached with order 1 exactly.
 SUPREMUM_FACTOR = 2.0
 # The supremum is approached from inside the panels, to this fraction of their width.
 INSET = 1e-9
@@ -39,8 +39,8 @@ ROUNDING = 1e-13
 def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: float) -> Estimate:
     """The mean or the supremum over incoming angles of W_p, by Gauss rules that are refined until they settle.
 
-    The error is the difference of two levels, which differ in the nodes, in the kinks that are known to them, and in
-    the cells on which densities are resolved.
+    The error is the difference of two levels, which differ in the nodes, in the breakpoints that are known to them, and
+    in the cells on which densities are resolved.
     """
     first, second = on_cells(first), on_cells(second)
     found: list[float] = []

@@ -54,7 +54,7 @@ class Distributions:
         fraction = (position - edges[cell]) / (edges[cell + 1] - edges[cell])
         low = np.take_along_axis(cumulative, cell, axis=1)
         at_atom = low + fraction * (np.take_along_axis(cumulative, cell + 1, axis=1) - low)
-        # every atom is two corners with the same place: before the jump and after it
+        # every atom is two corners with the same position: before the jump and after it
         corner = np.concatenate((np.broadcast_to(edges, (rows, count)), position, position), axis=1)
         base = np.concatenate((cumulative, at_atom, at_atom), axis=1)
         jump = np.concatenate((np.zeros((rows, count + position.shape[1])), probability), axis=1)

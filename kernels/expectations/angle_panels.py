@@ -32,7 +32,7 @@ NODES = np.array([-x for x in _NODES[:-1]] + list(_NODES[::-1]))
 KRONROD = np.array(list(_KRONROD[:-1]) + list(_KRONROD[::-1]))
 GAUSS = np.array(list(_GAUSS[:-1]) + list(_GAUSS[::-1]))
 
-# theta = low + (high - low) s^2 (3 - 2 s): where pieces of a row are born or vanish, its means behave like a square
+# theta = low + (high - low) s^2 (3 - 2 s): where pieces of a row appear or disappear, its means behave like a square
 # root, and cuts are made there.
 _S = 0.5 * (1.0 + NODES)
 STRETCHED, SLOPES = _S * _S * (3.0 - 2.0 * _S), 3.0 * _S * (1.0 - _S)

@@ -15,7 +15,7 @@ from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.intervals import edges_inside
 
-# Two isometries computed along different routes differ by a few roundings of numbers up to 2 pi.
+# Two isometries computed in different ways differ by a few roundings of numbers up to 2 pi.
 SAME_ANGLE = 16.0 * EPS
 # Merging compares all pairs, and the number of branches of a chain grows exponentially unless they merge.
 MOST_BRANCHES = 64

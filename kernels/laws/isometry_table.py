@@ -18,7 +18,7 @@ from .crevice import crevice_breakpoints, crevice_retro
 
 Whole = NDArray[np.int64]
 
-# Offsets are sums of a few angles of the wall, found along different routes: dozens of roundings of numbers below 2 pi.
+# Offsets are sums of a few angles of the wall, computed in different ways: dozens of roundings of numbers below 2 pi.
 SAME_OFFSET = 64.0 * np.pi * EPS
 # Rows of a table that misses nothing sum to 1 within the rounding of their many terms; below this it is made good.
 ROUNDED_SUM = 1e-9
@@ -190,7 +190,7 @@ class IsometryTable:
 
     @cached_property
     def ends(self) -> Floats:
-        """The different ends of pieces inside (0, pi): the kinks of the law, those of crevices apart."""
+        """The different ends of pieces inside (0, pi): the breakpoints of the law, those of crevices apart."""
         ends = np.unique(np.concatenate([self.low, self.high]))
         return ends[(ends > 0.0) & (ends < np.pi)]
 
@@ -208,7 +208,8 @@ class IsometryTable:
     def conditionals(self, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Probability, sign and offset of the branches at each angle, shape ``theta.shape + (branches,)``.
 
-        Between two kinks every slot is one isometry. Unused slots have probability 0 and repeat the first isometry.
+        Between two breakpoints every slot is one isometry. Unused slots have probability 0 and repeat the first
+        isometry.
         """
         incoming = angles("theta", theta)
         flat = incoming.ravel()
@@ -251,7 +252,7 @@ class IsometryTable:
             query = begin + owner
             piece = members[first[bucket[query]] + group]
             at = theta[query]
-            # a kink belongs to the piece on its right
+            # a breakpoint belongs to the piece on its right
             inside = (self.low[piece] <= at) & (at < self.high[piece])
             query, piece, at = query[inside], piece[inside], at[inside]
             found.append((query, number[piece], self.density(at, piece) / np.sin(at)))
@@ -281,7 +282,7 @@ class IsometryTable:
         return self.sign, self.offset, self.low, self.high, self.start, self.end
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """The ends of pieces and the kinks of crevices, at most about ``limit``, and the measure of those left out."""
+        """Ends of pieces and breakpoints of crevices, about ``limit`` at most, and the measure of those left out."""
         lists, left_out = [self.ends], 0.0
         for crevice in self.crevices:
             breakpoints, omitted = crevice_breakpoints(crevice.height_to_width, max(limit // len(self.crevices), 1))

@@ -96,7 +96,7 @@ class LeastResistanceLaw(Law):
 
     @cached_property
     def mean_cosine(self) -> float:
-        """E[cos(theta' - theta)] under sin(theta)/2 d theta, by Gauss rules between the kinks."""
+        """E[cos(theta' - theta)] under sin(theta)/2 d theta, by Gauss rules between the breakpoints."""
         edges = np.concatenate(([0.0], self.breakpoints(6)[0], [np.pi]))
         fine = np.concatenate((edges, 0.5 * np.pi + _graded(self.split_ends), 0.5 * np.pi - _graded(self.split_ends)))
         fine = np.unique(fine)

@@ -109,8 +109,8 @@ def replicate_z_score(antisymmetric: list[Floats]) -> float:
     With A_r independent and of mean 0 the inner products <A_r, A_s>, r < s, are uncorrelated and of mean 0; their
     average is compared with its standard error. The fewer dimensions the A_r vary in, the heavier the tails of this
     ratio; so it is made normal through a Student distribution, whose degrees of freedom follow from that number of
-    dimensions, (trace C)^2 / trace C^2 with C the covariance, estimated from the A_r themselves. Parts of one net make
-    up for each other: the score of noise is then lower, and does not accuse more often than it should.
+    dimensions, (trace C)^2 / trace C^2 with C the covariance, estimated from the A_r themselves. Replicates of one
+    sequence make up for each other: the score of noise is then lower, and does not accuse more often than it should.
     """
     from scipy.stats import norm, t
 

@@ -74,8 +74,8 @@ def array_from_counts(
     Parameters
     ----------
     parts : sequence of (n, n) arrays
-        One array for pairs that are independent; several, of batches of the same size or parts of a randomised net,
-        for others. Weights may stand for counts in the latter case.
+        One array for pairs that are independent; several, of batches of the same size or replicates of a randomised
+        Sobol sequence, for others. Weights may stand for counts in the latter case.
     basis : Basis
         The partition that was counted in.
     symmetrise : bool
@@ -117,7 +117,7 @@ def array_from_counts(
 
 
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
-    """The estimate from means of e_i(theta) e_j(theta') over batches of the same size or parts of a net.
+    """The estimate from means of e_i(theta) e_j(theta') over batches of one size or replicates of a Sobol sequence.
 
     What is known is put in: P 1 = 1, and where the law keeps the measure also the same for the adjoint. Errors are
     those of the spread over these.

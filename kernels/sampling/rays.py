@@ -43,7 +43,7 @@ class RaySums:
 
     @property
     def chunk(self) -> int:
-        """Rays at a time; a power of two, which keeps the balance of nets."""
+        """Rays at a time; a power of two, which keeps the balance of the Sobol sequence."""
         cells = self.basis.size**2 if self.basis.is_partition else 0
         return max(SMALLEST_CHUNK, 1 << (cells // CELLS_A_RAY).bit_length())
 

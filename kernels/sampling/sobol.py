@@ -14,10 +14,11 @@ from ..laws.law import Law, entry_inside
 from .counts import SampledArray
 from .rays import RaySums, progress_bar
 
-# Parts of a net whose spread gives its error: eight tell it within a quarter. More would be less exact nets each.
+# Replicates of a Sobol sequence whose spread gives its error: eight tell it within a quarter. More would be less exact
+# replicates each.
 PARTS = 8
-# Digits of the nets: scrambling them takes a time like their number squared. What lies beyond is one random shift of
-# all points, so that none falls on a corner at a dyadic place but by chance.
+# Digits of the sequences: scrambling them takes a time like their number squared. What lies beyond is one random shift
+# of all points, so that none falls on a corner at a dyadic position but by chance.
 SOBOL_BITS = 32
 
 
@@ -27,8 +28,9 @@ class SobolSampler:
     They are eight parts of the same number of rays. Each part is the same scrambled Sobol sequence after a random
     digital shift of its own, which makes it a scrambled Sobol sequence itself; given the sequence the parts are
     independent and have the same distribution, so that their spread is that of their mean. The sequence goes on where
-    it was: fewer rays are a part of more, and a look at a few costs nothing. Of a mirror-symmetric law they have
-    theta < pi/2, in a basis with that symmetry: every ray counts with its mirror image, and the net is twice as dense.
+    it was: fewer rays are a part of more, so a pilot run costs nothing. Of a mirror-symmetric law they have
+    theta < pi/2, in a basis with that symmetry: every ray counts with its mirror image, and the sequence is twice as
+    dense.
 
     Parameters
     ----------
@@ -69,7 +71,9 @@ class SobolSampler:
         each = 1 << (max(-(-samples // PARTS), 1) - 1).bit_length()
         if each > 1 << SOBOL_BITS:
             most = PARTS << SOBOL_BITS
-            raise InputError(f"samples: a net has at most {most} rays, got {samples}; use method 'monte-carlo'")
+            raise InputError(
+                f"samples: a Sobol sequence has at most {most} rays, got {samples}; use method 'monte-carlo'"
+            )
         with progress_bar(PARTS * max(each - self.sums.each, 0)) as bar:
             while self.sums.each < each:
                 # powers of two, which the sequence is balanced in

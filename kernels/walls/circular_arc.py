@@ -206,7 +206,7 @@ def followed_hits(tolerance: float) -> int:
     """How many hits N to follow, so that integrals over theta of means of functions of slope 10 err by less.
 
     Rays with more hits are a fraction of 1/(4 N^2), for theta within xi/N of xi, and leave within 2 xi/N of their
-    place.
+    position.
     """
     return int(np.clip(np.ceil((100.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))
 

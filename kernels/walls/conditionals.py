@@ -20,7 +20,7 @@ from .hollow_conditionals import NO_LIMIT, HollowConditionals
 MOST_PIECES = 64
 # The first of the Gauss rules on a piece that may be used for polynomials on panels.
 PANEL_LEVEL = 2
-# A look at some angles tells chaotic hollows: 31,000 and 71,000 flights an angle against 260 to 7,400 of 28 other
+# A pilot run at some angles tells chaotic hollows: 31,000 and 71,000 flights an angle against 260 to 7,400 of 28 other
 # walls. One angle stops at so many.
 PILOT_ANGLES = np.linspace(0.13, 3.01, 12)
 PILOT_TOLERANCE = 1e-3
@@ -199,7 +199,7 @@ class WallConditionals:
         )
 
     def critical_angles(self, low: float, high: float) -> Floats:
-        """Angles in (low, high), increasing, where pieces of rows are born or vanish: the most important ones known."""
+        """Angles in (low, high), increasing, where pieces appear or disappear: the most important ones known."""
         found = [cut for conditionals in self._hollows for cut in conditionals.critical_angles(low, high)]
         return np.unique([angle for angle, _ in found])
 
@@ -233,7 +233,7 @@ class TracedExpectations(Expectations):
         return means, found.error + 2.0 * found.unresolved
 
     def are_costly(self) -> bool:
-        """Whether a look at some angles takes very many flights."""
+        """Whether a pilot run at some angles takes very many ray segments."""
         conditionals = WallConditionals(self.wall, 1, np.empty(0), most_segments=MOST_PILOT_SEGMENTS)(
             PILOT_ANGLES, PILOT_TOLERANCE
         )

@@ -167,7 +167,7 @@ class HollowConditionals:
         return set(angles[owner].tolist())
 
     def critical_angles(self, low: float, high: float) -> list[tuple[float, float]]:
-        """Angles in (low, high) where a piece is born or vanishes, with the width of that piece in the nearest row.
+        """Angles in (low, high) where a piece appears or disappears, with the width of that piece in the nearest row.
 
         Only those that the rows known so far on either side of them show.
         """

@@ -8,15 +8,15 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, angles
 from ..laws.law import Law
 
-# Angles nearer to grazing than this many kinks are probed between the last kink found and 0 or pi.
+# Angles nearer to grazing than this many breakpoints are probed between the last breakpoint found and 0 or pi.
 BREAKPOINTS = 20_000
 
 
 def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Probability, sign and offset of every branch of a law at the angles ``theta``.
 
-    A law with a table says so itself. For others: between two kinks every branch is one isometry, so a second angle
-    of the same interval gives the sign.
+    A law with a table says so itself. For others: between two breakpoints every branch is one isometry, so a second
+    angle of the same interval gives the sign.
 
     Parameters
     ----------

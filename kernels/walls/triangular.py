@@ -15,9 +15,9 @@ from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entry_points
 
-# Kinks closer together than this are one kink computed in two ways.
+# Breakpoints closer together than this are one breakpoint computed in two ways.
 BREAKPOINT_SPACING = 16.0 * EPS
-# A table has four pieces between two kinks; laws with more kinks than this have none.
+# A table has four pieces between two breakpoints; laws with more breakpoints than this have none.
 MOST_LISTED_BREAKPOINTS = 2**17
 
 
@@ -116,7 +116,7 @@ class TriangularTeethLaw(BranchLaw):
         return without_extremal(breakpoints, max(breakpoints.size - limit, 0))
 
     def isometry_table(self) -> IsometryTable | None:
-        """The pieces between the kinks, or None where there are too many."""
+        """The pieces between the breakpoints, or None where there are too many."""
         if 4.0 * np.pi / self.angle > MOST_LISTED_BREAKPOINTS:
             return None
         breakpoints, _ = self.breakpoints(2 * MOST_LISTED_BREAKPOINTS)

@@ -154,7 +154,7 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
     edges = [basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES]
     for part in {part for word in words_of(law) or () for part in word}:
         if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
-            # the law is symmetric: where p(theta, .) has kinks, p(., theta') has them
+            # the law is symmetric: where p(theta, .) has breakpoints, p(., theta') has them
             edges += [part.outgoing_breakpoints, part.incoming_edges(basis.edges)]
             edges += [np.pi - one for one in edges[-2:]] if law.frame == "specular" else []
     joint = np.unique(np.clip(np.concatenate(edges), 0.0, np.pi))

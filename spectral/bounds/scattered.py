@@ -177,7 +177,7 @@ def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parit
 
 
 def _is_certain(values: Floats, index: int, number: int, distance: float, essential: float) -> bool:
-    """Whether a value's place is known: all that may have its modulus are near to it, and are listed."""
+    """Whether a value's position is known: all that may have its modulus are near to it, and are listed."""
     if abs(values[index]) - distance <= essential + distance:
         return False
     # neighbours by modulus as far as no gap tells them apart

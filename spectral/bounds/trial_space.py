@@ -19,7 +19,7 @@ from ..eigenvalues.parity import Parity
 
 # Degree on each panel: Kronrod's rule is then still exact for products of two functions.
 DEGREE = 6
-# Kinks that the law knows become edges at once, the widest panel of the first level is this.
+# Breakpoints that the law knows become edges at once, the widest panel of the first level is this.
 FIRST_BREAKPOINTS, WIDEST = 40, np.pi / 10
 # Nearest distance of two edges.
 NARROWEST = 1e-7
@@ -217,7 +217,7 @@ def _room(values: Floats, k: int) -> float:
 
 
 def _first_edges(law: Law, mirrored: bool) -> Floats:
-    """Kinks that the law knows, and panels that are not too wide between them; from 0 to pi or pi/2."""
+    """Breakpoints that the law knows, and panels that are not too wide between them; from 0 to pi or pi/2."""
     end = 0.5 * np.pi if mirrored else np.pi
     points, left_out = law.breakpoints(FIRST_BREAKPOINTS)
     used = (points > NARROWEST) & (points < end - NARROWEST) & math.isfinite(left_out)

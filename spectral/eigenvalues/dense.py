@@ -157,7 +157,7 @@ def end_values(array: Floats, constant: Floats | None, top: int, bottom: int) ->
 
 
 def wanted(values: Floats, k: int, which: Which) -> NDArray[np.intp]:
-    """Places in descending values of the k wanted ones: of moduli the first is among them in any case."""
+    """Positions in descending values of the k wanted ones: of moduli the first is among them in any case."""
     if which == "largest" or not len(values):
         return np.arange(min(k, len(values)))
     return np.union1d([0], np.argsort(-np.abs(values), kind="stable")[:k])

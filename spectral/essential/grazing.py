@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 ANGLES = 10.0 ** -np.arange(3.0, 9.0)
 # A tangent is taken as vertical if its horizontal part is below this fraction: the angles of some ten operations.
 VERTICAL = 64.0 * EPS
-# The end of a hollow keeps its direction until its tangent has turned by this angle; halvings that find the place.
+# The end of a hollow keeps its direction until its tangent has turned by this angle; halvings that find the position.
 TURN, HALVINGS = 0.1, 60
 # Adaptive quadrature in the entry point: first panels, error asked for, and rays that it may take.
 FIRST_PANELS, QUADRATURE_TOLERANCE, MOST_RAYS, NARROWEST = 8, 1e-9, 20_000, 1e-13

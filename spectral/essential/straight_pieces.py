@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 STEP, SAME_ANGLE = 1e-7, 1e-11
 # Outgoing angles of the same angle nearer than this are of one isometry, and so are nodes of one orbit.
 SAME_NODE = 1e-8
-# Entry points of a row at first, and in the last look, where the changes between them are halved so often.
+# Entry points of a row at first, and on the last level, where the changes between them are halved so often.
 POINTS, FINE_POINTS, HALVINGS = 256, 2048, 40
 # Orbits are followed from so many angles, through so many layers while they have no more nodes than this.
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
 # The largest values are looked at again, so often and the last of these times with all entry points, between so many
 # angles that are nearer by this factor.
 PEAKS, LEVELS, FINE_LEVELS, NEARBY_ANGLES, NEARER = 4, 5, 2, 9, 6.0
-# Of what the last look, or the last layers, added: what may still be missing.
+# Of what the last level, or the last layers, added: what may still be missing.
 BEYOND = 2.0
 ROUNDING = 1e-9
 

@@ -26,7 +26,7 @@ from .theorems import gap_by_theorem
 from .verdict import SpectralGap, isolated, made_from
 
 # Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
-# exact the look is that counts them.
+# exact the pilot run is that counts them.
 ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
 # Enclosures somewhat wider than the tolerance are sought once more, to this fraction of it; a gap whose error misses
 # the tolerance is handed over as it is where that is below the largest miss, a fraction of the gap.
@@ -84,7 +84,7 @@ def _gap_of_enclosures(law: Law, number: int, tolerance: float) -> SpectralGap |
 
 
 def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
-    """How many of the largest moduli reach down to the largest value off the constants, at a first look.
+    """How many of the largest moduli reach down to the largest value off the constants, in a pilot run.
 
     None where that value is not beyond the essential spectrum.
     """

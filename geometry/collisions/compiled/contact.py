@@ -8,7 +8,7 @@ safe step; where the parabola has none, F has none. The steps converge quadratic
 of F are visited in their order, in both directions, until one lies on the piece.
 
 **No face is met from behind.** A satellite that leaves one piece within rounding of another one has F = 0 there, too.
-Whether it lies in front of that one is decided by the pieces' own places, see `sides`: not of the other face of
+Whether it lies in front of that one is decided by the pieces' own positions, see `sides`: not of the other face of
 a plate without thickness, nor of the other side of a sharp peak.
 
 Lengths are in units of the wall, so the disk's radius is 1/scale and the wall's tops are at height 0. In the time t a

@@ -58,7 +58,7 @@ TOP = 7
 # Cells that one satellite may pass, and satellites that may pass the lowest point, in one flight.
 MOST_CELLS = 1_000_000
 
-# Cells, or satellites, between two looks at the flag that tells a disk to end: a power of 2.
+# Cells, or satellites, between two checks of the flag that tells a disk to end: a power of 2.
 CELLS_A_CHECK = 1024
 
 # A time that no flight takes, but that is not infinite: bounds are multiplied by it.
@@ -84,14 +84,14 @@ class Chosen(NamedTuple):
 
 @inlined
 def hollow_at(hollows, entry):
-    """The hollow over which a place of the cell lies, or -1 over a flat top."""
+    """The hollow over which a position of the cell lies, or -1 over a flat top."""
     h = last_hollow(entry, hollows)
     return h if h >= 0 and entry < hollows[h, RIGHT] else -1
 
 
 @inlined
 def near_edge(hollows, entry, slack):
-    """Whether a place at height 0 is within the slack of an end of a hollow that is a corner."""
+    """Whether a position at height 0 is within the slack of an end of a hollow that is a corner."""
     for h in range(hollows.shape[0]):
         if abs(entry - hollows[h, LEFT]) <= slack and hollows[h, LEFT_EDGE] == CORNER_EDGE:
             return True
@@ -193,7 +193,7 @@ def surface(kind, index, x, y, ground):
 def satellite_at(x, y, turn, j, ring):
     """Where the j-th satellite after the one at (x, y) and the angle (sine, cosine) is, and its angle alike.
 
-    It is a chord away, so that its place is not the difference of two of the disk's size. For neighbours, nearly all
+    It is a chord away, so that its position is not the difference of two of the disk's size. For neighbours, nearly all
     that are asked for, no sine is computed.
     """
     half_sine, half_cosine = j * ring.half_sine, ring.half_cosine
@@ -228,7 +228,7 @@ def out_of_reach_after(angle, motion, ring):
 
 @inlined
 def first_of_all(own, below, path, height, angle, end, ring, ground):
-    """-> (t, Place, base, Chosen, code): the first contact of any satellite before ``end``; t is ``end`` if none.
+    """-> (t, Touching, base, Chosen, code): the first contact of any satellite before ``end``; t is ``end`` if none.
 
     The path is that of satellite 0, which starts on ``own``; the disk is at ``height``.
     """
@@ -281,7 +281,7 @@ def first_of_all(own, below, path, height, angle, end, ring, ground):
 def left_below(own, below, path, angle, time, chosen, ring, ground):
     """-> Below: the neighbour of the satellite that touches the wall that is below the tops then.
 
-    Under an overhang its place does not tell its hollow; where it came in does. At most one satellite is below the
+    Under an overhang its position does not tell its hollow; where it came in does. At most one satellite is below the
     tops beside the one that touches.
     """
     if ground.is_open:
@@ -421,7 +421,7 @@ def collide_disks(position, velocity, disk, ring, limit, ground, results):
 def roll_disk(entry, velocity, disk, rolling, limit, ground):
     """-> (displacement, turn, time, velocity, contacts, status): one collision on the cylinder.
 
-    The contact moves on a straight line with the velocity (v1 + omega, v2) and starts at (place, 0).
+    The contact moves on a straight line with the velocity (v1 + omega, v2) and starts at (position, 0).
     """
     v1, v2, omega = velocity
     travel, rotation, passed, contacts = 0.0, 0.0, 0.0, 0

@@ -25,7 +25,7 @@ from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, nearby_address, trace
 from ...tracing.compiled.records import Results, results_for
 
 # Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Those
-# that neither allocate nor return arrays count no references, see `options`. Integers are born as such, np.int64(0):
+# that neither allocate nor return arrays count no references, see `options`. Integers start as np.int64(0):
 # for a bare 0 type inference compiles what it is passed to once more.
 _INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 inner = njit(**_INNER)
@@ -257,9 +257,9 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
 
 @inner
 def sample_entries(entries, task, chain, goal):
-    """Chain the samples at increasing places, and halve the gaps; returns the number of samples, and the last one.
+    """Chain the samples at increasing positions, and halve the gaps; returns the number of samples, and the last one.
 
-    The last one is that with the largest place, not the one that was found last.
+    The last one is that with the largest position, not the one that was found last.
     """
     xs, outs, labels, follow, gaps, _ = chain
     left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
@@ -285,7 +285,7 @@ def sample_entries(entries, task, chain, goal):
 
 @inner
 def add_change(x, first, task, chain, count, goal):
-    """A place x, in the piece that begins with the sample ``first``, has another label: find the edges around it."""
+    """A position x, in the piece that begins with the sample ``first``, has another label: find the edges around it."""
     xs, _, _, follow, gaps, _ = chain
     before = first
     while xs[follow[before]] <= x:

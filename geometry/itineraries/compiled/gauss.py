@@ -57,8 +57,8 @@ def gauss_tables(least: int) -> Rules:
 def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     """One rule after the other on [low, high], until two of them agree.
 
-    Returns the number of nodes, the error, a place where a ray has another label (nan: none), and the number of rays.
-    Without ``strict`` labels do not matter, and the difference of the rules has to show what the piece hides.
+    Returns the number of nodes, the error, a position where a ray has another label (nan: none), and the number of
+    rays. Without ``strict`` labels do not matter, and the difference of the rules has to show what the piece hides.
     """
     low, high = ends
     positions, weights, starts, least = rules
@@ -107,7 +107,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
 def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     """Nodes on a piece, which is halved where the rules do not agree.
 
-    ``sample`` are the angle and label of a ray of it. Returns the number of nodes in all, the error, a place where a
+    ``sample`` are the angle and label of a ray of it. Returns the number of nodes in all, the error, a position where a
     ray has another label (nan: none), and the rays.
     """
     whole = task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]

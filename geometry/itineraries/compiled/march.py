@@ -31,7 +31,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 # Pieces of a row that its neighbours start from.
 MOST_SEEDS = 128
-# Rounding of the mean of a row, as a fraction of the opening, and of the place of a change, as one of the hollow's
+# Rounding of the mean of a row, as a fraction of the opening, and of the position of a change, as one of the hollow's
 # size. Rays are good to a few units of EPS times the derivative of their map, seldom above some hundreds except next to
 # a change: measured, not proved.
 ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
@@ -61,7 +61,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     """Nodes and masses of one row; returns their number, the error, the lost width, the number of pieces and of rays.
 
     What a row that has spent its flights leaves undone is in its error. ``pieces`` receives first and last
-    place and label of every piece.
+    position and label of every piece.
     """
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
@@ -116,7 +116,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
 
 @allocating
 def room_for_pieces(count):
-    """First places, last places and labels."""
+    """First positions, last positions and labels."""
     return np.empty(count), np.empty(count), np.empty(count, np.uint64)
 
 

@@ -29,10 +29,10 @@ def label_at(x, task):
 
 @_compile
 def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree):
-    """Places in rows where a ray has another label than the piece that it belongs to: pieces of a neighbour say where.
+    """Entry points where a ray has another label than the piece around them; the pieces of a neighbour suggest them.
 
     Rows ``k`` and ``k + 1`` are compared where ``linked[k]``. Pieces of the one no wider than the other's
-    ``least_widths`` do not count. Returns the numbers of the rows, the places, and the numbers of rays and flights.
+    ``least_widths`` do not count. Returns the numbers of the rows, the positions, and the numbers of rays and flights.
     """
     lows, highs, labels = pieces
     spent = np.zeros(1, np.int64)

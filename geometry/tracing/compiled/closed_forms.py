@@ -50,13 +50,13 @@ _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 @_compile
 def cross_arc(form, entry, angle, hits, moment, incidence):
-    """Take rays through a bowl: place and angle become those of the exit, hits their number, 0 for a doubtful ray.
+    """Take rays through a circular hollow: entry and angle become those of the exit; hits is their number, 0 in doubt.
 
     With d the angle of incidence from the arc, X the fraction of the opening to the left of the ray,
 
         sin^2(d/2) = (1 - X) sin^2((theta + xi)/2) + X sin^2((theta - xi)/2),
 
-    all terms positive, and the same with cosines; a hop advances by 2 d, to the left where d is acute, else by
+    all terms positive, and the same with cosines; a chord advances by 2 d, to the left where d is acute, else by
     2 (pi - d) to the right, and the rest is counting. The angular momentum about the centre gives the exit.
     """
     left, right, doubt = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT]
@@ -87,7 +87,7 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
         start = (half - seen) + incidence[i]
         gone = ((seen - count * step) + PI) + PI_REST
         angle[i] = gone if acute else (PI - gone) + PI_REST
-        # the lines of the first and the last flight pass the joints at 2 r sin(a/2) sin((hop - a)/2) with these a
+        # the lines of the first and the last flight pass the joints at 2 r sin(a/2) sin((step - a)/2) with these a
         passing = start * (step - start)
         passing = passing if passing < off * (step - off) else off * (step - off)
         hits[i] = count if passing > doubt else 0.0
@@ -98,7 +98,7 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
 
 @_compile
 def cross_wedge(form, entry, angle, hits, vx, vy, turn):
-    """Take rays through a fan, as `cross_arc` does; the last three arrays are room to work in.
+    """Take rays through a wedge, as `cross_arc` does; the last three arrays are room to work in.
 
     The sign of ``turn``, the moment of the apex about the ray, tells which line is met first. The number of hits is
     that of the unfolded ends of the opening, one after the other, that lie on the other side of the ray than the apex.
@@ -154,7 +154,7 @@ def cross(form, entry, angle, hits, room):
 
 @_compile
 def cell_of(x, cell):
-    """Left end of the cell in which a place lies."""
+    """Left end of the cell in which a position lies."""
     return np.floor(x / cell) * cell
 
 

@@ -4,7 +4,7 @@ One compiled version serves all walls: a table is empty where the wall has no su
 themselves; there is no epsilon that decides which piece is hit:
 
 * Lines, arcs and Bezier pieces: see `lines`, `arcs` and `beziers`.
-* A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact places of the
+* A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact positions of the
   joints, see `sides`: not the other face of a plate without thickness, nor the other side of a sharp peak.
 * The hit point is put back on its piece, and the velocity is renormalised, once a bounce.
 """
@@ -76,7 +76,7 @@ BEND_SHIFT = 40
 
 @inlined
 def last_hollow(entry, hollows):
-    """-> int: number of the last hollow whose left end is not beyond a place of the cell, -1 where there is none."""
+    """-> int: number of the last hollow whose left end is not beyond a position of the cell, -1 where there is none."""
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -89,7 +89,7 @@ def last_hollow(entry, hollows):
 
 @inlined
 def opening_at(entry, hollows):
-    """-> int: number of the hollow that opens at a place of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
+    """-> int: number of the hollow that opens at a position of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
     h = last_hollow(entry, hollows)
     if h < 0 or entry >= hollows[h, RIGHT] or (entry == hollows[h, LEFT] and hollows[h, LEFT_EDGE] != NO_EDGE):
         # a flat top, or an edge of it; the edges between two hollows are corners
@@ -320,7 +320,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
             bounces += hits
             if labelled:
                 label = HASH_FACTOR * label + np.uint64(hits)
-        # one Newton step on |v| = 1 keeps rounding errors of speed and place from feeding each other
+        # one Newton step on |v| = 1 keeps rounding errors of speed and position from feeding each other
         scale = 1.5 - 0.5 * (vx * vx + vy * vy)
         vx *= scale
         vy *= scale

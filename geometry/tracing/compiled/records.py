@@ -54,8 +54,8 @@ class Own(NamedTuple):
 class Hit(NamedTuple):
     """What a flight meets: its time, inf for none, kind and row of the piece, where on it, and a doubt.
 
-    The place on a line is the fraction of it, negative from its end; on a Bezier piece it is the parameter. The doubt
-    is 0, or 1 where hit and miss are not told apart, or `DOUBTFUL`.
+    The position on a line is the fraction of it, negative from its end; on a Bezier piece it is the parameter. The
+    doubt is 0, or 1 where hit and miss are not told apart, or `DOUBTFUL`.
     """
 
     time: float

@@ -41,7 +41,7 @@ END_SLACKS = 2.0
 
 @compiled
 def skip_chords(arc, px, py, vx, vy, most):
-    """-> (px, py, vx, vy, hops): carry a ray along a circular arc by all whole hops of its run, at most ``most``."""
+    """-> (px, py, vx, vy, chords): carry a ray along a circular arc by all whole chords of its run, up to ``most``."""
     qx, qy = px - arc[START_X], py - arc[START_Y]
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
     sine = vx * nx + vy * ny
@@ -100,9 +100,9 @@ def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
         count = room * away / step
     else:
         if gap * away <= slack:
-            # next to the apex, where the gap is within rounding, doubles do not know the ray's place
+            # next to the apex, where the gap is within rounding, doubles do not know the ray's position
             return px, py, vx, vy, 0
-        # the part ends on circles about the apex, whose curvature is that of the circle through the ray's place
+        # the part ends on circles about the apex, whose curvature is that of the circle through the ray's position
         curvature = sine / gap
         d = along * along - ahead * curvature * (2.0 - ahead * curvature)
         if along > 0.0 and d >= 0.0:

@@ -160,7 +160,7 @@ def on_arc(arc, qx, qy, slack):
 
 @_compile
 def arc_height(arc, px, py):
-    """-> (height, nx, ny): distance of a place close to an arc, positive on its free side; unit normal."""
+    """-> (height, nx, ny): distance of a position close to an arc, positive on its free side; unit normal."""
     n0x, n0y, curvature, stretch = wide_arc(arc)
     qx, qy = subtract(px, wide(arc[START_X])), multiply(stretch, subtract(py, wide(arc[START_Y])))
     nx = subtract(n0x, multiply(curvature, qx))
@@ -173,7 +173,7 @@ def arc_height(arc, px, py):
 
 @_compile
 def arc_point(arc, t, px, py, vx, vy):
-    """-> (x, y, nx, ny, bent): place on the arc after the time t, unit normal, and curvature (a double)."""
+    """-> (x, y, nx, ny, bent): position on the arc after the time t, unit normal, and curvature (a double)."""
     n0x, n0y, curvature, stretch = wide_arc(arc)
     qx = subtract(add(px, multiply(t, vx)), wide(arc[START_X]))
     qy = multiply(stretch, subtract(add(py, multiply(t, vy)), wide(arc[START_Y])))

@@ -178,7 +178,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
 
 @_compile
 def bezier_point(curve, s):
-    """-> (x, y, nx, ny, bent): place and unit normal at s, and the curvature (a double, positive where focusing)."""
+    """-> (x, y, nx, ny, bent): position and unit normal at s, and the curvature (a double, positive where focusing)."""
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
     tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
     size = square_root(dot(tx, ty, tx, ty))

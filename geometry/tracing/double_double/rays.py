@@ -113,7 +113,7 @@ def crossings(tables, index, other, py, vx, vy, most):
             count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
             if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
                 hits = 2 * np.int64(0.5 * count)
-                # beyond 2^53 there is no such double, and no double-double knows the ray's place
+                # beyond 2^53 there is no such double, and no double-double knows the ray's position
                 return hits, multiply((float(hits), 0.0), step), float(hits) * time[0]
     return 0, travel, flight
 
@@ -159,7 +159,7 @@ def meets(tables, hit, own, px, py, vx, vy, clearance):
     """-> bool: whether a ray meets a piece that it hits.
 
     ``clearance`` are that of its start in front of the piece, the slack of double precision, within which the pieces'
-    own places decide, so that both tracers go the same way, and the error of the ray.
+    own positions decide, so that both tracers go the same way, and the error of the ray.
     """
     height, slack, error = clearance
     if height > slack or own.kind in (OPENING, SIDE):
@@ -456,7 +456,7 @@ def wide_scope(tables, h):
 
 @_compile
 def hollow_at(hollows, entry):
-    """-> (h, is_edge): the hollow that opens at a double-double place, or -1; whether that is a corner of the tops."""
+    """-> (h, is_edge): the hollow that opens at a double-double position, or -1; whether this is a corner."""
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2

@@ -1,13 +1,13 @@
 """Whether a ray that leaves one piece within rounding of another one lies in front of that one.
 
-The place of a ray is wrong by some rounding errors of the hollow's size. So its distance from a piece says nothing
+The position of a ray is wrong by some rounding errors of the hollow's size. So its distance from a piece says nothing
 where it is of that size: beside the tip of a sharp peak, in the apex of a narrow wedge, and on a plate that is thinner
 than rounding or has no thickness. The wall is exact there, and the ray starts on the piece that it has left. So the
 distance is taken from the joints of both pieces.
 
 * Two segments: the distance is linear along the own one, and its signs at the two joints are exact (expansions of
   Shewchuk 1997). Coincident faces have distance 0: the ray is not in front of the other one.
-* Curves: the place is put on its own piece, and its distance taken, in double-double arithmetic. Distances below the
+* Curves: the position is put on its own piece, and its distance taken, in double-double arithmetic. Distances below the
   rounding of that are 0.
 
 Two faces of a plate cross within rounding where vertices that are meant to lie on one line do not, in doubles. Then the
@@ -31,13 +31,13 @@ from .arithmetic import add, divide, dot, multiply, negate, square_root, subtrac
 from .beziers import bezier_coefficients, bezier_point, cubic, cubic_slope
 
 LINE, ARC, BEZIER = 3, 4, 5
-# A double-double place that was put on a curve carries so much of the slack: 16 EPS against 64 of its own roundings.
+# A double-double position that was put on a curve carries so much of the slack: 16 EPS against 64 of its own roundings.
 CURVE_NOISE = 2.0**-48
 # Rounding of (b - a) x (c - a), as a fraction of the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ROUNDING = (3.0 + 16.0 * EPS) * UNIT_ROUNDOFF
 # A ray whose last start lies further behind a face than so many slacks did not start between it and its own piece.
 BEHIND_SLACKS = 4.0
-# Newton steps from a place within rounding of a curve to one on it: the error is squared each time.
+# Newton steps from a position within rounding of a curve to one on it: the error is squared each time.
 STEPS = 2
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
@@ -57,9 +57,9 @@ class Face(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """How a ray came to its start: the length of that flight, and how exactly the place is known.
+    """How a ray came to its start: the length of that flight, and how exactly the position is known.
 
-    ``slack`` is the distance within which pieces are nearby; ``blur`` is the error of the place along the own piece.
+    ``slack`` is the distance within which pieces are nearby; ``blur`` is the error of the position along the own piece.
     Where that decides, as where one piece stands on the other, the ray counts as one in front.
     """
 
@@ -102,7 +102,7 @@ def line_ends(joints, index):
 
 @_compile
 def line_height(joints, index, px, py):
-    """Distance of a place from a line, on whose left the free side is, and the unit normal there."""
+    """Distance of a position from a line, on whose left the free side is, and the unit normal there."""
     x0, y0, x1, y1 = line_ends(joints, index)
     ex, ey = two_sum(x1, -x0), two_sum(y1, -y0)
     size = square_root(dot(ex, ey, ex, ey))
@@ -112,9 +112,9 @@ def line_height(joints, index, px, py):
 
 @_compile
 def height_over_line(joints, own, other, px, py, blur):
-    """Distance of a place on the line ``own`` from the line ``other``, times the length of that, with the exact sign.
+    """Distance of a position on the line ``own`` from the line ``other``, times its length, with the exact sign.
 
-    The two may meet between the ends of the own one, where the other stands on it. Then the double-double place
+    The two may meet between the ends of the own one, where the other stands on it. Then the double-double position
     decides, which is known to ``blur`` along the own line, and the distance is the largest that it may have.
     """
     ax, ay, bx, by = line_ends(joints, other)
@@ -131,7 +131,7 @@ def height_over_line(joints, own, other, px, py, blur):
 
 @_compile
 def bezier_height(curve, s, px, py):
-    """Distance of a place from a Bezier piece near its parameter s, and the unit normal there."""
+    """Distance of a position from a Bezier piece near its parameter s, and the unit normal there."""
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
     for _ in range(STEPS):
         tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
@@ -143,7 +143,7 @@ def bezier_height(curve, s, px, py):
 
 @_compile
 def height_over(joints, face, px, py):
-    """-> (height, nx, ny): distance of a place from a piece, positive on its free side, and the unit normal."""
+    """-> (height, nx, ny): distance of a position from a piece, positive on its free side, and the unit normal."""
     if face.kind == LINE:
         return line_height(joints, face.number, px, py)
     if face.kind == ARC:
@@ -189,7 +189,7 @@ def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
 
 @_compile
 def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
-    """-> bool: `in_front` by the heights of the place, whatever the pieces are."""
+    """-> bool: `in_front` by the heights of the position, whatever the pieces are."""
     nx, ny = px, py
     for _ in range(STEPS):
         height, nx, ny = height_over(joints, own, px, py)
@@ -206,7 +206,7 @@ def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
 def in_front(joints, piece, own, px, py, vx, vy, arrival):
     """-> bool: whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
 
-    ``px``, ``py`` (double-doubles) is the place, within rounding of the own piece.
+    ``px``, ``py`` (double-doubles) is the position, within rounding of the own piece.
     """
     if own.kind == LINE and piece.kind == LINE:
         return line_in_front_of_line(joints, piece.number, own.number, px, py, vx, vy, arrival)

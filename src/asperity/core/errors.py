@@ -10,7 +10,7 @@ class InputError(AsperityError, ValueError):
 
 
 class WallError(InputError):
-    """A wall breaks one of the conditions on its geometry; the message names the pieces and the place."""
+    """A wall breaks one of the conditions on its geometry; the message names the pieces and the position."""
 
 
 class FileExistsRefusal(AsperityError, FileExistsError):

@@ -9,7 +9,7 @@ import numpy as np
 
 ENTRIES = 1000
 HALVINGS = 40
-# An outcome changes at a handful of places, each known to (1/ENTRIES) 2^-HALVINGS and to the rounding of the tracer.
+# An outcome changes at a handful of positions, each known to (1/ENTRIES) 2^-HALVINGS and to the rounding of the tracer.
 FRACTION_ERROR = 1e-10
 
 

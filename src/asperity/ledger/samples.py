@@ -38,7 +38,7 @@ def tooth(x: Floats) -> Floats:
 
 
 def satellites(configuration: Floats, count: int) -> Floats:
-    """The places (2, n, count) of all satellites as points of a turned circle, heights from where they touch."""
+    """The positions (2, n, count) of all satellites as points of a turned circle, heights from where they touch."""
     x1, x2, alpha = configuration
     rotated = np.exp(1j * (alpha[:, np.newaxis] + 2 * np.pi * np.arange(count) / count)) * -1j
     return np.stack([x1[:, np.newaxis] + rotated.real, x2[:, np.newaxis] + 1.0 + rotated.imag])

@@ -1,6 +1,6 @@
 """Exact derivations of equalities and inequalities on a domain, part by part.
 
-The domain is taken apart into its inside and its faces, and these at the places where a function jumps or bends. On
+The domain is taken apart into its inside and its faces, and these at the points where a function jumps or bends. On
 each part both sides are resolved into smooth functions, and compared by a normal form, by squares, or because the
 derivative of their difference vanishes. A part on which a side is defined nowhere needs no proof.
 
@@ -32,7 +32,7 @@ DEPTH = 8
 LARGEST_NUMBER = 60
 NUMBER_BITS = 256
 
-# Half the lengths of such intervals; on a long one a place is found at which both sides are known.
+# Half the lengths of such intervals; on a long one a point is found at which both sides are known.
 NEAR = (sp.Rational(1, 64), sp.Integer(4))
 # A symbol of this beginning is half of an integer, which is not halved again.
 HALF = "half of "
@@ -65,7 +65,7 @@ class Derivation:
 
     Attributes
     ----------
-    routes : list of str
+    methods : list of str
         How the parts were proved, those on which a side is defined.
     reason : str
         Why no proof was found.
@@ -77,7 +77,7 @@ class Derivation:
     refute: Refute
     spreads: bool = True
     methods: list[str] = field(default_factory=list, init=False)
-    reason: str = field(default="no proof among the routes known", init=False)
+    reason: str = field(default="no known method proves it", init=False)
     _parts: int = field(default=0, init=False)
     _failed: bool = field(default=False, init=False)
 
@@ -197,7 +197,7 @@ class Derivation:
 
     @staticmethod
     def _pieces(domain: Domain, expressions: list[Any], undetermined: list[Any]) -> list[Domain] | None:
-        """The part cut at the zeros of the first of the places that can be cut at, or by the sign of what decides."""
+        """The part cut at the zeros of the first of the points that can be cut at, or by the sign of what decides."""
         for e in dict.fromkeys(factor for point in expressions for factor in sp.Mul.make_args(point)):
             symbols = [s for s in domain.symbols if e.has(s)]
             if len(symbols) == 1 and e.free_symbols <= set(symbols):
@@ -298,7 +298,7 @@ def expands_to_zero(difference: Any) -> bool:
 
 
 def equal_as_written(left: Any, right: Any, part: Part) -> str | None:
-    """The route by which two sides are found equal without regard to branches."""
+    """The method by which two sides are found equal without regard to branches."""
     if expands_to_zero(left - right):
         return EXPANSION
     if vanishes(left - right, part.plain) or vanishes(left - right, part.parameters):
@@ -307,7 +307,7 @@ def equal_as_written(left: Any, right: Any, part: Part) -> str | None:
 
 
 def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -> str | None:
-    """The route by which two resolved sides are found equal on an open part, or None."""
+    """The method by which two resolved sides are found equal on an open part, or None."""
     method = equal_as_written(left, right, part)
     if method is not None:
         return method
@@ -403,7 +403,7 @@ _POINTS = (
 
 
 def _equal_numbers(difference: Any) -> str | None:
-    """The route by which a number is found to be 0."""
+    """The method by which a number is found to be 0."""
     try:
         ball = evaluate(difference, {}, NUMBER_BITS).ball
     except (Undefined, Unclear):

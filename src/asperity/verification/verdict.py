@@ -95,7 +95,7 @@ def agreement(found: ArrayLike, expected: ArrayLike, allowed: float, **where: Ar
     allowed : float
         The largest difference that rounding, sampling or the order of an approximation can explain.
     **where : array_like
-        The places, by name, broadcast with the values: the worst of them is the counterexample.
+        The points, by name, broadcast with the values: the worst of them is the counterexample.
 
     Examples
     --------
@@ -119,7 +119,7 @@ def no_excess(small: ArrayLike, large: ArrayLike, allowed: float = 0.0, **where:
 
 
 def holds(condition: ArrayLike, of_what: str, **where: ArrayLike) -> Verdict:
-    """Whether a condition holds at every place.
+    """Whether a condition holds at every point.
 
     Examples
     --------
@@ -143,7 +143,7 @@ def _compared(
     point = _point(index, defect.shape, where)
     if broken.any():
         # neither for the formula nor against it
-        return Verdict("undecided", f"not a number at {int(broken.sum())} of {defect.size} places", point)
+        return Verdict("undecided", f"not a number at {int(broken.sum())} of {defect.size} points", point)
     evidence = words.format(worst=f"{float(defect[index]):.2g}") + f", allowed {allowed:.2g}"
     if defect[index] <= allowed:
         return Verdict("agrees", evidence)

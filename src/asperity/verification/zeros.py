@@ -19,7 +19,7 @@ LARGEST = 300
 
 
 def zeros(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
-    """The places in the open interval at which e is 0 or infinite, ascending; None where they are not known.
+    """The points in the open interval at which e is 0 or infinite, ascending; None where they are not known.
 
     An expression that is 0 everywhere has none that are known.
     """
@@ -36,7 +36,7 @@ def zeros(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
 
 
 def _points(e: Any, symbol: Any, low: Any, high: Any) -> set[Any] | None:
-    """Zeros and poles, and possibly other places, some of them outside."""
+    """Zeros and poles, and possibly other points, some of them outside."""
     if sp.count_ops(e) > LARGEST:
         return None
     points: set[Any] = set()
@@ -110,7 +110,7 @@ def _of_polynomial(e: Any, symbol: Any) -> list[Any] | None:
 
 
 def _where(function: Any, level: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
-    """The places where a function of something takes a value."""
+    """The points where a function of something takes a value."""
     inner = function.args[0]
     solutions: list[Any] | None
     try:

@@ -55,7 +55,7 @@ class MatrixMethod:
 
 
 def methods_for(wall: Wall) -> tuple[MatrixMethod, ...]:
-    """The routes that a wall allows, the library's own choice first."""
+    """The methods that a wall allows, the library's own choice first."""
     found = [AUTO]
     if WallLaw(wall).closed_form is not None:
         found.append(CLOSED_FORM)
@@ -66,7 +66,7 @@ def methods_for(wall: Wall) -> tuple[MatrixMethod, ...]:
 
 
 def declared_order(chosen: MatrixMethod, wall: Wall) -> float | None:
-    """The order of a route for matrices in bins, at the numbers of rays of the ladders.
+    """The order of a method for matrices in bins, at the numbers of rays of the ladders.
 
     >>> from asperity.bench.quantities.walls import wall_of
     >>> [declared_order(STRATIFIED, wall_of(name)) for name in ("cusps", "profile")]
@@ -78,7 +78,7 @@ def declared_order(chosen: MatrixMethod, wall: Wall) -> float | None:
 def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelMatrix:
     """From the formula for the wall's hollows."""
     law = WallLaw(wall).closed_form
-    assert law is not None  # `methods_for` offers this route to no other wall
+    assert law is not None  # `methods_for` offers this method to no other wall
     return discretise(law, basis)
 
 

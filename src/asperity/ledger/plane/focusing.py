@@ -18,7 +18,7 @@ RAYS = 4000
 TRACED = 1e-9
 # Rays this near to a change of N may round to either side of it.
 UNDECIDED = 1e-9
-# The place of a ray that enters beside a corner, and how far from the corner it hits.
+# The position of a ray that enters beside a corner, and how far from the corner it hits.
 BESIDE_THE_CORNER, NEAR = 1e-9, 1e-5
 
 
@@ -184,7 +184,7 @@ def outgoing_angle_of_an_arc(angle: Code) -> Verdict:
     id="S2.13",
     section="2.2.3",
     equation="2.18, second line",
-    statement="Focusing arcs: the place of entry as a function of the place of the first hit.",
+    statement="Focusing arcs: the position of entry as a function of the position of the first hit.",
     printed=Formula(
         r"X = \frac{\cos(\theta + \gamma) - \cos(\theta + \xi)}{\cos(\theta - \xi) - \cos(\theta + \xi)}",
         lambda theta, gamma, xi, xp: entry_of(theta, gamma, xi, theta + gamma, xp),
@@ -242,7 +242,7 @@ def range_of_the_arccosine(condition: Code) -> Verdict:
 @erratum(
     id="S2.15",
     section="2.2.3",
-    statement="Focusing arcs: the place of the first hit as a function of the place of entry.",
+    statement="Focusing arcs: the position of the first hit as a function of the position of entry.",
     printed=Formula(
         r"\gamma = -\theta + \mathrm{Arccos}(X \cos(\theta - \xi) + (1 - X) \cos(\theta + \xi))",
         lambda theta, delta: -theta + delta,

@@ -19,7 +19,7 @@ ENTRIES = 2000
 EDGE, TIP = 1e-4, 1e-9
 # Rounding of a ray between straight sides, with up to twenty bounces.
 TRACED = 1e-11
-# Of a midpoint sum over angles at which the law has kinks.
+# Of a midpoint sum over angles at which the law has breakpoints.
 FLUX_ERROR = 1e-4
 
 

@@ -211,7 +211,7 @@ def rolling_chart(chart: Code) -> Verdict:
     printed=Formula(r"S_k,\quad F(x_1, x_2, \alpha)", lambda x1, x2, k: (k, x2)),
     corrected=Formula(r"S_{-k},\quad F(x_1, x_2 - 1, \alpha)", lambda x1, x2, k: (-k, x2 - 1)),
     reason="At α = kρ the satellite at the lowest point of the rim is S₋ₖ, at (x₁, x₂ - 1). F takes the satellite's "
-    "place, not the centre's.",
+    "position, not the centre's.",
 )
 def rolling_from_rest(claim: Code) -> Verdict:
     rng = generator()
