@@ -13,8 +13,10 @@ from asperity.errors import InputError
 from asperity.kernels import SINE, SINE_SQUARED, Bins, Legendre, Panels
 from asperity.kernels.bases import assembly as products_module
 from asperity.kernels.bases import measure as weights_module
-from asperity.kernels.bases.assembly import add_products, one_blas_thread, overlaps
+from asperity.kernels.bases.assembly import add_products, largest_square_sum, one_blas_thread, overlaps
+from asperity.kernels.bases.basis import Basis
 from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
+from asperity.kernels.bases.momentum import Directions
 
 UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]
 
@@ -346,3 +348,24 @@ def test_products_run_on_one_thread_of_the_linear_algebra() -> None:
         with one_blas_thread():
             assert threads() == {1}
         assert threads() == outside
+
+
+def test_the_largest_sum_of_squares_is_that_of_the_orthogonal_polynomials_at_an_end() -> None:
+    # sum of 2 l + 1, sum of (l + 1)^2, and 1 over the smallest mass
+    assert largest_square_sum(Legendre(5)) == pytest.approx(25.0, rel=1e-14)
+    assert largest_square_sum(Legendre(5, "sin2")) == pytest.approx(55.0, rel=1e-14)
+    narrow = float(exact_mass("sin", 1.0, 1.3))
+    assert largest_square_sum(Bins([0.0, 1.0, 1.3, np.pi])) == pytest.approx(1.0 / narrow, rel=1e-14)
+
+
+# the narrow panel's sum is largest at its right end, which is the next panel's left one; then at 0, and at pi
+ENDS = Panels([0.0, 1.8, 2.1, np.pi], 2), Panels([0.0, 0.3, np.pi], 2), Panels([0.0, 2.9, np.pi], 1)
+
+
+@pytest.mark.parametrize("basis", [*ENDS, Legendre(4), Legendre(4, "sin2"), Bins(UNEVEN), Directions()])
+def test_the_largest_sum_of_squares_is_attained_and_exceeded_nowhere(basis: Basis) -> None:
+    inner = basis.edges[1:-1]
+    angle = np.concatenate((np.linspace(1e-9, np.pi - 1e-9, 10_001), inner + 1e-9, inner - 1e-9))
+    found = np.sum(basis.evaluate(angle) ** 2, axis=-1).max()
+    assert found <= largest_square_sum(basis) * (1.0 + 1e-14)
+    assert found >= largest_square_sum(basis) * (1.0 - 1e-6)
