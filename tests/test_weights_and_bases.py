@@ -287,7 +287,9 @@ def test_angles_that_nearly_coincide_are_one_edge() -> None:
         assert np.diff(edges).min() > 1e-5 - 1e-12 and edges[-1] == np.pi
         assert np.abs(edges - half_angle).min() < 1e-5
     plain = Panels.for_wall(geo.flat())
-    assert Panels.for_arc(0.5 * np.pi) != plain == Panels.for_arc(None)
+    assert (
+        Panels.for_wall(geo.focusing_arcs(0.5 * np.pi)) == Panels.for_arc(0.5 * np.pi) != plain == Panels.for_arc(None)
+    )
     # no circular arc of at most a quarter turn either way: nothing to follow
     two = geo.Wall(
         [piece.stretched(0.5, 0.5).moved(x, 0.0) for x in (0.0, 0.5) for piece in geo.focusing_arcs(1.2).pieces]

@@ -192,10 +192,10 @@ def _single_arc_half_angle(wall: Wall) -> float | None:
     from ...geometry import Arc
 
     pieces = wall.cell.pieces
-    if len(pieces) != 1 or not isinstance(pieces[0], Arc) or not pieces[0].is_circular:
-        return None
-    half_angle = pieces[0].half_span
-    return half_angle if 0.0 < half_angle <= 0.5 * np.pi else None
+    # more than a half circle would overlap the next period
+    if len(pieces) == 1 and isinstance(pieces[0], Arc) and pieces[0].is_circular:
+        return pieces[0].half_span
+    return None
 
 
 def _graded_edges(special: list[float], followed: list[float], smallest: float) -> Floats:

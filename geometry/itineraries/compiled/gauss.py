@@ -74,7 +74,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
         if last - first > MOST_NODES - filled - 2 or is_spent(task):
             break
         new0, new1, new2 = 0.0, 0.0, 0.0
-        block = task.setting.tracer.positions[: last - first]
+        block = task.setting.tracer.entries[: last - first]
         for n in range(first, last):
             block[n - first] = low + width * positions[n]
         trace_block(block, task)
