@@ -1,4 +1,4 @@
-"""The cell of a periodic wall: its pieces over one period, its islands, and its properties that need no ray."""
+"""The cell of a periodic wall: its pieces over one period, its islands, and its geometric properties."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from .origin import HighestPoint, highest_point_of
 
 @dataclass(frozen=True, repr=False)
 class Cell:
-    """The pieces of a wall over one period, its islands, and its cell; `Wall` adds validation, files and rays.
+    """The pieces of a wall over one period and its islands; `Wall` adds validation, files and rays.
 
     Attributes
     ----------
     pieces : tuple of Curve
-        With exact joints: each piece starts to the bit where the one before ends.
+        Each piece starts exactly at the end of the piece before.
     period : float
     islands : tuple of tuples of Curve
     """
@@ -37,7 +37,7 @@ class Cell:
         object.__setattr__(self, "islands", islands)
 
     def _image(self, x_factor: float, y_factor: float, period: float) -> Self:
-        """Return an upright affine image: it needs no new validation."""
+        """Return the image under scaling of x and y, which needs no new validation."""
         image = object.__new__(type(self))
         paths = [tuple(p.stretched(x_factor, y_factor) for p in path) for path in (self.pieces, *self.islands)]
         image._fill(paths[0], period, tuple(paths[1:]))
@@ -55,7 +55,7 @@ class Cell:
 
     @cached_property
     def depth(self) -> float:
-        """How far the wall reaches below y = 0."""
+        """The depth of the wall below y = 0."""
         lowest = [float(self.vertices[:, 1].min())]
         lowest += [p.box[1] for path in (self.pieces, *self.islands) for p in path if not isinstance(p, Segment)]
         return max(0.0, -min(lowest + [float(v[:, 1].min()) for v in self.island_vertices]))
@@ -76,9 +76,9 @@ class Cell:
 
     @cached_property
     def closes(self) -> bool:
-        """Conditions B5, B5': no ray passes from cell to cell below the level of the wall's highest points.
+        """Whether no ray passes from cell to cell below the wall's highest points (conditions B5, B5').
 
-        It holds if there are no islands; it is not made use of where pieces would vanish by rounding in ``cell``.
+        True for every wall without islands, unless ``cell`` would lose a piece by rounding.
 
         Examples
         --------
@@ -90,9 +90,9 @@ class Cell:
 
     @cached_property
     def cell(self) -> Self:
-        """The same wall begun at one of its highest points and raised to y = 0; itself if it does not close.
+        """The same wall moved so that a highest point is the origin; the wall itself if it does not close.
 
-        Two pieces that are parts of one, which the given period cuts, are one piece here.
+        If the ends of the given period cut a curve in two, ``cell`` joins the parts to one piece.
 
         Examples
         --------
@@ -108,7 +108,7 @@ class Cell:
 
     @property
     def origin(self) -> Point:
-        """Where the origin of ``cell`` lies in the coordinates of this wall.
+        """The origin of ``cell`` in the coordinates of this wall.
 
         Examples
         --------
@@ -126,9 +126,10 @@ class Cell:
 
     @cached_property
     def hollows(self) -> tuple[Hollow, ...]:
-        """The openings on the level of the highest points with the pieces of ``cell`` below each, from there on.
+        """The hollows of one period: each opening at the level of the highest points, with its pieces of ``cell``.
 
-        Left and right are in the coordinates of this wall, unfolded. Empty for a wall that does not close.
+        Left and right are in the coordinates of this wall and may exceed the period. Empty for a wall that does not
+        close.
 
         Examples
         --------
@@ -165,7 +166,7 @@ class Cell:
         return f"{type(self).__name__}({', '.join(counts)}, period {self.period:g}, depth {self.depth:.6g}, {state})"
 
     def __getstate__(self) -> dict[str, Any]:
-        # cached arrays stay behind: an unpickled array would be writable
+        # without the cached arrays, because unpickling makes arrays writable
         return {"pieces": self.pieces, "period": self.period, "islands": self.islands}
 
 

@@ -18,10 +18,10 @@ class Hollow:
     Parameters
     ----------
     left, right : float
-        The opening is left < x < right on the level of the wall's highest points.
+        The opening is left < x < right at the level of the wall's highest points.
     first, last : int
-        ``wall.cell.pieces[first:last]`` is the boundary of the hollow, in order, from its left end to its right end;
-        a wall that begins at (0, 0) is its own ``cell``.
+        ``wall.cell.pieces[first:last]`` is the boundary of the hollow from its left end to its right end. A wall that
+        begins at (0, 0) is its own ``cell``.
     """
 
     left: float
@@ -42,10 +42,10 @@ def flat_tops(pieces: Sequence[Curve], vertices: Floats) -> list[int]:
 
 
 def hollows_between(tops: Sequence[int], vertices: Floats) -> tuple[Hollow, ...]:
-    """Return the hollows of a closed wall: the chains of pieces between flat tops, cut where they touch y = 0.
+    """Return the hollows of a closed wall: the chains of pieces between flat tops, cut at joints at height 0.
 
-    A chain is cut at joints at height 0 that lie strictly between its ends; joints beside the ends belong to pieces
-    that run back below a flat top (a plate of zero thickness).
+    Only joints with x strictly between the ends of a chain cut it. The other joints at height 0 belong to pieces that
+    run back below a flat top (a plate of zero thickness).
     """
     found: list[Hollow] = []
     count = len(vertices) - 1

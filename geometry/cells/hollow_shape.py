@@ -1,4 +1,4 @@
-"""The shape of a hollow up to translation and scale, on which alone its law depends."""
+"""The shape of a hollow up to translation and scale; its law depends on the shape only."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..curves.segment import Segment
 from .cell import Cell
 from .hollow import Hollow
 
-# Shapes are equal, and sides level or vertical, to this fraction of the size of the numbers: positions are rounded once
-# each, and named walls compute them by some ten operations.
+# Relative tolerance for equal shapes and for level or vertical sides. Each coordinate is rounded once, and named walls
+# compute it by about ten operations.
 SHAPE_TOLERANCE = 64.0 * EPS
-# Besides its ends three inner points tell a piece: circles need three points, ellipses and cubics five.
+# The ends and these three inner points determine a piece: circles need three points, ellipses and cubics five.
 INNER = np.array([0.25, 0.5, 0.75])
 
 
@@ -33,7 +33,7 @@ class HollowShape:
     inner : array, shape (curved pieces, 3, 2)
         Points inside the pieces that are not straight.
     rounding : float
-        How far a coordinate may be off because the wall's own coordinates are rounded.
+        Bound on the error of a coordinate due to rounding of the wall's coordinates.
     """
 
     kinds: tuple[str, ...]
@@ -43,7 +43,7 @@ class HollowShape:
 
     @classmethod
     def of(cls, wall: Cell, hollow: Hollow) -> HollowShape:
-        """The shape of one hollow of a wall that is its own ``cell``."""
+        """Return the shape of one hollow of a wall that is its own ``cell``."""
         pieces = wall.pieces[hollow.first : hollow.last]
         corner = np.array([hollow.left, 0.0])
         vertices = (wall.vertices[hollow.first : hollow.last + 1] - corner) / hollow.width
@@ -55,13 +55,13 @@ class HollowShape:
         return cls(kinds, frozen(vertices), frozen(inner), SHAPE_TOLERANCE * size)
 
     def mirrored(self) -> HollowShape:
-        """The shape of the mirror image."""
+        """Return the shape of the mirror image."""
         vertices, inner = self.vertices[::-1].copy(), self.inner[::-1, ::-1].copy()
         vertices[:, 0], inner[..., 0] = 1.0 - vertices[:, 0], 1.0 - inner[..., 0]
         return HollowShape(self.kinds[::-1], frozen(vertices), frozen(inner), self.rounding)
 
     def same_as(self, other: HollowShape) -> bool:
-        """Whether two shapes are equal within the rounding of either."""
+        """Whether two shapes are equal within the larger of their roundings."""
         if self.kinds != other.kinds:
             return False
         rounding = max(self.rounding, other.rounding)
@@ -86,7 +86,7 @@ class HollowShape:
 
 
 def distinct_hollows(wall: Cell) -> list[tuple[HollowShape, list[Hollow]]]:
-    """The different shapes of a closed wall's hollows, each with the hollows of ``wall.cell`` that have it, in order.
+    """Return the distinct shapes of a closed wall's hollows, each with the hollows of ``wall.cell`` of that shape.
 
     Examples
     --------

@@ -14,18 +14,18 @@ from ..curves.segment import Segment
 from .cell import Cell
 from .origin import joined
 
-# Mirror images agree to rounding if their points differ by this much, relative to the wall's size: a mirrored point
-# rounds once, but the two halves of a wall may have been computed by formulas of some fifty operations.
+# Distance up to which points of mirror images agree, relative to the wall's size. A mirrored point rounds once, but
+# the two halves of a wall may have been computed by formulas of about fifty operations.
 MIRROR_TOLERANCE = 256.0 * EPS
-# Where pieces are compared besides their starts; the same read backwards.
+# Parameters at which pieces are compared, besides 0; the set is symmetric under t -> 1 - t.
 PARAMETERS = np.array([0.25, 0.5, 0.75, 1.0])
 
 
 def has_mirror_axis(wall: Cell) -> bool:
-    """Whether the periodic wall has a mirror axis x = const; with islands only x = period/2 is tried.
+    """Whether the periodic wall has a mirror axis x = const; for a wall with islands only x = period/2 is tested.
 
-    A wall without islands is compared with its mirror image as a cycle of pieces, from every position at which the
-    first piece of the one can be the first of the other; so the cell may start anywhere.
+    A wall without islands is compared with its mirror image as a cycle of pieces, starting from every piece that
+    agrees with the first piece of the image. So the result does not depend on the start of the cell.
     """
     tolerance = MIRROR_TOLERANCE * max(wall.period, float(np.abs(wall.vertices).max()), wall.depth)
     if wall.islands:
@@ -42,7 +42,7 @@ def has_mirror_axis(wall: Cell) -> bool:
 
 
 def _closed_up(pieces: Sequence[Curve], tolerance: float) -> Sequence[Curve]:
-    """The pieces as a cycle: the last and the first one are one if they are parts of it, as of a flat top."""
+    """Return the pieces as a cycle; the last and the first are joined if they are parts of one curve."""
     if len(pieces) < 2:
         return pieces
     last, first = pieces[-1], pieces[0].moved(pieces[-1].end[0], 0.0)
@@ -51,7 +51,7 @@ def _closed_up(pieces: Sequence[Curve], tolerance: float) -> Sequence[Curve]:
 
 
 def _with_bottom_starts(islands: Sequence[Sequence[Curve]]) -> list[tuple[Curve, ...]]:
-    """The same islands, with those of one whole ellipse starting at its bottom: they may start anywhere."""
+    """Return the islands with each whole ellipse starting at its lowest point, since its given start is arbitrary."""
     bottom = -0.5 * np.pi
     return [
         (Arc(loop[0].center, loop[0].semi_axes, bottom, bottom + 2.0 * np.pi * loop[0].direction),)
@@ -62,7 +62,7 @@ def _with_bottom_starts(islands: Sequence[Sequence[Curve]]) -> list[tuple[Curve,
 
 
 def _steps(path: Sequence[Curve]) -> Floats:
-    """For every piece its points at three parameters and at its end, seen from its start; shape (n, 4, 2)."""
+    """Return the points of every piece at PARAMETERS relative to its start, shape (n, 4, 2)."""
     start, end = (np.array([getattr(piece, name) for piece in path]) for name in ("start", "end"))
     # the points of a segment follow from its ends
     steps = PARAMETERS[:, None] * (end - start)[:, None, :]
@@ -73,14 +73,14 @@ def _steps(path: Sequence[Curve]) -> Floats:
 
 
 def _mirrored(steps: Floats) -> Floats:
-    """The steps of the mirror image, which runs backwards: parameter t is 1 - t there."""
+    """Return the steps of the mirror image; its parameter at a point is 1 - t."""
     end = steps[:, -1:]
     points = np.concatenate([steps[:, -2::-1] - end, -end], axis=1)
     return np.asarray(points[::-1] * [-1.0, 1.0])
 
 
 def _agree(path: Sequence[Curve], other: Sequence[Curve], tolerance: float) -> bool:
-    """Whether two paths are the same piece by piece within ``tolerance``."""
+    """Whether two paths agree piece by piece within ``tolerance``."""
     if len(path) != len(other) or [type(p) for p in path] != [type(p) for p in other]:
         return False
     starts = np.array([p.start for p in path]) - np.array([p.start for p in other])

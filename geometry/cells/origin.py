@@ -1,7 +1,7 @@
-"""The origin of the cell: one of the wall's highest points, from which the period is taken (condition B5').
+"""The origin of a wall's cell: one of the wall's highest points (condition B5'; Rudzis 2022, section 1.3.1).
 
-(Rudzis 2022, section 1.3.1.) A wall without islands closes from any of its highest points on, whatever point of its
-period was given first and however far below y = 0 it lies: its law is that of the cell that begins there.
+A wall without islands closes if its period begins at any of its highest points. So the law of the wall is that of
+the cell that begins there, for any given start of the period and any height of the wall below y = 0.
 """
 
 from __future__ import annotations
@@ -19,25 +19,25 @@ from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
 
-# Two pieces are parts of one if that passes their joint, and points of either, at this distance relative to the wall's
-# size: the joint comes out of a few dozen operations, and the shift of the cell rounds once more.
+# Two pieces are parts of one curve if it passes within this distance, relative to the wall's size, of their joint and
+# of points of both. The joint is computed by a few dozen operations, and shifting the cell rounds once more.
 SAME_PIECE = 64.0 * EPS
-# Where parts are compared with the whole.
+# Parameters at which the parts are compared with the whole curve.
 INNER = np.array([0.25, 0.5, 0.75])
 
 
 @dataclass(frozen=True)
 class HighestPoint:
-    """The pieces of a wall from one of its highest points on, over one period, with that point as the origin.
+    """The pieces of a wall over one period, starting from one of its highest points as the origin.
 
     Parameters
     ----------
     pieces : tuple of Curve
         From (0, 0) to (period, 0).
     origin : (float, float)
-        Where (0, 0) lies in the coordinates of the wall.
+        The position of (0, 0) in the coordinates of the wall.
     numbers : tuple of int
-        For every piece the number of the (first) piece of the wall that it is.
+        For every piece its index in the wall, of a joined piece that of its first part.
     """
 
     pieces: tuple[Curve, ...]
@@ -46,7 +46,7 @@ class HighestPoint:
 
 
 def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> HighestPoint | None:
-    """The cell of a wall without islands; None if the shift would make pieces vanish by rounding."""
+    """Return the cell of a wall without islands; None without a first top or if rounding would remove a piece."""
     first = first_top(joints, period)
     if first is None:
         return None
@@ -76,9 +76,9 @@ def highest_point_of(path: tuple[Curve, ...], joints: Floats, period: float) -> 
 
 
 def first_top(vertices: Floats, period: float) -> int | None:
-    """The first joint of greatest height from which all others of that height lie within a period to the right.
+    """Return the first joint of greatest height with all others of that height at most one period to its right.
 
-    Only joints on plates of zero thickness, which run back below a flat top, do not have that property.
+    Only joints on plates of zero thickness, which run back below a flat top, lack this property.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def first_top(vertices: Floats, period: float) -> int | None:
     height = vertices[:-1, 1]
     tops = np.flatnonzero(height == height.max())
     x = vertices[tops, 0]
-    # of this joint and those after it, and of those before it, a period later
+    # extremal x of this joint and the later ones, and of the earlier ones shifted by one period
     least = np.minimum.accumulate(x[::-1])[::-1]
     most = np.maximum.accumulate(x[::-1])[::-1]
     least[1:] = np.minimum(least[1:], np.minimum.accumulate(x)[:-1] + period)
@@ -98,7 +98,7 @@ def first_top(vertices: Floats, period: float) -> int | None:
 
 
 def joined(before: Curve, after: Curve, tolerance: float) -> Curve | None:
-    """The one piece whose two parts, one behind the other, these are within ``tolerance``; None if there is none.
+    """Return the curve whose two consecutive parts are the given pieces within ``tolerance``; None if none exists.
 
     Examples
     --------
@@ -137,7 +137,7 @@ def _joined_beziers(before: Bezier, after: Bezier, tolerance: float) -> Bezier |
     if before.degree != after.degree:
         return None
     first, second = (np.array(part.control_points) for part in (before, after))
-    # the derivative at the joint, times the fraction of the parameter that each part has
+    # each distance is proportional to the derivative at the joint times the part's fraction of the parameter
     left, right = math.dist(first[-1], first[-2]), math.dist(second[1], second[0])
     if left == 0.0 or right == 0.0:
         return None
@@ -150,7 +150,7 @@ def _joined_beziers(before: Bezier, after: Bezier, tolerance: float) -> Bezier |
 
 
 def _are_parts(whole: Curve, before: Curve, after: Curve, fraction: float, tolerance: float) -> bool:
-    """Whether points of both parts, and their joint, lie on the whole at their fraction of its parameter."""
+    """Whether the joint and points of both parts lie on the whole curve at the corresponding parameters."""
     given = np.concatenate([before.point(INNER), [before.end], after.point(INNER)])
     found = whole.point(np.concatenate([fraction * INNER, [fraction], fraction + (1.0 - fraction) * INNER]))
     return bool(np.abs(given - found).max() <= tolerance)

@@ -1,8 +1,8 @@
-"""The conditions on a wall's geometry: pieces join, do not cross, and lie in y <= 0 over one period.
+"""Checks of a wall's geometry: its pieces join, do not cross, and lie in y <= 0 over one period.
 
-(Rudzis 2022, section 1.3.1, conditions B1-B5.) Joints are made exact here: neighbouring pieces share their joint to
-the bit, the path runs from exactly (0, y0) to exactly (period, y0), heights within rounding of 0 become 0, and those
-within rounding of the greatest height become that.
+The conditions are B1-B5 of Rudzis 2022, section 1.3.1. This module also makes the joints exact. Neighbouring pieces
+share their joint exactly, and the path runs from exactly (0, y0) to exactly (period, y0). Heights within rounding of
+0 become 0, and heights within rounding of the greatest height become equal to it.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from ..curves.crossings import find_crossing
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
 
-# Two pieces join if their ends are this close, relative to the wall's size: what ten digits typed by hand allow.
+# Distance, relative to the wall's size, up to which the ends of two pieces join; enough for input of ten digits.
 JOIN_TOLERANCE = 1e-9
 
-# A coordinate this close to 0 or to the period, relative to the wall's size, is that number: coordinates come out
-# of a few dozen operations, each of which rounds by eps/2.
+# Distance, relative to the wall's size, up to which a coordinate is set to 0 or to the period. Coordinates are
+# computed by a few dozen operations, each of which rounds by eps/2.
 SNAP_TOLERANCE = 64.0 * EPS
 
-# A piece touches the level of the tops at its own top, not at its end, if the parameter of the top is this far from 0
-# and from 1: the height near a top is quadratic, so an end point's rounding of eps moves the top by its square root.
+# A piece touches the level of the tops inside, not at its end, if the parameter of its top is this far from 0 and 1.
+# The height near a top is quadratic, so rounding an end point by eps moves the top by about sqrt(eps).
 TOUCH_MARGIN = 1e-7
 
 Pieces = tuple[Curve, ...]
 
 
 def canonical_path(given: Sequence[Curve], period: float) -> Pieces:
-    """Return the pieces with exact joints, cut where they touch the level of their tops, or raise a WallError."""
+    """Return the pieces with exact joints, cut at inner tops of greatest height, or raise a WallError."""
     pieces = _curves(given, "pieces")
     starts, ends = _end_points(pieces)
     size = _size(starts, ends, period)
@@ -57,7 +57,7 @@ def canonical_path(given: Sequence[Curve], period: float) -> Pieces:
 
 
 def canonical_island(given: Sequence[Curve], period: float, size: Floats, index: int) -> Pieces:
-    """Return the pieces of an island with exact joints, clockwise, so that the free side is on the left."""
+    """Return the pieces of an island with exact joints, clockwise: the free side is on the left."""
     label = f" of island {index}"
     pieces = _curves(given, f"islands[{index}]")
     starts, ends = _end_points(pieces)
@@ -113,7 +113,7 @@ def check_crossings(
 
 
 def wall_size(pieces: Pieces, period: float) -> Floats:
-    """Return the width and the height that tolerances are relative to."""
+    """Return the width and the height to which tolerances are relative."""
     starts, ends = _end_points(pieces)
     return _size(starts, ends, period)
 
@@ -162,7 +162,7 @@ def _check_left_and_right(starts: Floats, ends: Floats, rounding: Floats, period
 def _joints(
     following: Floats, ends: Floats, later_rounding: Floats, rounding: Floats, size: Floats, label: str
 ) -> tuple[Floats, Floats]:
-    """Return where pieces meet (of two ends the one that was given, not computed) and how far that may be off."""
+    """Return the joints, each the more accurate of the two ends that meet, and bounds on their errors."""
     gaps = np.abs(following - ends)
     excess = gaps - JOIN_TOLERANCE * size - (later_rounding + rounding)[:, np.newaxis]
     if len(gaps) and excess.max() > 0.0:
@@ -186,7 +186,7 @@ def _snapped(vertices: Floats, slack: Floats, period: float, size: Floats) -> Fl
 
 
 def _pinned(pieces: Pieces, vertices: Floats, size: Floats, label: str) -> Pieces:
-    """Give every piece its vertices as end points; pieces that have them already are kept as they are."""
+    """Set the end points of every piece to its vertices; pieces with these end points are returned unchanged."""
     points = [(x, y) for x, y in vertices.tolist()]
     shortest = 4.0 * JOIN_TOLERANCE * float(size.max())
     result = []
@@ -206,7 +206,7 @@ def _check_heights(pieces: Pieces, vertices: Floats, size: Floats, label: str) -
             _, bottom, _, top = piece.box
             if bottom == top == 0.0:
                 raise WallError(f"piece {i}{label}: expected a Segment where the wall runs along y = 0, got {piece}")
-            # the inside of a curve moves by as much as its ends may be moved
+            # pinning moves the inside of a curve by up to the tolerance of its ends
             excess[i] = max(excess[i], top - JOIN_TOLERANCE * size[1])
     worst = int(np.argmax(excess))
     if excess[worst] > 0.0:
@@ -219,16 +219,16 @@ def _check_heights(pieces: Pieces, vertices: Floats, size: Floats, label: str) -
 
 
 def _level(pieces: Pieces, vertices: Floats, slack: Floats) -> tuple[float, NDArray[np.bool_]]:
-    """Return the greatest height of the path, at most 0, and which vertices have it within their slack."""
+    """Return the greatest height of the path, at most 0, and a mask of the vertices at that height within slack."""
     tops = [y for piece in pieces if not isinstance(piece, Segment) for y in piece.turning_values(1)]
     highest = min(max([float(vertices[:, 1].max()), *tops]), 0.0)
     near = vertices[:, 1] >= highest - slack
-    # of a vertex, which was given, and the top of a curve, which was computed, the former
+    # the height of a vertex, which was given, is preferred to that of a curve's top, which was computed
     return float(vertices[near, 1].max(initial=-np.inf)) if near.any() else highest, near
 
 
 def _cut_at_touching(piece: Curve, level: float, limit: float) -> list[Curve]:
-    """Cut a curved piece where its tops touch the level of all tops, because hollows end there."""
+    """Cut a curved piece at its tops of greatest height, because hollows end there."""
     if not isinstance(piece, Segment):
         for top in piece.turning_points(1):
             x, y = (float(v) for v in piece.point(top))
@@ -240,7 +240,7 @@ def _cut_at_touching(piece: Curve, level: float, limit: float) -> list[Curve]:
 
 
 def _signed_area(pieces: Pieces, size: Floats) -> float:
-    """Twice the area inside a closed path, positive if it runs counterclockwise."""
+    """Return twice the area inside a closed path, positive if it runs counterclockwise."""
     p = np.concatenate([piece.flattened(1e-5 * float(size.max()))[:-1] for piece in pieces])
     p = p - p[0]
     q = np.roll(p, -1, axis=0)

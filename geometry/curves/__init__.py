@@ -1,1 +1,1 @@
-"""Pieces of walls: segments, arcs and Bezier curves, and the test whether they cross."""
+"""The curves that make up walls: segments, arcs and Bezier curves, and the test for crossings."""

@@ -1,4 +1,4 @@
-"""Circular and elliptic arcs with axes along x and y; scalings of x and y map them to such arcs."""
+"""Arcs of circles, and of ellipses with axes along x and y; scaling x and y maps such arcs to such arcs."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
-# Up to this span (radians) an arc is placed by its chord and its semi-axes: the difference of two angles near pi/2
-# has an error of eps, so a span of 1e-8 read from the angles would keep 8 digits only; the chord keeps 16.
-# Beyond it the angles are the better data, because a chord says little about a span near pi.
+# Up to this span (radians) the points of an arc are computed from its chord and semi-axes. The difference of two
+# angles near pi/2 has an error of eps, so the angles give a span of 1e-8 with 8 digits only, the chord with 16.
+# Above CHORD_SPAN the points are computed from the angles, because the chord determines a span near pi poorly.
 CHORD_SPAN = 1.0
 
-# Semi-axes that agree to this relative distance after a stretch are those of a circle: two products and two
-# quotients, each rounded by eps/2, separate them by at most 2 eps.
+# Relative difference up to which two semi-axes count as equal after a stretch. Two products and two quotients, each
+# rounded by eps/2, separate equal semi-axes by at most 2 eps.
 CIRCLE_TOLERANCE = 4.0 * EPS
 
-# Computing c + a cos t rounds three times at the size of |c| + a.
+# Error of a computed end point, relative to |c| + a: c + a cos t rounds three times.
 END_ROUNDING = 4.0 * EPS
 
 
 @dataclass(frozen=True, init=False, repr=False)
 class Arc(Curve):
-    """The arc (cx + a cos t, cy + b sin t) with t running from one angle to another, either way round.
+    """The arc (cx + a cos t, cy + b sin t), t from one angle to another, clockwise or counterclockwise.
 
     Parameters
     ----------
@@ -38,19 +38,19 @@ class Arc(Curve):
     semi_axes : float or (float, float)
         The radius, or (a, b); greater than 0.
     start, end : float
-        The angles t of the two ends in radians; their distance is greater than 0 and at most 2 pi. For an ellipse t
-        is the parametric (eccentric) angle. Counterclockwise if ``end > start``.
+        The angles t of the two ends in radians; their difference is greater than 0 and at most 2 pi. For an ellipse
+        t is the parametric (eccentric) angle. The arc is counterclockwise if ``end > start``.
 
     Attributes
     ----------
     start_angle, end_angle : float
         The two arguments ``start`` and ``end``.
     start, end : (float, float)
-        The end *points*, as on every curve.
+        The end *points*, as for every curve.
     is_circular : bool
         Whether the semi-axes are equal.
     half_span : float
-        Half of the angle that the arc subtends, in (0, pi]; accurate also for arcs that are nearly straight.
+        Half of the angle that the arc subtends, in (0, pi]; accurate also for nearly straight arcs.
 
     Raises
     ------
@@ -59,8 +59,8 @@ class Arc(Curve):
 
     Notes
     -----
-    A nearly straight arc has its centre far away, and its end points cannot be computed well from it. ``pinned``
-    gives an arc end points that are known exactly; the curve is then placed by its chord and semi-axes.
+    The centre of a nearly straight arc is far away and gives its end points inaccurately. ``pinned`` sets the end
+    points to exactly known values; the chord and the semi-axes then define the curve.
 
     Examples
     --------
@@ -150,7 +150,7 @@ class Arc(Curve):
         return self._with_exact_ends(s, np.stack([x, y], axis=-1))
 
     def _point_by_angle(self, s: Floats) -> Floats:
-        """Add to the nearer end point the exact product form of a (cos t - cos t0), b (sin t - sin t0)."""
+        """Return the nearer end point plus (a (cos t - cos t0), b (sin t - sin t0)), the differences as products."""
         first = (s <= 0.5)[..., np.newaxis]
         anchor = np.where(first, np.array(self.start), np.array(self.end))
         anchor_angle = np.where(s <= 0.5, self.start_angle, self.end_angle)
@@ -188,7 +188,7 @@ class Arc(Curve):
         half = self.half_span
         if self.is_circular:
             return 2.0 * a * half
-        if half < 0.1 * min(a / b, b / a):  # far from the branch points tan t = +-i b/a: Gauss is exact to rounding
+        if half < 0.1 * min(a / b, b / a):  # branch points tan t = +-i b/a are far: Gauss quadrature is exact
             nodes, weights = np.polynomial.legendre.leggauss(20)
             t = 0.5 * (self.start_angle + self.end_angle) + half * nodes
             return float(half * np.sum(weights * np.hypot(a * np.sin(t), b * np.cos(t))))
@@ -211,7 +211,7 @@ class Arc(Curve):
         return sorted(s for s in turns if 0.0 < s < 1.0)
 
     def turning_values(self, axis: int) -> list[float]:
-        """Return coordinate ``axis`` at its turning points: the centre's plus or minus the semi-axis."""
+        """Return coordinate ``axis`` at its turning points: that of the centre plus or minus the semi-axis."""
         span = self.end_angle - self.start_angle
         if abs(span) <= CHORD_SPAN:
             return super().turning_values(axis)
@@ -220,7 +220,7 @@ class Arc(Curve):
         return [self.center[axis] + math.copysign(self.semi_axes[axis], wave(t)) for t in angles]
 
     def reversed(self) -> Arc:
-        """Return the arc run the other way."""
+        """Return the arc in the opposite direction."""
         angles = (self.end_angle, self.start_angle)
         return self._with(self.center, self.semi_axes, angles, self.end, self.start, self.rounding)
 
@@ -259,7 +259,7 @@ class Arc(Curve):
 
     def flattened(self, tolerance: float) -> Floats:
         """Return points on the arc, uniform in t, whose polyline is within ``tolerance``."""
-        # A step of d leaves at most max(a, b) (1 - cos(d/2)) = 2 max(a, b) sin^2(d/4).
+        # A step of d radians has an error of at most max(a, b) (1 - cos(d/2)) = 2 max(a, b) sin^2(d/4).
         sine = math.sqrt(max(tolerance, 0.0) / (2.0 * max(self.semi_axes)))
         step = 4.0 * math.asin(min(sine, 0.5)) or math.inf
         return self.point(uniform_parameters(tolerance, 2.0 * self.half_span / step))

@@ -1,4 +1,4 @@
-"""Quadratic and cubic Bezier curves; the quadratic ones are the arcs of parabolas."""
+"""Quadratic and cubic Bezier curves; the quadratic ones are arcs of parabolas."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
-# Beyond this distance (in the parameter) between the speed's minimum and [0, 1] the closed formula of a quadratic's
-# length cancels, while 24 Gauss nodes are exact to rounding: the integrand's branch points are that far away too.
+# Distance (in the parameter) from the minimum of the speed to [0, 1] above which the closed formula for the length of
+# a quadratic curve cancels. There 24 Gauss nodes are exact to rounding: the branch points are at least as far away.
 FAR_MINIMUM = 2.0
 
 
@@ -70,11 +70,11 @@ class Bezier(Curve):
         return _bernstein(np.array(self.control_points), np.asarray(s, dtype=np.float64))
 
     def _derivative(self) -> Floats:
-        """Control points of the derivative."""
+        """Return the control points of the derivative."""
         return self.degree * np.diff(np.array(self.control_points), axis=0)
 
     def tangent(self, s: ArrayLike) -> Floats:
-        """Return the unit tangents at the parameters ``s`` in [0, 1]; at a stationary point the limit from inside."""
+        """Return the unit tangents at the parameters ``s`` in [0, 1]; at a stationary point, one from 1e-6 inside."""
         s = np.asarray(s, dtype=np.float64)
         velocity = _bernstein(self._derivative(), s)
         speed = np.hypot(velocity[..., 0], velocity[..., 1])
@@ -89,7 +89,7 @@ class Bezier(Curve):
 
     @property
     def length(self) -> float:
-        """The arc length: a closed formula for degree 2, quadrature between the speed's minima for degree 3."""
+        """The arc length: a closed formula for degree 2, quadrature between the minima of the speed for degree 3."""
         return _quadratic_length(self._derivative()) if self.degree == 2 else self._cubic_length()
 
     def _cubic_length(self) -> float:
@@ -97,7 +97,7 @@ class Bezier(Curve):
 
         velocity = self._derivative()
         c0, c1, c2 = velocity[0], 2.0 * (velocity[1] - velocity[0]), velocity[0] - 2.0 * velocity[1] + velocity[2]
-        # d|v|^2/ds / 2 = v . v' as a polynomial, highest power first: the speed is smooth between its minima
+        # (d|v|^2/ds) / 2 = v . v' as a polynomial, highest power first; the speed is smooth between its minima
         slope = [2.0 * c2 @ c2, 3.0 * c1 @ c2, 2.0 * c0 @ c2 + c1 @ c1, c0 @ c1]
         breaks = [0.0, *_roots_inside(slope), 1.0]
         size = float(np.abs(velocity).max())
@@ -120,7 +120,7 @@ class Bezier(Curve):
         return _roots_inside([v[0] - 2.0 * v[1] + v[2], 2.0 * (v[1] - v[0]), v[0]])
 
     def reversed(self) -> Bezier:
-        """Return the curve run the other way."""
+        """Return the curve in the opposite direction."""
         return Bezier(self.control_points[::-1])
 
     def stretched(self, x_factor: float, y_factor: float) -> Bezier:
@@ -150,12 +150,12 @@ class Bezier(Curve):
         """Return points on the curve, uniform in the parameter, whose polyline is within ``tolerance``."""
         bend = np.diff(np.array(self.control_points), n=2, axis=0)
         most = self.degree * (self.degree - 1) * float(np.hypot(bend[:, 0], bend[:, 1]).max())
-        # a step h leaves at most h^2 max|B''| / 8
+        # a step h has an error of at most h^2 max|B''| / 8
         return self.point(uniform_parameters(tolerance, math.sqrt(most / (8.0 * max(tolerance, 1e-300)))))
 
 
 def _bernstein(control: Floats, s: Floats) -> Floats:
-    """Evaluate by de Casteljau's rule, which is exact at both ends."""
+    """Evaluate a Bezier curve by de Casteljau's algorithm, which is exact at both ends."""
     t = s[..., np.newaxis]
     level = [np.broadcast_to(p, (*s.shape, 2)) for p in control]
     while len(level) > 1:
@@ -170,13 +170,13 @@ def _roots_inside(coefficients: Any) -> list[float]:
         return []
     trimmed = [float(c) / scale if abs(c) > EPS * scale else 0.0 for c in coefficients]
     roots = np.roots(trimmed)
-    # a double root comes back as a pair with imaginary parts of about the square root of eps
+    # np.roots returns a double root as a pair with imaginary parts of about sqrt(eps)
     real = roots.real[np.abs(roots.imag) <= 4.0 * math.sqrt(EPS) * np.maximum(1.0, np.abs(roots))]
     return sorted(float(r) for r in real if 0.0 < r < 1.0)
 
 
 def _quadratic_length(velocity: Floats) -> float:
-    """Integrate sqrt(|c|^2 (s - m)^2 + h^2) over [0, 1], where v(s) = v0 + c s."""
+    """Integrate the speed |v0 + c s| = sqrt(|c|^2 (s - m)^2 + h^2) over [0, 1]."""
     v0, change = velocity[0], velocity[1] - velocity[0]
     growth = float(np.hypot(*change))
     if growth == 0.0:

@@ -1,12 +1,12 @@
-"""Whether the pieces of a wall cross; touching, cusps and plates of zero thickness are allowed.
+"""Test whether the pieces of a wall cross; touching, cusps and plates of zero thickness are allowed.
 
-The wall over one period is closed by a path above y = 0 and the winding number of the closed path is taken on every
-face that it cuts out of the plane. Around a crossing the winding number takes three consecutive values; around a
-touching it takes two. So pieces cross if and only if some face has a winding number other than 0 and 1. Faces that
-are thinner than the tolerance come from rounding and from flattening curves, and do not count.
+A path above y = 0 closes the wall over one period. The closed path divides the plane into faces, each with a winding
+number. Around a crossing the winding number takes three consecutive values, around a touching point two. So pieces
+cross if and only if some face has a winding number other than 0 and 1. Faces thinner than the tolerance come from
+rounding and from flattening curves; they are ignored.
 
-A path that turns back along itself is a plate of zero thickness where free space lies beside it. Where none does it is
-a slit of zero width in the solid: there is no free space on the left of the path, and no ray meets it.
+A path that turns back along itself is a plate of zero thickness if free space lies beside it. Otherwise it is a slit
+of zero width in the solid: no free space lies on the left of the path, and no ray meets the slit.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ from ...core.rounding import EPS
 from .curve import Curve
 from .segment import Segment
 
-# Curves become polylines within this distance, in coordinates where the wall is 1 wide and 1 deep. Polylines of
-# curves that only touch overlap by at most twice as much, and a face of thickness d has 2 area / perimeter <= d.
+# Tolerance of the polylines that replace curves, in coordinates where the wall is 1 wide and 1 deep. Polylines of
+# curves that only touch overlap by at most twice the tolerance; a face of thickness d has 2 area / perimeter <= d.
 FLATTENING = 1e-5
 CURVED_THICKNESS = 4.0 * FLATTENING
 
-# Vertices of polygons are given and noding them rounds by a few eps, but joints may have been moved together by 1e-9
-# (JOIN_TOLERANCE in conditions.py) on both sides of a touching.
+# Thickness up to which a face between segments is ignored. Noding rounds by a few eps only, but on both sides of a
+# touching point joints may have been moved by 1e-9 (JOIN_TOLERANCE in cells/validity.py).
 STRAIGHT_THICKNESS = 4e-9
 
-# Coordinates this close are the same, relative to the wall's size (SNAP_TOLERANCE in conditions.py).
+# Distance up to which coordinates are equal, relative to the wall's size (SNAP_TOLERANCE in cells/validity.py).
 SAME_POINT = 64.0 * EPS
 
-# Pieces this close to a crossing are named in the message.
+# Distance from a crossing up to which a piece is named in the message.
 NEARBY = 1e-7
 
-# A path turns back where its directions before and after a joint are opposite to this, and for segments if their ends
-# are apart by no more than rounding of coordinates.
+# Sine of the angle up to which the directions before and after a joint are opposite, so that the path turns back. Two
+# segments must also be no further apart than the rounding of coordinates.
 REVERSED = 1e-9
-# Where on the shorter of two pieces that lie on each other it is asked whether free space is beside them.
+# Parameters on the shorter of two coinciding pieces at which free space beside them is tested.
 ASKED = np.array([0.125, 0.5, 0.875])
 
-# Edges times faces in one block of the winding count: 32 MB of booleans.
+# Edges times faces in one block of winding numbers: the largest temporary array has 32 MB.
 WINDING_BLOCK = 4_000_000
 
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where pieces cross, or make a slit: the point in the wall's coordinates and the labels of the pieces there."""
+    """A crossing or a slit: its point in the coordinates of the wall and the labels of the pieces there."""
 
     point: tuple[float, float]
     labels: tuple[str, ...]
@@ -59,7 +59,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class _Turn:
-    """Where a path turns back along itself: the point, the two pieces, and points beside both, left, then right."""
+    """A joint at which a path turns back along itself: the point, the two pieces, points on their left, then right."""
 
     point: tuple[float, float]
     pieces: tuple[int, int]
@@ -68,7 +68,7 @@ class _Turn:
 
 @dataclass(frozen=True)
 class _Loop:
-    """A closed polyline: points (n + 1, 2), and per edge the label's index (-1 for the closing path)."""
+    """A closed polyline: points, shape (n + 1, 2), and the label index of each edge (-1 on the closing path)."""
 
     points: Floats
     labels: NDArray[np.int64]
@@ -81,7 +81,7 @@ def find_crossing(
     islands: Sequence[Sequence[Curve]],
     numbers: Sequence[int],
 ) -> Crossing | None:
-    """Return the worst crossing of the pieces of a canonical wall, which have these numbers, and its islands."""
+    """Return the crossing with the thickest face, else a slit, else None; ``numbers`` label the pieces of the wall."""
     import shapely
 
     size = (period, depth if depth > 0.0 else period)
@@ -115,7 +115,7 @@ def find_crossing(
 
 
 def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[_Turn]:
-    """Where paths turn back along themselves; the first path is open, the others are closed."""
+    """Return the joints at which paths turn back along themselves; the first path is open, the others are closed."""
     found, first = [], 0
     for number, path in enumerate(paths):
         into, out = _directions(path)
@@ -137,7 +137,7 @@ def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[
 
 
 def _directions(path: Sequence[Curve]) -> tuple[Floats, Floats]:
-    """The unit vectors in which every piece comes to its end, and in which it leaves its start."""
+    """Return the unit tangents of every piece at its end and at its start."""
     chords = np.array([piece.end for piece in path]) - np.array([piece.start for piece in path])
     straight = np.array([isinstance(piece, Segment) for piece in path])
     chords[straight] /= np.hypot(chords[straight, 0], chords[straight, 1])[:, np.newaxis]
@@ -148,7 +148,7 @@ def _directions(path: Sequence[Curve]) -> tuple[Floats, Floats]:
 
 
 def _coincidence(before: Curve, after: Curve, across: float, size: tuple[float, float]) -> float:
-    """How far apart two pieces may be that lie on each other from their joint on; 0 if they do not."""
+    """Return the tolerance within which two pieces coincide from their joint on; 0 if they do not coincide."""
     if isinstance(before, Segment) and isinstance(after, Segment):
         apart = across * min(before.length, after.length)
         return STRAIGHT_THICKNESS if apart <= SAME_POINT * max(size) else 0.0
@@ -161,7 +161,7 @@ def _coincidence(before: Curve, after: Curve, across: float, size: tuple[float, 
 
 
 def _without_repeats(points: Floats) -> Floats:
-    """Drop points that equal the one before."""
+    """Drop points equal to their predecessor."""
     keep = np.ones(len(points), dtype=bool)
     keep[1:] = np.any(points[1:] != points[:-1], axis=1)
     return points[keep]
@@ -182,13 +182,13 @@ def _flatten(pieces: Sequence[Curve], size: tuple[float, float], first_label: in
 
 
 def _copies(points: Floats) -> int:
-    """How many periods side by side hold every pair of pieces that can meet."""
+    """Return the number of adjacent periods that contains every pair of pieces that can meet."""
     reach = max(-float(points[:, 0].min()), float(points[:, 0].max()) - 1.0)
     return 1 + 2 * (math.ceil(reach) if reach > STRAIGHT_THICKNESS else 0)
 
 
 def _close(path: _Loop, copies: int) -> _Loop:
-    """Lay copies side by side and close the path above: up on the right, leftward at y = 1, down on the left."""
+    """Repeat the path ``copies`` times and close it above: up on the right, leftward at y = 1, down on the left."""
     shifts = [path.points[:-1] + np.array([k, 0.0]) for k in range(copies)]
     roof = np.array([(copies, path.points[-1, 1]), (copies, 1.0), (0.0, 1.0), path.points[0]])
     labels = np.concatenate([np.tile(path.labels, copies), np.full(3, -1, dtype=np.int64)])
@@ -207,7 +207,7 @@ def _faces(loops: Sequence[_Loop]) -> tuple[NDArray[np.object_], Floats]:
 
 
 def _winding_numbers(points: Floats, points_tested: Floats) -> NDArray[np.int64]:
-    """Count how often the closed polyline winds around each point, counterclockwise."""
+    """Return the counterclockwise winding number of the closed polyline around each point."""
     start, end = points[:-1], points[1:]
     winding = np.zeros(len(points_tested), dtype=np.int64)
     block = max(1, WINDING_BLOCK // len(start))
@@ -221,7 +221,7 @@ def _winding_numbers(points: Floats, points_tested: Floats) -> NDArray[np.int64]
 
 
 def _is_among_segments(face: object, loops: Sequence[_Loop], straight: NDArray[np.bool_]) -> bool:
-    """Whether no curved piece comes near the face, so that flattening cannot have made it."""
+    """Whether no curved piece is near the face; flattening then cannot have produced the face."""
     import shapely
 
     for loop in loops:
@@ -233,7 +233,7 @@ def _is_among_segments(face: object, loops: Sequence[_Loop], straight: NDArray[n
 
 
 def _describe(face: object, loops: Sequence[_Loop], labels: Sequence[str], size: tuple[float, float]) -> Crossing:
-    """Find the corner of the face where most pieces meet, and name them."""
+    """Return the corner of the face at which most edges meet, with the labels of their pieces."""
     import shapely
 
     edges = np.concatenate([np.stack([loop.points[:-1], loop.points[1:]], axis=1) for loop in loops])

@@ -17,16 +17,16 @@ Box = tuple[float, float, float, float]
 
 
 class Curve(ABC):
-    """A smooth directed curve in the plane, parametrised over [0, 1]; a value that never changes.
+    """A smooth directed curve in the plane, parametrised over [0, 1]; immutable.
 
     The free side of a wall is on the left of the direction of travel.
 
     Attributes
     ----------
     start, end : (float, float)
-        The end points. ``point(0.0)`` and ``point(1.0)`` are these numbers to the bit.
+        The end points, exactly equal to ``point(0.0)`` and ``point(1.0)``.
     rounding : float
-        How far ``start`` and ``end`` may be off because they were computed; 0.0 where they were given.
+        Bound on the rounding error of ``start`` and ``end`` if they were computed; 0.0 if they were given.
     """
 
     start: Point
@@ -57,11 +57,11 @@ class Curve(ABC):
 
     @abstractmethod
     def reversed(self) -> Self:
-        """Return the same curve run the other way."""
+        """Return the same curve in the opposite direction."""
 
     @abstractmethod
     def stretched(self, x_factor: float, y_factor: float) -> Self:
-        """Return the image under (x, y) -> (x_factor x, y_factor y); negative factors reflect, 0 is refused."""
+        """Return the image under (x, y) -> (x_factor x, y_factor y); negative factors reflect, 0 raises WallError."""
 
     @abstractmethod
     def moved(self, dx: float, dy: float) -> Self:
@@ -81,7 +81,7 @@ class Curve(ABC):
 
     @property
     def box(self) -> Box:
-        """The smallest upright box (xmin, ymin, xmax, ymax) that holds the curve."""
+        """The bounding box (xmin, ymin, xmax, ymax) of the curve."""
         bounds = []
         for axis in (0, 1):
             values = [self.start[axis], self.end[axis], *self.turning_values(axis)]
@@ -91,7 +91,7 @@ class Curve(ABC):
 
 
 def as_point(name: str, value: Any) -> Point:
-    """Return ``value`` as a pair of finite floats, or raise a WallError that says what it is."""
+    """Return ``value`` as a pair of finite floats, or raise a WallError that begins with ``name``."""
     try:
         x, y = value
         point = float(x), float(y)
@@ -103,7 +103,7 @@ def as_point(name: str, value: Any) -> Point:
 
 
 def stretch_factors(x_factor: float, y_factor: float) -> tuple[float, float]:
-    """Return both factors as finite floats other than zero."""
+    """Return both factors as floats; raise WallError unless both are finite and other than 0."""
     factors = float(x_factor), float(y_factor)
     if not all(math.isfinite(f) and f != 0.0 for f in factors):
         raise WallError(f"stretched: expected two finite factors other than 0, got {factors}")

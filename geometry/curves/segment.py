@@ -53,7 +53,7 @@ class Segment(Curve):
         return points
 
     def tangent(self, s: ArrayLike) -> Floats:
-        """Return the unit tangent, once for every parameter in ``s``, shape ``s.shape + (2,)``."""
+        """Return the unit tangent, repeated for every parameter in ``s``, shape ``s.shape + (2,)``."""
         dx, dy = self.end[0] - self.start[0], self.end[1] - self.start[1]
         speed = math.hypot(dx, dy)
         direction = np.array([dx / speed, dy / speed])
@@ -66,16 +66,16 @@ class Segment(Curve):
 
     @property
     def box(self) -> Box:
-        """The smallest upright box (xmin, ymin, xmax, ymax) that holds the segment."""
+        """The bounding box (xmin, ymin, xmax, ymax) of the segment."""
         (x0, y0), (x1, y1) = self.start, self.end
         return min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)
 
     def turning_points(self, axis: int) -> list[float]:
-        """Return an empty list: a straight line does not turn."""
+        """Return an empty list: a segment has no turning points."""
         return []
 
     def reversed(self) -> Segment:
-        """Return the segment run the other way."""
+        """Return the segment in the opposite direction."""
         return Segment(self.end, self.start)
 
     def stretched(self, x_factor: float, y_factor: float) -> Segment:
@@ -88,7 +88,7 @@ class Segment(Curve):
         return Segment((self.start[0] + dx, self.start[1] + dy), (self.end[0] + dx, self.end[1] + dy))
 
     def pinned(self, start: Point, end: Point) -> Segment:
-        """Return the segment between the given points."""
+        """Return the segment with its end points replaced."""
         return Segment(start, end)
 
     def split(self, s: float) -> tuple[Segment, Segment]:
@@ -98,5 +98,5 @@ class Segment(Curve):
         return Segment(self.start, middle), Segment(middle, self.end)
 
     def flattened(self, tolerance: float) -> Floats:
-        """Return the two end points, whatever the tolerance."""
+        """Return the two end points, for any tolerance."""
         return np.array([self.start, self.end])
