@@ -1,1 +1,1 @@
-"""The tables of a wall for the compiled loops, their tolerances, and the plan of a trace."""
+"""The tables of a wall for the compiled functions, their tolerances, and the plan of a trace."""

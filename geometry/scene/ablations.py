@@ -1,4 +1,4 @@
-"""Scenes without one of the tracer's optimisations, to measure what it saves; no ray may change."""
+"""Scenes without one of the tracer's optimisations, to measure its saving; the traced rays must not change."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ Table = TypeVar("Table", Floats, Floats | None)
 
 
 def without_pairs(scene: Scene) -> Scene:
-    """Without channels and wedges: every hit between facing lines is a step."""
+    """Return the scene without channels and wedges: every hit between facing lines is a step."""
     return replace(scene, pairs=None, lines=_cleared(scene.lines, (FIRST_PAIR, PAIRS_END)))
 
 
 def without_runs(scene: Scene) -> Scene:
-    """Without runs along arcs: every hit on an arc that the loop follows is a step."""
+    """Return the scene without runs along arcs: every hit on an arc outside closed forms is a step."""
     return replace(scene, circles=_cleared(scene.circles, (RUN_SINE,)))
 
 
 def without_grid(scene: Scene) -> Scene:
-    """Without grids: every line of a hollow is tested."""
+    """Return the scene without grids: every line of a hollow is tested."""
     return replace(scene, hollows=_cleared(scene.hollows, (GRID_COLUMNS,)), grid=None)
 
 
 def without_formulas(scene: Scene) -> Scene:
-    """Without closed forms of whole hollows: every flight is followed."""
+    """Return the scene without closed forms of hollows: every ray segment is traced."""
     return replace(scene, closed=None)
 
 
 def _cleared(table: Table, columns: tuple[int, ...]) -> Table:
-    """A copy with zeros in these columns, of a table that the scene has."""
+    """Return a copy of the table with zeros in the given columns, None for None."""
     if table is None:
         return table
     copy = table.copy()

@@ -1,10 +1,9 @@
-"""The table of the hollows that are reflected in closed form: of two lines, or of one circular arc.
+"""The table of hollows with a closed form of their reflection: two lines, or one circular arc.
 
-`tracing/compiled/closed_forms` reads its rows. A *wedge* is a hollow of two lines: unfolded about its apex, the copies
-of its triangle are a fan, a ray is straight, and it leaves through the copy of the opening that it meets first. A
-*circular hollow* is a hollow of one circular arc of at most a half circle: all chords of a ray are equal.
-
-The columns are in `columns`.
+`tracing/compiled/closed_forms` reads its rows; `columns` names its columns. A *wedge* is a hollow of two lines. Its
+triangle is unfolded about the apex into copies, in which a ray is straight; the ray leaves through the first copy of
+the opening that it meets. A *circular hollow* is one circular arc of at most a half circle: all chords of a ray are
+equal.
 """
 
 from __future__ import annotations
@@ -46,18 +45,18 @@ from .facing import WIDEST_WEDGE
 if TYPE_CHECKING:
     from ..curves.curve import Curve, Point
 
-# A ray whose line passes a joint within this fraction of the hollow's size, or an arc's hit within this angle of an
-# end, is left to the loop. This is far beyond what the loop calls a corner and beyond all rounding, so that the two
-# never disagree about a ray's number of hits or its status; and it is one ray in 10^8.
+# Distance from a joint, as a fraction of the hollow's size, or angle from the end of an arc, within which a ray is
+# traced hit by hit instead. This is far above the tolerance of a corner and above all rounding errors, so that both
+# methods agree on the number of hits and on the status. About one ray in 10^8 is concerned.
 DOUBT_FRACTION = 2.0**-30
-# Shallower arcs are left to the loop, which keeps the digits of positions along them.
+# Half angle, radians, below which arcs are traced hit by hit, which is more accurate for positions along flat arcs.
 FLATTEST_ARC = 0.05
-# In a narrower wedge the loop takes runs of hits in one step.
+# Angle, radians, up to which a wedge is traced hit by hit, with runs of hits computed in one step.
 NARROWEST_WEDGE = WIDEST_WEDGE
 
 
 def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float) -> Floats:
-    """The row of one hollow; ``points`` are its joints from left to right."""
+    """Return the row of one hollow; ``points`` are its joints from left to right."""
     (left, top), (right, other) = points[0], points[-1]
     if top == other == 0.0 and left < right:
         if len(pieces) == 2 and all(isinstance(piece, Segment) for piece in pieces):
@@ -68,7 +67,7 @@ def closed_form_of(pieces: Sequence[Curve], points: Sequence[Point], size: float
 
 
 def closed_table(rows: Sequence[Floats]) -> Floats | None:
-    """All rows as one table, or None where no hollow has a closed form."""
+    """Return all rows as one table, or None if no hollow has a closed form."""
     if all(row[FORM] == NO_FORM for row in rows):
         return None
     table = np.zeros((len(rows), max(map(len, rows))))
@@ -79,10 +78,10 @@ def closed_table(rows: Sequence[Floats]) -> Floats | None:
 
 def _wedge_form(left: float, right: float, apex: Point, size: float) -> Floats:
     x, y = apex
-    # inclinations of the two lines, each measured from its own side of the horizontal
+    # inclinations of the two lines, each measured from its own end of the opening
     west, east = atan2(-y, x - left), atan2(-y, right - x)
     angle = fsum([pi, -west, -east])
-    # the chain of the openings' ends is convex if the apex lies below the opening
+    # the chain of the unfolded ends of the opening is convex if the apex lies below the opening
     if not left <= x <= right or angle <= NARROWEST_WEDGE:
         return row_of(FORM_COLUMNS, {FORM: NO_FORM})
     # a straight ray turns by less than pi about the apex
@@ -106,10 +105,10 @@ def _wedge_form(left: float, right: float, apex: Point, size: float) -> Floats:
 
 
 def _constant(hits: int, side: float, first: float, angle: float) -> float:
-    """c of theta' = +-theta + c after so many hits, of which the first is on the right for side 1, on the left for -1.
+    """Return c of theta' = +-theta + c after ``hits`` hits, the first on the right (side 1) or on the left (side -1).
 
-    A reflection takes the direction a to 2 b - a. On the right the lines have the directions b = first, first + angle,
-    first, ..., and the ray's direction is theta + pi; the left is its mirror image, all angles taken from pi.
+    A line of direction b reflects a ray of direction a to 2 b - a. For side 1 the lines have the directions b = first,
+    first + angle, first, ..., and the ray enters in the direction theta + pi. Side -1 is the mirror image.
     """
     if hits % 2 == 0:
         return side * fsum([hits * angle, -pi])

@@ -1,7 +1,7 @@
-"""The columns of the tables that compiled loops read, by name. Lengths are in units of the wall, angles in radians.
+"""The columns, by name, of the tables for compiled functions. Lengths are in units of the wall, angles in radians.
 
-Each table is an array with one row for each hollow, joint, pair, curve or closed form; numbers of rows and flags are
-floats, too. A curve is an arc or a Bezier piece: their tables begin with the same columns.
+Each table is an array of floats with one row for each hollow, joint, pair, curve or closed form; row numbers and flags
+are stored as floats. A curve is an arc or a Bezier piece; the tables of all curves begin with the same columns.
 """
 
 from __future__ import annotations
@@ -12,61 +12,61 @@ import numpy as np
 
 from ...core.checks import Floats
 
-# Points, and tables of them.
+# Points and tables of points.
 POINT_X = 0
 POINT_Y = 1
-# Tables of double-double numbers: a number is the sum of the two.
+# Tables of double-double numbers: a number is the sum of its two parts.
 HIGH = 0
 LOW = 1
-# The bands of heights at which no piece of an open wall lies.
+# Bands of heights without any piece of an open wall.
 BAND_LOW = 0
 BAND_HIGH = 1
 
-# hollows: one row for each hollow; the whole cell is the only one of an open wall.
+# hollows: one row for each hollow; an open wall has one row, the whole cell.
 LEFT = 0  # x of the left end of the opening
-RIGHT = 1  # x of its right end
-SIZE = 2  # larger of the opening's width and the extent of the joints in x and y
-FIRST_JOINT = 3  # row of its first joint in `joints`
-JOINTS_END = 4  # row after its last one
-FIRST_CIRCLE = 5  # row of its first piece in `circles`
-CIRCLES_END = 6  # row after its last one
+RIGHT = 1  # x of the right end
+SIZE = 2  # maximum of the width of the opening and the extents of the joints in x and y
+FIRST_JOINT = 3  # row of the first joint in `joints`
+JOINTS_END = 4  # row after the last joint
+FIRST_CIRCLE = 5  # row of the first piece in `circles`
+CIRCLES_END = 6  # row after the last piece
 FIRST_ELLIPSE = 7  # the same in `ellipses`
 ELLIPSES_END = 8
 FIRST_BEZIER = 9  # the same in `beziers`
 BEZIERS_END = 10
-LEFT_EDGE = 11  # the opening's left end: NO_EDGE, SMOOTH_EDGE or CORNER_EDGE
-RIGHT_EDGE = 12  # its right end
-GRID_X = 13  # lower left corner of the grid over the hollow's lines, where they are many
+LEFT_EDGE = 11  # the left end of the opening: NO_EDGE, SMOOTH_EDGE or CORNER_EDGE
+RIGHT_EDGE = 12  # the right end
+GRID_X = 13  # lower left corner of the grid over the lines of a hollow that has many
 GRID_Y = 14
-CELL_WIDTH = 15  # of a cell of the grid
+CELL_WIDTH = 15  # of a grid cell
 CELL_HEIGHT = 16
-GRID_COLUMNS = 17  # number of cells side by side, 0 without a grid
-GRID_ROWS = 18  # number of cells one above the other
+GRID_COLUMNS = 17  # number of grid columns, 0 without a grid
+GRID_ROWS = 18  # number of grid rows
 GRID_START = 19  # index of the first cell in the list `grid`, see `grid.grid_of`
 HOLLOW_COLUMNS = 20
-# Kinds of ends of an opening: an open wall has none.
+# Kinds of ends of an opening; NO_EDGE for an open wall.
 NO_EDGE, SMOOTH_EDGE, CORNER_EDGE = 0.0, 1.0, 2.0
 
-# joints: the ends of pieces, one chain after the other; row j + 1 is the other end of the piece that starts at row j.
+# joints: the ends of pieces, chain by chain; row j + 1 is the other end of the piece that starts at row j.
 JOINT_X = 0
 JOINT_Y = 1
-IS_CORNER = 2  # 1 if the tangents of the two pieces differ there
+IS_CORNER = 2  # 1 if the tangents of the two pieces differ
 STARTS_LINE = 3  # 1 if the piece that starts here is a segment
 JOINT_COLUMNS = 4
 
-# lines: a row for each joint, of zeros where no segment starts.
+# lines: one row for each joint, zeros if no segment starts there.
 EDGE_X = 0  # vector from the start of the segment to its end
 EDGE_Y = 1
 LINE_NORMAL_X = 2  # unit normal on the left, the free side
 LINE_NORMAL_Y = 3
 LENGTH = 4
-FIRST_PAIR = 5  # row of its first entry in `pairs`
-PAIRS_END = 6  # row after its last one
+FIRST_PAIR = 5  # row of the line's first entry in `pairs`
+PAIRS_END = 6  # row after the last entry
 LINE_COLUMNS = 7
 
-# pairs: a row for each line of two that face each other with nothing in between, sorted by that line.
+# pairs: for each line of two that face each other with nothing in between one row, sorted by line.
 PARTNER = 0  # row of the other line in `lines`
-NEAR_X = 1  # the end, towards the apex, of the part of the line that faces the other one
+NEAR_X = 1  # end towards the apex of the part of the line that faces the other line
 NEAR_Y = 2
 FAR_X = 3  # the other end of that part
 FAR_Y = 4
@@ -74,7 +74,7 @@ APEX_X = 5  # unit vector along the line, towards the apex
 APEX_Y = 6
 GAP = 7  # distance to the other line at the end towards the apex
 PAIR_SINE = 8  # sine of the angle between the lines
-PAIR_ANGLE = 9  # that angle, 0 for parallel lines
+PAIR_ANGLE = 9  # angle between the lines, 0 if parallel
 PAIR_COLUMNS = 10
 
 # The first columns of every curve.
@@ -83,22 +83,22 @@ START_Y = 1
 END_X = 2
 END_Y = 3
 START_CORNER = 4  # 1 if the start is a corner of the wall
-END_CORNER = 5  # 1 if the end is one
+END_CORNER = 5  # 1 if the end is a corner
 CURVE_COLUMNS = 6
 
-# circles and ellipses: what follows is in coordinates whose y is multiplied by STRETCH, in which the arc is circular.
+# circles and ellipses: columns 6 to 13 are in coordinates with y multiplied by STRETCH, in which the arc is circular.
 NORMAL_X = 6  # unit normal at the start, towards the free side
 NORMAL_Y = 7
-CURVATURE = 8  # positive where the arc is focusing
+CURVATURE = 8  # positive if the arc is focusing
 CHORD_X = 9  # unit vector from the start to the end
 CHORD_Y = 10
 SHORT_CHORD = 11  # length of the chord, 0 for half angles beyond pi/4
-RUN_SINE = 12  # sine of incidence below which a run of hits is computed in one step, 0 if never
+RUN_SINE = 12  # sine of the angle of incidence below which a run of hits is computed in one step, 0 if never
 SPAN = 13  # angle of the arc
 STRETCH = 14  # 1 for circles
 ARC_COLUMNS = 15
 
-# beziers: b(s) is the start + s (X1, Y1) + s^2 (X2, Y2) + s^3 (X3, Y3).
+# beziers: b(s) = start + s (X1, Y1) + s^2 (X2, Y2) + s^3 (X3, Y3).
 X1 = 6
 Y1 = 7
 X2 = 8
@@ -107,7 +107,7 @@ X3 = 10
 Y3 = 11
 BEZIER_COLUMNS = 12
 
-# The arcs of double-double arithmetic, as `refined_arcs` makes them: the ends, then numbers in two parts.
+# Arcs in double-double arithmetic, made by `refined_arcs`: the ends, then numbers in two parts.
 WIDE_NORMAL_X = 4  # unit normal at the start
 WIDE_NORMAL_X_LOW = 5
 WIDE_NORMAL_Y = 6
@@ -120,15 +120,15 @@ WIDE_CHORD_Y = 12
 WIDE_CHORD_Y_LOW = 13
 WIDE_CHORD = 14  # length of the chord
 WIDE_CHORD_LOW = 15
-IS_SHORT = 16  # 1 where the position along the chord decides what belongs to the arc
+IS_SHORT = 16  # 1 if the position along the chord decides whether a point is on the arc
 WIDE_STRETCH = 17  # a double
 WIDE_ARC_COLUMNS = 18
 
-# closed: a row for each hollow, see `closed_forms`.
-FORM = 0  # NO_FORM, FAN or BOWL
+# closed: one row for each hollow, see `closed_forms`.
+FORM = 0  # NO_FORM, WEDGE or CIRCULAR
 FORM_LEFT = 1  # x of the ends of the opening
 FORM_RIGHT = 2
-DOUBT = 3  # a ray that passes a joint more closely is left to the loop: length in wedges, angle in circular hollows
+DOUBT = 3  # a ray closer to a joint is traced hit by hit: a length in wedges, an angle in circular hollows
 CIRCLE_X = 4  # the centre
 CIRCLE_Y = 5
 RADIUS = 6
@@ -136,12 +136,12 @@ HALF_ANGLE = 7  # of the arc
 WEDGE_X = 4  # the apex
 WEDGE_Y = 5
 COPIES = 6  # number K of copies of the triangle that a straight ray can meet
-CHAIN = 7  # K + 2 links for rays that first meet the right line, then as many for the others
+CHAIN = 7  # K + 2 links for rays that meet the right line first, then K + 2 links for the other rays
 FORM_COLUMNS = 8  # of a circular hollow
 # Kinds of closed forms.
 NO_FORM, WEDGE, CIRCULAR = 0.0, 1.0, 2.0
-# A link of a wedge's chain, from its first column on: the unfolded end of the opening, and the constant c in
-# theta' = +-theta + c after as many hits as links came before. Link 0 is the end of the opening on the other side.
+# Columns of a link of a wedge's chain, relative to its first column: the unfolded end of the opening, and c in
+# theta' = +-theta + c after k hits for link k. Link 0 is the end of the opening on the other side.
 LINK_X = 0
 LINK_Y = 1
 LINK_CONSTANT = 2
@@ -149,7 +149,7 @@ LINK_COLUMNS = 3
 
 
 def row_of(columns: int, values: Mapping[int, float]) -> Floats:
-    """A row of a table, zero in the columns that are not named.
+    """Return a row of a table with the given values, zero in all other columns.
 
     Examples
     --------
@@ -163,5 +163,5 @@ def row_of(columns: int, values: Mapping[int, float]) -> Floats:
 
 
 def table_of(rows: list[Floats], columns: int) -> Floats:
-    """Rows as a table, which has its columns even without a row."""
+    """Return rows as a table of shape (rows, columns), also without rows."""
     return np.array(rows, dtype=np.float64).reshape(-1, columns)

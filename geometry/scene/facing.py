@@ -1,4 +1,4 @@
-"""Pairs of straight pieces that face each other with nothing in between: the channels and wedges of a hollow."""
+"""The channels and wedges of a hollow: pairs of straight pieces that face each other with nothing in between."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from .columns import APEX_X, APEX_Y, FAR_X, FAR_Y, GAP, NEAR_X, NEAR_Y, PAIR_ANGLE, PAIR_SINE, PARTNER
 
-# In a wedge wider than this a ray makes ten hits at most; a run is not worth its arctangents there.
+# Widest wedge with runs, radians. In a wider wedge a ray has at most about ten hits, and a run does not pay.
 WIDEST_WEDGE = 0.3
-# Up to so many lines in a hollow all pairs are looked at, beyond it those with at most one piece between them.
+# Number of lines in a hollow up to which all pairs are tested; above it, pairs of lines at most two joints apart.
 MANY_LINES = 64
-# Pieces looked at for all pairs of a large hollow together; pairs beyond it go without runs. About a second.
+# Limit on pairs times pieces tested in one hollow, about one second; pairs above the limit have no runs.
 MOST_WORK = 50_000_000
-# Pieces that reach into the part between two lines by this fraction of the hollow's size touch it within rounding.
+# Depth, in eps times the hollow's size, to which a piece may reach between two lines by rounding.
 TOUCH_ULPS = 16.0
 
 PairRow = dict[int, float]
@@ -32,9 +32,9 @@ def facing_pairs(
     Parameters
     ----------
     numbers : array of int, shape (m,)
-        Numbers of the lines, by which rows name them.
+        Row numbers of the lines.
     starts, ends : array, shape (m, 2)
-        Their ends; the free side is on the left.
+        Ends of the lines; the free side is on the left.
     hulls : array, shape (n, 4, 2)
         For every piece of the hollow, lines included, four points whose convex hull contains it.
     size : float
@@ -43,8 +43,7 @@ def facing_pairs(
     Returns
     -------
     list of (int, row)
-        The number of a line and the row of the table ``pairs`` for its partner, by columns; both lines of a pair have
-        one.
+        For both lines of every pair the number of the line and its row of the table ``pairs``, by columns.
     """
     count = len(numbers)
     if count < 2:
@@ -73,14 +72,14 @@ def facing_pairs(
 
 
 def _facing(a0: Floats, a1: Floats, b0: Floats, b1: Floats, hulls: Floats, slack: float) -> list[PairRow] | None:
-    """Rows of two lines without their partners' numbers, or None if they do not face each other freely."""
+    """Return the rows of two lines without the partners' numbers; None if the lines do not face each other freely."""
     sine, cosine = _turn(a0, a1, b0, b1)
     beta = atan2(abs(sine), -cosine)
     u_a, u_b = _unit(a1 - a0), _unit(b0 - b1)
     n_a, n_b = np.array([-u_a[1], u_a[0]]), np.array([u_b[1], -u_b[0]])
     if u_a @ n_b > 0.0 or (u_a @ n_b == 0.0 and u_b @ n_a > 0.0):
         u_a, u_b = -u_a, -u_b
-    # mirror images in the bisector have the same coordinate along it; the apex lies in its direction
+    # the bisector, towards the apex; points that are mirror images in it have the same coordinate along it
     axis = _unit(u_a + u_b)
     far_a, near_a = sorted((a0, a1), key=lambda p: float(p @ axis))
     far_b, near_b = sorted((b0, b1), key=lambda p: float(p @ axis))
@@ -98,7 +97,7 @@ def _facing(a0: Floats, a1: Floats, b0: Floats, b1: Floats, hulls: Floats, slack
         0.0 if touching else float((parts[0][0] - near_b) @ n_b),
         0.0 if touching else float((parts[1][0] - near_a) @ n_a),
     ]
-    # the narrow end must be open towards both, or be the apex
+    # the narrow end must have a positive gap to both lines, or be the apex
     if not touching and min(gaps) <= 2.0 * slack:
         return None
     free = (
@@ -130,7 +129,7 @@ def _unit(vector: Floats) -> Floats:
 
 
 def _turn(a0: Floats, a1: Floats, b0: Floats, b1: Floats) -> tuple[float, float]:
-    """Cross and dot product of two edges, exact but for one rounding: a run multiplies the error of their angle."""
+    """Return the cross and dot product of two edges, each rounded once: a run multiplies the error of their angle."""
     (ax, ay), (bx, by) = (
         [Fraction(float(q)) - Fraction(float(p)) for p, q in zip(start, end, strict=True)]
         for start, end in ((a0, a1), (b0, b1))

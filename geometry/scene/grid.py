@@ -1,4 +1,4 @@
-"""A uniform grid over the straight pieces of a hollow that has many. Loads numba: imported where it is used."""
+"""A uniform grid over the straight pieces of a hollow with many pieces; loads numba, so it is imported late."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from .columns import POINT_X, POINT_Y
 
-# Cells a piece: a choice that keeps a cell about as large as a piece; it has not been tuned.
+# Cells per piece; a cell is then about as large as a piece (not tuned).
 CELLS_PER_PIECE = 2.0
-# Long pieces lie in many cells each; the grid is coarsened until a piece lies in no more than this many on average.
+# Largest average number of cells per piece; the grid is coarsened to meet it, because long pieces lie in many cells.
 MOST_ENTRIES = 16
-# A piece is listed in every cell that it comes this close to, in cells. A ray's walk through the cells and its position
-# there are wrong by some rounding errors of the hollow's size, a millionth of this where cells are 1e-3 of the size.
+# Margin, in cells: a piece is listed in every cell within this distance. The grid traversal of a ray has an error of
+# some rounding errors of the hollow's size, a millionth of the margin if cells are 1e-3 of the size.
 MARGIN = 1e-6
 
 
@@ -27,16 +27,17 @@ def grid_of(starts: Floats, ends: Floats, first: int, base: int) -> tuple[list[f
     ----------
     starts, ends : array, shape (m, 2)
     first : int
-        Number of the first line; the others follow. A row whose start equals its end is a joint where a curve starts.
+        Number of the first line; the numbers are consecutive. A line of equal ends is a joint where a curve starts.
     base : int
-        Where the list will begin in the table ``grid``.
+        Start of the returned array in the table ``grid``.
 
     Returns
     -------
-    list of 7 floats, array of int
-        Lower left corner, width and height of a cell, columns, rows, position of the first cell; then for every cell
-        where its entries begin, the end of the last one, and the entries: numbers of lines
-        and of joints where no line starts.
+    list of 7 floats
+        Lower left corner, width and height of a cell, numbers of columns and rows, position of the first cell.
+    array of int
+        For every cell the start of its entries, then the end of the last cell's entries, then all entries: numbers of
+        lines and of joints where no line starts.
     """
     low = np.minimum(starts.min(axis=0), ends.min(axis=0))
     high = np.maximum(starts.max(axis=0), ends.max(axis=0))
@@ -61,7 +62,7 @@ def grid_of(starts: Floats, ends: Floats, first: int, base: int) -> tuple[list[f
 
 @njit(cache=True, nogil=True)
 def touches(ax, ay, bx, by, column, row):
-    """Whether the segment from a to b, in units of cells, comes within the margin of a cell."""
+    """Whether the segment from a to b, in units of cells, meets a cell enlarged by the margin."""
     x, y = column + 0.5, row + 0.5
     reach = 0.5 + MARGIN
     if max(ax, bx) < x - reach or min(ax, bx) > x + reach or max(ay, by) < y - reach or min(ay, by) > y + reach:
@@ -72,16 +73,16 @@ def touches(ax, ay, bx, by, column, row):
 
 @njit(cache=True, nogil=True)
 def cells_about(low, high, count):
-    """First and last cell that an interval may touch, in units of cells."""
+    """Return the first and last cell that an interval, in units of cells, may touch."""
     return max(0, int(np.floor(low - MARGIN))), min(count - 1, int(np.floor(high + MARGIN)))
 
 
 @njit(cache=True, nogil=True)
 def list_entries(starts, ends, frame, first, next_entry, entries):
-    """List the lines of every cell in ``entries``, from the cell's position on; move the position behind them.
+    """Write the lines of every cell into ``entries`` from ``next_entry`` of the cell on, and advance ``next_entry``.
 
-    ``frame`` is the lower left corner, the size of a cell, columns and rows. With no entries the lines are only
-    counted: positions that begin at 0 become their numbers.
+    ``frame`` is the lower left corner, the size of a cell, columns and rows. If ``entries`` is empty, the lines are
+    only counted in ``next_entry``.
     """
     low, size, columns, rows = frame
     for k in range(starts.shape[0]):

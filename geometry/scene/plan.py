@@ -1,4 +1,4 @@
-"""The plan of a trace: pieces and hollows that are skipped, hollows in closed form, grids and symmetry."""
+"""The plan of a trace: skipped pieces and hollows, hollows in closed form, grids and symmetry."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from .scene import Scene
 
 @dataclass(frozen=True)
 class TracePlan:
-    """How `trace` treats a wall; made by ``wall.plan()``.
+    """The optimisations that `trace` applies to a wall; made by ``wall.plan()``.
 
     Attributes
     ----------
     primitives : tuple of str
-        What the wall has, of "lines", "circles", "ellipses" and "beziers".
+        The kinds of pieces of the wall, from "lines", "circles", "ellipses" and "beziers".
     hollows : int
-        Openings that are traced separately, each against its own pieces only; 1 for an open wall.
+        Number of openings, each traced separately against its own pieces only; 1 for an open wall.
     pieces_traced, pieces_left_out : int
-        Pieces that rays are tested against, and flat tops, which are answered without tracing.
-    flat_share : float
-        Share of the period that is flat top.
+        Numbers of pieces that rays are tested against, and of flat tops, which need no tracing.
+    flat_fraction : float
+        Fraction of the period that is flat top.
     arcs_with_runs : int
-        Circular arcs on which a run of hits is computed in one step.
+        Number of circular arcs on which a run of hits is computed in one step.
     channels, wedges : int
-        Pairs of lines, parallel or not, that face each other with nothing in between: there, too, a run of hits is
-        computed in one step. Wedges of more than 0.3 radians have no long runs and are not among them.
+        Numbers of parallel and of other pairs of lines that face each other with nothing in between. A run of hits
+        between them is computed in one step. Wedges of more than 0.3 radians have no long runs and are not counted.
     closed_forms : int
-        Hollows of two lines or of one circular arc whose rays are followed by a formula from the opening to the exit:
-        wedges (lines that meet at more than 0.3 radians, their apex below the opening) and circular hollows (half
-        angles from 0.05 to pi/2). Rays within 1e-9 of a corner are followed flight by flight there, too.
+        Number of hollows whose rays are computed by a formula from the opening to the exit: wedges (two lines that
+        meet at more than 0.3 radians, apex below the opening) and circular hollows (one arc of half angle 0.05 to
+        pi/2). Rays within 1e-9 of a corner are traced segment by segment.
     hollows_with_grid : int
-        Hollows of so many lines that rays walk through the cells of a grid; in the others every piece is tested.
+        Number of hollows with so many lines that a grid selects the lines to test; elsewhere every piece is tested.
     distinct_hollows : int
-        Hollows that remain when those equal to another but for their position and size, to 64 rounding errors, are left
-        out. The law of the wall is a mixture of theirs.
+        Number of hollows that differ by more than translation and scale, to 64 rounding errors. The law of the wall
+        is a mixture of the laws of these hollows.
     mirror_symmetric : bool
-        Whether the wall has a mirror axis: half of the angles then give the other half.
+        Whether the wall has a mirror axis; half of the angles then determine the other half.
     wraps : bool
-        Whether rays pass from cell to cell, because the wall does not close its hollows.
+        Whether rays pass from cell to cell because the wall does not close.
 
     Examples
     --------
@@ -72,11 +72,11 @@ class TracePlan:
 
 
 def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
-    """Read the plan of a wall that is its own cell off the tables that the tracer uses."""
+    """Return the plan of a wall that is its own cell, read from the tables of the tracer."""
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     traced = sum(h.last - h.first for h in wall.hollows) if wall.closes else pieces
     runs = 0 if scene.circles is None else int((scene.circles[:, RUN_SINE] > 0.0).sum())
-    # every pair has a row for each of its two lines
+    # every pair has two rows, one for each line
     parallel = 0 if scene.pairs is None else int((scene.pairs[:, PAIR_ANGLE] == 0.0).sum()) // 2
     return TracePlan(
         primitives=scene.primitives,

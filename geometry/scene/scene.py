@@ -1,8 +1,7 @@
-"""The tables of a wall for the compiled loops: the pieces that a ray can meet, hollow by hollow.
+"""The tables of a wall for the compiled functions: the pieces that a ray can meet, hollow by hollow.
 
-Flat tops have no place in the tables, and a table of a primitive that the wall does not have is None.
-
-The columns of the tables are in `columns`.
+Flat tops are not in the tables. The table of a primitive that the wall does not have is None. `columns` names the
+columns.
 """
 
 from __future__ import annotations
@@ -93,23 +92,22 @@ from .columns import (
 )
 from .facing import facing_pairs
 
-# Tangents that agree to this angle make a smooth joint: a ray at the joint is then reflected alike by both pieces, up
-# to this angle. Joints of arcs and splines that are meant to be smooth agree to a few rounding errors.
+# Largest angle, radians, between the tangents at a smooth joint. Both pieces then reflect a ray at the joint alike,
+# within twice this angle. Tangents at joints meant to be smooth agree to a few rounding errors.
 SMOOTH_JOINT = 1e-9
-# Below this half angle the chord and the radius give it more exactly than the difference of two parameters does.
+# Half angle below which it is computed from the chord and the radius, more exactly than from two parameters.
 SHALLOW_ARC = 0.5
-# An arc of more than this span is cut in two, so that the side of its chord decides what belongs to it.
+# Largest span of an arc; longer arcs are cut in two, so that the side of the chord decides which points are on the arc.
 LONGEST_ARC = 1.5 * pi
-# A run along an arc is worth its two arctangents and one sincos where it has at least this many chords.
+# Number of chords from which on a run along an arc pays for its two arctangents and one sincos.
 RUN_CHORDS = 8.0
 OUTLINE_POINTS = 64
-# A grid pays from about so many lines a hollow: at 256 it was a third faster on a Koch curve; the position was not
-# tuned.
+# Number of lines in a hollow from which on it has a grid; not tuned (at 256 lines a grid saves a third of the time).
 GRID_LINES = 96
 
 
 def hull_of(piece: Curve, start: Point, end: Point) -> list[Point]:
-    """Four points whose convex hull contains the piece."""
+    """Return four points whose convex hull contains the piece."""
     if isinstance(piece, Segment):
         return [start, end, start, end]
     if isinstance(piece, Bezier):
@@ -119,7 +117,7 @@ def hull_of(piece: Curve, start: Point, end: Point) -> list[Point]:
 
 
 def corners_of(pieces: list[Curve]) -> list[bool]:
-    """For every joint of the cycle of pieces (the first one again at the end): is it a corner?"""
+    """Return whether each joint of the cycle of pieces is a corner; the first joint is repeated at the end."""
     heads = np.array([_tangent(piece, 0.0) for piece in pieces])
     tails = np.roll(np.array([_tangent(piece, 1.0) for piece in pieces]), 1, axis=0)
     turn = np.abs(tails[:, 0] * heads[:, 1] - tails[:, 1] * heads[:, 0])
@@ -137,7 +135,7 @@ def _tangent(piece: Curve, s: float) -> Point:
 
 
 def line_row(start: Point, end: Point) -> Floats:
-    """A row of ``lines``; its pairs are marked later."""
+    """Return a row of ``lines``; the columns of its pairs are set later."""
     x, y = end[0] - start[0], end[1] - start[1]
     length = hypot(x, y)
     row = {EDGE_X: x, EDGE_Y: y, LINE_NORMAL_X: -y / length, LINE_NORMAL_Y: x / length, LENGTH: length}
@@ -145,17 +143,17 @@ def line_row(start: Point, end: Point) -> Floats:
 
 
 def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
-    """A row of ``circles`` or ``ellipses``, whose first columns are given; where runs are allowed is marked later."""
+    """Return a row of ``circles`` or ``ellipses`` from its first columns ``ends``; RUN_SINE is set later."""
     a, b = arc.semi_axes
     stretch = a / b
     turn = arc.end_angle - arc.start_angle
-    # anticlockwise arcs have their centre on the left, the free side: they focus
+    # counterclockwise arcs have their centre on the left, the free side: they are focusing
     sign = 1.0 if turn > 0.0 else -1.0
     chord = (ends[END_X] - ends[START_X], stretch * (ends[END_Y] - ends[START_Y]))
     length = hypot(*chord)
     direction = (chord[0] / length, chord[1] / length)
     half = 0.5 * abs(turn)
-    # both joints lie on the circle exactly if sin(half) = kappa length / 2; the better known side gives the other
+    # sin(half) = kappa length / 2 puts both joints on the circle: the more accurate of half and kappa gives the other
     if half < SHALLOW_ARC:
         half = asin(min(1.0, 0.5 * length / a))
         curvature = sign / a
@@ -174,7 +172,7 @@ def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
 
 
 def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
-    """A row of ``beziers``, whose first columns are given."""
+    """Return a row of ``beziers`` from its first columns ``ends``."""
     inner = list(curve.control_points[1:-1])
     start, end = (ends[START_X], ends[START_Y]), (ends[END_X], ends[END_Y])
     points = np.array([start, *inner, end], dtype=np.float64)
@@ -190,7 +188,7 @@ def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
 
 
 class Tables(NamedTuple):
-    """The tables of a scene as compiled loops take them: those of absent pieces are empty."""
+    """The tables of a scene as arguments of compiled functions; tables of absent primitives are empty."""
 
     hollows: Floats
     joints: Floats
@@ -204,7 +202,7 @@ class Tables(NamedTuple):
     is_open: bool
 
 
-# Tables without rows: all tables have these types.
+# Empty tables, with the types of all tables.
 NO_TABLES = Tables(
     np.empty((0, HOLLOW_COLUMNS)),
     np.empty((0, JOINT_COLUMNS)),
@@ -221,7 +219,7 @@ NO_TABLES = Tables(
 
 @dataclass(frozen=True)
 class Scene:
-    """The tables of one wall; see the head of this file."""
+    """The tables of one wall; see the docstring of this module."""
 
     hollows: Floats
     joints: Floats
@@ -237,7 +235,7 @@ class Scene:
 
     @cached_property
     def tables(self) -> Tables:
-        """The same for compiled loops, of which one version serves all walls."""
+        """The tables with types equal for all walls, so that each function is compiled once."""
         return Tables(
             hollows=_filled(self.hollows, HOLLOW_COLUMNS),
             joints=_filled(self.joints, JOINT_COLUMNS),
@@ -255,7 +253,7 @@ class Scene:
 
     @property
     def primitives(self) -> tuple[str, ...]:
-        """Names of the primitives that the wall has."""
+        """The names of the wall's primitives."""
         return tuple(name for name in ("lines", "circles", "ellipses", "beziers") if getattr(self, name) is not None)
 
 
@@ -288,7 +286,7 @@ def _edge(is_corner: bool) -> float:
 
 
 def scene_in_one(wall: Cell) -> Scene:
-    """The tables of a wall that closes as if its cell were one hollow: one list of all pieces, the flat tops too."""
+    """Build the tables of a closed wall with its whole cell, flat tops included, as one hollow."""
     tables = _Tables()
     vertices = [(float(x), float(y)) for x, y in wall.vertices]
     chain = _Chain(list(wall.pieces), vertices, corners_of(list(wall.pieces)))
@@ -305,7 +303,7 @@ class _Chain:
     corners: list[bool]
 
     def without_long_arcs(self) -> _Chain:
-        """The same chain with every arc of more than LONGEST_ARC cut in two at a smooth joint."""
+        """Return the chain with every arc of more than LONGEST_ARC cut in two at a smooth joint."""
         pieces: list[Curve] = []
         vertices, corners = [self.vertices[0]], [self.corners[0]]
         for piece, vertex, corner in zip(self.pieces, self.vertices[1:], self.corners[1:], strict=True):
@@ -323,7 +321,7 @@ class _Chain:
 
 
 class _Tables:
-    """The tables while they grow."""
+    """The tables of a scene under construction."""
 
     def __init__(self) -> None:
         self.hollows: list[Floats] = []
@@ -384,7 +382,7 @@ class _Tables:
         self.joints.append(row_of(JOINT_COLUMNS, row))
 
     def _mark_runs(self, first: int, last: int, chains: list[_Chain]) -> None:
-        """Allow runs on the focusing circles whose circular segment no other piece of the hollow enters."""
+        """Set RUN_SINE of the focusing circles whose circular segment contains no other piece of the hollow."""
         outlines = [
             np.array([vertex]) if isinstance(piece, Segment) else piece.point(np.linspace(0.0, 1.0, OUTLINE_POINTS))
             for chain in chains
@@ -408,7 +406,7 @@ class _Tables:
                 row[RUN_SINE] = sin(half / RUN_CHORDS)
 
     def _add_grid(self, first: int) -> None:
-        """Lay a grid over the lines of the last hollow, which start at the joint ``first``, if they are many."""
+        """Add a grid to the last hollow, whose lines start at joint ``first``, if it has at least GRID_LINES lines."""
         joints = np.array(self.joints[first:], dtype=np.float64)
         is_line = joints[:, STARTS_LINE] > 0.0
         if is_line.sum() < GRID_LINES:
@@ -424,7 +422,7 @@ class _Tables:
         self.grids.append(table)
 
     def _mark_pairs(self, first: int, chains: list[_Chain], size: float) -> None:
-        """Find the channels and wedges of a hollow; its lines start at the joint ``first``."""
+        """Find the channels and wedges of the last hollow, whose lines start at joint ``first``."""
         numbers, starts, ends, hulls = [], [], [], []
         joint = first
         for chain in chains:
