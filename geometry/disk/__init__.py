@@ -1,1 +1,1 @@
-"""The disk: masses and frame, rolling, satellites, charts, and the same formulas as sympy objects."""
+"""The disk: its masses and frame, rolling, satellites and charts, and the same formulas as sympy objects."""

@@ -1,4 +1,4 @@
-"""The charts of a disk with satellites: the maps of rolling about a satellite, and those that straighten it."""
+"""The charts of a disk with satellites: the maps of rolling about a satellite, and the maps that straighten it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from .satellites import Satellites
 
 @dataclass(frozen=True)
 class RollingCharts:
-    """The maps between the configurations of a disk with satellites and those of its rolling, straightened.
+    """The maps between the configurations of a disk with satellites and the cylinder of straightened configurations.
 
-    Satellites sit on the rim of the unit disk, ``spacing`` apart. A disk that rolls about its lowest satellite moves
-    on a circle; the cylinder has a straight line instead, and `bend` takes one to the other.
+    Satellites are points on the rim of the unit disk, ``spacing`` apart. The centre of a disk that rolls about its
+    lowest satellite moves on a circle, on the cylinder along a straight line; `bend` maps the line to the circle.
 
     Parameters
     ----------
@@ -28,14 +28,14 @@ class RollingCharts:
         rho in radians, 2 pi over a whole number of at least 4 (to rounding).
     scale : float
         Unit of length, greater than 0: 1 for the maps F, f_lin, H_1, eta of Rudzis 2022, section 4; eps for the zoomed
-        maps f*, H_eps, G_eps of section 5.3. The third coordinate is in the same unit: alpha/scale.
+        maps f*, H_eps, G_eps of section 5.3. The third coordinate has the same unit: alpha/scale.
 
     Attributes
     ----------
     spacing : float
         Exactly 2 pi over ``satellites``.
     satellites : int
-        How many there are.
+        The number of satellites.
 
     Raises
     ------
@@ -44,10 +44,10 @@ class RollingCharts:
 
     Notes
     -----
-    Arrays broadcast. Heights, of centres and of satellites, are measured from where a satellite at the lowest point of
-    the rim touches the tops of the wall, as in `Wall`; the paper's heights of satellites are less by 1/scale. Nothing
-    cancels for small angles: 1 - cos and x - sin x are computed as such. The formulas are those of
-    `asperity.geometry.disk.rolling`, which takes ``xp=sympy`` too; the ledger proves them.
+    Arrays broadcast. Heights of centres and of satellites are 0 if a satellite at the lowest point of the rim touches
+    the tops of the wall, as in `Wall`; the paper's heights of satellites are less by 1/scale. 1 - cos and x - sin x
+    are computed without cancellation. The formulas are in `asperity.geometry.disk.rolling`, which also takes
+    ``xp=sympy``; the ledger proves them.
 
     Examples
     --------
@@ -73,20 +73,20 @@ class RollingCharts:
         return round(2.0 * math.pi / self.spacing)
 
     def nearest(self, alpha: ArrayLike) -> NDArray[np.int64]:
-        """Return k-bar, the multiple of the spacing nearest to alpha; halfway between two the greater one.
+        """Return k-bar, where k-bar rho is the multiple of rho nearest to alpha (of two nearest, the greater).
 
-        The lowest satellite is then number -k-bar, modulo ``satellites`` (the paper says S_k-bar).
+        The lowest satellite is number -k-bar, modulo ``satellites`` (the paper prints S_k-bar).
         """
         turns = finite_array("alpha", alpha) * (self.scale / self.spacing)
         return np.floor(turns + 0.5).astype(np.int64)
 
     def residual(self, alpha: ArrayLike) -> Floats:
-        """Return alpha-bar = alpha - k-bar rho/scale, in [-rho/2, rho/2] over the scale."""
+        """Return alpha-bar = alpha - k-bar rho/scale, in [-rho/2, rho/2] divided by the scale."""
         rotation = finite_array("alpha", alpha)
         return np.asarray(rotation - self.nearest(rotation) * (self.spacing / self.scale))
 
     def satellite(self, configuration: ArrayLike, number: ArrayLike) -> Floats:
-        """Return the positions (..., 2) of the satellites S_k, k = ``number``, height 0 at the tops (eq. 1.38).
+        """Return the positions (..., 2) of the satellites S_k, k = ``number``, with height 0 at the tops (eq. 1.38).
 
         Examples
         --------
@@ -98,7 +98,7 @@ class RollingCharts:
         return _join(rolling.satellite(x1, x2, bar, self.scale))
 
     def contact(self, configuration: ArrayLike) -> Floats:
-        """Return the position (..., 2) of the lowest satellite: G_eps (eq. 3.60', as the map of M* to the plane)."""
+        """Return the position (..., 2) of the lowest satellite: G_eps as the map of M* to the plane (eq. 3.60')."""
         x1, x2, alpha = _split("configuration", configuration, 3)
         return _join(rolling.satellite(x1, x2, self.residual(alpha), self.scale))
 
@@ -108,7 +108,7 @@ class RollingCharts:
         return _matrix(rolling.satellite_differential(self.residual(alpha), self.scale), alpha.shape)
 
     def roll(self, point: ArrayLike, alpha: ArrayLike) -> Floats:
-        """Return the configurations (..., 3) with lowest satellite at ``point`` (..., 2), turned by ``alpha``.
+        """Return the configurations (..., 3) with the lowest satellite at ``point`` (..., 2), rotated by ``alpha``.
 
         F (eq. 4.4) with ``scale`` 1, f* (eq. 3.56, corrected: alpha-bar* = alpha - k-bar* rho/eps) with eps.
 
@@ -123,7 +123,7 @@ class RollingCharts:
         return _join((*rolling.roll(s1, s2, self.residual(rotation), self.scale), rotation))
 
     def roll_linear(self, point: ArrayLike, alpha: ArrayLike) -> Floats:
-        """Return (s1 - alpha, s2, alpha): f_lin, the linear part of `roll` at alpha = 0 and the chart of M_cyl."""
+        """Return f_lin = (s1 - alpha, s2, alpha), the linear part of `roll` at alpha = 0 and the chart of M_cyl."""
         s1, s2 = _split("point", point, 2)
         rotation = finite_array("alpha", alpha)
         return _join(rolling.roll_linear(s1, s2, rotation))
@@ -131,8 +131,9 @@ class RollingCharts:
     def bend(self, configuration: ArrayLike) -> Floats:
         """Return H_1 (eq. 4.43), or H_eps (eq. 3.54), of configurations (..., 3).
 
-        It takes the straightened configurations M_cyl with alpha in Z^0 to those of the disk, M; with every alpha if
-        rho is a whole multiple of the wall's period (eq. 5.71, corrected). There `bend` o `roll_linear` = `roll`.
+        The map takes the straightened configurations M_cyl with alpha in Z^0 to the configurations M of the disk. If
+        rho is a whole multiple of the wall's period, this holds for every alpha (eq. 5.71, corrected). For these alpha
+        `bend` o `roll_linear` = `roll`.
         """
         y1, y2, alpha = _split("configuration", configuration, 3)
         return _join((*rolling.bend(y1, y2, self.residual(alpha), self.scale), alpha))
@@ -148,20 +149,20 @@ class RollingCharts:
         return _matrix(rolling.bend_differential(self.residual(alpha), self.scale), alpha.shape)
 
     def transfer(self, position: ArrayLike, velocity: ArrayLike) -> Floats:
-        """Return phi_w, the position of eta(y, w): `bend`, then along the velocity back to height 0.
+        """Return phi_w, the position of eta(y, w): `bend`, then motion along the velocity back to height 0.
 
         Parameters
         ----------
         position : array_like, shape (..., 2)
             y = (x1, alpha) on the plane x2 = 0.
         velocity : array_like, shape (..., 3)
-            w = (v1, v2, omega) with v2 other than 0; eta keeps it.
+            w = (v1, v2, omega) with v2 other than 0, invariant under eta.
 
         Returns
         -------
         ndarray, shape (..., 2)
-            (x1 + abar - sin abar + (1 - cos abar) v1/v2, alpha + (1 - cos abar) omega/v2) (section 5.2, corrected: all
-            corrections are printed with the wrong sign).
+            (x1 + abar - sin abar + (1 - cos abar) v1/v2, alpha + (1 - cos abar) omega/v2). Section 5.2 prints all
+            terms in abar with the wrong sign.
 
         Examples
         --------
@@ -175,7 +176,7 @@ class RollingCharts:
     def transfer_differential(self, position: ArrayLike, velocity: ArrayLike) -> Floats:
         """Return the differential (..., 2, 5) of `transfer` in (x1, alpha, v1, v2, omega).
 
-        The first two columns are d phi_w (section 5.2, corrected); their determinant U = 1 + sin(abar) omega/v2.
+        The first two columns are d phi_w (section 5.2, corrected), with determinant U = 1 + sin(abar) omega/v2.
         """
         x1, alpha = _split("position", position, 2)
         w = _velocity(velocity)
@@ -184,7 +185,7 @@ class RollingCharts:
 
 
 def plane_crossing(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
-    """Return (x1, alpha) where the line through a configuration along its velocity meets x2 = 0: Psi (eq. 4.66).
+    """Return (x1, alpha) at x2 = 0 on the line through a configuration along its velocity: Psi (eq. 4.66).
 
     Parameters
     ----------
@@ -213,7 +214,7 @@ def plane_crossing(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
 def plane_crossing_differential(configuration: ArrayLike, velocity: ArrayLike) -> Floats:
     """Return the differential (..., 2, 6) of `plane_crossing` in (x1, x2, alpha, v1, v2, omega).
 
-    Arguments and errors are those of `plane_crossing`.
+    Arguments and errors are the same as for `plane_crossing`.
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """The disk: its masses, its kinetic-energy metric, its frame, and the angles of its velocities.
 
-``xp`` is the arithmetic: ``numpy`` for arrays, ``sympy`` for expressions to prove things about; both know ``sqrt``,
-``sin`` and ``cos``. The library computes with these formulas, and the ledger proves them.
+``xp`` is the arithmetic: ``numpy`` for arrays, ``sympy`` for expressions. The library computes with these formulas,
+and the ledger proves them.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ...core.errors import InputError
 
 
 def frame_rows(mass: Any, inertia: Any, xp: Any = np) -> list[list[Any]]:
-    """The orthonormal frame chi_perp, e2^, chi in the coordinates (v1, v2, omega).
+    """Return the orthonormal frame chi_perp, e2^, chi in the coordinates (v1, v2, omega).
 
     Source: Rudzis 2022, section 1.3.6, with the sign of chi of the index of notation.
     """
@@ -28,7 +28,7 @@ def frame_rows(mass: Any, inertia: Any, xp: Any = np) -> list[list[Any]]:
 
 
 def direction(theta: Any, psi: Any, xp: Any = np) -> list[Any]:
-    """The components of a unit velocity in the frame: (cos theta sin psi, sin theta sin psi, cos psi).
+    """Return the components of a unit velocity in the frame: (cos theta sin psi, sin theta sin psi, cos psi).
 
     Source: Rudzis 2022, eq. 1.27'.
     """
@@ -36,27 +36,28 @@ def direction(theta: Any, psi: Any, xp: Any = np) -> list[Any]:
 
 
 def foreshortening(mass: Any, inertia: Any, xp: Any = np) -> Any:
-    """kappa = (1 + m/J)^(-1/2), by which the disk's rotation compresses a wall along x (eq. 1.66)."""
+    """Return kappa = (1 + m/J)^(-1/2), the factor by which the disk's rotation compresses a wall along x (eq. 1.66)."""
     return 1 / xp.sqrt(1 + mass / inertia)
 
 
 def branch_block(sign: Any, cosine: Any, sine: Any) -> list[list[Any]]:
-    """In the frame, the matrix of theta' = sign theta + offset, psi' = pi - psi, given cos and sin of the offset.
+    """Return the matrix of theta' = sign theta + offset, psi' = pi - psi, in the frame.
 
-    It takes the true incoming velocity to the outgoing one; the angles are those of *minus* the incoming velocity,
-    hence the signs. The chi component is kept.
+    Arguments are the sign, and cos and sin of the offset. The matrix maps the incoming to the outgoing velocity. The
+    signs follow from the convention that theta and psi are the angles of *minus* the incoming velocity. The chi
+    component is invariant.
     """
     return [[-cosine, sign * sine, 0], [-sine, -sign * cosine, 0], [0, 0, 1]]
 
 
 def contact_normal(mass: Any, inertia: Any, wall_normal: Any, turn: Any, xp: Any = np) -> list[Any]:
-    """The inward unit normal n(q), in (v1, v2, omega), where the satellite at the angle ``turn`` touches a wall.
+    """Return the inward unit normal n(q), in (v1, v2, omega), for contact of the satellite at the angle ``turn``.
 
     The satellite is at (x1 + sin turn, x2 - cos turn) with turn = alpha + j rho, and ``wall_normal`` = (k1, k2) is the
     wall's unit normal, into the free side. In the kinetic-energy metric n(q) has length 1.
 
-    Source: Rudzis 2022, remark 4.6 and eq. 3.26, corrected: it is alpha + j rho, and the root is that of
-    1/m + (k1 cos turn + k2 sin turn)^2 / J.
+    Source: Rudzis 2022, remark 4.6 and eq. 3.26, corrected: the angle is alpha + j rho, and the square root is taken
+    of 1/m + (k1 cos turn + k2 sin turn)^2 / J.
     """
     k1, k2 = wall_normal
     torque = k1 * xp.cos(turn) + k2 * xp.sin(turn)
@@ -66,7 +67,7 @@ def contact_normal(mass: Any, inertia: Any, wall_normal: Any, turn: Any, xp: Any
 
 @dataclass(frozen=True)
 class Disk:
-    """A disk of radius 1 that slides and spins: velocities are w = (v1, v2, omega).
+    """A disk of radius 1, free to move and rotate, with velocities w = (v1, v2, omega).
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ class Disk:
         m, greater than 0.
     inertia : float
         J, the moment of inertia about the centre, greater than 0. A uniform disk has J = m/2 and a ring J = m;
-        J > m is accepted but no real disk of radius 1 has it.
+        J > m is accepted, although no real disk of radius 1 has such an inertia.
 
     Raises
     ------
@@ -83,8 +84,8 @@ class Disk:
 
     Notes
     -----
-    The inner product is the kinetic-energy one, <w, w'> = m v1 v1' + m v2 v2' + J omega omega'. The sign of chi is
-    that of Rudzis 2022, index of notation (sections 1.3.6 and 4.2 print the opposite one).
+    The inner product is that of kinetic energy, <w, w'> = m v1 v1' + m v2 v2' + J omega omega'. The sign of chi follows
+    the index of notation of Rudzis 2022; sections 1.3.6 and 4.2 print the opposite sign.
 
     Examples
     --------
@@ -104,12 +105,12 @@ class Disk:
 
     @property
     def foreshortening(self) -> float:
-        """kappa = (1 + m/J)^(-1/2) < 1: how much the disk's rotation compresses a wall along x."""
+        """kappa = (1 + m/J)^(-1/2) < 1: the factor by which the disk's rotation compresses a wall along x."""
         return float(foreshortening(self.mass, self.inertia))
 
     @property
     def frame(self) -> Floats:
-        """Rows chi_perp, e2^ and chi, orthonormal for ``inner``; shape (3, 3), read-only.
+        """The frame: rows chi_perp, e2^ and chi, orthonormal for ``inner``; shape (3, 3), read-only.
 
         chi_perp = (1/m + 1/J)^(-1/2) (1/m, 0, 1/J), e2^ = m^(-1/2) (0, 1, 0), chi = (m + J)^(-1/2) (-1, 0, 1).
         """
@@ -121,22 +122,22 @@ class Disk:
         return np.asarray(self.mass * (products[..., 0] + products[..., 1]) + self.inertia * products[..., 2])
 
     def rolling_momentum(self, w: ArrayLike) -> Floats:
-        """Return -m v1 + J omega, which every collision keeps; shape (...) for velocities of shape (..., 3)."""
+        """Return -m v1 + J omega, invariant in every collision; shape (...) for velocities of shape (..., 3)."""
         velocity = _velocities("w", w)
         return np.asarray(-self.mass * velocity[..., 0] + self.inertia * velocity[..., 2])
 
     def to_angles(self, w: ArrayLike) -> tuple[Floats, Floats]:
-        """Return the angles (theta, psi) of velocities; the speed is dropped.
+        """Return the angles (theta, psi) of velocities, which do not depend on the speed.
 
         Parameters
         ----------
         w : array_like, shape (..., 3)
-            Velocities (v1, v2, omega) with v2 > 0. Of an incoming velocity pass the negative.
+            Velocities (v1, v2, omega) with v2 > 0. For an incoming velocity pass minus the velocity.
 
         Returns
         -------
         theta, psi : ndarray, shape (...)
-            In (0, pi), with w = speed (cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi).
+            In (0, pi), radians, with w = speed (cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi).
 
         Raises
         ------
@@ -160,7 +161,7 @@ class Disk:
         across = (velocity[..., 0] + velocity[..., 2]) / math.sqrt(1.0 / self.mass + 1.0 / self.inertia)
         upward = math.sqrt(self.mass) * velocity[..., 1]
         rolling = self.rolling_momentum(velocity) / math.sqrt(self.mass + self.inertia)
-        # two arctangents are accurate at grazing and at the poles, where arccos loses half of the digits
+        # two arctangents are accurate at grazing angles and at the poles, where arccos loses half of the digits
         return np.arctan2(upward, across), np.arctan2(np.hypot(upward, across), rolling)
 
     def from_angles(self, theta: ArrayLike, psi: ArrayLike, speed: ArrayLike = 1.0) -> Floats:
@@ -198,7 +199,7 @@ class Disk:
                 raise
             raise InputError(f"theta, psi, speed: expected shapes that broadcast ({reason})") from reason
         parts = norms[..., np.newaxis] * np.stack(direction(theta, psi), axis=-1)
-        # not a matrix product: each component keeps its own relative accuracy
+        # a sum instead of a matrix product preserves the relative accuracy of each component
         return np.asarray(np.sum(parts[..., :, np.newaxis] * self.frame, axis=-2))
 
 

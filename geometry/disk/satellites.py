@@ -10,11 +10,12 @@ from ...core.checks import positive_number
 from ...core.errors import InputError
 from . import rolling
 
-# The theorem asks for spacings that tend to 0 while scale/spacing^2 tends to 0; two fifths is in the middle.
+# Power of the scale in the default spacing. The theorem needs spacing -> 0 and scale/spacing^2 -> 0, a power in
+# (0, 1/2).
 SPACING_POWER = 0.4
-# With fewer satellites the lowest of them may turn to the side of the disk.
+# Least number of satellites; with fewer, the lowest satellite may be at the side of the disk.
 FEWEST = 4
-# 2 pi/n and what a caller computes for it differ by a few rounding errors.
+# Relative difference allowed between a given spacing and 2 pi/n, which differ by a few rounding errors.
 DIVISOR_TOLERANCE = 1e-12
 
 
@@ -27,13 +28,14 @@ class Satellites:
     count : int
         At least 4.
     depth : float
-        How far the wall reaches below its tops, in units of the disk's radius.
+        The depth of the wall below its tops, in units of the disk's radius.
 
     Raises
     ------
     InputError
-        If three satellites could be below the wall's tops at once: depth must be less than 1 - cos(spacing), and less
-        than cos(spacing/2) so that no satellite at the disk's side touches the wall.
+        If there are fewer than 4 satellites, or the depth is not less than 1 - cos(spacing), so that at most two
+        satellites are below the wall's tops, and less than cos(spacing/2), so that no satellite at the side of the
+        disk touches the wall.
 
     Source: Rudzis 2022, section 1.3.1, eq. 1.38, and Proposition 4.1 (vi).
 
@@ -58,12 +60,12 @@ class Satellites:
 
     @classmethod
     def around(cls, scale: float, depth: float, spacing: Any = None) -> Satellites:
-        """The ring with the given spacing, or by default the least spacing of at least scale^0.4 that is allowed.
+        """Return the satellites of the given spacing, by default the least allowed spacing of at least scale^0.4.
 
         Raises
         ------
         InputError
-            If the spacing does not divide the circle, or is too small for the depth.
+            If the spacing does not divide 2 pi, or is too small for the depth.
         """
         if spacing is not None:
             gap = positive_number("spacing", spacing)
@@ -81,12 +83,12 @@ class Satellites:
 
     @staticmethod
     def deepest_for(count: int) -> float:
-        """The depth below which at most two of ``count`` satellites are between the wall's tops and its bottom."""
+        """Return the depth of the wall below which at most two of ``count`` satellites are below the wall's tops."""
         return min(float(rolling.rise(2.0 * math.pi / count)), math.cos(math.pi / count))
 
     @property
     def deepest(self) -> float:
-        """The wall must be less deep than this."""
+        """The upper bound, exclusive, on the depth of the wall."""
         return self.deepest_for(self.count)
 
     @property
@@ -101,5 +103,5 @@ class Satellites:
 
     @property
     def lowest(self) -> float:
-        """How far the disk's centre can come below height 0: -x2 <= depth + 1 - cos(spacing/2)."""
+        """The largest depth of the disk's centre below height 0: -x2 <= depth + 1 - cos(spacing/2)."""
         return self.depth + float(rolling.rise(0.5 * self.spacing))

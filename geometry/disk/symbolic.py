@@ -1,15 +1,15 @@
-r"""The coordinates of the disk as sympy objects, to verify formulas of one's own with `verify`.
+r"""The coordinates of the disk as sympy objects, to verify your own formulas with `verify`.
 
 Attributes
 ----------
 m, J : Symbol
     Mass and moment of inertia, positive.
 theta, psi : Symbol
-    The angles of a velocity, real; `ANGLES` says that they lie in (0, pi).
+    The angles of a velocity, real; `ANGLES` is the condition that both are in (0, pi).
 alpha, rho, k1, k2 : Symbol
     Angle of the disk, spacing of its satellites, and the components of the wall's unit normal.
 metric : Matrix
-    Of the kinetic energy, diag(m, m, J).
+    The kinetic-energy metric, diag(m, m, J).
 chi_perp, e2_hat, chi : Matrix
     The orthonormal frame, column vectors in the coordinates (v1, v2, omega).
 G, G_jacobian : Matrix
@@ -21,10 +21,10 @@ smooth, no_slip : Matrix
 x1, x2, v1, v2, omega, epsilon : Symbol
     Centre of the disk, its velocity (v2 positive), and the scale of the charts.
 roll, roll_linear, bend, straighten : Matrix
-    The charts f*, f_lin, H_eps and its inverse at (x1, x2, alpha), on Z^0* and heights from the tops as in
-    `RollingCharts`; with epsilon = 1 they are F, f_lin, H_1 and its inverse.
+    The charts f*, f_lin, H_eps and its inverse at (x1, x2, alpha) on Z^0*, with heights relative to the tops as in
+    `RollingCharts`. For epsilon = 1 they are F, f_lin, H_1 and its inverse.
 contact, plane_crossing, transfer : Matrix
-    G_eps, the position of Psi and the position phi_w of eta, on Z^0* too.
+    G_eps, the position of Psi and the position phi_w of eta, also on Z^0*.
 
 Examples
 --------
@@ -75,24 +75,24 @@ G_jacobian = G.jacobian([theta, psi])
 
 
 def inner(w: Any, w2: Any) -> Any:
-    """The kinetic-energy inner product of two velocities."""
+    """Return the kinetic-energy inner product of two velocities."""
     return (sp.Matrix(w).T * metric * sp.Matrix(w2))[0, 0]
 
 
 def volume_density(chart: Any, parameters: Any) -> Any:
-    """The density of the kinetic-energy area of a parametrised surface or curve: the root of its Gram determinant."""
+    """Return the kinetic-energy area density of a parametrised surface or curve, the root of its Gram determinant."""
     jacobian = sp.Matrix(chart).jacobian(sp.Matrix(parameters))
     return sp.sqrt(sp.simplify((jacobian.T * metric * jacobian).det()))
 
 
 def branch_matrix(sign: Any, offset: Any) -> Any:
-    """The velocity matrix of theta' = sign theta + offset, psi' = pi - psi, incoming to outgoing."""
+    """Return the velocity matrix of theta' = sign theta + offset, psi' = pi - psi, incoming to outgoing."""
     block = sp.Matrix(branch_block(sign, cos(offset), sin(offset)))
     return (frame.T * block * frame * metric).applyfunc(sp.cancel)
 
 
 def satellite_normal(number: Any) -> Any:
-    """The inward unit normal n(q) at a configuration where satellite ``number`` touches a wall of unit normal k.
+    """Return the inward unit normal n(q) for contact of satellite ``number`` with a wall of unit normal k.
 
     Source: Rudzis 2022, remark 4.6 and eq. 3.26, corrected; see `contact_normal` in `disk/disk`.
     """

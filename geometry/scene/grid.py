@@ -27,7 +27,7 @@ def grid_of(starts: Floats, ends: Floats, first: int, base: int) -> tuple[list[f
     ----------
     starts, ends : array, shape (m, 2)
     first : int
-        Number of the first line; the numbers are consecutive. A line of equal ends is a joint where a curve starts.
+        Number of the first line; the numbers are consecutive. A row with equal ends is a joint where a curve starts.
     base : int
         Start of the returned array in the table ``grid``.
 

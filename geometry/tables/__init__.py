@@ -1,1 +1,1 @@
-"""Regions with straight walls in which the centre of a disk flies."""
+"""Regions with straight walls in which the centre of a disk moves."""

@@ -1,4 +1,4 @@
-"""The convex region between straight walls in which the centre of a disk flies."""
+"""The convex region between straight walls in which the centre of a disk moves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, frozen, number_between, positive_number
 from ...core.errors import InputError
 
-# Normals have length 1 to a few rounding errors.
+# Tolerance for the length 1 of the normals, which have a few rounding errors.
 UNIT_TOLERANCE = 1e-12
 
 
@@ -19,20 +19,20 @@ UNIT_TOLERANCE = 1e-12
 class Container:
     """The convex region {x : (x - p_i).n_i >= 0 for all i} in which the centre of the disk moves.
 
-    The disk's radius is not part of it: between two plates at distance 3 the centre of a disk of radius 1 has the room
-    ``Container.strip(1.0)``.
+    The walls bound the centre, not the rim. For example, the centre of a disk of radius 1 between two plates at
+    distance 3 moves in ``Container.strip(1.0)``.
 
     Parameters
     ----------
     points : array_like, shape (k, 2)
         A point p_i on every wall.
     normals : array_like, shape (k, 2)
-        Unit normals n_i into the region.
+        The unit normal n_i of every wall, into the region.
 
     Raises
     ------
     InputError
-        If shapes are wrong or a normal is not of length 1.
+        If a shape is wrong or a normal does not have length 1.
 
     Examples
     --------
@@ -60,20 +60,20 @@ class Container:
 
     @classmethod
     def strip(cls, gap: float = 1.0) -> Container:
-        """0 <= x2 <= gap, unbounded along x1."""
+        """Return the strip 0 <= x2 <= gap, unbounded along x1."""
         height = positive_number("gap", gap)
         return cls(np.array([[0.0, 0.0], [0.0, height]]), np.array([[0.0, 1.0], [0.0, -1.0]]))
 
     @classmethod
     def wedge(cls, angle: float) -> Container:
-        """The points at angles between 0 and ``angle`` from the x1 axis, seen from the apex at the origin."""
+        """Return the wedge of polar angles from 0 to ``angle``, apex at the origin; ``angle`` in (0, pi), radians."""
         opening = number_between("angle", angle, 0.0, math.pi)
         normals = [[0.0, 1.0], [math.sin(opening), -math.cos(opening)]]
         return cls(np.zeros((2, 2)), np.array(normals))
 
     @classmethod
     def polygon(cls, vertices: ArrayLike) -> Container:
-        """The inside of a convex polygon, its vertices counterclockwise.
+        """Return the inside of a convex polygon from its vertices in counterclockwise order.
 
         Raises
         ------
@@ -90,21 +90,21 @@ class Container:
         if not np.all(turns > 0.0) or total_turn > 3.0 * math.pi:
             raise InputError("vertices: expected a convex polygon with its vertices counterclockwise")
         lengths = np.hypot(edges[:, 0], edges[:, 1])[:, None]
-        # adding 0 makes 0 of -0
+        # adding 0 turns -0 into 0
         return cls(corners, np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths + 0.0)
 
     @property
     def tangents(self) -> Floats:
-        """Unit tangents (k, 2) that point to the right where the wall is seen below the disk."""
+        """The unit tangents (k, 2), to the right if the wall is seen below the disk."""
         return frozen(np.stack([self.normals[:, 1], -self.normals[:, 0]], axis=1))
 
     def distances(self, position: ArrayLike) -> Floats:
-        """Return the distances (n, k) of points (n, 2) from the walls, negative outside."""
+        """Return the signed distances (n, k) of points (n, 2) from the walls, negative outside."""
         positions = finite_array("position", position)
         if positions.ndim != 2 or positions.shape[1] != 2:
             raise InputError(f"position: expected shape (n, 2), got {positions.shape}")
         return np.asarray(np.einsum("nki,ki->nk", positions[:, None, :] - self.points, self.normals))
 
     def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
-        """Return which of the points (n, 2) are inside or on the boundary."""
+        """Return whether each of the points (n, 2) is inside or on the boundary."""
         return np.asarray(np.all(self.distances(position) >= 0.0, axis=1))

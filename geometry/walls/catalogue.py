@@ -1,4 +1,4 @@
-"""The named walls with their default parameters, and the command line's argument WALL."""
+"""The named walls with their default parameters, and the parser of the command line's argument WALL."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .wall import Wall, load_wall
 
 @dataclass(frozen=True)
 class NamedWall:
-    """A wall's constructor with its name, default parameters and one line about it."""
+    """A wall's constructor with its name, default parameters and a one-line summary."""
 
     name: str
     constructor: Callable[..., Wall]
@@ -78,19 +78,19 @@ WALLS: Mapping[str, NamedWall] = MappingProxyType({entry.name: entry for entry i
 
 
 def wall_from_text(text: str) -> Wall:
-    """Return the wall that a text describes: a name with parameters, a TOML file, or a file with a profile.
+    """Return the wall given by a name with parameters, a TOML file, or a file with a profile.
 
     Parameters
     ----------
     text : str
-        ``"name"`` or ``"name:parameter=value,parameter=value"`` with a name from ``WALLS``; or the path of a file:
-        one that ends in ``.toml`` is read by ``load_wall``, any other by ``read_profile``. A path may be followed by
-        ``:seam=step`` or ``:seam=mirror`` (see ``Wall.from_profile``).
+        ``"name"`` or ``"name:parameter=value,parameter=value"`` with a name from ``WALLS``, or the path of a file.
+        ``load_wall`` reads files that end in ``.toml``, ``read_profile`` all others. The path of a profile may be
+        followed by ``:seam=step`` or ``:seam=mirror`` (see ``Wall.from_profile``).
 
     Raises
     ------
     InputError
-        If there is no such name and no such file (the message lists near matches and all names), a parameter is
+        If no named wall and no file has this name (the message lists near matches and all names), a parameter is
         unknown, or a value is not a number.
 
     Examples

@@ -1,4 +1,4 @@
-"""Whether a point lies inside the solid of a wall, by the parity of the boundary's crossings above it."""
+"""Test for points inside the solid of a wall, by the parity of the boundary's crossings above the point."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from ..curves.curve import Curve
 from ..curves.segment import Segment
 from .wall import Wall
 
-# Halvings of the parameter's interval [0, 1] until it is two neighbouring floats near 1.
+# Number of bisections of the parameter interval [0, 1] that leave two neighbouring floats near 1.
 HALVINGS = 53
 
 
 def in_solid(wall: Wall, points: Floats) -> NDArray[np.bool_]:
-    """Return whether points of shape (..., 2) are in the interior of the solid, which is open: its boundary is not.
+    """Return whether points of shape (..., 2) are in the interior of the solid; boundary points are not.
 
-    A point is interior if it is on the solid side in each of the four limits x + 0, x - 0, y + 0, y - 0. Rounding
-    decides for points within a few units in the last place of a curved boundary.
+    A point is interior if it is on the solid side in all four limits (x +- 0, y +- 0). For points within a few units
+    in the last place of a curved boundary the result depends on rounding.
     """
     flat = points.reshape(-1, 2)
     x, y = np.mod(flat[:, 0], wall.period), flat[:, 1]
-    # the parity of crossings above the point, by the side of x (second axis) and of y (first axis)
+    # parity of the crossings above each point, for y +- 0 (first axis) and x +- 0 (second axis)
     odd = np.zeros((2, 2, len(flat)), dtype=bool)
     for path in (wall.pieces, *wall.islands):
         for piece in path:
@@ -36,7 +36,7 @@ def in_solid(wall: Wall, points: Floats) -> NDArray[np.bool_]:
 
 
 def _cross(piece: Curve, x: Floats, y: Floats, odd: NDArray[np.bool_]) -> None:
-    """Flip the parities of the points that have the piece above them."""
+    """Flip the parities of the points below the piece."""
     for start, end in pairwise([0.0, *piece.turning_points(0), 1.0]):
         left, right = (float(piece.point(s)[0]) for s in (start, end))
         if left == right:

@@ -1,4 +1,4 @@
-"""Mushrooms: hollows with a stem and a wide cap, and further generations in the flat tops between them."""
+"""Walls of mushroom-shaped hollows, a stem with a wide cap, and further generations in their flat tops."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..curves.curve import Curve
 from ..curves.segment import Segment
 from .wall import Wall
 
-# More pieces than this take minutes to validate and trace; the message says how many were asked for.
+# Largest number of pieces; more take minutes to validate and trace.
 MOST_PIECES = 200_000
 
-# A stem shorter than this cannot be told from rounding of coordinates of size 1; the plate above the cap then has
+# Shortest stem that differs from rounding of coordinates of size 1. The plate above the cap of a shorter stem has
 # zero thickness, as for stem_aspect = 0.
 SHORTEST_STEM = 256.0 * EPS
 
@@ -24,17 +24,16 @@ SHORTEST_STEM = 256.0 * EPS
 def mushrooms(stem_to_cap: float, stem_aspect: float = 0.0, generations: int = 1) -> Wall:
     """Return a wall of mushroom-shaped hollows.
 
-    A hollow is a straight stem with its opening in the middle of the cell, then a cap as wide as the cell: a
-    semicircle below a flat ceiling. Generation g + 1 fills the flat tops of generation g with equal, equally spaced
-    mushrooms of the same proportions: the largest that divide the flat top into whole cells and fit strictly above
-    the ceiling of the cap beneath.
+    A hollow is a straight stem, open in the middle of the cell, above a cap as wide as the cell: a semicircle below a
+    flat ceiling. Generation g + 1 divides every flat top of generation g into equal cells with mushrooms of the same
+    proportions, the largest that fit strictly above the ceiling of the cap beneath.
 
     Parameters
     ----------
     stem_to_cap : float
-        s in (0, 1): the width of the stem over that of the cap.
+        s in (0, 1): the width of the stem over the width of the cap.
     stem_aspect : float
-        a >= 0: the length of the stem over its width. At 0 the flat top is a plate of zero thickness.
+        a >= 0: the length of the stem over its width. For a = 0 the flat top is a plate of zero thickness.
     generations : int
         At least 1; more than 1 needs a > 0. The openings cover 1 - (1 - s)^generations of the period.
 
@@ -67,11 +66,11 @@ def mushrooms(stem_to_cap: float, stem_aspect: float = 0.0, generations: int = 1
 
 
 def _cells_per_top(s: float, a: float, generations: int) -> list[int]:
-    """How many mushrooms a flat top of each generation holds in the next one; the last generation holds none."""
+    """Return for each generation the number of next-generation mushrooms per flat top, 0 for the last."""
     if generations == 1:
         return [0]
-    # Relative to a cap of width 1: flat tops are (1 - s)/2 wide and a s thick, a mushroom of width d is
-    # d (a s + 1/2) deep; d = (1 - s)/(2 n) fits strictly if n a s > (1 - s)/2 (a s + 1/2). Every generation is alike.
+    # In units of the cap's width, flat tops are (1 - s)/2 wide and a s thick, and a mushroom of width d has the depth
+    # d (a s + 1/2). So d = (1 - s)/(2 n) fits strictly if n a s > (1 - s)/2 (a s + 1/2), in every generation.
     per_top = math.floor(0.5 * (1.0 - s) * (a * s + 0.5) / (a * s)) + 1
     pieces = 9 * sum((2 * per_top) ** g for g in range(min(generations, 60)))
     if pieces > MOST_PIECES:
@@ -92,11 +91,11 @@ def _cells(left: float, right: float, count: int, s: float, a: float, deeper: li
 
 
 def _cell(left: float, right: float, s: float, a: float, deeper: list[int]) -> list[Curve]:
-    """Return one mushroom on [left, right] with what its flat tops hold."""
+    """Return one mushroom on [left, right] with the mushrooms in its flat tops."""
     width = right - left
     middle = left + 0.5 * width
     stem_right = middle + 0.5 * s * width
-    stem_left = left + (right - stem_right)  # exact on [0, 1], so that the mirror image is too
+    stem_left = left + (right - stem_right)  # exact on [0, 1]: mirror symmetry is exact
     ceiling = -a * s * width
     cap = Arc((middle, ceiling), 0.5 * width, math.pi, 2.0 * math.pi).pinned((left, ceiling), (right, ceiling))
     inside: list[Curve] = [

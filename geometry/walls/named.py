@@ -15,7 +15,7 @@ from ..curves.segment import Segment
 from ..disk.disk import Disk
 from .wall import Wall
 
-# 4^10 is a million segments; more does not fit the memory of a laptop as separate pieces.
+# 4^10 is a million segments; more pieces do not fit the memory of a laptop.
 MOST_GENERATIONS = 10
 
 
@@ -36,8 +36,7 @@ def triangular_teeth(angle: float) -> Wall:
     Parameters
     ----------
     angle : float
-        The apex angle psi in (0, pi), radians, of the teeth and of the notches between them; the depth is
-        cot(psi/2)/2.
+        The apex angle psi in (0, pi), radians, of the teeth and of the notches; the depth is cot(psi/2)/2.
 
     Raises
     ------
@@ -63,7 +62,7 @@ def rectangular_teeth(height_to_width: float) -> Wall:
     Parameters
     ----------
     height_to_width : float
-        r > 0: the depth of the crevice over its width 1/2, so that the depth is r/2.
+        r > 0: the depth r/2 of the crevice over its width 1/2.
 
     Raises
     ------
@@ -84,12 +83,12 @@ def rectangular_teeth(height_to_width: float) -> Wall:
 
 
 def focusing_arcs(half_angle: float) -> Wall:
-    """Return one circular arc a period, below its chord [0, 1].
+    """Return the wall of one circular arc per period, below its chord [0, 1].
 
     Parameters
     ----------
     half_angle : float
-        xi in (0, pi/2], radians: the arc subtends 2 xi, its radius is 1/(2 sin xi) and its depth tan(xi/2)/2.
+        xi in (0, pi/2], radians: the arc subtends 2 xi; its radius is 1/(2 sin xi), its depth tan(xi/2)/2.
 
     Raises
     ------
@@ -140,14 +139,14 @@ def dispersing_arcs(curvature: float) -> Wall:
 
 
 def elliptical_arcs(half_angle: float, disk: Disk) -> Wall:
-    """Return the elliptical arcs whose foreshortened wall is ``focusing_arcs(half_angle)``.
+    """Return the wall of elliptical arcs whose foreshortened wall is ``focusing_arcs(half_angle)``.
 
     Parameters
     ----------
     half_angle : float
         xi in (0, pi/2], radians.
     disk : Disk
-        The disk that is to feel circular arcs.
+        The disk for which the wall acts as circular arcs.
 
     Raises
     ------
@@ -170,7 +169,7 @@ def elliptical_arcs(half_angle: float, disk: Disk) -> Wall:
 
 
 def double_parabola() -> Wall:
-    """Return Plakhov's pair of parabolas x = y^2/4 and x = 1 - y^2/4, which nearly retroreflects.
+    """Return Plakhov's double parabola x = y^2/4, x = 1 - y^2/4, which nearly retroreflects.
 
     Examples
     --------
@@ -184,7 +183,7 @@ def double_parabola() -> Wall:
 
 
 def koch(generations: int) -> Wall:
-    """Return Koch's curve turned downwards, a wall of 4^generations segments.
+    """Return the Koch curve pointing downwards, a wall of 4^generations segments.
 
     Parameters
     ----------
@@ -198,8 +197,8 @@ def koch(generations: int) -> Wall:
 
     Notes
     -----
-    The vertices are mirror symmetric in x = 1/2 to the bit, and the heights on the baseline are exactly 0. The length
-    is (4/3)^generations.
+    The vertices are exactly mirror symmetric in x = 1/2, and the heights on the baseline are exactly 0. The arc
+    length is (4/3)^generations.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A rough wall: a cell with its constructors, its foreshortened image, its tables for tracing and its file."""
+"""A rough wall: a cell with constructors, foreshortening, tables for tracing, and a file format."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ from ..scene.scene import Scene, scene_of
 
 @dataclass(frozen=True, repr=False, init=False)
 class Wall(Cell):
-    """One period of a wall, in y <= 0, whose free side is above (on the left of the direction of travel).
+    """One period of a wall in y <= 0, with the free side above (on the left of the direction of travel).
 
     Parameters
     ----------
     pieces : sequence of Segment, Arc or Bezier
-        From left to right a connected path from (0, y0) to (period, y0), y0 <= 0. Pieces may overhang and touch each
-        other, also along plates of zero thickness, but not cross.
+        A connected path from (0, y0) on the left to (period, y0) on the right, y0 <= 0. Pieces may overhang and may
+        touch each other, also along plates of zero thickness, but must not cross.
     period : float
         Greater than 0.
     islands : sequence of sequences of pieces
-        Closed loops that float above the path; loops that run counterclockwise are turned round.
+        Closed loops in the free space above the path; counterclockwise loops are reversed.
 
     Attributes
     ----------
     pieces : tuple of pieces
-        With exact joints: each piece starts to the bit where the one before ends. A curve that touches the level of
-        the wall's highest points with its top is cut there, so there may be more pieces than were given.
+        Each piece starts exactly at the end of the piece before. A curve whose top touches the level of the wall's
+        highest points is cut there, so there may be more pieces than were given.
 
     Raises
     ------
@@ -56,10 +56,10 @@ class Wall(Cell):
     Notes
     -----
     The conditions are those of Rudzis 2022, section 1.3.1, except that any depth is allowed. A wall without islands
-    ``closes`` (conditions B5 and B5'): every excursion below the level of its highest points stays in one of its
-    ``hollows``. Its period may begin anywhere and its highest points may lie below y = 0: all that depends on the law
-    alone uses its ``cell``, which begins at one of them; positions and angles of rays, pictures and files are in the
-    coordinates in which the wall was given.
+    ``closes`` (conditions B5 and B5'): a ray below the level of the highest points stays in one of the ``hollows``.
+    The period may begin anywhere, and the highest points may lie below y = 0. Results that depend on the law only use
+    the ``cell``, which begins at a highest point. Positions and angles of rays, pictures and files are in the given
+    coordinates.
 
     Examples
     --------
@@ -97,7 +97,7 @@ class Wall(Cell):
         Raises
         ------
         WallError
-            If a vertex is not finite or equals the one before it, or the wall breaks a condition.
+            If a vertex is not finite or equals its predecessor, or the wall violates a condition.
 
         Examples
         --------
@@ -135,13 +135,13 @@ class Wall(Cell):
         height : array_like, shape (n,)
             Heights above any level, in the same unit as ``x``.
         seam : {"mirror", "step"}
-            How the profile becomes periodic: followed by its mirror image (twice its length), or repeated as it is
-            with a vertical step between its last and its first height.
+            The periodic continuation: "mirror" appends the mirror image (twice the length), "step" repeats the profile
+            with a vertical step between its last and first height.
 
         Returns
         -------
         Wall
-            Rolled to start at the profile's highest point, which becomes (0, 0).
+            The wall starts at the highest point of the profile, moved to (0, 0).
 
         Raises
         ------
@@ -157,16 +157,16 @@ class Wall(Cell):
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
-        """Whether the periodic wall has a mirror axis, to rounding; with islands only x = period/2 is tried."""
+        """Whether the periodic wall has a mirror axis, to rounding; with islands only x = period/2 is tested."""
         return has_mirror_axis(self.cell)
 
     @cached_property
     def scene(self) -> Scene:
-        """The tables that the tracer reads, of the ``cell`` and in its coordinates, made on first use."""
+        """The tracer's tables of ``cell``, in the coordinates of ``cell``; computed at first use."""
         return scene_of(self.cell)
 
     def plan(self) -> TracePlan:
-        """What the tracer will do with this wall and what it leaves out.
+        """Return the optimisations that the tracer applies to this wall.
 
         Examples
         --------
@@ -176,9 +176,9 @@ class Wall(Cell):
         return plan_of(self.cell, self.cell.scene, self.is_mirror_symmetric)
 
     def foreshorten(self, disk: Disk) -> Self:
-        """Return the wall that the disk feels: y divided by ``disk.foreshortening``, same period.
+        """Return the foreshortened wall of the disk: y divided by ``disk.foreshortening``, same period.
 
-        The law is that of the wall compressed along x by the foreshortening factor (Rudzis 2022, section 1.3.7).
+        Its law equals the law of the wall compressed along x by the foreshortening factor (Rudzis 2022, section 1.3.7).
 
         Examples
         --------
@@ -188,16 +188,16 @@ class Wall(Cell):
         return self._image(1.0, 1.0 / _checked(disk).foreshortening, self.period)
 
     def unforeshorten(self, disk: Disk) -> Self:
-        """Return the wall whose foreshortened wall this is: y multiplied by ``disk.foreshortening``."""
+        """Return the wall whose foreshortened wall is this one: y multiplied by ``disk.foreshortening``."""
         return self._image(1.0, _checked(disk).foreshortening, self.period)
 
     def outline(self, tolerance: float) -> Floats:
-        """Return the path of one period as a polyline within ``tolerance``, shape (n, 2); islands left out."""
+        """Return the path of one period, without islands, as a polyline within ``tolerance``, shape (n, 2)."""
         chunks = [p.flattened(tolerance)[:-1] for p in self.pieces]
         return np.concatenate([*chunks, self.vertices[-1:]])
 
     def save(self, path: str | PathLike[str], overwrite: bool = False) -> None:
-        """Write the wall as a TOML file from which ``load_wall`` reads the same wall to the bit.
+        """Write the wall as a TOML file, from which ``load_wall`` restores it exactly.
 
         Raises
         ------
@@ -221,22 +221,22 @@ def load_wall(path: str | PathLike[str]) -> Wall:
     Parameters
     ----------
     path : path
-        A file that ``Wall.save`` wrote, or one written by hand: ``period``, then either ``vertices`` (a list of
-        points) or ``[[pieces]]`` tables of ``kind`` "segment" (``start``, ``end``), "arc" (``center``,
-        ``semi_axes``, ``angles`` and, where known exactly, ``start`` and ``end``) or "bezier" (``control_points``);
-        islands are ``[[islands]]`` tables with ``pieces``.
+        A file written by ``Wall.save`` or by hand: ``period``, then either ``vertices`` (a list of points) or
+        ``[[pieces]]`` tables of ``kind`` "segment" (``start``, ``end``), "arc" (``center``, ``semi_axes``, ``angles``
+        and, if known exactly, ``start`` and ``end``) or "bezier" (``control_points``). Islands are ``[[islands]]``
+        tables with ``pieces``.
 
     Returns
     -------
     Wall
-        Equal to the saved one, to the bit.
+        Exactly equal to the saved wall.
 
     Raises
     ------
     InputError
         If the file cannot be read, is not TOML, or has a missing, unknown or unsuitable key.
     WallError
-        If the wall breaks a condition.
+        If the wall violates a condition.
 
     Examples
     --------
