@@ -6,14 +6,14 @@ import numpy as np
 
 from ...core.checks import Floats
 
-# Samples that a row starts from, at irregular positions so that no symmetry of the wall hides a piece from all of them.
+# Samples per incoming angle, at irregular positions, so that no symmetry of the wall hides a piece from all samples.
 FIRST_SAMPLES = 32
 GOLDEN = 0.6180339887498949
-# Neighbouring rows have other positions: any large number without pattern does.
+# Shift of the positions per radian; any large number without pattern gives neighbouring angles other positions.
 ANGLE_SHIFT = 12345.6789
-# More of them at either end, each nearer to it by this ratio.
+# Further samples at each end of the opening, at geometrically decreasing distances from the end.
 END_SAMPLES, END_RATIO = 10, 0.3
-# The first and the last sample are this fraction of the row's tolerance, or of the opening, away from the ends.
+# Distance of the first and last sample from the ends, as a fraction of the tolerance or, times MARGIN, of the opening.
 MARGIN = 1e-3
 
 _NUMBERS = np.arange(FIRST_SAMPLES)
@@ -21,10 +21,10 @@ _ENDS = END_RATIO ** np.arange(1, END_SAMPLES + 1) / FIRST_SAMPLES
 
 
 def first_nodes(theta: float, left: float, right: float, goal: float) -> Floats:
-    """Positions of the samples that a row starts from, in any order.
+    """Return the positions of the first samples at one incoming angle, in any order.
 
-    They lie elsewhere in every row, so that the rows together leave no large part of all rays unseen, and crowd at the
-    ends of the opening, where the pieces of a smooth hollow become ever narrower.
+    The positions differ from angle to angle, so that all angles together leave no large part of the rays unsampled.
+    The positions accumulate at the ends of the opening, where the pieces of a smooth hollow become narrow.
     """
     whole = right - left
     shift = theta * ANGLE_SHIFT % 1.0

@@ -1,1 +1,1 @@
-"""Rays through the cell of a wall: the map (x, theta) -> (x', theta'), with refinement where doubles cannot decide."""
+"""Rays through the cell of a wall: the map (x, theta) -> (x', theta'), in double-double arithmetic if necessary."""

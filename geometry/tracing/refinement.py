@@ -1,4 +1,4 @@
-"""Rays that double precision does not decide, traced again in double-double arithmetic."""
+"""Trace rays that double precision does not resolve again in double-double arithmetic."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ from .double_double.records import WideResults, WideTables
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-# Double-double steps cost about twenty times a double one: a flagged ray that needs more flights than these keeps its
-# flag. Runs between vertical sides are one flight, runs along arcs and in wedges are not.
+# Limit on the ray segments of a flagged ray, above which its flag stays; a double-double step costs about twenty double
+# steps. A run between vertical sides counts as one segment; runs along arcs and in wedges do not.
 REFINED_SEGMENTS = 40_000
 _SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
 class RefinedTrace:
-    """Rays traced in double-double arithmetic, each value the sum of the last axis where there are two.
+    """Rays traced in double-double arithmetic; a double-double is the sum of the two entries of the last axis.
 
     Attributes
     ----------
@@ -49,12 +49,12 @@ class RefinedTrace:
         Position and angle of rays that escaped, as double-doubles.
     collisions : array of int, shape (n,)
     status : array of int, shape (n,)
-        Values of `Status`; 4 where no piece was met, which no ray should show, and 5 where rounding decides.
+        Values of `Status`; also 4 if no piece was met (should not occur) and 5 if the result depends on rounding.
     amplification : array of float, shape (n,)
-        Norm of the derivative of (x'/scale, theta') by (x/scale, theta), the scale being the cell plus the hollow's
-        size: an error e of the incoming ray is about this times e in the outgoing one.
+        Norm of the derivative of (x'/scale, theta') by (x/scale, theta), with scale = cell + size of the hollow. An
+        error e of the incoming ray becomes about amplification times e in the outgoing ray.
     rounding : array of float, shape (n,)
-        Bound, to first order, of the rounding error of the double-double ray in the same units.
+        First-order bound on the rounding error of the double-double ray, in the same units.
     """
 
     x: Floats
@@ -66,7 +66,7 @@ class RefinedTrace:
 
 
 def refined_trace(scene: Scene, x: Floats, theta: Floats, max_collisions: int = 2**62) -> RefinedTrace:
-    """Trace rays (two arrays of one dimension) in double-double arithmetic, whatever double precision makes of them."""
+    """Trace rays (two one-dimensional arrays) in double-double arithmetic from the start."""
     from .double_double.arcs import refined_arcs
     from .double_double.rays import refined_rays
 
@@ -98,10 +98,10 @@ def retrace(
     collisions: NDArray[np.int64],
     status: NDArray[np.uint8],
 ) -> None:
-    """Settle, in place, the rays with the status corner or grazing that double-double arithmetic can settle.
+    """Resolve, in place, rays with status corner or grazing by double-double arithmetic if possible.
 
-    A ray that meets a corner within half an ulp of its incoming angle keeps its status: among the angles that round
-    to its angle there is one that meets the corner.
+    A ray that meets a corner within half an ulp of its incoming angle keeps its status, because one of the angles that
+    round to its angle meets the corner.
 
     Parameters
     ----------
@@ -109,9 +109,9 @@ def retrace(
     x, theta : array of float, shape (n,)
         The incoming rays.
     max_collisions : int
-        The limit that was asked for; no ray is followed for more than ``REFINED_SEGMENTS``.
+        The caller's limit; each ray has at most ``REFINED_SEGMENTS`` segments.
     out_x, out_theta, collisions, status : arrays of shape (n,)
-        What double precision made of them.
+        The results of double precision, replaced for the resolved rays.
     """
     flagged = np.flatnonzero((status == _CORNER) | (status == _GRAZING))
     if len(flagged) == 0:
@@ -119,7 +119,7 @@ def retrace(
     from .compiled.trigonometry import LAST_ANGLE
 
     refined = refined_trace(scene, x[flagged], theta[flagged], max_collisions)
-    # a ray that is still inside after as many collisions as were asked for is settled, too
+    # a ray still inside after max_collisions collisions is resolved, too
     limited = (refined.status == _BOUNCE_LIMIT) & (refined.collisions >= max_collisions)
     collisions[flagged[limited]], status[flagged[limited]] = refined.collisions[limited], _BOUNCE_LIMIT
     settled = refined.status == _SETTLED
@@ -133,13 +133,13 @@ def _rows(table: Floats | None, columns: int) -> Floats:
 
 
 def _free_bands(scene: Scene) -> Floats:
-    """The heights (low, high) of an open wall, shape (n, 2), at which no piece lies; none where rays stay in a cell."""
+    """Return the bands of heights (low, high) of an open wall without any piece, shape (n, 2); empty if not open."""
     if not scene.is_open:
         return np.empty((0, 2))
     lines = np.flatnonzero(scene.joints[:, STARTS_LINE] > 0.0)
     heights = [np.column_stack([scene.joints[lines, JOINT_Y], scene.joints[lines + 1, JOINT_Y]])]
     for arcs in (_rows(scene.circles, ARC_COLUMNS), _rows(scene.ellipses, ARC_COLUMNS)):
-        # no point of an arc is further from both ends than half of its length
+        # every point of an arc is within half of the arc length of one of its ends
         half = 0.5 * arcs[:, SPAN] / np.abs(arcs[:, CURVATURE]) / arcs[:, STRETCH]
         heights.append(
             np.column_stack(

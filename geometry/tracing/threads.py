@@ -1,8 +1,8 @@
-"""Blocks of independent work on threads: compiled loops that release the lock, and that Ctrl-C ends.
+"""Blocks of independent work on threads, for compiled functions that release the lock and end at Ctrl-C.
 
-Python answers a signal between two of its own instructions, in the main thread only. So while compiled loops run for
-long they run on other threads, and the main one waits, a moment at a time. A loop that may take long by itself reads
-a flag, a one-element array, every so often (`is_raised` in `compiled/interruption`), and ends when it is raised.
+Python handles signals between its own instructions, in the main thread only. So long compiled functions run on other
+threads, while the main thread waits in short intervals. A function that may take long reads a flag, a one-element
+array, at intervals (`is_raised` in `compiled/interruption`), and ends when the flag is raised.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from numpy.typing import NDArray
 
 from ...core.checks import whole_number
 
-# Rays in one block: handing a block to a thread costs some 30 us, as much as a thousand of the cheapest rays, and one
-# thread at a time does so. So blocks are large, but small enough to share them evenly, some to every thread.
+# Rays in one block. Passing a block to a thread costs about 30 us, as much as a thousand of the cheapest rays, and is
+# serial; smaller blocks balance the threads better.
 LEAST_BLOCK, MOST_BLOCK = 2**13, 2**15
 BLOCKS_PER_THREAD = 4
-# Seconds that the main thread waits at a time: where its waiting cannot be interrupted, Ctrl-C is answered after it.
+# Seconds of one wait of the main thread, the largest delay of Ctrl-C if waiting cannot be interrupted.
 MOMENT = 0.1
 
 Result = TypeVar("Result")
 
 
 def new_flag() -> NDArray[np.int64]:
-    """A flag that is not raised; ``flag[0] = 1`` raises it."""
+    """Return a flag that is not raised; ``flag[0] = 1`` raises it."""
     return np.zeros(1, np.int64)
 
 
@@ -42,8 +42,8 @@ def in_blocks(
 ) -> None:
     """Call ``run`` with slices that cover ``range(count)``, on ``threads`` threads, by default `usable_processors`.
 
-    What ``run`` does with an index must not depend on the slice that contains it. Where ``stop`` is given the slices
-    may take long: the caller's own thread does none of them, and Ctrl-C raises that flag, which ``run`` must obey.
+    The result of ``run`` for an index must not depend on the slice that contains the index. If ``stop`` is given, no
+    slice runs on the caller's thread, and Ctrl-C raises the flag ``stop``, at which ``run`` must end.
 
     Examples
     --------
@@ -74,9 +74,10 @@ def in_blocks(
 
 
 def interruptibly(call: Callable[[], Result]) -> Result:
-    """The result of a compiled call that may take seconds and allocates what it returns; Ctrl-C does not wait for it.
+    """Return the result of a compiled call that may take seconds; Ctrl-C does not wait for the call.
 
-    The call goes on where it cannot be told to stop; what it finds is lost, and it keeps no process from ending.
+    The call must allocate its result. After Ctrl-C the call continues on its thread and its result is dropped; the
+    process can end nevertheless.
 
     Examples
     --------
@@ -89,7 +90,7 @@ def interruptibly(call: Callable[[], Result]) -> Result:
 
 
 def _started(call: Callable[[], Result]) -> Future[Result]:
-    """A call on a thread of its own, which ends with the process."""
+    """Start a call on a new thread that ends with the process."""
     future: Future[Result] = Future()
 
     def run() -> None:
@@ -103,7 +104,7 @@ def _started(call: Callable[[], Result]) -> Future[Result]:
 
 
 def _wait_for(futures: Sequence[Future[Result]], stop: NDArray[np.int64]) -> None:
-    """Wait until all are done or one has failed; raise the flag and the exception in that case, and on Ctrl-C."""
+    """Wait for all futures; at the first failure and at Ctrl-C set the flag and raise the exception."""
     try:
         pending = set(futures)
         while pending:
@@ -116,7 +117,7 @@ def _wait_for(futures: Sequence[Future[Result]], stop: NDArray[np.int64]) -> Non
 
 
 def usable_processors() -> int:
-    """How many processors this process may use: all, unless it is pinned to some, as by a batch system."""
-    # the system's: only some have it
+    """Return the number of processors that this process may use, fewer than all if a batch system restricts it."""
+    # not every operating system has this function
     pinned = hasattr(os, "sched_getaffinity")
     return len(os.sched_getaffinity(0)) if pinned else os.cpu_count() or 1

@@ -19,24 +19,24 @@ from .threads import in_blocks, interruptibly, new_flag
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-# Rays times pieces up to which rays are followed on the caller's own thread: with 10^6 flights each, of some 10 ns a
-# piece, they take a fraction of a second. Another thread costs 0.1 ms, as much as a few hundred flights.
+# Rays times pieces up to which rays are traced on the caller's thread. With 10^6 segments per ray, at about 10 ns a
+# piece, this takes a fraction of a second. Another thread costs 0.1 ms, as much as a few hundred segments.
 LITTLE_WORK = 16
-# Below the first angle, and where it flies more than so many periods between y = 0 and the highest points of a wall, a
-# ray's way there is reduced by whole periods before it is rounded: the rounding error else grows with it.
+# Angle (radians) below which, and number of periods above which, the distance in x between y = 0 and a wall's highest
+# points is reduced by whole periods before rounding; its rounding error would grow with the distance.
 FLAT, FAR = 2.0**-6, 2.0**6
 # pi to 65 digits.
 PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923, 10**64)
-# No limit in effect: a ray ends after MOST_STEPS flights computed one by one (`compiled/rays`), however many hits.
+# No limit in effect: a ray ends after MOST_STEPS segments (`compiled/rays`), for any number of hits.
 MAX_COLLISIONS = 2**62
 
 
 class Status(IntEnum):
-    """How a ray ended.
+    """The outcome of tracing a ray.
 
-    ``ESCAPED``: it left through y = 0. ``CORNER``: it met a corner within rounding. ``GRAZING``: it touched a piece
-    so nearly tangentially that double precision does not tell a hit from a miss. ``BOUNCE_LIMIT``: it was still
-    inside after the largest number of collisions asked for, or after 10^6 flights.
+    ``ESCAPED``: the ray left through y = 0. ``CORNER``: the ray met a corner within rounding. ``GRAZING``: the ray was
+    so nearly tangent to a piece that double precision does not distinguish a hit from a miss. ``BOUNCE_LIMIT``: the
+    ray was still inside after ``max_collisions`` collisions or after 10^6 ray segments.
     """
 
     ESCAPED = 0
@@ -46,17 +46,17 @@ class Status(IntEnum):
 
 
 class StatusCounts:
-    """What a result with an array ``status`` says of it: of rays, or of disks."""
+    """Mask and counts of a result's array ``status``, of rays or of disks."""
 
     status: NDArray[np.uint8]
 
     @property
     def escaped(self) -> NDArray[np.bool_]:
-        """Mask of the rays that left through y = 0, or of the disks that came back to it."""
+        """Mask of the rays that left through y = 0, or of the disks that returned to it."""
         return np.asarray(self.status == Status.ESCAPED)
 
     def counts(self) -> dict[str, int]:
-        """Number of entries for every `Status`, by its name in lower case.
+        """Return the number of entries with every `Status`, by name in lower case.
 
         Examples
         --------
@@ -70,16 +70,15 @@ class StatusCounts:
 
 @dataclass(frozen=True)
 class Trace(StatusCounts):
-    """What became of the rays, each array in the broadcast shape of ``x`` and ``theta``.
+    """The outgoing rays, each array in the broadcast shape of ``x`` and ``theta``.
 
     Attributes
     ----------
     x : array of float
-        Where the ray left through y = 0, unfolded (not reduced to one period); elsewhere its last position.
+        Exit point on y = 0 of a ray that escaped, else the last position; unfolded (not reduced to one period).
     theta : array of float
-        Outgoing angle of rays that escaped, in (0, pi): an angle that rounds to pi is the largest double below it;
-        elsewhere the direction (cos, sin) of the last finite
-        velocity as an angle in [-pi, pi].
+        Outgoing angle in (0, pi) of a ray that escaped; an angle that rounds to pi becomes the largest double below
+        pi. For other rays the angle in [-pi, pi] of the last finite velocity.
     collisions : array of int
         Number of collisions; a flat top counts as one.
     status : array of int
@@ -93,7 +92,7 @@ class Trace(StatusCounts):
 
     @property
     def flagged(self) -> NDArray[np.bool_]:
-        """Mask of the rays that double precision does not settle: those that met a corner or grazed a piece.
+        """Mask of the unresolved rays: those that met a corner or grazed a piece.
 
         Examples
         --------
@@ -121,15 +120,16 @@ def trace(
     ----------
     wall : Wall
     x : array_like
-        Entry points, any finite numbers; the wall is periodic.
+        Entry points, finite; the wall is periodic.
     theta : array_like
         Incoming angles in (0, pi), radians.
     max_collisions : int
-        Rays still inside after so many collisions end with ``Status.BOUNCE_LIMIT``, as do those whose way takes more
-        than 10^6 flights. A run of hits on one circular arc, between two facing parallel lines or in a wedge is
-        computed in one flight, whatever its length, and counts in full.
+        Rays still inside after ``max_collisions`` collisions end with ``Status.BOUNCE_LIMIT``, as do rays of more than
+        10^6 segments. A run of hits on one circular arc, between two facing parallel lines or in a wedge counts as one
+        segment of any length, but as all of its collisions.
     threads : int, optional
-        Number of threads; by default one a processor that the process may use. The result does not depend on it.
+        Number of threads, by default one for each processor that the process may use. The result does not depend on
+        it.
 
     Returns
     -------
@@ -142,13 +142,13 @@ def trace(
 
     Notes
     -----
-    Cost: 10 to 20 ns a bounce where ``wall.plan()`` counts closed forms, else some 70 ns on a wall of few pieces, and
-    below 1 us on one of 10^5 lines (a grid). The first call of a process loads the compiled loop (about a second); the
-    first on a machine compiles it, once for all walls (some ten seconds, then cached).
+    Cost per bounce: 10 to 20 ns in hollows that ``wall.plan()`` counts as closed forms, else about 70 ns for a wall of
+    few pieces and below 1 us for 10^5 lines (with a grid). The first call in a process loads the compiled functions
+    (about 1 s); the first call on a machine compiles them once for all walls (about 10 s, then cached).
 
     Examples
     --------
-    A rectangular notch sends this ray back in the direction from which it came, after two hits:
+    A rectangular notch retroreflects this ray after two hits:
 
     >>> from math import pi
     >>> from asperity import geometry as geo
@@ -186,12 +186,12 @@ def trace(
 
 
 def _work(scene: Scene) -> int:
-    """What a flight costs, in pieces; a Bezier piece counts for ten."""
+    """Return the cost of a ray segment in pieces; a Bezier piece counts as ten."""
     return len(scene.joints) + (0 if scene.beziers is None else 10 * len(scene.beziers))
 
 
 def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) -> Callable[..., None]:
-    """A function of x, theta and the four arrays to fill: closed forms where the scene has some, else the loop."""
+    """Return a function of x, theta and four arrays to fill, which traces by closed forms where possible."""
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.rays import nearby_address, trace_rays
@@ -216,7 +216,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) ->
 
 
 def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_000) -> Floats:
-    """Points of one ray from its entry at y = 0 through every hit to its exit, shape (n, 2).
+    """Return the points of one ray: its entry at y = 0, every hit, and its exit.
 
     Parameters
     ----------
@@ -226,17 +226,17 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     theta : float
         Incoming angle in (0, pi), radians.
     max_collisions : int
-        The trajectory is cut after so many hits.
+        The trajectory ends after at most this number of hits.
 
     Returns
     -------
     array of shape (n, 2)
-        Unfolded: a ray that crosses into the next cell goes on there. It ends at y = 0 exactly if the ray escapes.
+        Unfolded: x increases or decreases beyond the cell. The last point is at y = 0 exactly if the ray escapes.
 
     Raises
     ------
     InputError
-        If ``wall`` is no wall, ``x`` not finite, ``theta`` not in its range or ``max_collisions`` below 1.
+        If ``wall`` is not a Wall, ``x`` not finite, ``theta`` not in (0, pi) or ``max_collisions`` below 1.
 
     Examples
     --------
@@ -273,7 +273,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
 
 
 def _in_coordinates_of(wall: Wall, points: Floats, x: float, theta: float, limit: int) -> Floats:
-    """A trajectory in ``wall.cell`` in the coordinates of the wall: from its entry at y = 0 on, and up to its exit."""
+    """Return a trajectory in ``wall.cell`` in the wall's coordinates, from the entry to the exit at y = 0."""
     level = wall.origin[1]
     ray = trace(wall, x, theta, max_collisions=limit)
     moved = points + np.array([x - points[0, 0] + (level / np.tan(theta) if level else 0.0), level])
@@ -284,9 +284,9 @@ def _in_coordinates_of(wall: Wall, points: Floats, x: float, theta: float, limit
 
 
 def entries(wall: Wall, x: Floats, theta: Floats) -> Floats:
-    """Where rays that enter through y = 0 come to the level of the highest points, in the coordinates of ``wall.cell``.
+    """Return where rays from y = 0 reach the level of the highest points, in the coordinates of ``wall.cell``.
 
-    Up to whole periods where a ray comes from far: there its way is reduced by them exactly, before it is rounded.
+    If the ray travels far, the position is reduced by whole periods, exactly and before rounding.
 
     Examples
     --------
@@ -307,10 +307,10 @@ def entries(wall: Wall, x: Floats, theta: Floats) -> Floats:
 
 
 def _reduced_travel(height: float, theta: float, period: float) -> float:
-    """height cot(theta) up to whole periods, for theta near 0 or pi: 1/theta is a quotient of whole numbers."""
+    """Return height cot(theta) up to whole periods for theta near 0 or pi, with 1/theta as an exact fraction."""
     exact = Fraction(theta) if theta < 1.0 else PI - Fraction(theta)
     small = float(exact)
-    # cot(t) = 1/t - t/3 - t^3/45 - 2 t^5/945 - ..., the next term is below 1e-18 where t < FLAT
+    # cot(t) = 1/t - t/3 - t^3/45 - 2 t^5/945 - ...; the next term is below 5e-17 for t < FLAT
     square = small * small
     rest = small * (1.0 / 3.0 + square * (1.0 / 45.0 + square * (2.0 / 945.0)))
     travel = float(Fraction(height) / exact % Fraction(period)) - height * rest
@@ -318,9 +318,9 @@ def _reduced_travel(height: float, theta: float, period: float) -> float:
 
 
 def _climbs(wall: Wall, incoming: Floats, outgoing: Floats, escaped: NDArray[np.bool_]) -> Floats:
-    """How far rays move in x between y = 0 and the level of the highest points, before and after, together.
+    """Return the sum of the distances in x between y = 0 and the level of the highest points, before and after.
 
-    Rays that do not escape move before only: where they are last is below that level.
+    For rays that do not escape it is the distance before only, because they end below that level.
     """
     level = wall.origin[1]
     if level == 0.0:
@@ -328,7 +328,7 @@ def _climbs(wall: Wall, incoming: Floats, outgoing: Floats, escaped: NDArray[np.
     with np.errstate(over="ignore", invalid="ignore"):
         before = level / np.tan(incoming)
         after = -level / np.tan(outgoing)
-        # ways of opposite signs cancel, as those of a ray that goes back the way it came
+        # distances of opposite signs cancel, for example those of a retroreflected ray
         difference = -level * (np.sin(incoming - outgoing) / np.sin(incoming)) / np.sin(outgoing)
         both = np.where(before * after < 0.0, difference, before + after)
     return np.asarray(np.where(escaped, both, before))

@@ -1,9 +1,9 @@
 """Compiled search for the entry points at which the itinerary changes, at one incoming angle.
 
-For one incoming angle the map x -> theta' is analytic between changes of the itinerary. A row is a chain of samples,
-each with the label of its itinerary; gaps between samples of different labels are halved, all of them once a round.
+At one incoming angle the map x -> theta' is analytic between changes of the itinerary. The search keeps a chain of
+samples, each with the label of its itinerary. In each round, every gap between samples of different labels is halved.
 
-What stays the same along a row travels in two named tuples, `Task` and `Chain`.
+The constants of one angle are in a `Task`, the samples in a `Chain`.
 """
 
 from __future__ import annotations
@@ -24,31 +24,31 @@ from ...tracing.compiled.pointers import call_at
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, nearby_address, trace_rays_address
 from ...tracing.compiled.records import Results, results_for
 
-# Functions that only compiled ones call have no wrappers: they would take as long to compile as the functions. Those
-# that neither allocate nor return arrays count no references, see `options`. Integers start as np.int64(0):
-# for a bare 0 type inference compiles what it is passed to once more.
+# Functions called from compiled code only have no wrappers, which would double the time of compilation. Functions that
+# neither allocate nor return arrays count no references, see `options`. Start integers as np.int64(0): a literal 0 has
+# its own type in numba, and each function that receives it would be compiled twice.
 _INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 inner = njit(**_INNER)
 inlined = njit(**_INNER, forceinline=True)
 allocating = njit(**{**_INNER, "_nrt": True})
 
-# Samples of one row at most; what is then still undecided counts as error.
+# Limit on the samples of one angle; the gaps that remain count as error.
 MOST_SAMPLES = 1 << 13
 MOST_ROUNDS = 200
-# Gaps that matter less than this fraction of the worst one wait for a later round.
+# Gaps with an error below this fraction of the worst gap's wait for a later round.
 WORST_FRACTION = 0.1
-# Labels below this are statuses of rays that did not escape.
+# Labels below this number are statuses of rays that did not escape.
 FIRST_LABEL = np.uint64(4)
 
 
-# Rays that are traced in one call.
+# Number of rays traced in one call.
 BLOCK = 32
 
 
 class Limits(NamedTuple):
-    """Limits of a row: collisions of a ray, how many of them count as flights at most, and flights of the row.
+    """Limits at one angle: collisions of a ray, how many of these count as ray segments at most, and all ray segments.
 
-    Runs cost one flight, whatever their length. So does every cell of an open wall that a ray passes.
+    A run of any length counts as one segment, and so does every cell of an open wall that a ray passes.
     """
 
     collisions: int
@@ -57,9 +57,9 @@ class Limits(NamedTuple):
 
 
 class Tracer(NamedTuple):
-    """How rays are traced: the addresses of `trace_rays` and `hit_nearby`, and room for a block of rays.
+    """The addresses of `trace_rays` and `hit_nearby`, and the arrays for a block of rays of equal incoming angle.
 
-    All angles of a block are that of the row. Nothing raises ``stop``.
+    ``stop`` is never raised.
     """
 
     address: int
@@ -71,9 +71,7 @@ class Tracer(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """What all rows of a hollow have in common: its row, the tables of the wall, limits, and outgoing angles at which
-    cells begin, and how rays are traced.
-    """
+    """The data common to all angles: row of the hollow, tables of the wall, limits, edges of outgoing bins, tracer."""
 
     hollow: Floats
     tables: Tables
@@ -83,7 +81,7 @@ class Setting(NamedTuple):
 
 
 class Task(NamedTuple):
-    """A row: the setting, incoming angle, degree of the functions that the row is for, and flights spent."""
+    """One incoming angle: the setting, the angle, the degree of the functions to integrate, and segments spent."""
 
     setting: Setting
     theta: float
@@ -92,7 +90,7 @@ class Task(NamedTuple):
 
 
 class Chain(NamedTuple):
-    """Samples in the order in which they were found, and two lists for gaps, each named by the sample on its left."""
+    """Samples in the order of their computation, and two lists of gaps, each given by the sample on its left."""
 
     entries: Floats
     angles: Floats
@@ -103,7 +101,7 @@ class Chain(NamedTuple):
 
 
 def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats) -> Setting:
-    """The setting of the rows of a hollow, by its number. It belongs to one thread at a time."""
+    """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
     results, angles, stop = results_for(BLOCK, BLOCK, BLOCK), np.empty(BLOCK), np.zeros(1, np.int64)
     address = trace_rays_address()
     tracer = Tracer(address, nearby_address(), angles, results, np.empty(BLOCK), stop)
@@ -113,7 +111,7 @@ def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats) -> Sett
 
 @allocating
 def empty_chain():
-    """Room for the samples of one row; the last one has the successor -1."""
+    """Return an empty chain for the samples of one angle; the last sample will have the successor -1."""
     return Chain(
         np.empty(MOST_SAMPLES),
         np.empty(MOST_SAMPLES),
@@ -126,14 +124,14 @@ def empty_chain():
 
 @allocating
 def task_of(setting, theta, degree, segments):
-    """-> Task: a row at an angle."""
+    """-> Task: the task of one incoming angle."""
     setting.tracer.angles[:] = theta
     return Task(setting, theta, degree, segments)
 
 
 @inlined
 def trace_block(entries, task):
-    """Trace rays, no more than `BLOCK`, into the results of the tracer."""
+    """Trace at most `BLOCK` rays into the results of the tracer."""
     setting = task.setting
     tracer = setting.tracer
     rays = entries, tracer.angles[: entries.shape[0]]
@@ -145,7 +143,7 @@ def trace_block(entries, task):
 def outcome(k, x, task):
     """-> (angle, label): the outgoing angle of ray k of the block, which entered at x, and its label.
 
-    The label is that of its itinerary and of the cell that it goes to. Its flights are added to those of the row.
+    The label combines the itinerary and the outgoing bin. The segments of the ray are added to those of the task.
     """
     hollow, limits, edges = task.setting.hollow, task.setting.limits, task.setting.edges
     results = task.setting.tracer.results
@@ -153,10 +151,10 @@ def outcome(k, x, task):
     task.segments[0] += 1 + min(results.collisions[k], limits.collisions_that_count) + cells
     if results.status[k] != ESCAPED:
         return task.theta, np.uint64(results.status[k])
-    # a ray along y = 0 within rounding
+    # clipped for a ray along y = 0 within rounding
     out = min(max(math.atan2(results.velocity[k, POINT_Y], results.velocity[k, POINT_X]), 0.0), math.pi)
     cell = np.int64(0)
-    # np.searchsorted would take as long to compile as all of this file
+    # instead of np.searchsorted, which would double the time of compilation of this file
     high = edges.shape[0]
     while cell < high:
         middle = (cell + high) // 2
@@ -178,13 +176,13 @@ def probe(x, task):
 
 @inlined
 def is_spent(task):
-    """Whether the row has taken as many flights as it may."""
+    """Whether the task has reached its limit of ray segments."""
     return task.segments[0] >= task.setting.limits.segments
 
 
 @inlined
 def spread(first, second, degree):
-    """Largest difference of cos, and of cos and sin of ``degree`` times the angle."""
+    """Return the largest difference of cos(angle), cos(k angle) and sin(k angle), k = ``degree``."""
     k = max(degree, 1)
     return max(
         abs(math.cos(first) - math.cos(second)),
@@ -194,7 +192,7 @@ def spread(first, second, degree):
 
 @inlined
 def undecided(before, task, chain):
-    """What the gap after a sample may contribute to a row's error."""
+    """Return the contribution to the error of the gap after the sample ``before``."""
     xs, outs, _, follow, _, _ = chain
     after = follow[before]
     width, whole = xs[after] - xs[before], task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
@@ -203,7 +201,7 @@ def undecided(before, task, chain):
 
 @inlined
 def insert(x, before, count, task, chain):
-    """Put a sample at x behind another one."""
+    """Insert a sample at x after the sample ``before``."""
     xs, outs, labels, follow, _, _ = chain
     xs[count] = x
     outs[count], labels[count] = probe(x, task)
@@ -213,7 +211,7 @@ def insert(x, before, count, task, chain):
 
 @inner
 def halve_gaps(task, chain, count, gap_count, goal, most):
-    """Halve gaps until together they matter less than ``goal``; returns the number of samples."""
+    """Halve gaps until the sum of their errors is at most ``goal``; return the number of samples."""
     xs, _, labels, follow, gaps, fresh = chain
     for _ in range(MOST_ROUNDS):
         total, worst = 0.0, 0.0
@@ -223,7 +221,7 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
             worst = max(worst, matter)
         if total <= goal:
             break
-        # the worst first, so that an accumulation of changes does not use up all samples before the others are found
+        # the worst gaps first, so that a point of accumulation of changes does not use up all samples
         fair = max(0.25 * goal / gap_count, WORST_FRACTION * worst)
         fresh_count = np.int64(0)
         moved = False
@@ -257,9 +255,9 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
 
 @inner
 def sample_entries(entries, task, chain, goal):
-    """Chain the samples at increasing positions, and halve the gaps; returns the number of samples, and the last one.
+    """Chain the samples at increasing positions and halve the gaps.
 
-    The last one is that with the largest position, not the one that was found last.
+    Returns the number of samples, and the sample of largest position.
     """
     xs, outs, labels, follow, gaps, _ = chain
     left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
@@ -285,7 +283,7 @@ def sample_entries(entries, task, chain, goal):
 
 @inner
 def add_change(x, first, task, chain, count, goal):
-    """A position x, in the piece that begins with the sample ``first``, has another label: find the edges around it."""
+    """Insert a position x of another label into the piece that begins with ``first``, and find the changes around x."""
     xs, _, _, follow, gaps, _ = chain
     before = first
     while xs[follow[before]] <= x:

@@ -1,7 +1,8 @@
 """Compiled Gauss rules between two neighbouring changes of itinerary.
 
-The rules are those in s with x = a + (b - a) s^2 (3 - 2 s): the square roots at tangencies are then analytic at both
-ends. ``rules`` are what `gauss_tables` gives. ``nodes`` are the outgoing angles and masses of a row, with spare room.
+The rules are Gauss rules in s with x = a + (b - a) s^2 (3 - 2 s), in which square roots at tangencies are analytic at
+both ends. ``rules`` is the result of `gauss_tables`. ``nodes`` are the outgoing angles and masses of a conditional
+distribution, with spare room.
 """
 
 from __future__ import annotations
@@ -18,22 +19,22 @@ from ...scene.columns import LEFT, RIGHT
 from .changes import FIRST_LABEL, allocating, inner, is_spent, outcome, trace_block
 
 ORDERS = (4, 7, 12, 20, 32)
-# Nodes of one row at most.
+# Limit on the nodes of one incoming angle.
 MOST_NODES = 1 << 17
-# Nodes that the margins and gaps of a row may need beyond those.
+# Further nodes for margins and gaps.
 SPARE = 4
-# A Gauss rule's error is taken as the last difference times the last ratio of differences, at least this, twice: where
-# differences shrink by chance rather than regularly, smaller ratios have proved too hopeful.
+# Least ratio of differences in the error estimate of a Gauss rule, 2 x last difference x last ratio of differences:
+# smaller ratios, which also occur by chance, underestimate the error.
 LEAST_RATIO = 0.03
-# Pieces are not halved below this fraction of the opening.
+# Width, as a fraction of the opening, below which pieces are not halved.
 NARROWEST = 1e-9
 MOST_HALVINGS = 40
-# The fraction of what the rules of a row may spend that those of any piece may, however short it is.
+# Least fraction of the tolerance for the rules of one piece, however narrow.
 LEAST_FRACTION = 0.02
 
 
 class Rules(NamedTuple):
-    """Positions in (0, 1) and weights of all rules, one after the other, their starts, and the first rule to use."""
+    """Positions in (0, 1) and weights of all rules, consecutively, their starts, and the number of the first rule."""
 
     positions: Floats
     weights: Floats
@@ -42,7 +43,7 @@ class Rules(NamedTuple):
 
 
 def gauss_tables(least: int) -> Rules:
-    """The rules after the substitution, from number ``least`` on."""
+    """Return the rules after the substitution, to be used from number ``least`` on."""
     positions, weights, starts = [], [], [0]
     for order in ORDERS:
         node, weight = np.polynomial.legendre.leggauss(order)
@@ -55,10 +56,10 @@ def gauss_tables(least: int) -> Rules:
 
 @inner
 def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
-    """One rule after the other on [low, high], until two of them agree.
+    """Apply rules of increasing order on an interval until the error estimate is at most ``goal``.
 
     Returns the number of nodes, the error, a position where a ray has another label (nan: none), and the number of
-    rays. Without ``strict`` labels do not matter, and the difference of the rules has to show what the piece hides.
+    rays. Without ``strict`` labels are ignored, and only the difference of the rules reveals a missed change.
     """
     low, high = ends
     positions, weights, starts, least = rules
@@ -105,10 +106,10 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
 
 @allocating
 def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
-    """Nodes on a piece, which is halved where the rules do not agree.
+    """Compute nodes on a piece, which is halved until the rules reach the tolerance.
 
-    ``sample`` are the angle and label of a ray of it. Returns the number of nodes in all, the error, a position where a
-    ray has another label (nan: none), and the rays.
+    ``sample`` is the outgoing angle and label of a ray of the piece. Returns the total number of nodes, the error, a
+    position where a ray has another label (nan: none), and the number of rays.
     """
     whole = task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
     low_stack, high_stack = np.empty(MOST_HALVINGS + 2), np.empty(MOST_HALVINGS + 2)

@@ -1,6 +1,6 @@
-"""Compiled march along the entry points of one angle: intervals of equal itinerary, and Gauss nodes on each.
+"""Compiled march along the entry points of one angle: intervals (pieces) of equal itinerary, and Gauss nodes on each.
 
-A node whose label is not that of its piece is a change that was overlooked; it is put among the samples.
+A node with another label than its piece reveals a missed change of itinerary; it is added to the samples.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from .gauss import MOST_NODES, SPARE, integrate_piece
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
-# Pieces of a row that its neighbours start from.
+# Limit on the pieces of one angle whose middles are samples of the next angle.
 MOST_SEEDS = 128
-# Rounding of the mean of a row, as a fraction of the opening, and of the position of a change, as one of the hollow's
-# size. Rays are good to a few units of EPS times the derivative of their map, seldom above some hundreds except next to
-# a change: measured, not proved.
+# Rounding error of a mean, as a fraction of the opening, and of the position of a change, as a fraction of the hollow's
+# size. Rays have errors of a few EPS times the derivative of the map, which is seldom above some hundreds except next
+# to a change (measured, not proved).
 ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
-# The fraction of the tolerance that the Gauss rules may spend, and that all undecided gaps may take.
+# Fractions of the tolerance for the Gauss rules and for all gaps.
 RULE_FRACTION, GAP_FRACTION = 0.5, 0.25
-# The fraction of what the gaps may take for those of a change that was overlooked.
+# Fraction of the tolerance of the gaps for the gaps at a missed change.
 LATE_FRACTION = 0.05
 
 
 @allocating
 def merged(first, second):
-    """Two increasing sequences as one."""
+    """Merge two increasing sequences."""
     both = np.empty(first.shape[0] + second.shape[0])
     i, j = np.int64(0), np.int64(0)
     for k in range(both.shape[0]):
@@ -58,10 +58,11 @@ def merged(first, second):
 
 @allocating
 def march_angle(task, goal, rules, entries, chain, nodes, pieces):
-    """Nodes and masses of one row; returns their number, the error, the lost width, the number of pieces and of rays.
+    """Compute the nodes and masses of the conditional distribution at one incoming angle.
 
-    What a row that has spent its flights leaves undone is in its error. ``pieces`` receives first and last
-    position and label of every piece.
+    Returns the number of nodes, the error, the width of unresolved rays, and the numbers of pieces and of rays. If the
+    limit of ray segments is reached, the error includes the gaps that remain. ``pieces`` receives the first and last
+    position and the label of every piece.
     """
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
@@ -72,7 +73,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     task.segments[0] = 0
     count, last = sample_entries(entries, task, chain, GAP_FRACTION * goal)
     rays = np.int64(0)
-    # the margins count with the first and the last sample
+    # the first and the last sample represent the margins
     node[0], mass[0] = outs[0], xs[0] - left
     node[1], mass[1] = outs[last], right - xs[last]
     filled, number, unresolved = np.int64(2), np.int64(0), 0.0
@@ -90,7 +91,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
             )  # fmt: skip
             rays += spent
             if not math.isnan(other):
-                # an overlooked change: it joins the samples, and the piece is walked again
+                # a missed change: add it to the samples, and repeat the piece
                 count = add_change(other, i, task, chain, count, LATE_FRACTION * GAP_FRACTION * goal)
                 continue
             filled, error = ready, error + miss
@@ -116,14 +117,14 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
 
 @allocating
 def room_for_pieces(count):
-    """First positions, last positions and labels."""
+    """Return arrays for the first positions, last positions and labels of ``count`` pieces."""
     return np.empty(count), np.empty(count), np.empty(count, np.uint64)
 
 
 @_compile
 def wide_middles(lows, highs, least):
-    """The middles of the pieces wider than that: of the widest ones, if they are many."""
-    # doubled until they are few
+    """Return the middles of the pieces wider than ``least``, of the widest ones if there are more than MOST_SEEDS."""
+    # double the least width until at most MOST_SEEDS pieces remain
     least, many = max(least, EPS * EPS), True
     while many:
         count = 0
@@ -142,12 +143,12 @@ def wide_middles(lows, highs, least):
 
 @_compile
 def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts):
-    """Rows at increasing angles.
+    """Compute the conditional distributions at increasing incoming angles.
 
-    A row starts from its seeds, which increase, and from the
-    middles of the pieces of the row before, so that a narrow piece is followed until it vanishes. Returns outgoing
-    angles and masses, one row after the other, and where each row starts; the same of first places, last places and
-    labels of the pieces; and the error, the width lost and the numbers of rays and of flights of each row.
+    The first samples at an angle are its seeds, which increase, and the middles of the pieces at the angle before, so
+    that a narrow piece is followed until it disappears. Returns outgoing angles and masses, angle by angle, and the
+    start of each angle; first positions, last positions and labels of the pieces, and the start of each angle; and for
+    each angle the error, the width of unresolved rays, and the numbers of rays and of ray segments.
     """
     hollow = setting.hollow
     whole = hollow[RIGHT] - hollow[LEFT]

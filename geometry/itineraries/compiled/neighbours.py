@@ -1,4 +1,4 @@
-"""Compiled comparison of the itineraries at two neighbouring angles, and the angle at which one of them appears."""
+"""Compiled comparison of the itineraries at two neighbouring angles, and the critical angle at which one appears."""
 
 from __future__ import annotations
 
@@ -10,29 +10,30 @@ from ...scene.columns import LEFT, RIGHT
 from .changes import inner, probe, task_of
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
-# Near its end a piece is as wide as the distance to it or its square root; so many places, at most its last width away
-# from where its middle is expected, meet it in either case.
+# Number of positions, at most the last width away from the expected middle, at which a piece is searched. Near a
+# critical angle the width is proportional to the distance from this angle or to its square root; both cases are found.
 POINTS_TRIED = 17
-# The ends of a piece are found to this fraction of its width, so that its middle can be followed.
+# Bisections for the ends of a piece, enough to follow its middle.
 EDGE_STEPS = 5
 MOST_STEPS = 80
-# Angles closer than this are the same cut: what a square root leaves of it is below rounding.
+# Difference, radians, up to which critical angles are equal; its effect through a square root is below rounding.
 SAME_ANGLE = 1e-11
 
 
 @inner
 def label_at(x, task):
-    """The label of one ray."""
+    """Return the label of one ray."""
     _, label = probe(x, task)
     return label
 
 
 @_compile
 def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree):
-    """Entry points where a ray has another label than the piece around them; the pieces of a neighbour suggest them.
+    """Return entry points whose ray has another label than the piece around them.
 
-    Rows ``k`` and ``k + 1`` are compared where ``linked[k]``. Pieces of the one no wider than the other's
-    ``least_widths`` do not count. Returns the numbers of the rows, the positions, and the numbers of rays and flights.
+    The candidates are the middles of the pieces at a neighbouring angle: angles ``k`` and ``k + 1`` are compared if
+    ``linked[k]``. Pieces no wider than ``least_widths`` of the other angle are ignored. Returns the numbers of the
+    angles, the positions, and the numbers of rays and of ray segments.
     """
     lows, highs, labels = pieces
     spent = np.zeros(1, np.int64)
@@ -50,7 +51,7 @@ def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree):
                 x = 0.5 * (lows[p] + highs[p])
                 while m < end - 1 and highs[m] <= x:
                     m += 1
-                # what lies in the gaps is in the row's error
+                # positions in gaps are ignored: the error of the angle includes the gaps
                 if labels[m] != labels[p] and lows[m] < x < highs[m]:
                     rays += 1
                     if label_at(x, task) != labels[m]:
@@ -61,7 +62,7 @@ def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree):
 
 @inner
 def edge_from(x, step, label, task):
-    """An end of the piece around x, seen in the direction of ``step``: to a small fraction of its distance."""
+    """Return the end of the piece around x in the direction of ``step``, to a small fraction of its distance."""
     left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
     inside, outside = x, x + step
     while left < outside < right and label_at(outside, task) == label:
@@ -80,9 +81,9 @@ def edge_from(x, step, label, task):
 
 @_compile
 def find_critical(label, present, absent, low, high, drift, setting, degree):
-    """The angle between ``present`` and ``absent`` where the piece ends that is [low, high] at the former.
+    """Return the critical angle between ``present`` and ``absent`` of the piece [low, high] at the angle ``present``.
 
-    ``drift`` is how fast its middle moves, as far as known.
+    ``drift`` is the estimated derivative of the piece's middle by the angle.
     """
     hollow = setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]

@@ -1,1 +1,1 @@
-"""The compiled loop of the tracer in double precision: the flight of a ray, and its hit on each kind of piece."""
+"""The compiled functions of the tracer in double precision: the path of a ray and its hits on all kinds of pieces."""

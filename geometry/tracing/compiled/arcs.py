@@ -1,9 +1,8 @@
 """The first hit of a ray on a circular or elliptic arc, and the reflection there: compiled.
 
-A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0 with r measured from its first joint and n0 the unit normal there,
-towards the free side; kappa > 0 is focusing. Its one front root is (B + sqrt(D)) / (kappa |v|^2), and
-2 B / (kappa |v|^2) where the ray starts on the arc itself. An elliptic arc is the same in stretched coordinates. The
-columns of the tables are in `columns`.
+A circular arc is F(r) = n0.r - kappa |r|^2 / 2 = 0, with r relative to its first joint and n0 the unit normal there,
+towards the free side; kappa > 0 is focusing. The front root is (B + sqrt(D)) / (kappa |v|^2), and
+2 B / (kappa |v|^2) if the ray starts on the arc. An elliptic arc is circular in stretched coordinates.
 """
 
 from __future__ import annotations
@@ -33,11 +32,10 @@ from .options import inlined
 
 @inlined
 def arc_time(arc, own, px, py, vx, vy, stretch):
-    """-> (t, tangent, height): flight time to the front of the arc, inf if there is no hit.
+    """-> (t, tangent, height): time to the front of the arc, inf if there is no hit.
 
-    ``tangent`` is 1 where hit and miss are not told apart. The height, in coordinates where the arc is a circle, is
-    about the distance in front of the arc of a ray that comes from there and meets it close by, and inf where the ray
-    goes to the far side of a focusing arc.
+    ``tangent`` is 1 if hit and miss are not distinguished. For a hit close by, ``height`` is about the distance of the
+    start in front of the arc, in coordinates with a circular arc; inf for a hit on the far side of a focusing arc.
     """
     rx, ry = px - arc[START_X], stretch * (py - arc[START_Y])
     wy = stretch * vy
@@ -66,21 +64,21 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
 
 @inlined
 def on_arc(arc, qx, qy, slack):
-    """-> bool: whether the point q on the full circle, measured from the first joint, belongs to the arc."""
+    """-> bool: whether the point q of the full circle, relative to the first joint, is on the arc."""
     if arc[SHORT_CHORD] > 0.0:
-        # up to a half angle of pi/4 the position along the chord decides, on the arc's own side of the circle
+        # up to a half angle of pi/4: by the position along the chord, on the arc's side of the circle
         along = qx * arc[CHORD_X] + qy * arc[CHORD_Y]
         nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
         facing = ny * arc[CHORD_X] - nx * arc[CHORD_Y]
         return -slack <= along <= arc[SHORT_CHORD] + slack and facing > 0.0
-    # beyond it the side of the chord decides; the arc bulges away from its free side exactly if it is focusing
+    # larger half angles: by the side of the chord; the arc curves away from its free side exactly if it is focusing
     height = qy * arc[CHORD_X] - qx * arc[CHORD_Y]
     return height <= slack if arc[CURVATURE] > 0.0 else height >= -slack
 
 
 @inlined
 def on_arc_after(arc, t, px, py, vx, vy, stretch, slack):
-    """-> bool: whether the point after the time t, on the full circle, belongs to the arc."""
+    """-> bool: whether the point of the full circle after the time t is on the arc."""
     qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
     return on_arc(arc, qx, qy, slack * max(1.0, stretch))
 
@@ -97,7 +95,7 @@ def near_end(curve, px, py, slack):
 
 @inlined
 def arc_reflect(arc, t, px, py, vx, vy, stretch):
-    """-> (px, py, vx, vy): position on the arc after the time t and the velocity reflected there."""
+    """-> (px, py, vx, vy): the position on the arc after the time t and the reflected velocity."""
     qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
     f = arc[NORMAL_X] * qx + arc[NORMAL_Y] * qy - 0.5 * arc[CURVATURE] * (qx * qx + qy * qy)
@@ -115,7 +113,7 @@ def arc_reflect(arc, t, px, py, vx, vy, stretch):
 
 @inlined
 def arc_incidence(arc, t, px, py, vx, vy, stretch):
-    """-> float: sine of the angle between the velocity and the arc that it meets after the time t."""
+    """-> float: sine of the angle between the velocity and the arc after the time t."""
     qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, stretch * (arc[NORMAL_Y] - arc[CURVATURE] * qy)
     return abs(vx * nx + vy * ny) / math.sqrt(nx * nx + ny * ny)

@@ -1,7 +1,7 @@
-"""Where a ray meets a Bezier piece: compiled, and taken in by the loop of `rays`. Loads numba.
+"""The first hit of a ray on a Bezier piece, and the reflection there: compiled, inlined in `rays`. Loads numba.
 
-A piece b(s), 0 <= s <= 1, is hit where g(s) = (b(s) - p) x v falls through zero; the root at the ray's own start is
-divided out. The columns of the table are in `columns`.
+A piece b(s), 0 <= s <= 1, is hit where g(s) = (b(s) - p) x v falls through zero. The root at the ray's start on the
+piece itself is divided out.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def bezier_value(a0, a1, a2, a3, s):
 
 @inlined
 def falling_root(a0, a1, a2, a3, low, high):
-    """-> float: the root of the cubic in [low, high], where it falls from >= 0 to <= 0; safeguarded Newton."""
+    """-> float: the root of a cubic that falls from >= 0 at low to <= 0 at high, by safeguarded Newton steps."""
     s = 0.5 * (low + high)
     for _ in range(ROOT_STEPS):
         value = bezier_value(a0, a1, a2, a3, s)
@@ -57,7 +57,7 @@ def bezier_tangent(curve, s):
 
 @inlined
 def bezier_time(curve, s, px, py, vx, vy):
-    """-> float: the way along the ray to the point s of the curve."""
+    """-> float: the distance along the ray to the point s of the curve."""
     dx = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], s) - px
     dy = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s) - py
     return dx * vx + dy * vy
@@ -65,10 +65,10 @@ def bezier_time(curve, s, px, py, vx, vy):
 
 @inlined
 def contact_time(curve, bend, s, px, py, vx, vy):
-    """-> float: time to the point s, where the ray's line touches the curve from its free side; inf if from the other.
+    """-> float: time to the point s, where the ray's line touches the curve from its free side, else inf.
 
-    ``bend`` is the second derivative of g there. Of the two hits that merge at s the front one came first exactly if
-    the curve runs along the ray where g has a minimum, or against it where g has a maximum.
+    ``bend`` is the second derivative of g at s. Of the two hits that merge at s, the front hit is first exactly if the
+    curve runs along the ray at a minimum of g or against the ray at a maximum.
     """
     tx, ty = bezier_tangent(curve, s)
     if not 0.0 < s < 1.0 or bend * (tx * vx + ty * vy) <= 0.0:
@@ -78,9 +78,9 @@ def contact_time(curve, bend, s, px, py, vx, vy):
 
 @inlined
 def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
-    """-> (t, s, tangent): first front hit of the Bezier piece that the ray has just left at ``own_s``; inf if none.
+    """-> (t, s, tangent): first front hit on the Bezier piece that the ray has just left at ``own_s``; inf if none.
 
-    ``g`` are the coefficients of g. Its root at the start is divided out: with sigma = s - own,
+    ``g`` are the coefficients of g. The root at the start is divided out: with sigma = s - own_s,
     g(s) = sigma (b2 sigma^2 + b1 sigma + b0).
     """
     _, a1, a2, a3 = g
@@ -114,7 +114,7 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
 
 @inlined
 def extrema(a1, a2, a3):
-    """-> (c1, c2): where the cubic g has its extrema, in increasing order; beyond 1 if it has none."""
+    """-> (c1, c2): the extrema of the cubic g in increasing order; 2 in place of a missing one."""
     c1, c2 = 2.0, 2.0
     disc = a2 * a2 - 3.0 * a3 * a1
     if disc > 0.0:
@@ -130,7 +130,7 @@ def extrema(a1, a2, a3):
 
 @inlined
 def is_close_by(curve, g, s, t, spread, slack):
-    """-> bool: whether a hit at s after the time t is within the slack of the ray's start, before or behind it."""
+    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start."""
     _, a1, a2, a3 = g
     # the height in front of the curve is t times the sine of incidence, g' / |b'|
     fall = -((3.0 * a3 * s + 2.0 * a2) * s + a1)
@@ -141,9 +141,9 @@ def is_close_by(curve, g, s, t, spread, slack):
 
 @inlined
 def hit_from_afar(curve, g, px, py, vx, vy, slack):
-    """-> (t, s, tangent, near_s): first front hit of a Bezier piece that the ray has not left; see `bezier_hit`."""
+    """-> (t, s, tangent, near_s): first front hit on a Bezier piece that the ray did not start on; see `bezier_hit`."""
     a0, a1, a2, a3 = g
-    # g is a sum of products of numbers of this size
+    # size of the products in the sum g
     spread = max(abs(vx), abs(vy)) * (abs(curve[START_X] - px) + abs(curve[START_Y] - py) + curve_size(curve))
     # g can fall through zero once on each part of [0, 1] between its extrema
     c1, c2 = extrema(a1, a2, a3)
@@ -158,7 +158,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
             high = 1.0
         touched, touches = touches, False
         if high == 1.0:
-            # the joint itself, so that the next piece sees the same number
+            # computed from the joint, so that the next piece has the same number
             value_high = (curve[END_X] - px) * vy - (curve[END_Y] - py) * vx
         else:
             value_high = bezier_value(a0, a1, a2, a3, high)
@@ -167,7 +167,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                 touches = t > slack and t < np.inf
                 if touches and t < best_t:
                     best_t, best_s, tangent = t, high, 1
-        # the root beside a contact is the contact itself, within rounding
+        # a root beside a contact equals the contact within rounding
         if value_low >= 0.0 >= value_high and value_low > value_high and not touched and not touches:
             s = falling_root(a0, a1, a2, a3, low, high)
             t = bezier_time(curve, s, px, py, vx, vy)
@@ -182,11 +182,10 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
 
 @inlined
 def bezier_hit(curve, own_s, px, py, vx, vy, slack):
-    """-> (t, s, tangent, near_s): flight time to the first front hit of one Bezier piece, inf if none, and parameter.
+    """-> (t, s, tangent, near_s): time to the first front hit on a Bezier piece, inf if none, and its parameter.
 
-    ``tangent`` is 1 where hit and miss are not told apart. ``own_s`` is below 0 if the ray starts elsewhere.
-    A hit that lies within the slack of the start, before or behind it, is not among them: ``near_s`` is its parameter,
-    -1 if there is none.
+    ``tangent`` is 1 if hit and miss are not distinguished. ``own_s`` is below 0 if the ray does not start on the piece.
+    A hit within the slack of the start is not counted: ``near_s`` is its parameter, -1 if there is none.
     """
     g = (
         (curve[START_X] - px) * vy - (curve[START_Y] - py) * vx,
@@ -202,7 +201,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
 
 @inlined
 def bezier_reflect(curve, s, vx, vy):
-    """-> (px, py, vx, vy): the point s of the curve and the velocity reflected there."""
+    """-> (px, py, vx, vy): the point s of the curve and the reflected velocity."""
     px = bezier_value(curve[START_X], curve[X1], curve[X2], curve[X3], s)
     py = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s)
     tx, ty = bezier_tangent(curve, s)
@@ -213,10 +212,10 @@ def bezier_reflect(curve, s, vx, vy):
 
 @inlined
 def bend_number(curve, s):
-    """-> int: which part between its inflections the point s of a Bezier piece belongs to, 0, 1 or 2.
+    """-> int: the number, 0, 1 or 2, of the part between inflections that contains the point s of a Bezier piece.
 
-    A ray that just misses a bump may hit the same piece behind it, and leaves elsewhere; only a part that bends to one
-    side has one front hit that moves continuously with the ray.
+    Only on a part without inflection the front hit is unique and moves continuously with the ray. A ray that just
+    misses a bump may hit the same piece behind the bump.
     """
     # the curvature has the sign of b' x b'', which is a quadratic in s for a cubic b
     c0 = 2.0 * (curve[X1] * curve[Y2] - curve[Y1] * curve[X2])

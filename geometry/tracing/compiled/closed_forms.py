@@ -1,9 +1,8 @@
-"""The outgoing angles of rays into hollows of two lines or of one circular arc, in closed form: compiled.
+"""The reflection of rays by hollows of two lines or of one circular arc, in closed form: compiled.
 
-The numbers of a hollow are a row of the table of `scene/closed_forms`. Rays are taken in blocks that fit into the
-first-level cache, and those of one hollow together. The loops over a block have no branches and change their arrays in
-place, so that the compiler makes vector instructions of them; all they compute is sums, products, quotients, roots and
-choices, so that a ray's result does not depend on its block.
+A hollow is a row of the table of `scene/closed_forms`. Rays are computed in blocks that fit into the first-level cache,
+hollow by hollow. The loops over a block have no branches and work in place, so the compiler vectorises them. They use
+sums, products, quotients, roots and selections only, so a ray's result does not depend on its block.
 """
 
 from __future__ import annotations
@@ -38,11 +37,11 @@ from ...scene.columns import (
 from .rays import FLAT_TOP, TOP_CORNER, opening_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 
-# Status of a ray that is left to the loop.
+# Status of a ray to be traced hit by hit.
 UNDECIDED = 255
 ESCAPED = 0
 RAYS = 512
-# Adding and subtracting it rounds a number below 2^51 to a whole one.
+# Adding and then subtracting this number rounds a number below 2^51 to an integer.
 ROUNDER = 1.5 * 2.0**52
 
 _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
@@ -50,14 +49,14 @@ _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 @_compile
 def cross_arc(form, entry, angle, hits, moment, incidence):
-    """Take rays through a circular hollow: entry and angle become those of the exit; hits is their number, 0 in doubt.
+    """Reflect rays by a circular hollow: entry and angle become those of the exit, hits their number (0 if in doubt).
 
     With d the angle of incidence from the arc, X the fraction of the opening to the left of the ray,
 
         sin^2(d/2) = (1 - X) sin^2((theta + xi)/2) + X sin^2((theta - xi)/2),
 
-    all terms positive, and the same with cosines; a chord advances by 2 d, to the left where d is acute, else by
-    2 (pi - d) to the right, and the rest is counting. The angular momentum about the centre gives the exit.
+    all terms positive, and the same with cosines. A chord advances by 2 d to the left if d is acute, else by
+    2 (pi - d) to the right, which gives the number of hits. The angular momentum about the centre gives the exit.
     """
     left, right, doubt = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT]
     middle, height, radius, half = form[CIRCLE_X], form[CIRCLE_Y], form[RADIUS], form[HALF_ANGLE]
@@ -75,19 +74,19 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
         incidence[i] = 2.0 * arcsine(math.sqrt(incidence[i]))
     for i in range(entry.shape[0]):
         acute = moment[i] < 0.0
-        # |theta - pi| where d is obtuse: the mirror image
+        # for obtuse d the mirror image, pi - theta
         seen = angle[i] if acute else (PI - angle[i]) + PI_REST
         step = 2.0 * incidence[i]
         ratio = ((half + seen) - incidence[i]) / step
         count = (ratio + ROUNDER) - ROUNDER
-        # from the last hit on to the end, or from the end on to the hit that is none
+        # angle from the last hit to the end of the arc, or from the end to the first point beyond it
         off = (ratio - count) * step
         count = count + 1.0 if off > 0.0 else count
         off = -off if off < 0.0 else off
         start = (half - seen) + incidence[i]
         gone = ((seen - count * step) + PI) + PI_REST
         angle[i] = gone if acute else (PI - gone) + PI_REST
-        # the lines of the first and the last flight pass the joints at 2 r sin(a/2) sin((step - a)/2) with these a
+        # the first and last segments pass the joints at 2 r sin(a/2) sin((step - a)/2) with a = start and a = off
         passing = start * (step - start)
         passing = passing if passing < off * (step - off) else off * (step - off)
         hits[i] = count if passing > doubt else 0.0
@@ -98,10 +97,10 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
 
 @_compile
 def cross_wedge(form, entry, angle, hits, vx, vy, turn):
-    """Take rays through a wedge, as `cross_arc` does; the last three arrays are room to work in.
+    """Reflect rays by a wedge, with results as in `cross_arc`; the last three arrays are work space.
 
-    The sign of ``turn``, the moment of the apex about the ray, tells which line is met first. The number of hits is
-    that of the unfolded ends of the opening, one after the other, that lie on the other side of the ray than the apex.
+    The sign of ``turn``, the moment of the apex about the ray, selects the line that is met first. The number of hits
+    is the number of consecutive unfolded ends of the opening on the side of the ray opposite to the apex.
     """
     left, right, doubt, apex_x, apex_y = form[FORM_LEFT], form[FORM_RIGHT], form[DOUBT], form[WEDGE_X], form[WEDGE_Y]
     copies = int(form[COPIES])
@@ -135,7 +134,7 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
         exit = near + fraction * (far - near)
         incoming = angle[i]
         angle[i] = form[last + LINK_CONSTANT] + (-incoming if odd else incoming)
-        # how closely the ray's line passes the apex, the ends of the opening where it enters, and where it leaves
+        # distances of the ray's line from the apex, from the ends of the opening, and from its ends at the exit
         west, east = (left - entry[i]) * vy[i], (entry[i] - right) * vy[i]
         closest = min(min(abs(turn[i]), min(west, east)), min(abs(inside), abs(outside)))
         hits[i] = hits[i] if closest > doubt and fraction > 0.0 else 0.0
@@ -144,7 +143,7 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
 
 @_compile
 def cross(form, entry, angle, hits, room):
-    """Take rays of one hollow through it."""
+    """Reflect rays by one hollow; ``room`` is work space."""
     count = entry.shape[0]
     if form[FORM] == WEDGE:
         cross_wedge(form, entry, angle, hits, room[0, :count], room[1, :count], room[2, :count])
@@ -154,27 +153,27 @@ def cross(form, entry, angle, hits, room):
 
 @_compile
 def cell_of(x, cell):
-    """Left end of the cell in which a position lies."""
+    """Return the left end of the cell that contains x."""
     return np.floor(x / cell) * cell
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def trace_closed(x, theta, hollows, closed, cell, limit, results):
-    """Trace a block of rays through flat tops and closed forms; all others get the status `UNDECIDED`.
+    """Trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
 
     ``results`` are four arrays to fill: x, theta, collisions, status.
     """
     out_x, out_theta, bounces, status = results
     room = np.empty((6, RAYS))
     rays, others, met = np.empty(RAYS, np.int64), np.empty(RAYS, np.int64), np.empty(RAYS, np.int64)
-    # the rays of a hollow in a block are a list: the first one, and for each the next one, numbers from 0 in the block
+    # linked lists of the rays of each hollow in a block: `heads` is the first ray, `others` the next
     heads = np.full(hollows.shape[0], -1)
     whole = hollows.shape[0] == 1 and hollows[0, LEFT] == 0.0 and hollows[0, RIGHT] == cell
     for first in range(0, x.shape[0], RAYS):
         count = min(RAYS, x.shape[0] - first)
         starts = x[first : first + count]
         if whole:
-            # the only hollow: its rays need not be gathered, and are taken through it where their results are to stand
+            # a single hollow without flat tops: compute in the arrays of the results, without gathering
             entry, angle, hits = out_x[first : first + count], out_theta[first : first + count], room[3, :count]
             for j in range(count):
                 entry[j] = starts[j] - cell_of(starts[j], cell)

@@ -1,7 +1,4 @@
-"""Arrays that grow while a compiled loop fills them: copies with more room.
-
-Plain loops, because numba takes seconds to compile a concatenation.
-"""
+"""Larger copies of arrays that grow in compiled functions; plain loops, which compile faster than concatenation."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 @_compile
 def longer(array, size):
-    """The array with room for so many entries."""
+    """Return a copy with ``size`` entries; the new ones are not set."""
     new = np.empty(size, array.dtype)
     for i in range(array.shape[0]):
         new[i] = array[i]
@@ -22,7 +19,7 @@ def longer(array, size):
 
 @_compile
 def taller(array, rows):
-    """The array with so many rows; the new ones are zero."""
+    """Return a copy with ``rows`` rows; the new ones are zero."""
     new = np.zeros((rows, array.shape[1]), array.dtype)
     for i in range(array.shape[0]):
         for j in range(array.shape[1]):
@@ -32,7 +29,7 @@ def taller(array, rows):
 
 @_compile
 def larger(array, rows, columns):
-    """The array with so many rows of so many columns."""
+    """Return a copy with ``rows`` rows and ``columns`` columns; the new entries are not set."""
     new = np.empty((rows, columns, array.shape[2]))
     for i in range(array.shape[0]):
         for j in range(array.shape[1]):

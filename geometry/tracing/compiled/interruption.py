@@ -1,4 +1,4 @@
-"""Whether the flag is raised that ends a long compiled loop."""
+"""Test of the flag that ends a long compiled function."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numba.extending import intrinsic
 def is_raised(context, flag):
     """Whether the first number of an array of integers is not 0, read from memory at every call.
 
-    An ordinary read would be moved out of a loop that does not write to the array.
+    The compiler would move an ordinary read out of a loop that does not write to the array.
     """
 
     def read(context, builder, signature, arguments):

@@ -1,7 +1,7 @@
-"""Where a ray meets the lines of a hollow: compiled, and taken in by the loop of `rays`. Loads numba.
+"""The first hit of a ray on the lines of a hollow: compiled, inlined in `rays`. Loads numba.
 
-The side of a ray on which a joint V lies is the sign of c = (V - p) x v. A line is hit from its free side exactly if c
-goes from >= 0 at its start to <= 0 at its end. Neighbours share the number c, so that no ray slips between them.
+The sign of c = (V - p) x v is the side of the ray on which a joint V lies. A line is hit from its free side exactly if
+c goes from >= 0 at its start to <= 0 at its end. Neighbouring lines share the number c, so no ray passes between them.
 """
 
 from __future__ import annotations
@@ -27,24 +27,22 @@ from ...scene.tolerances import NEARBY_SLACKS
 from .options import inlined
 from .records import LINE
 
-# The fraction from a line's end is negative even where the ray meets that end: it is at least the smallest of doubles.
+# Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.
 LEAST_FRACTION = 5e-324
 
 
 @inlined
 def line_time(tables, j, sides, px, py, vx, vy):
-    """-> (t, fraction): flight time to the line that starts at joint j, and the position on it as a fraction.
+    """-> (t, fraction): time to the line that starts at joint j, and the position on the line as a fraction.
 
-    The fraction is negative where it is counted from the line's end.
-
-    ``sides`` are the numbers c of its joints.
+    A negative fraction is relative to the line's end. ``sides`` are the numbers c of the line's joints.
     """
     joints, lines = tables.joints, tables.lines
     c_before, c_after = sides
     fraction = c_before / (c_before - c_after)
     near = j
     if fraction > 0.5:
-        # from the nearer joint, and negative to say so, so that both ends keep their digits
+        # relative to the nearer joint, for accuracy at both ends
         fraction = min(c_after / (c_before - c_after), -LEAST_FRACTION)
         near = j + 1
     hx = joints[near, JOINT_X] + fraction * lines[j, EDGE_X]
@@ -54,12 +52,12 @@ def line_time(tables, j, sides, px, py, vx, vy):
 
 @inlined
 def joint_side(joints, j, own, px, py, vx, vy, slack):
-    """-> (c, t): the side of joint j, and the time to it where it is a corner that the ray meets, else inf."""
+    """-> (c, t): the number c of joint j, and the time to the joint if it is a corner that the ray meets, else inf."""
     dx, dy = joints[j, JOINT_X] - px, joints[j, JOINT_Y] - py
     c = dx * vy - dy * vx
     if abs(c) <= slack and joints[j, IS_CORNER] > 0.0:
         ahead = dx * vx + dy * vy
-        # the corners of the opening are left behind for certain, however shallow the ray comes
+        # at entry the corners of the opening are always behind the ray, at any angle
         if (own.bounces > 0 or dy != 0.0) and ahead > slack:
             return c, ahead
     return c, np.inf
@@ -69,7 +67,7 @@ def joint_side(joints, j, own, px, py, vx, vy, slack):
 def nearest_line(scope, own, px, py, vx, vy, time):
     """-> (t, line, fraction, corner, nearby): the first line before ``time``, and the time to the first corner; or inf.
 
-    ``nearby`` says that a line is met so close that the start's rounding may count; see `nearby`.
+    ``nearby`` is true if a line is so close that rounding of the start may decide the hit; see `nearby`.
     """
     tables, slack = scope.tables, scope.slack
     joints = tables.joints
@@ -95,10 +93,10 @@ def nearest_line(scope, own, px, py, vx, vy, time):
 
 @inlined
 def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
-    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the cells that the ray passes.
+    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the grid cells along the ray.
 
-    Lines are listed in every cell that they nearly touch, so the walk's own rounding leaves out no line that the ray
-    can meet; the signs at the joints are the same numbers in every cell.
+    Every cell lists all lines within a margin, so rounding in the grid traversal misses no line that the ray can meet.
+    The numbers c of the joints are the same in every cell.
     """
     tables, hollow, slack = scope.tables, scope.hollow, scope.slack
     joints, grid = tables.joints, tables.grid
@@ -120,13 +118,13 @@ def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
             c_before, ahead = joint_side(joints, j, own, px, py, vx, vy, slack)
             corner_time = min(corner_time, ahead)
             if joints[j, STARTS_LINE] <= 0.0:
-                # a joint between curves, listed for its corner
+                # a joint where no line starts, listed because it may be a corner
                 continue
             c_after, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
             corner_time = min(corner_time, ahead)
             if c_before >= 0.0 >= c_after and c_before > c_after and (own.kind != LINE or j != own.number):
                 t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
-                # of two lines at one distance the first in the order of the wall is hit, as without a grid
+                # of two lines at equal distance the first along the wall is hit, as without a grid
                 if t > close:
                     if t < best or (t == best and j < found):
                         best, found, best_fraction = t, j, fraction

@@ -1,6 +1,7 @@
 """Hits of a ray on pieces within rounding of its start: compiled.
 
-The loop of `rays` sets such pieces aside, and a function of its own looks at them again, so that the loop has no call.
+The loop of `rays` only detects such pieces. The separate function `hit_nearby` tests them again, so that the loop
+itself contains no call.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from .lines import line_time
 from .options import allocating, compiled
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 
-# In place of a tangency.
+# A value of `Hit.doubt`: the side of the piece on which the ray starts is not resolved.
 DOUBTFUL = 2
-# numba compiles a function again for every literal that it is called with, but not for constants of this type.
+# A constant of this type, because numba compiles a function again for every literal argument.
 NOT_OWN = np.bool_(False)
 
 
 @allocating
 def face_of(tables, kind, number, s):
-    """-> Face: a piece by kind, row and parameter, as double-double arithmetic takes it."""
+    """-> Face: a piece, given by kind, row and parameter, for double-double arithmetic."""
     arc, curve = np.empty(0), np.empty(0)
     form = STRAIGHT
     if kind in (CIRCLE, ELLIPSE):
@@ -48,9 +49,9 @@ def face_of(tables, kind, number, s):
 
 @allocating
 def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
-    """-> bool: whether the ray's start lies in front of a piece that is nearby, or may do so; see `sides`."""
+    """-> bool: whether the ray's start lies, or may lie, in front of a nearby piece; see `sides`."""
     if own.kind in (OPENING, SIDE):
-        # no piece lies above the opening or beyond a side: one within rounding of them is met there
+        # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
         return True
     return in_front(
         tables.joints,
@@ -62,7 +63,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
 
 @compiled
 def line_nearby(tables, j, px, py, vx, vy, slack):
-    """-> (t, fraction, is_clear): flight time to a line close by, or inf; whether it is ahead for certain."""
+    """-> (t, fraction, is_clear): time to a line close by, or inf; whether the line is certainly ahead."""
     joints = tables.joints
     c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
     c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
@@ -76,7 +77,7 @@ def line_nearby(tables, j, px, py, vx, vy, slack):
 
 @compiled
 def arc_nearby(arc, px, py, vx, vy, slack):
-    """-> (t, tangent, is_clear): flight time to an arc that is met close by, or inf; see `line_nearby`."""
+    """-> (t, tangent, is_clear): time to a hit on an arc close by, or inf; see `line_nearby`."""
     stretch = arc[STRETCH]
     wide = slack * max(1.0, stretch)
     t, tangent, height = arc_time(arc, NOT_OWN, px, py, vx, vy, stretch)
@@ -90,9 +91,9 @@ def arc_nearby(arc, px, py, vx, vy, slack):
 
 @compiled
 def piece_nearby(tables, piece, own, px, py, vx, vy, slack):
-    """-> (t, s, tangent, is_clear): flight time to a piece that is met close by, or inf, and where it is met.
+    """-> (t, s, tangent, is_clear): time to a hit on a piece close by, or inf, and the position s on the piece.
 
-    ``piece`` is its kind and row.
+    ``piece`` is the kind and row of the piece.
     """
     kind, number = piece
     is_own = own.kind == kind and own.number == number
@@ -111,10 +112,10 @@ def piece_nearby(tables, piece, own, px, py, vx, vy, slack):
 
 @allocating
 def hit_nearby(scope, own, px, py, vx, vy):
-    """-> Hit: the first one among the pieces nearby that the ray starts in front of.
+    """-> Hit: the first hit on nearby pieces with the ray's start on their front side.
 
-    It is doubtful where the gap that the ray crosses is within the slack: doubles do not know where it goes on, in the
-    apex of a wedge.
+    The hit is DOUBTFUL if the gap between start and piece is within the slack, as in the apex of a wedge: double
+    precision does not determine how the ray continues.
     """
     tables, slack = scope.tables, scope.slack
     from_piece = own.kind not in (OPENING, SIDE)

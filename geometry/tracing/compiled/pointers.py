@@ -1,7 +1,7 @@
 """Calls of compiled functions by their address. Loads numba.
 
-numba takes what a function calls into the function, and optimises it again there, at every level. A large function
-that is called from many places, or seldom, is compiled once instead, and called by its address.
+numba copies all called functions into a function and optimises them again, at every level. A large function that is
+called from many places, or seldom, is compiled once instead and called by its address.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 
 
 def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
-    """The address of a compiled function for arguments of the types of these, compiled or loaded now if need be."""
+    """Return the address of a function compiled for the types of ``arguments``; compile or load it if necessary."""
     kinds = tuple(typeof(argument) for argument in arguments)
     function.compile(kinds)
     version = function.overloads[kinds]
@@ -23,9 +23,9 @@ def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
 
 @intrinsic
 def call_at(context, address, result, arguments):
-    """Call the function at an address, which takes these arguments, a tuple, and returns what has the type of a result.
+    """Call the function at ``address`` with a tuple of arguments; it returns a value of the type of ``result``.
 
-    The types must be those for which the function was compiled: nothing checks them.
+    The types must be those for which the function was compiled; they are not checked.
     """
     kinds = tuple(arguments)
 

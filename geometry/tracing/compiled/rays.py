@@ -1,12 +1,12 @@
-"""The compiled loop of the planar tracer: the hollow that a ray enters, and its flights to the exit. Loads numba.
+"""The compiled loop of the planar tracer: the hollow that a ray enters, and its segments to the exit. Loads numba.
 
-One compiled version serves all walls: a table is empty where the wall has no such piece. The formulas are stable by
-themselves; there is no epsilon that decides which piece is hit:
+One compiled version serves all walls: a table is empty if the wall has no such piece. The formulas are numerically
+stable, and no epsilon decides which piece is hit:
 
-* Lines, arcs and Bezier pieces: see `lines`, `arcs` and `beziers`.
+* For hits on lines, arcs and Bezier pieces see `lines`, `arcs` and `beziers`.
 * A piece within rounding of the ray's start is hit only if the start lies in front of it by the exact positions of the
-  joints, see `sides`: not the other face of a plate without thickness, nor the other side of a sharp peak.
-* The hit point is put back on its piece, and the velocity is renormalised, once a bounce.
+  joints, see `sides`. So the opposite face of a plate of zero thickness or of a sharp peak is not hit.
+* After each bounce the hit point is projected onto its piece, and the velocity is renormalised.
 """
 
 from __future__ import annotations
@@ -63,20 +63,20 @@ from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
-# In place of a hollow's number: a flat top, and an end of one that is a corner.
+# In place of a hollow's number: a flat top, and a corner at an end of an opening.
 FLAT_TOP, TOP_CORNER = -1, -2
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT = 0, 1, 2, 3
-# Flights followed one by one before a ray is given up: 20 to 100 ms. Hits in a run cost one flight together.
+# Limit on the segments of a ray, 20 to 100 ms of work. A run of hits counts as one segment.
 MOST_STEPS = 1_000_000
-# An odd number without pattern, so that itineraries of the same pieces in another order differ.
+# An odd number without pattern, so that itineraries with the same pieces in another order differ.
 HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)
-# Far beyond the numbers of the pieces.
+# Shift to bits that the numbers of the pieces do not reach.
 BEND_SHIFT = 40
 
 
 @inlined
 def last_hollow(entry, hollows):
-    """-> int: number of the last hollow whose left end is not beyond a position of the cell, -1 where there is none."""
+    """-> int: number of the last hollow with left end <= entry, -1 if there is none."""
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -89,10 +89,10 @@ def last_hollow(entry, hollows):
 
 @inlined
 def opening_at(entry, hollows):
-    """-> int: number of the hollow that opens at a position of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
+    """-> int: number of the hollow whose opening contains a position of the cell, or `FLAT_TOP`, or `TOP_CORNER`."""
     h = last_hollow(entry, hollows)
     if h < 0 or entry >= hollows[h, RIGHT] or (entry == hollows[h, LEFT] and hollows[h, LEFT_EDGE] != NO_EDGE):
-        # a flat top, or an edge of it; the edges between two hollows are corners
+        # a flat top or its edge; an edge between two hollows is a corner
         at_left = h >= 0 and entry == hollows[h, LEFT] and hollows[h, LEFT_EDGE] == CORNER_EDGE
         at_right = h >= 0 and entry == hollows[h, RIGHT] and hollows[h, RIGHT_EDGE] == CORNER_EDGE
         return TOP_CORNER if at_left or at_right else FLAT_TOP
@@ -101,7 +101,7 @@ def opening_at(entry, hollows):
 
 @inlined
 def scope_of(tables, h, nearby):
-    """-> Scope: the hollow number h."""
+    """-> Scope: hollow number h."""
     hollow = tables.hollows[h]
     return Scope(
         tables,
@@ -120,7 +120,7 @@ def scope_of(tables, h, nearby):
 
 @inlined
 def nearest_curve(scope, own, px, py, vx, vy):
-    """-> (Hit, nearby): the first hit of a circle, ellipse or Bezier piece; for ``nearby`` see `nearest_line`."""
+    """-> (Hit, nearby): the first hit on a circle, ellipse or Bezier piece; for ``nearby`` see `nearest_line`."""
     tables, slack = scope.tables, scope.slack
     circles, ellipses, beziers = tables.circles, tables.ellipses, tables.beziers
     close = NEARBY_SLACKS * slack
@@ -153,7 +153,7 @@ def nearest_curve(scope, own, px, py, vx, vy):
 
 @inlined
 def nearest_piece(scope, own, px, py, vx, vy):
-    """-> (Hit, corner): the first hit of a piece, and the time to the first corner that is met within the slack."""
+    """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
     hit, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_grid:
         t, line, fraction, corner, near = nearest_line_in_grid(scope, own, px, py, vx, vy, hit.time)
@@ -170,9 +170,9 @@ def nearest_piece(scope, own, px, py, vx, vy):
 
 @inlined
 def exit_time(scope, own, px, py, vx, vy, time):
-    """-> (t, kind): time to the opening (LID) or to a side of an open wall (SIDE), if met before ``time``; or NO_PIECE.
+    """-> (t, kind): time to the opening (OPENING) or to a side of an open wall (SIDE) before ``time``, else NO_PIECE.
 
-    The opening is an edge from right to left. A piece that lies in it or in a side within rounding is met before.
+    The opening is an edge from right to left. A piece within rounding of the opening or of a side is hit first.
     """
     left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
     kind = NO_PIECE
@@ -190,13 +190,13 @@ def exit_time(scope, own, px, py, vx, vy, time):
 
 @inlined
 def meets_corner(scope, hit, corner, px, py, vx, vy):
-    """-> bool: whether a ray meets the corner that it passes after the time ``corner``, and not only what it hits."""
+    """-> bool: whether a ray meets the corner that it passes after the time ``corner``, besides or before its hit."""
     if corner == np.inf:
         return False
     tables, time, slack = scope.tables, hit.time, scope.slack
     if corner <= time + slack:
         return True
-    # at a shallow incidence a corner that the ray meets within the slack lies far beyond the hit
+    # at grazing incidence a corner within the slack of the ray may lie far beyond the hit
     sine = abs(vy)
     if hit.kind == LINE:
         lines = tables.lines
@@ -214,7 +214,7 @@ def line_reflect(scope, hit, own, vx, vy):
     joints, lines, line = scope.tables.joints, scope.tables.lines, hit.number
     near = line if hit.s >= 0.0 else line + 1
     px, py = joints[near, JOINT_X] + hit.s * lines[line, EDGE_X], joints[near, JOINT_Y] + hit.s * lines[line, EDGE_Y]
-    # a first hit below an end of the opening is as exact as the ray, at the smallest distance from that corner
+    # a first hit near an end of the opening is as accurate as the ray, at any distance from that corner
     room = LEAST_FRACTION * lines[line, LENGTH] if own.bounces == 0 and joints[near, JOINT_Y] == 0.0 else scope.slack
     at_corner = abs(hit.s) * lines[line, LENGTH] <= room and joints[near, IS_CORNER] > 0.0
     w = 2.0 * (vx * lines[line, LINE_NORMAL_X] + vy * lines[line, LINE_NORMAL_Y])
@@ -225,7 +225,7 @@ def line_reflect(scope, hit, own, vx, vy):
 def reflect(scope, hit, own, px, py, vx, vy):
     """-> (px, py, vx, vy, at_corner): the ray after its reflection on a piece, and whether it is at a corner.
 
-    At a corner the velocity is that before the reflection.
+    At a corner the velocity is not reflected.
     """
     tables = scope.tables
     if hit.kind == LINE:
@@ -247,11 +247,11 @@ def reflect(scope, hit, own, px, py, vx, vy):
 
 @inlined
 def skip_run(scope, hit, own, px, py, vx, vy, most):
-    """-> (px, py, vx, vy, hits): the ray after the run of hits that follows one, if that is worth it."""
+    """-> (px, py, vx, vy, hits): the ray after the run of hits that follows a hit; no hits if a run does not pay."""
     tables, number = scope.tables, hit.number
     if hit.kind == CIRCLE and tables.circles[number, RUN_SINE] > 0.0:
         return skip_chords(tables.circles[number], px, py, vx, vy, most)
-    # the ray came from this line, to that one, and back
+    # the ray came from this line, hit the other one, and came back
     if hit.kind == LINE and own.kind == LINE and own.before == number:
         lines, pairs = tables.lines, tables.pairs
         normal = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
@@ -263,7 +263,7 @@ def skip_run(scope, hit, own, px, py, vx, vy, most):
 
 @inlined
 def piece_label(tables, hit, vx):
-    """-> int: a number for the piece or side that is hit; of a Bezier piece, for the part that bends to one side."""
+    """-> int: a number for the piece or side that is hit; for a Bezier piece, of its part between inflections."""
     side = 1 if hit.kind == SIDE and vx > 0.0 else 0
     number = 8 * (hit.number + 1 + side) + hit.kind
     if hit.kind == BEZIER:
@@ -273,10 +273,10 @@ def piece_label(tables, hit, vx):
 
 @inlined
 def trace_ray(scope, entry, theta, limit, labelled, path):
-    """-> (x, vx, vy, bounces, status, label): follow one ray through one hollow.
+    """-> (x, vx, vy, bounces, status, label): trace one ray through one hollow.
 
-    In an open wall x is unfolded. The label is that of
-    `Results.itinerary`, if ``labelled``; ``path`` is that of `Results`.
+    In an open wall x is unfolded. ``label`` is the hash of `Results.itinerary`, if ``labelled``; ``path`` is
+    `Results.path`.
     """
     sine, cosine = sine_cosine(theta)
     px, py, vx, vy, shift = entry, 0.0, -cosine, -sine, 0.0
@@ -306,7 +306,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
         if labelled:
             label = HASH_FACTOR * label + piece_label(scope.tables, hit, vx)
         if hit.kind == SIDE:
-            # the ends of the wall are one point of it, and a ray passes a side above them
+            # the two ends of the wall are the same point, and a ray passes a side above this point
             py = max(py + hit.time * vy, scope.tables.joints[scope.joints[0], JOINT_Y])
             px = scope.left if vx > 0.0 else scope.right
             shift += (scope.right - scope.left) if vx > 0.0 else (scope.left - scope.right)
@@ -320,7 +320,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
             bounces += hits
             if labelled:
                 label = HASH_FACTOR * label + np.uint64(hits)
-        # one Newton step on |v| = 1 keeps rounding errors of speed and position from feeding each other
+        # one Newton step on |v| = 1, so that rounding errors of speed and position do not amplify each other
         scale = 1.5 - 0.5 * (vx * vx + vy * vy)
         vx *= scale
         vy *= scale
@@ -333,10 +333,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
 
 @compiled
 def trace_rays(x, theta, tables, limit, stop, results, nearby):
-    """Trace a block of rays; fills the results, as far as it comes before ``stop`` is raised.
-
-    ``nearby`` is the address of `hit_nearby`, `nearby_address`.
-    """
+    """Trace a block of rays into ``results``, until ``stop`` is raised; ``nearby`` is `nearby_address()`."""
     out_x, out_theta, collisions, status = results.x, results.theta, results.collisions, results.status
     hollows, cell, labelled = tables.hollows, tables.cell, results.itinerary.shape[0] > 0
     for i in range(x.shape[0]):
@@ -365,13 +362,13 @@ def trace_rays(x, theta, tables, limit, stop, results, nearby):
 
 @cache
 def nearby_address() -> int:
-    """The address of `hit_nearby`, for all walls."""
+    """Return the address of `hit_nearby`, for all walls."""
     scope = Scope(NO_TABLES, np.empty(0), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, 0)
     return address_of(hit_nearby, (scope, Own(OPENING, -1, -1.0, 0.0, -1, 0), 0.0, 0.0, 0.0, 0.0))
 
 
 @cache
 def trace_rays_address() -> int:
-    """The address of `trace_rays`, for all walls, with velocities and itineraries or without."""
+    """Return the address of `trace_rays`, for all walls, with or without velocities and itineraries."""
     numbers, stop = np.empty(0), np.zeros(1, np.int64)
     return address_of(trace_rays, (numbers, numbers, NO_TABLES, 1, stop, results_for(0), nearby_address()))

@@ -1,4 +1,4 @@
-"""What the compiled loop of the tracer passes from function to function, and the kinds of pieces. No numba here."""
+"""The named tuples passed between the compiled functions of the tracer, and the kinds of pieces; without numba."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ...scene.scene import Tables
 
-# Kinds of what a ray meets; LID is the opening, SIDE a side of an open wall.
+# Kinds of obstacles; OPENING is the opening of the hollow, SIDE a side of an open wall.
 NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
 
 class Scope(NamedTuple):
-    """The hollow that a ray is in.
+    """The hollow that contains a ray.
 
-    The tables of the wall, the row of the hollow, its opening, and the slack: a joint that is met within it, and a hit
-    of one, are not resolved in double precision. Then the ranges of its joints and pieces in the tables, whether its
-    lines have a grid, and the address of `hit_nearby`.
+    The tables of the wall, the row of the hollow, the ends of its opening, and the slack: double precision does not
+    resolve hits within the slack of a joint. Then the ranges of the hollow's joints and pieces in the tables, whether
+    its lines have a grid, and the address of `hit_nearby`.
     """
 
     tables: Tables
@@ -36,11 +36,11 @@ class Scope(NamedTuple):
 
 
 class Own(NamedTuple):
-    """Where a flight starts.
+    """The start of a ray segment.
 
-    The piece by kind and row of its table, -1 for the opening and the sides; the parameter on a Bezier piece, else -1;
-    the length of the last flight that ended on a piece; the row of the line that was hit before this piece, or -1; and
-    the collisions so far.
+    The kind of the piece and its row in the table, -1 for the opening and the sides; the parameter on a Bezier piece,
+    else -1; the length of the last segment that ended on a piece; the row of the line that was hit before this piece,
+    or -1; and the number of collisions so far.
     """
 
     kind: int
@@ -52,10 +52,10 @@ class Own(NamedTuple):
 
 
 class Hit(NamedTuple):
-    """What a flight meets: its time, inf for none, kind and row of the piece, where on it, and a doubt.
+    """The end of a ray segment: time (inf for no hit), kind and row of the piece, position s on it, and doubt.
 
-    The position on a line is the fraction of it, negative from its end; on a Bezier piece it is the parameter. The
-    doubt is 0, or 1 where hit and miss are not told apart, or `DOUBTFUL`.
+    On a line, s is a fraction, negative if relative to the line's end; on a Bezier piece, s is the parameter. The
+    doubt is 0, 1 if hit and miss are not distinguished, or `DOUBTFUL`.
     """
 
     time: float
@@ -66,11 +66,11 @@ class Hit(NamedTuple):
 
 
 class Results(NamedTuple):
-    """The arrays that `trace_rays` fills, with a row for each ray; the last three have no row if they are not wanted.
+    """The arrays that `trace_rays` fills, one row for each ray; the last three are empty if they are not wanted.
 
-    ``velocity`` is the outgoing one, (n, 2). ``itinerary`` is a hash of the pieces hit, in their order, of the lengths
-    of runs, and of the sides passed. ``path``, (limit + 2, 2), is for a single ray: the points of its trajectory, with
-    the hits of runs one by one.
+    ``velocity`` is the outgoing velocity, shape (n, 2). ``itinerary`` is a hash of the pieces hit, in order, of the
+    lengths of runs, and of the sides passed. ``path``, shape (limit + 2, 2), for a single ray, has the points of the
+    trajectory, with every hit of a run.
     """
 
     x: Floats
@@ -82,12 +82,12 @@ class Results(NamedTuple):
     path: Floats
 
 
-# The last three of the results of rays of which only where and how they end is wanted.
+# The last three results, if only the ends of the rays are wanted.
 NOT_WANTED = np.empty((0, 2)), np.zeros(0, np.uint64), np.empty((0, 2))
 
 
 def results_for(count: int, velocity: int = 0, itinerary: int = 0, path: int = 0) -> Results:
-    """Room for rays, and for so many rows of the three that may have none."""
+    """Return results for ``count`` rays, with the given numbers of rows of the last three arrays."""
     return Results(
         np.empty(count), np.empty(count), np.empty(count, np.int64), np.empty(count, np.uint8),
         np.empty((velocity, 2)), np.zeros(itinerary, np.uint64), np.full((path, 2), np.nan),

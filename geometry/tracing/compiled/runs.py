@@ -1,7 +1,7 @@
-"""Runs in closed form: the hits that a ray makes in a row on one circular arc, or between two facing lines.
+"""Runs in closed form: consecutive hits of a ray on one circular arc or between two facing lines. Loads numba.
 
-Imported by `rays` alone, because it loads numba. Both functions return the state after the run and its number of
-hits, 0 where the run is not worth it; they stop short of the last hits, which the ordinary loop then judges.
+Both functions return the state after the run and its number of hits, 0 if a run does not pay. A run omits the last
+hits, which are computed one by one.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ from ...scene.columns import (
 )
 from .options import compiled
 
-# A run costs an arctangent and three sines or so; the number of hits from which it pays is a guess, not tuned.
+# Least number of hits in a run, which costs about one arctangent and three sines; not tuned.
 SHORTEST_RUN = 4.0
-# The number of hits left carries some eight rounding errors of itself; the last two are left to the ordinary loop.
+# The computed number of remaining hits has about eight relative rounding errors; a run omits the last two hits.
 COUNT_ROUNDING = 1.0 - 16.0 * 2.0**-52
 LAST_HITS = 2.0
-# Ends of the facing parts, and the pieces beyond them, are known to JOINT_ULPS of `rays`, once for each of the two.
+# Uncertainty of the ends of the facing parts and of the pieces beyond them, one slack (JOINT_ULPS) each.
 END_SLACKS = 2.0
 
 
 @compiled
 def skip_chords(arc, px, py, vx, vy, most):
-    """-> (px, py, vx, vy, chords): carry a ray along a circular arc by all whole chords of its run, up to ``most``."""
+    """-> (px, py, vx, vy, chords): move a ray along a circular arc by all whole chords of its run, up to ``most``."""
     qx, qy = px - arc[START_X], py - arc[START_Y]
     nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
     sine = vx * nx + vy * ny
-    # the tangent in the direction of travel has the free side, and so the normal n, on its left
+    # the free side, and so the normal n, is on the left of the tangent in the direction of travel
     cosine = vx * ny - vy * nx
     if sine <= 0.0 or sine > arc[RUN_SINE]:
         return px, py, vx, vy, 0
@@ -71,16 +71,16 @@ def skip_chords(arc, px, py, vx, vy, most):
 
 @compiled
 def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
-    """-> (px, py, vx, vy, hits): carry a ray that has just left a line for the facing one, by hits of an even number.
+    """-> (px, py, vx, vy, hits): move a ray from a line by an even number of hits, at most ``most``, between two lines.
 
-    They are ``most`` at most. ``pair`` is a row of the table of that name, ``normal`` the unit normal of the line. With
-    beta the angle between the lines, g the gap at the ray and alpha the angle of its velocity with the direction u of
-    the apex, the unfolded lines are a fan: hit k lies
+    ``pair`` is a row of the table ``pairs``, ``normal`` the unit normal of the line. Let beta be the angle between the
+    lines, g the gap at the ray and alpha the angle of its velocity with the direction u of the apex. By unfolding the
+    lines, hit k lies
 
         s_k = g (2 sin(k beta/2) / sin(beta)) cos(alpha + k beta/2) / sin(alpha + k beta)
 
-    further towards the apex and its angle is alpha + k beta; for beta = 0, s_k = g k cot(alpha). All terms keep
-    their digits down to beta = 0, because the distance g / sin(beta) of the apex enters by its inverse only.
+    further towards the apex and its angle is alpha + k beta; for beta = 0, s_k = g k cot(alpha). All terms are
+    accurate down to beta = 0, because the distance g / sin(beta) of the apex enters only by its inverse.
     """
     nx, ny = normal
     ux, uy, sine, beta = pair[APEX_X], pair[APEX_Y], pair[PAIR_SINE], pair[PAIR_ANGLE]
@@ -100,9 +100,9 @@ def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
         count = room * away / step
     else:
         if gap * away <= slack:
-            # next to the apex, where the gap is within rounding, doubles do not know the ray's position
+            # next to the apex, where the gap is within rounding, double precision does not resolve the position
             return px, py, vx, vy, 0
-        # the part ends on circles about the apex, whose curvature is that of the circle through the ray's position
+        # the facing part ends on circles about the apex; curvature is that of the circle through the ray's position
         curvature = sine / gap
         d = along * along - ahead * curvature * (2.0 - ahead * curvature)
         if along > 0.0 and d >= 0.0:

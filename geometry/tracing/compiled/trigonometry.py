@@ -1,9 +1,8 @@
-"""Sine and cosine of an angle, and the angle of a direction, as polynomials without branches.
+"""Sine and cosine of an angle, and the angle of a direction, by polynomials without branches.
 
-A loop over rays that calls these functions is compiled to vector instructions, several rays at once, which calls of the
-mathematical library would prevent. Only sums, products, quotients and choices occur, so that a ray's result does not
-depend on its neighbours. The coefficients come from ``tests/precise_polynomials.py``; errors are below 2 ulp, relative
-to the result down to the smallest angles.
+The compiler vectorises loops over rays that call these functions, unlike calls of the mathematical library. The
+functions use sums, products, quotients and selections only, so a ray's result does not depend on other rays. The
+coefficients come from ``tests/precise_polynomials.py``; errors are below 2 ulp of the result, at all angles.
 """
 
 from __future__ import annotations
@@ -12,13 +11,13 @@ from numba import njit
 
 # pi as the sum of two doubles
 PI, PI_REST = 3.141592653589793, 1.2246467991473532e-16
-# The largest double below PI: of the angles that leave, those that round to PI. Incoming angles are below PI, too, so
-# that every ray that leaves can be sent back.
+# The largest double below PI, for outgoing angles that round to PI. Incoming angles are below PI, too, so every
+# outgoing ray can be reversed.
 LAST_ANGLE = 3.1415926535897927
 HALF_PI, HALF_PI_REST = 0.5 * PI, 0.5 * PI_REST
 QUARTER_PI = 0.25 * PI
 
-# (sin z - z) / z^3, (cos z - 1 + z^2 / 2) / z^4 for z to pi/4, (arcsin z - z) / z^3 for z to sqrt(1/2), in u = z^2
+# (sin z - z) / z^3 and (cos z - 1 + z^2 / 2) / z^4 up to z = pi/4, (arcsin z - z) / z^3 up to sqrt(1/2), in u = z^2
 SINE = (
     -0.16666666666666666,
     0.008333333333330946,
@@ -61,8 +60,8 @@ _compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
 
 @_compile
 def sine_cosine(theta):
-    """Sine and cosine of an angle in [0, pi]."""
-    # from the vertical, and from the horizontal on the angle's side
+    """Return sine and cosine of an angle in [0, pi]."""
+    # angles from the vertical and from the nearer horizontal
     off = (theta - HALF_PI) - HALF_PI_REST
     upright = -off if off < 0.0 else off
     flat = theta if off < 0.0 else (PI - theta) + PI_REST
@@ -79,15 +78,15 @@ def sine_cosine(theta):
 
 @_compile
 def mirrored(theta):
-    """pi - theta, at most `LAST_ANGLE`."""
+    """Return pi - theta, at most `LAST_ANGLE`."""
     angle = (PI - theta) + PI_REST
     return angle if angle < LAST_ANGLE else LAST_ANGLE
 
 
 @_compile
 def arcsine(z):
-    """Arcsine of a number in [0, sqrt(1/2)]."""
-    # pairs of terms, pairs of pairs, ...: short chains, so that the processor has the next rays to work on
+    """Return the arcsine of a number in [0, sqrt(1/2)]."""
+    # Estrin's scheme: short chains of operations, so that the processor computes several rays at once
     u = z * z
     u2 = u * u
     u4 = u2 * u2
@@ -104,7 +103,7 @@ def arcsine(z):
 
 @_compile
 def direction_angle(vx, vy):
-    """Angle in [-pi, pi] of a unit vector; an error of its length counts by the tangent of at most pi/4."""
+    """Return the angle in [-pi, pi] of a unit vector; its error is at most the relative error of the length."""
     ax = -vx if vx < 0.0 else vx
     ay = -vy if vy < 0.0 else vy
     flat = ay < ax

@@ -1,1 +1,1 @@
-"""The compiled loop of the tracer in double-double arithmetic."""
+"""The compiled tracer in double-double arithmetic."""

@@ -1,4 +1,4 @@
-"""Hits of a ray on circular and elliptic arcs in double-double arithmetic."""
+"""The hits of a ray on circular and elliptic arcs in double-double arithmetic."""
 
 from __future__ import annotations
 
@@ -50,11 +50,8 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 @_compile
 def refined_arcs(arcs):
-    """The table of arcs that go through both joints exactly and subtend their span exactly.
-
-    Their columns are in `columns`.
-    """
-    # at least one row, so that a wall without arcs has one to pass on
+    """Return the table of arcs that go through both joints exactly and subtend their span exactly."""
+    # at least one row, because `face_of` passes a row also for a wall without arcs
     table = np.zeros((max(1, arcs.shape[0]), WIDE_ARC_COLUMNS))
     for k in range(arcs.shape[0]):
         stretch = arcs[k, STRETCH]
@@ -86,7 +83,7 @@ def refined_arcs(arcs):
 
 @_compile
 def wide_arc(arc):
-    """-> (n0x, n0y, curvature, stretch): the double-doubles of a row of `refined_arcs`."""
+    """-> (n0x, n0y, curvature, stretch): double-doubles from a row of `refined_arcs`."""
     return (
         (arc[WIDE_NORMAL_X], arc[WIDE_NORMAL_X_LOW]),
         (arc[WIDE_NORMAL_Y], arc[WIDE_NORMAL_Y_LOW]),
@@ -99,7 +96,7 @@ def wide_arc(arc):
 def arc_hit(arc, own, px, py, vx, vy, error):
     """-> (t, undecided, height): time to the front of one arc, or inf; time of an undecided contact, or inf.
 
-    The height is that of `arc_time` in `compiled/arcs`. ``error`` bounds the transversal error of the ray there.
+    For ``height`` see `arc_time` in `compiled/arcs`. ``error`` bounds the transversal error of the ray at the arc.
     """
     nothing = (np.inf, 0.0)
     n0x, n0y, curvature, stretch = wide_arc(arc)
@@ -120,7 +117,7 @@ def arc_hit(arc, own, px, py, vx, vy, error):
         product = multiply(bend, f)
         d = add(multiply(b, b), (2.0 * product[0], 2.0 * product[1]))
         if curvature[0] < 0.0 and b[0] < 0.0:
-            # d = w^2 - kappa^2 (distance of the line from the centre)^2 w^2, and kappa distance is about 1 where d is 0
+            # d = w^2 - kappa^2 (distance of the line from the centre)^2 w^2; kappa times distance is about 1 at d = 0
             wide_stretch = max(1.0, arc[WIDE_STRETCH]) ** 2
             noise = 8.0 * LOCAL_ERROR * (b[0] * b[0] + 2.0 * abs(product[0]))
             if abs(d[0]) <= noise + 4.0 * abs(curvature[0]) * wide_stretch * wide_stretch * error:
@@ -146,7 +143,7 @@ def arc_hit(arc, own, px, py, vx, vy, error):
 
 @_compile
 def on_arc(arc, qx, qy, slack):
-    """Whether the point q on the full circle, measured from the first joint, belongs to the arc."""
+    """Whether the point q of the full circle, relative to the first joint, is on the arc."""
     ex, ey = (arc[WIDE_CHORD_X], arc[WIDE_CHORD_X_LOW]), (arc[WIDE_CHORD_Y], arc[WIDE_CHORD_Y_LOW])
     if arc[IS_SHORT] > 0.0:
         along = dot(qx, qy, ex, ey)
@@ -160,7 +157,7 @@ def on_arc(arc, qx, qy, slack):
 
 @_compile
 def arc_height(arc, px, py):
-    """-> (height, nx, ny): distance of a position close to an arc, positive on its free side; unit normal."""
+    """-> (height, nx, ny): distance of a position close to an arc, positive on the free side; unit normal."""
     n0x, n0y, curvature, stretch = wide_arc(arc)
     qx, qy = subtract(px, wide(arc[START_X])), multiply(stretch, subtract(py, wide(arc[START_Y])))
     nx = subtract(n0x, multiply(curvature, qx))
@@ -173,7 +170,7 @@ def arc_height(arc, px, py):
 
 @_compile
 def arc_point(arc, t, px, py, vx, vy):
-    """-> (x, y, nx, ny, bent): position on the arc after the time t, unit normal, and curvature (a double)."""
+    """-> (x, y, nx, ny, bent): the position on the arc after the time t, unit normal, and curvature (a double)."""
     n0x, n0y, curvature, stretch = wide_arc(arc)
     qx = subtract(add(px, multiply(t, vx)), wide(arc[START_X]))
     qy = multiply(stretch, subtract(add(py, multiply(t, vy)), wide(arc[START_Y])))

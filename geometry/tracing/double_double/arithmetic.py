@@ -1,9 +1,8 @@
 """Compiled double-double arithmetic: a number is an unevaluated sum (high, low) of two doubles, about 31 digits.
 
-Only compiled loops import this file, because it loads numba. The error-free transforms are those of Dekker (1971)
-and Knuth; sums and products follow Joldes, Muller & Popescu (2017), whose bounds on the relative error are 3 u^2 for
-the sum, 7 u^2 for the product and 15 u^2 for the quotient, u = 2^-53. No operation may be reassociated: never compile
-this with ``fastmath``.
+Loads numba. The error-free transforms are those of Dekker (1971) and Knuth. Sums and products follow Joldes, Muller &
+Popescu (2017), with relative errors of at most 3 u^2 for the sum, 7 u^2 for the product and 15 u^2 for the quotient,
+u = 2^-53. No operation may be reassociated: never compile this module with ``fastmath``.
 """
 
 from __future__ import annotations
@@ -12,20 +11,20 @@ import math
 
 from numba import njit
 
-# Relative error of one operation on double-doubles: 15 u^2 is below 2^-102.
+# Bound on the relative error of one operation: 15 u^2 < 2^-102.
 EPS_DOUBLE_DOUBLE = 2.0**-102
-# A bounce is fewer than 64 operations in a row on each coordinate, each within EPS_DOUBLE_DOUBLE of the cell's size.
+# Error of one bounce relative to the cell's size: fewer than 64 consecutive operations on each coordinate.
 LOCAL_ERROR = 64.0 * EPS_DOUBLE_DOUBLE
 # 2^27 + 1 splits a double into two halves of 26 bits (Dekker).
 _SPLITTER = 134217729.0
-# pi/2 as the sum of three doubles: an angle up to 4 is reduced with an error below 2^-160.
+# pi/2 as the sum of three doubles; angles up to 4 are reduced with an error below 2^-160.
 _HALF_PI = (1.5707963267948966, 6.123233995736766e-17, -1.4973849048591698e-33)
-# Where |x| <= pi/4, the first term left out of either series is below 1e-34.
+# Order of the series; for |x| <= pi/4 the first omitted term of either series is below 1e-34.
 _TERMS = 28
 
 
 def _inverse_factorials() -> tuple[tuple[float, float], ...]:
-    """1/n! for n = 0 .. _TERMS as double-doubles, correctly rounded from integers."""
+    """Return 1/n! for n = 0 .. _TERMS as double-doubles, correctly rounded."""
     from fractions import Fraction
 
     rows = []
@@ -43,7 +42,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 @_compile
 def two_sum(a, b):
-    """a + b exactly, as a double and its rounding error."""
+    """Return a + b exactly, as a double and its rounding error."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
@@ -51,14 +50,14 @@ def two_sum(a, b):
 
 @_compile
 def quick_two_sum(a, b):
-    """a + b exactly, where the exponent of a is not below that of b."""
+    """Return a + b exactly, if the exponent of a is at least that of b."""
     s = a + b
     return s, b - (s - a)
 
 
 @_compile
 def two_product(a, b):
-    """a b exactly, as a double and its rounding error (Dekker; no overflow below 1e300)."""
+    """Return a b exactly, as a double and its rounding error (Dekker; no overflow below 1e300)."""
     p = a * b
     t = _SPLITTER * a
     a_high = t - (t - a)
@@ -71,7 +70,7 @@ def two_product(a, b):
 
 @_compile
 def wide(a):
-    """A double as a double-double."""
+    """Return a double as a double-double."""
     return a, 0.0
 
 
@@ -101,7 +100,7 @@ def multiply(a, b):
 
 @_compile
 def divide(a, b):
-    """Long division with three partial quotients."""
+    """Return a / b by long division with three partial quotients."""
     q1 = a[0] / b[0]
     r = subtract(a, multiply(b, (q1, 0.0)))
     q2 = r[0] / b[0]
@@ -113,14 +112,14 @@ def divide(a, b):
 
 @_compile
 def square_root(a):
-    """One Newton step on the double root; 0 where a <= 0."""
+    """Return the square root of a by two Newton steps from the root in double precision; 0 if a <= 0."""
     if a[0] <= 0.0:
         return 0.0, 0.0
     x = math.sqrt(a[0])
     p, e = two_product(x, x)
     rest = subtract(a, (p, e))
     s, e = quick_two_sum(x, rest[0] / (2.0 * x))
-    # a second step makes up for the first one's division in single doubles
+    # the second step corrects the first one, whose division is in double precision
     rest = subtract(a, multiply((s, e), (s, e)))
     return add((s, e), (rest[0] / (2.0 * x), 0.0))
 
@@ -137,9 +136,9 @@ def dot(ax, ay, bx, by):
 
 @_compile
 def sine_cosine(angle):
-    """Sine and cosine of a double 0 <= angle <= 4, each to a few units of EPS_DOUBLE_DOUBLE relative to itself."""
+    """Return sine and cosine of a double 0 <= angle <= 4, with relative errors of a few EPS_DOUBLE_DOUBLE."""
     turns = math.floor(angle / _HALF_PI[0] + 0.5)
-    # turns is at most 3, and products by the middle and last parts are exact or below 2^-160
+    # turns is at most 3; the products by the middle and last parts are exact or have errors below 2^-160
     high, error = two_product(turns, _HALF_PI[0])
     x = add((angle - high, 0.0), (-error, 0.0))
     x = subtract(x, two_product(turns, _HALF_PI[1]))
@@ -165,7 +164,7 @@ def sine_cosine(angle):
 
 @_compile
 def direction_angle(x, y):
-    """The angle of the unit vector (x, y), in [-pi, pi]: the double-precision one and a correction from its sine."""
+    """Return the angle in [-pi, pi] of the unit vector (x, y): the double-precision angle plus a correction."""
     angle = math.atan2(y[0], x[0])
     sine, cosine = sine_cosine(abs(angle))
     if angle < 0.0:

@@ -1,4 +1,4 @@
-"""Hits of a ray on Bezier pieces in double-double arithmetic."""
+"""The hits of a ray on Bezier pieces in double-double arithmetic."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...scene.columns import END_X, END_Y, START_X, START_Y, X1, X2, X3, Y1, Y2,
 from ...scene.tolerances import NEARBY
 from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, square_root, subtract, wide
 
-# Bisections: more than a double has digits and exponents before the point.
+# Limit on bisections, more than the search for neighbouring doubles needs.
 ROOT_STEPS = 200
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
@@ -30,7 +30,7 @@ def cubic_slope(a1, a2, a3, s):
 
 @_compile
 def falling_root(a0, a1, a2, a3, low, high):
-    """The root in [low, high], where the cubic falls from >= 0 to <= 0: bisection to a double, then Newton steps."""
+    """Return the root of a cubic that falls from >= 0 at low to <= 0 at high, by bisection and Newton steps."""
     for _ in range(ROOT_STEPS):
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
@@ -53,7 +53,7 @@ def falling_root(a0, a1, a2, a3, low, high):
 
 @_compile
 def bezier_coefficients(curve):
-    """-> (ax0, ay0, ..., ay3): the coefficients; the highest one takes the curve to its end joint exactly."""
+    """-> (ax0, ay0, ..., ay3): the coefficients; the highest one makes the curve end exactly at its joint."""
     ax0, ax1, ax2, ax3 = wide(curve[START_X]), wide(curve[X1]), wide(curve[X2]), wide(curve[X3])
     ay0, ay1, ay2, ay3 = wide(curve[START_Y]), wide(curve[Y1]), wide(curve[Y2]), wide(curve[Y3])
     rest_x = subtract(subtract(wide(curve[END_X]), ax0), ax1)
@@ -67,7 +67,7 @@ def bezier_coefficients(curve):
 
 @_compile
 def bezier_time(coefficients, s, px, py, vx, vy):
-    """-> double-double: the way along the ray to the point s of a curve."""
+    """-> double-double: the distance along the ray to the point s of a curve."""
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
     dx, dy = subtract(cubic(ax0, ax1, ax2, ax3, s), px), subtract(cubic(ay0, ay1, ay2, ay3, s), py)
     return dot(dx, dy, vx, vy)
@@ -75,9 +75,9 @@ def bezier_time(coefficients, s, px, py, vx, vy):
 
 @_compile
 def hit_from_own(coefficients, g, own_s, px, py, vx, vy):
-    """-> (t, s): first front hit of the Bezier piece that the ray has just left at ``own_s``; inf if none.
+    """-> (t, s): first front hit on the Bezier piece that the ray has just left at ``own_s``; inf if none.
 
-    ``g`` are the coefficients of g, whose root at the start is divided out.
+    ``g`` are the coefficients of g; the root at the start is divided out.
     """
     _, a1, a2, a3 = g
     best_t, best_s = (np.inf, 0.0), (0.0, 0.0)
@@ -104,9 +104,9 @@ def hit_from_own(coefficients, g, own_s, px, py, vx, vy):
 
 @_compile
 def extrema(a1, a2, a3):
-    """-> (c1, c2): where the cubic g has its extrema, in increasing order; beyond 1 if it has none.
+    """-> (c1, c2): the extrema of the cubic g in increasing order; 2 in place of a missing one.
 
-    They are needed as doubles only: g there changes in second order.
+    Double precision suffices, because g changes in second order at an extremum.
     """
     c1, c2 = 2.0, 2.0
     disc = subtract(multiply(a2, a2), multiply((3.0, 0.0), multiply(a3, a1)))
@@ -124,7 +124,7 @@ def extrema(a1, a2, a3):
 
 @_compile
 def is_close_by(coefficients, s, t, vx, vy, size, slack):
-    """-> bool: whether a hit at s after the time t is within the slack of the ray's start, before or behind it."""
+    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start."""
     _, _, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
     tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
     reach = slack * math.hypot(tx[0], ty[0])
@@ -133,10 +133,10 @@ def is_close_by(coefficients, s, t, vx, vy, size, slack):
 
 @_compile
 def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
-    """-> (t, s, undecided, near_s): time to the first front hit of one Bezier piece, inf if none, and parameter.
+    """-> (t, s, undecided, near_s): time to the first front hit on a Bezier piece, inf if none, and its parameter.
 
-    ``undecided`` is the time of a contact that is undecided, or inf; ``near_s`` is the parameter of a hit within the
-    slack of the start, which is not among the others, or -1. ``error`` bounds the transversal error of the ray.
+    ``undecided`` is the time of an undecided contact, or inf. ``near_s`` is the parameter of a hit within the slack of
+    the start, which is not counted, or -1. ``error`` bounds the transversal error of the ray.
     """
     coefficients = bezier_coefficients(curve)
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
@@ -178,7 +178,7 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack, error):
 
 @_compile
 def bezier_point(curve, s):
-    """-> (x, y, nx, ny, bent): position and unit normal at s, and the curvature (a double, positive where focusing)."""
+    """-> (x, y, nx, ny, bent): position and unit normal at s, and curvature (a double, positive if focusing)."""
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
     tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
     size = square_root(dot(tx, ty, tx, ty))
@@ -190,5 +190,5 @@ def bezier_point(curve, s):
 
 @_compile
 def curve_size(curve):
-    """A bound of a Bezier piece's extent: the sum of its coefficients but the constant ones."""
+    """Return a bound on the extent of a Bezier piece: the sum of the absolute non-constant coefficients."""
     return abs(curve[X1]) + abs(curve[Y1]) + abs(curve[X2]) + abs(curve[Y2]) + abs(curve[X3]) + abs(curve[Y3])

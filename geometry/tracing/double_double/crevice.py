@@ -12,14 +12,14 @@ from .arithmetic import divide, multiply, sine_cosine, subtract, wide
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def crossings_modulo_two(double_height, theta):
-    """d mod 2 for d = double_height |cot theta|, with an error of at most some d 2^-100; for d below 2^53."""
+    """Return d mod 2 for d = double_height |cot theta| < 2^53, with an error of at most about d 2^-100."""
     found = np.empty(theta.size)
     for k in range(theta.size):
         sine, cosine = sine_cosine(theta[k])
         if cosine[0] < 0.0:
             cosine = -cosine[0], -cosine[1]
         pairs = divide(multiply(wide(0.5 * double_height), cosine), sine)
-        # the high part of a number below 2^52 may be whole, and the low part then negative
+        # the high part may be an integer with a negative low part
         whole = math.floor(pairs[0])
         if whole == pairs[0] and pairs[1] < 0.0:
             whole -= 1.0

@@ -1,23 +1,23 @@
-"""The compiled tracer in double-double arithmetic, for the few rays that double precision does not decide.
+"""The compiled tracer in double-double arithmetic, for the few rays that double precision does not resolve.
 
-Only `refinement` imports this file, because it loads numba. The formulas are those of `compiled.rays`, one for one;
-those of curves are in `arcs` and `beziers`. What is exact is the wall: its joints are the doubles of the tables,
-segments join them, a circular arc goes through both of its joints and subtends the double in its table (elliptic arcs
-in stretched coordinates), and a Bezier piece has the coefficients of its table but the highest, which takes it to its
-end joint. The ray starts from exact doubles, too.
+Loads numba. The formulas are the same as in `compiled.rays`; those of curves are in `arcs` and `beziers`. The wall is
+exact: its joints are the doubles of the tables, and segments join them. A circular arc goes through both of its joints
+and subtends the double in its table (elliptic arcs in stretched coordinates). A Bezier piece has the coefficients of
+its table, except the highest, which is adjusted so that the piece ends at its joint. The ray starts from exact doubles.
 
-Three sizes accompany a ray.
+Three quantities are computed along a ray.
 
-* Its Jacobi fields: displacement and turn of the ray for a unit displacement, and a unit turn, of the incoming one.
-* The bound on its rounding error: to first order the error after n bounces is the sum of M(n <- i) e_i over the local
-  errors e_i, at most sqrt((n + 1) trace C) max |e_i| with C the sum of M(n <- i) M(n <- i)^T (Cauchy and Schwarz), and
-  C goes from bounce to bounce as M C M^T + 1.
-* Its width: half an ulp of the incoming angle. An angle stands for the angles that round to it; a ray meets a corner
-  exactly if one of them does. (No ray of rational data but a vertical one meets a corner in the strict sense, since
-  the tangent of an algebraic angle is transcendental.)
+* The Jacobi fields: displacement and rotation of the ray for a unit displacement, and for a unit rotation, of the
+  incoming ray.
+* A bound on the rounding error. To first order the error after n bounces is the sum of M(n <- i) e_i over the local
+  errors e_i, at most sqrt((n + 1) trace C) max |e_i| with C the sum of M(n <- i) M(n <- i)^T (Cauchy and Schwarz). A
+  bounce changes C to M C M^T + 1.
+* The width, from half an ulp of the incoming angle. An angle represents all angles that round to it, and a ray meets a
+  corner exactly if one of these angles does. (Strictly, a ray of rational data meets no corner unless it is vertical,
+  because the tangent of an algebraic angle is transcendental.)
 
-Long runs between two vertical sides that face each other are counted by a division, and so are the cells that a ray
-passes at heights at which no piece lies; no other run is left out.
+Long runs between two facing vertical sides are computed by a division, and so are the cells that a ray passes in bands
+of heights without pieces. All other hits are computed one by one.
 """
 
 from __future__ import annotations
@@ -86,11 +86,11 @@ ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, UNRESOLVED, UNSETTLED = 0, 1, 2, 3, 4, 5
 NO_PIECE, OPENING, SIDE, LINE, ARC, BEZIER = 0, 1, 2, 3, 4, 5
 # pi - math.pi
 PI_REST = 1.2246467991473532e-16
-# The first-order estimate of the width is trusted to this fraction.
+# Factor for the error of the first-order estimate of the width.
 WIDTH_MARGIN = 1.0 + 2.0**-20
-# Where the accumulated rounding exceeds this fraction of the cell, nothing is settled.
+# Accumulated rounding error, as a fraction of the scale, above which a ray remains unresolved.
 LARGEST_ERROR = 2.0**-50
-# Shorter runs are followed hit by hit, so that they check those of `compiled/runs`; of a longer one the last hits are.
+# Runs up to this number of hits are traced hit by hit, as a check of `compiled/runs`; so are the last hits of a run.
 LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
@@ -98,7 +98,7 @@ _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 @_compile
 def crossings(tables, index, other, py, vx, vy, most):
-    """-> (hits, way, flight): an even number of hits between two facing vertical sides; way along y, and time."""
+    """-> (hits, travel, flight): an even number of hits between two facing vertical sides, travel along y, and time."""
     joints, lines, pairs = tables.joints, tables.lines, tables.pairs
     travel, flight = (0.0, 0.0), 0.0
     if joints[index, JOINT_X] != joints[index + 1, JOINT_X] or joints[other, JOINT_X] != joints[other + 1, JOINT_X]:
@@ -113,17 +113,17 @@ def crossings(tables, index, other, py, vx, vy, most):
             count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
             if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
                 hits = 2 * np.int64(0.5 * count)
-                # beyond 2^53 there is no such double, and no double-double knows the ray's position
+                # beyond 2^53 hits is no double, and a double-double does not resolve the ray's position
                 return hits, multiply((float(hits), 0.0), step), float(hits) * time[0]
     return 0, travel, flight
 
 
 @_compile
 def free_cells(bands, py, vx, vy, cell, width, spread):
-    """-> (cells, way): how many cells a ray passes without coming near a piece, and the way along y in each.
+    """-> (cells, step): the number of cells that a ray passes without coming near a piece, and the step in y per cell.
 
-    ``bands`` are the heights (low, high) at which no piece lies. The ray's width is at most ``width`` plus ``spread``
-    times the flight. The last cells before the end of a band are left over.
+    ``bands`` are the heights (low, high) without pieces. The ray's width is at most ``width`` plus ``spread`` times
+    the distance. The last cells before the end of a band are not counted.
     """
     if vx[0] == 0.0 or vy[0] == 0.0:
         return 0.0, (0.0, 0.0)
@@ -135,7 +135,7 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
                 behind, room = high - py[0], py[0] - low
             margin = width + spread * room / abs(vy[0])
             cells = math.floor((room - margin) * abs(vx[0] / vy[0]) / cell - LAST_HITS)
-            # beyond 2^53 not all whole numbers are doubles
+            # beyond 2^53 not all integers are doubles
             if behind > margin and 0.0 < cells < 2.0**53:
                 return cells, multiply((cell, 0.0), divide(vy, vx if vx[0] > 0.0 else negate(vx)))
     return 0.0, (0.0, 0.0)
@@ -143,23 +143,23 @@ def free_cells(bands, py, vx, vy, cell, width, spread):
 
 @_compile
 def earlier(t, time):
-    """-> bool: whether t < time, which may be (inf, 0): differences of infinities are not numbers."""
+    """-> bool: whether t < time; both may be (inf, 0), whose difference is not a number."""
     return t[0] < np.inf and (time[0] == np.inf or subtract(t, time)[0] < 0.0)
 
 
 @_compile
 def face_of(tables, kind, number, s):
-    """-> Face: a piece as `in_front` takes it."""
+    """-> Face: a piece as an argument of `in_front`."""
     arc, curve = tables.arcs[number if kind == ARC else 0], tables.beziers[number if kind == BEZIER else 0]
     return Face(kind, number, arc, curve, s)
 
 
 @_compile
 def meets(tables, hit, own, px, py, vx, vy, clearance):
-    """-> bool: whether a ray meets a piece that it hits.
+    """-> bool: whether a computed hit counts, that is, whether the ray starts in front of the piece.
 
-    ``clearance`` are that of its start in front of the piece, the slack of double precision, within which the pieces'
-    own positions decide, so that both tracers go the same way, and the error of the ray.
+    ``clearance`` is the height of the start in front of the piece, the slack of double precision, and the error of the
+    ray. Within the slack the exact positions of the pieces decide, so that both tracers agree.
     """
     height, slack, error = clearance
     if height > slack or own.kind in (OPENING, SIDE):
@@ -172,7 +172,7 @@ def meets(tables, hit, own, px, py, vx, vy, clearance):
 
 @_compile
 def is_beside(joints, index, corner):
-    """-> bool: whether a corner lies on a line or on its free side: a ray that meets the line meets none behind it."""
+    """-> bool: whether a corner lies on a line or on its free side; a ray that hits the line meets no corner behind."""
     x0, y0, x1, y1 = line_ends(joints, index)
     return orientation(x0, y0, x1, y1, joints[corner, JOINT_X], joints[corner, JOINT_Y]) >= 0.0
 
@@ -185,7 +185,7 @@ def local_error(sizes):
 
 @_compile
 def error_of(scope, sizes):
-    """-> float: bound on the transversal error of the ray: on the segment, at a distance of up to one scale."""
+    """-> float: bound on the transversal error of the ray on its segment, at a distance of up to one scale."""
     return 2.0 * scope.scale * local_error(sizes)
 
 
@@ -197,7 +197,7 @@ def amplification_of(sizes):
 
 @_compile
 def after_flight(sizes, flight):
-    """-> Sizes: those of a ray after a flight, whose time is a fraction of the scale."""
+    """-> Sizes: the sizes after a ray segment, whose length is in units of the scale."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
     c_jj += flight * (2.0 * c_ja + flight * c_aa)
     return Sizes(j1 + flight * a1, a1, j2 + flight * a2, a2, c_jj, c_ja + flight * c_aa, c_aa, errors, half_ulp)
@@ -205,7 +205,7 @@ def after_flight(sizes, flight):
 
 @_compile
 def after_reflection(sizes, power):
-    """-> Sizes: those of a ray after a reflection; the power of a straight piece is 0."""
+    """-> Sizes: the sizes after a reflection; the power of a straight piece is 0."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
     c_aa += power * (power * c_jj - 2.0 * c_ja)
     return Sizes(j1, a1 - power * j1, j2, a2 - power * j2, c_jj, c_ja - power * c_jj, c_aa, errors, half_ulp)
@@ -213,21 +213,21 @@ def after_reflection(sizes, power):
 
 @_compile
 def with_new_error(sizes):
-    """-> Sizes: those of a ray that makes one more local error."""
+    """-> Sizes: the sizes with one more local error."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
     return Sizes(j1, a1, j2, a2, c_jj + 1.0, c_ja, c_aa + 1.0, errors + 1.0, half_ulp)
 
 
 @_compile
 def width_at(scope, sizes, ahead, error):
-    """-> float: width of the ray, and its error, after the flight ``ahead``."""
+    """-> float: width of the ray plus its error, at the distance ``ahead``."""
     tilt = sizes.half_ulp * abs(scope.scale * sizes.j2 + ahead * sizes.a2)
     return WIDTH_MARGIN * tilt + (1.0 + ahead / scope.scale) * error
 
 
 @_compile
 def nearest_line(scope, own, sizes, px, py, vx, vy):
-    """-> (WideHit, corner): the first line that is hit, and the time to the first corner in the ray's width, or inf."""
+    """-> (WideHit, corner): the first hit on a line, and the time to the first corner in the ray's width, or inf."""
     tables, error = scope.tables, error_of(scope, sizes)
     joints = tables.joints
     first, end = scope.joints
@@ -258,7 +258,7 @@ def nearest_line(scope, own, sizes, px, py, vx, vy):
 
 @_compile
 def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
-    """-> (WideHit, graze): the first curve that is hit before ``nearest``, or that; time of an undecided contact."""
+    """-> (WideHit, graze): the first hit on a curve before ``nearest``, or ``nearest``; time of undecided contact."""
     tables, slack = scope.tables, scope.slack
     graze = np.inf
     for low, high in (scope.circles, scope.ellipses):
@@ -286,9 +286,9 @@ def nearest_curve(scope, own, nearest, px, py, vx, vy, error):
 
 @_compile
 def exit_time(scope, own, hit, px, py, vx, vy):
-    """-> WideHit: the opening or a side of an open wall, if met before the hit, or that.
+    """-> WideHit: the opening or a side of an open wall if it is met before the hit, else the hit.
 
-    A piece that lies in the opening or in a side within rounding is met before them.
+    A piece within rounding of the opening or of a side is hit first.
     """
     left, right, slack, is_open = scope.left, scope.right, scope.slack, scope.tables.is_open
     time, kind = hit.time, hit.kind
@@ -313,7 +313,7 @@ def exit_time(scope, own, hit, px, py, vx, vy):
 
 @_compile
 def point_of(tables, hit, px, py, vx, vy):
-    """-> (qx, qy, nx, ny, bent): where a flight ends, the unit normal there, and the curvature, a double."""
+    """-> (qx, qy, nx, ny, bent): the end of a ray segment, the unit normal there, and the curvature (a double)."""
     if hit.kind == LINE:
         x0, y0, x1, y1 = line_ends(tables.joints, hit.number)
         ex, ey = two_sum(x1, -x0), two_sum(y1, -y0)
@@ -330,9 +330,9 @@ def point_of(tables, hit, px, py, vx, vy):
 
 @_compile
 def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
-    """-> bool: whether a corner in the ray's width is met with what is hit.
+    """-> bool: whether a corner in the ray's width is met before the hit or together with it.
 
-    At the end of what is hit it is as far away as the hit up to the width over the sine of incidence.
+    A corner at the end of the piece is further away than the hit by at most the width over the sine of incidence.
     """
     joints, error = scope.tables.joints, error_of(scope, sizes)
     first, end = scope.joints
@@ -352,10 +352,10 @@ def meets_corner(scope, hit, sizes, px, py, vx, vy, incidence):
 def pass_cells(scope, sizes, py, vx, vy, error):
     """-> (py, cells, Sizes): the ray after it has passed a side and all cells in which it comes near no piece.
 
-    ``error`` is that of the flight up to the side.
+    ``error`` bounds the error of the ray on the segment up to the side.
     """
     cell, scale = scope.tables.cell, scope.scale
-    # the ends of the wall are one point of it, and a ray passes a side above them
+    # the two ends of the wall are the same point, and a ray passes a side above this point
     end = wide(scope.tables.joints[scope.joints[0], JOINT_Y])
     py = end if subtract(py, end)[0] < 0.0 else py
     spread = WIDTH_MARGIN * sizes.half_ulp * abs(sizes.a2) + error / scale
@@ -366,7 +366,7 @@ def pass_cells(scope, sizes, py, vx, vy, error):
 
 @_compile
 def reflected(vx, vy, nx, ny, approach):
-    """-> (vx, vy): the velocity reflected, with one Newton step on its length."""
+    """-> (vx, vy): the reflected velocity, normalised by one Newton step."""
     twice = (2.0 * approach[0], 2.0 * approach[1])
     vx, vy = subtract(vx, multiply(twice, nx)), subtract(vy, multiply(twice, ny))
     speed2 = dot(vx, vy, vx, vy)
@@ -376,10 +376,10 @@ def reflected(vx, vy, nx, ny, approach):
 
 @_compile
 def refined_ray(scope, entry, theta, limit, most_segments):
-    """-> (x, angle, bounces, status, amplification, rounding): follow one ray; x and angle are double-doubles.
+    """-> (x, angle, bounces, status, amplification, rounding): trace one ray; x and angle are double-doubles.
 
     ``entry`` is a double-double in the hollow. The amplification is the norm of the map's derivative in the units
-    (cell, radian).
+    (scale, radian).
     """
     tables, scale = scope.tables, scope.scale
     px, py = entry, (0.0, 0.0)
@@ -439,7 +439,7 @@ def refined_ray(scope, entry, theta, limit, most_segments):
 
 @_compile
 def wide_scope(tables, h):
-    """-> WideScope: the hollow number h."""
+    """-> WideScope: hollow number h."""
     hollow, ellipse = tables.hollows[h], tables.first_ellipse
     return WideScope(
         tables,
@@ -456,7 +456,7 @@ def wide_scope(tables, h):
 
 @_compile
 def hollow_at(hollows, entry):
-    """-> (h, is_edge): the hollow that opens at a double-double position, or -1; whether this is a corner."""
+    """-> (h, is_edge): the hollow whose opening contains a double-double position, or -1; whether this is a corner."""
     low, high = 0, hollows.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -476,7 +476,7 @@ def hollow_at(hollows, entry):
 
 @_compile
 def refined_rays(x, theta, tables, limit, most_segments, results):
-    """Trace rays; fills the results with double-doubles."""
+    """Trace rays into ``results``, as double-doubles."""
     out_x, out_theta, bounces, status, amplification, rounding = results
     cell = tables.cell
     for i in range(x.shape[0]):

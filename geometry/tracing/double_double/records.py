@@ -1,7 +1,4 @@
-"""What the tracer in double-double arithmetic takes, fills, and passes from function to function. No numba here.
-
-A double-double number is a pair (high, low).
-"""
+"""The named tuples of the tracer in double-double arithmetic; a double-double is a pair (high, low). Without numba."""
 
 from __future__ import annotations
 
@@ -16,10 +13,10 @@ Wide = tuple[float, float]
 
 
 class WideTables(NamedTuple):
-    """The tables of a wall as in `Tables`, but for those of arcs.
+    """The tables of a wall as in `Tables`, except for arcs.
 
-    ``arcs`` are those of `refined_arcs`, the circles and then the ellipses; ``bands`` are the heights at which no piece
-    of an open wall lies.
+    ``arcs`` is the table of `refined_arcs`, circles first, then ellipses; ``bands`` are the bands of heights of an open
+    wall without pieces.
     """
 
     hollows: Floats
@@ -35,7 +32,7 @@ class WideTables(NamedTuple):
 
 
 class WideResults(NamedTuple):
-    """The arrays that `refined_rays` fills; x and theta are (n, 2), the others (n,)."""
+    """The arrays that `refined_rays` fills; x and theta have the shape (n, 2), the others (n,)."""
 
     x: Floats
     theta: Floats
@@ -46,7 +43,7 @@ class WideResults(NamedTuple):
 
 
 class WideScope(NamedTuple):
-    """The hollow that a ray is in: the tables, its opening, scale of lengths, slack, and the ranges of its pieces."""
+    """The hollow that contains a ray: tables, ends of the opening, scale of lengths, slack, and ranges of pieces."""
 
     tables: WideTables
     left: float
@@ -60,7 +57,7 @@ class WideScope(NamedTuple):
 
 
 class WideOwn(NamedTuple):
-    """Where a flight starts: the piece, the parameter on a Bezier piece, and the last flight that ended on a piece."""
+    """The start of a segment: piece, parameter on a Bezier piece, length of the last segment that ended on a piece."""
 
     kind: int
     number: int
@@ -69,7 +66,7 @@ class WideOwn(NamedTuple):
 
 
 class WideHit(NamedTuple):
-    """What a flight meets: its time, the piece, and the position on it: fraction of a line, parameter of a curve."""
+    """The end of a segment: time, piece, and position on it, the fraction of a line or the parameter of a curve."""
 
     time: Wide
     kind: int
@@ -78,10 +75,10 @@ class WideHit(NamedTuple):
 
 
 class Sizes(NamedTuple):
-    """What accompanies a ray, see `rays`; displacements are fractions of the scale.
+    """The quantities computed along a ray, see `rays`; displacements are in units of the scale.
 
-    Its Jacobi fields, of a displacement (j1, a1) and of a turn (j2, a2); the sum of M M^T, with entries for
-    displacement and turn, and how many errors there are; and half an ulp of the incoming angle.
+    The Jacobi fields of a displacement (j1, a1) and of a rotation (j2, a2); the sum C of M M^T, with entries for
+    displacement and rotation, and the number of local errors in C; half an ulp of the incoming angle.
     """
 
     j1: float

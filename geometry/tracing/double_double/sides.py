@@ -1,18 +1,18 @@
-"""Whether a ray that leaves one piece within rounding of another one lies in front of that one.
+"""Test whether a ray that leaves one piece within rounding of another piece starts in front of the other piece.
 
-The position of a ray is wrong by some rounding errors of the hollow's size. So its distance from a piece says nothing
-where it is of that size: beside the tip of a sharp peak, in the apex of a narrow wedge, and on a plate that is thinner
-than rounding or has no thickness. The wall is exact there, and the ray starts on the piece that it has left. So the
-distance is taken from the joints of both pieces.
+The position of a ray has an error of some rounding errors of the hollow's size. So a distance of this size from a piece
+is not significant: beside the tip of a sharp peak, in the apex of a narrow wedge, and on a plate of no thickness or
+thinner than rounding. But the joints of the wall are exact, and the ray starts on the piece that it has left (its own
+piece). So the distance is computed from the joints of both pieces.
 
-* Two segments: the distance is linear along the own one, and its signs at the two joints are exact (expansions of
-  Shewchuk 1997). Coincident faces have distance 0: the ray is not in front of the other one.
-* Curves: the position is put on its own piece, and its distance taken, in double-double arithmetic. Distances below the
-  rounding of that are 0.
+* Two segments: the distance is linear along the own segment, and its signs at the two joints are exact (expansions of
+  Shewchuk 1997). Coincident faces have distance 0: the ray is not in front of the other face.
+* Curves: the position is projected onto its own piece, and the distance computed, in double-double arithmetic.
+  Distances below the rounding error of this computation are 0.
 
-Two faces of a plate cross within rounding where vertices that are meant to lie on one line do not, in doubles. Then the
-ray has come through the back of the one to the front of the other; a face that it came through from behind does not
-hold it back on its way out.
+Two faces of a plate cross within rounding if vertices that should lie on one line do not in doubles. Then the ray has
+passed through the back of one face to the front of the other. A face that the ray passed from behind does not stop the
+ray after its reflection.
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ from .arithmetic import add, divide, dot, multiply, negate, square_root, subtrac
 from .beziers import bezier_coefficients, bezier_point, cubic, cubic_slope
 
 LINE, ARC, BEZIER = 3, 4, 5
-# A double-double position that was put on a curve carries so much of the slack: 16 EPS against 64 of its own roundings.
+# Error of a double-double position projected onto a curve, as a fraction of the slack (64 roundings to 16 EPS).
 CURVE_NOISE = 2.0**-48
-# Rounding of (b - a) x (c - a), as a fraction of the sum of its two products: Shewchuk 1997, ccwerrboundA.
+# Rounding error of (b - a) x (c - a), relative to the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ROUNDING = (3.0 + 16.0 * EPS) * UNIT_ROUNDOFF
-# A ray whose last start lies further behind a face than so many slacks did not start between it and its own piece.
+# Distance behind a face, in slacks, beyond which the last segment did not start between the face and the own piece.
 BEHIND_SLACKS = 4.0
-# Newton steps from a position within rounding of a curve to one on it: the error is squared each time.
+# Newton steps that project a position onto a curve within rounding of it; each step squares the error.
 STEPS = 2
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
 
 
 class Face(NamedTuple):
-    """A piece: its kind, the row of a line, an arc as a row of `refined_arcs`, a Bezier piece and a parameter on it.
+    """A piece: kind, row of a line, arc as a row of `refined_arcs`, row of a Bezier piece and parameter on it.
 
-    What does not belong to the kind has no meaning.
+    Fields of other kinds are not used.
     """
 
     kind: int
@@ -57,10 +57,10 @@ class Face(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """How a ray came to its start: the length of that flight, and how exactly the position is known.
+    """The arrival of a ray at its start: the length of the last segment and the accuracy of the position.
 
     ``slack`` is the distance within which pieces are nearby; ``blur`` is the error of the position along the own piece.
-    Where that decides, as where one piece stands on the other, the ray counts as one in front.
+    If this error decides, for example if one piece stands on the other, the ray counts as in front.
     """
 
     flown: float
@@ -70,7 +70,7 @@ class Arrival(NamedTuple):
 
 @_compile
 def orientation(ax, ay, bx, by, cx, cy):
-    """(b - a) x (c - a) with the exact sign: positive where c lies on the left of the way from a to b."""
+    """Return (b - a) x (c - a) with the exact sign: positive if c lies on the left of the line from a to b."""
     first, second = (bx - ax) * (cy - ay), (by - ay) * (cx - ax)
     value = first - second
     size = abs(first) + abs(second)
@@ -78,7 +78,7 @@ def orientation(ax, ay, bx, by, cx, cy):
         return value
     along, up = two_sum(bx, -ax), two_sum(by, -ay)
     right, above = two_sum(cx, -ax), two_sum(cy, -ay)
-    # the exact sum of 16 terms, as numbers that do not overlap, the largest last
+    # the exact sum of 16 terms as an expansion of non-overlapping numbers, the largest last
     total, count = np.zeros(16), 0
     for i in range(2):
         for j in range(2):
@@ -102,7 +102,7 @@ def line_ends(joints, index):
 
 @_compile
 def line_height(joints, index, px, py):
-    """Distance of a position from a line, on whose left the free side is, and the unit normal there."""
+    """-> (height, nx, ny): distance of a position from a line, positive on the free side (left), and unit normal."""
     x0, y0, x1, y1 = line_ends(joints, index)
     ex, ey = two_sum(x1, -x0), two_sum(y1, -y0)
     size = square_root(dot(ex, ey, ex, ey))
@@ -112,10 +112,10 @@ def line_height(joints, index, px, py):
 
 @_compile
 def height_over_line(joints, own, other, px, py, blur):
-    """Distance of a position on the line ``own`` from the line ``other``, times its length, with the exact sign.
+    """Return the distance of a position on line ``own`` from line ``other``, times a length, with the exact sign.
 
-    The two may meet between the ends of the own one, where the other stands on it. Then the double-double position
-    decides, which is known to ``blur`` along the own line, and the distance is the largest that it may have.
+    If the lines meet between the ends of ``own``, the double-double position decides. Its error along ``own`` is
+    ``blur``, and the result is the largest possible distance.
     """
     ax, ay, bx, by = line_ends(joints, other)
     x0, y0, x1, y1 = line_ends(joints, own)
@@ -131,7 +131,7 @@ def height_over_line(joints, own, other, px, py, blur):
 
 @_compile
 def bezier_height(curve, s, px, py):
-    """Distance of a position from a Bezier piece near its parameter s, and the unit normal there."""
+    """-> (height, nx, ny): distance of a position from a Bezier piece near its parameter s, and the unit normal."""
     ax0, ay0, ax1, ay1, ax2, ay2, ax3, ay3 = bezier_coefficients(curve)
     for _ in range(STEPS):
         tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
@@ -143,7 +143,7 @@ def bezier_height(curve, s, px, py):
 
 @_compile
 def height_over(joints, face, px, py):
-    """-> (height, nx, ny): distance of a position from a piece, positive on its free side, and the unit normal."""
+    """-> (height, nx, ny): distance of a position from a piece, positive on the free side, and the unit normal."""
     if face.kind == LINE:
         return line_height(joints, face.number, px, py)
     if face.kind == ARC:
@@ -162,9 +162,9 @@ def ends_of(joints, face):
 
 @_compile
 def came_through(ends, mx, my, px, py, vx, vy, arrival):
-    """-> bool: whether a ray's last flight, which ended at p with the velocity v, crossed a piece from behind.
+    """-> bool: whether a ray's last segment, which ended at p with the velocity v, crossed a piece from behind.
 
-    The piece has these ends, and its normal next to p is (mx, my).
+    ``ends`` are the ends of the piece, (mx, my) is its normal next to p.
     """
     x0, y0, x1, y1 = ends
     if arrival.flown * (vx * mx + vy * my) <= BEHIND_SLACKS * arrival.slack:
@@ -189,7 +189,7 @@ def line_in_front_of_line(joints, line, own, px, py, vx, vy, arrival):
 
 @_compile
 def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
-    """-> bool: `in_front` by the heights of the position, whatever the pieces are."""
+    """-> bool: `in_front` for pieces of any kind, by the heights of the position."""
     nx, ny = px, py
     for _ in range(STEPS):
         height, nx, ny = height_over(joints, own, px, py)
@@ -204,9 +204,9 @@ def in_front_at(joints, piece, own, px, py, vx, vy, arrival):
 
 @_compile
 def in_front(joints, piece, own, px, py, vx, vy, arrival):
-    """-> bool: whether a ray that has just left a piece lies in front of another one, which is within the slack of it.
+    """-> bool: whether a ray that has just left the piece ``own`` starts in front of ``piece``, within the slack of it.
 
-    ``px``, ``py`` (double-doubles) is the position, within rounding of the own piece.
+    (``px``, ``py``), double-doubles, is the position, within rounding of ``own``.
     """
     if own.kind == LINE and piece.kind == LINE:
         return line_in_front_of_line(joints, piece.number, own.number, px, py, vx, vy, arrival)
