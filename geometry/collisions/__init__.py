@@ -1,1 +1,1 @@
-"""The collision of a disk with satellites, in the plane and in the straightened configuration space."""
+"""The collision of a disk with satellites, in the plane and on the straightened configuration space."""

@@ -19,19 +19,19 @@ from ..walls.wall import Wall
 
 @dataclass(frozen=True)
 class ConfigurationSpace:
-    """The configurations M of a disk and a wall, and its straightened neighbour M_cyl.
+    """The configuration space M of a disk above a wall, and its straightened form M_cyl.
 
     Parameters
     ----------
     wall : Wall
-        Of any period; its tops are at height 0, where the paper's are at -1.
+        Of any period; the tops are at height 0 (in the paper at -1).
     disk : Disk
-        Its radius is 1.
+        Of radius 1.
     scale : float
-        eps, greater than 0: the disk meets ``wall.scaled(scale)``.
+        eps, greater than 0: the disk collides with ``wall.scaled(scale)``.
     spacing : float, optional
-        rho, the angle between satellites, 2 pi over a whole number; by default the least of at least scale^0.4 at which
-        no three satellites reach the wall, as in ``collide``.
+        rho, the angle between satellites, 2 pi over a whole number; by default, as in ``collide``, the least spacing of
+        at least scale^0.4 at which no three satellites reach the wall.
 
     Attributes
     ----------
@@ -84,26 +84,27 @@ class ConfigurationSpace:
 
     @property
     def gap_radius(self) -> float:
-        """delta_0: within it of odd multiples of rho/2 two satellites may be below the tops (section 4.1).
+        """delta_0 = arcsin(depth/(2 sin(rho/2))), section 4.1.
 
-        arcsin(depth/(2 sin(rho/2))), which is sharp for a wall that reaches its depth close to every point.
+        Two satellites can be below the tops only if alpha is within delta_0 of an odd multiple of rho/2. The bound is
+        sharp for a wall that reaches its depth near every point.
         """
         return float(rolling.gap_radius(self.depth, self.spacing))
 
     def is_single(self, alpha: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether alpha is in Z, where only one satellite can touch; the rest has the fraction 2 delta_0/rho."""
+        """Return whether alpha is in Z, where only one satellite can touch; Z is 1 - 2 delta_0/rho of all angles."""
         bar = self.charts.residual(alpha)
         return np.asarray(np.abs(bar) <= 0.5 * self.spacing - self.gap_radius)
 
     def contains(self, configuration: ArrayLike) -> NDArray[np.bool_]:
-        """Return whether configurations (..., 3) are in M: no satellite in the interior of the solid.
+        """Return whether configurations (..., 3) are in M: no satellite is in the interior of the solid.
 
-        Only the two lowest satellites are looked at, as no third one reaches the wall; and where the centre is so low
-        that the lowest satellite is below the whole wall, it is in the solid.
+        Only the two lowest satellites are tested. A third satellite reaches the wall only if the lowest one is below
+        the whole wall, that is, in the solid.
         """
         values = _configurations(configuration)
         bar, zoomed = self.charts.residual(values[..., 2]), values / self.scale
-        # one k for both: two roundings of a tie would give the same satellite twice
+        # one k for both, because rounding a tie twice could give the same satellite twice
         lowest = -self.charts.nearest(values[..., 2])
         beside = lowest + np.where(bar > 0.0, -1, 1)
         centres = (self.zoomed.satellite(zoomed, number) for number in (lowest, beside))
@@ -128,12 +129,12 @@ class ConfigurationSpace:
         number : array_like
             j: the satellite is at the angle alpha + j rho (eq. 3.26 prints alpha - j rho).
         wall_normal : array_like, shape (..., 2)
-            The wall's unit normals there, out of the solid.
+            The wall's unit normals at the contact, out of the solid.
 
         Returns
         -------
         ndarray, shape (..., 3)
-            Of norm 1 in the kinetic-energy metric: v - 2 <v, n> n is the velocity v after a frictionless impact.
+            Of norm 1 in the kinetic-energy metric; a frictionless impact takes the velocity v to v - 2 <v, n> n.
 
         Examples
         --------

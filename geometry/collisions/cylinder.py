@@ -1,4 +1,4 @@
-"""The straightened collision: the disk rolls on a line, and its law decouples (Rudzis 2022, sections 4.2, 5.1)."""
+"""The collision on the cylinder, whose law decouples, and the modified collision (Rudzis 2022, sections 4.2, 5)."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .configuration_space import ConfigurationSpace
 from .records import Rolling, ground_of, mass_fractions, position_rounding, results_for
 from .rigid import at_the_tops, check_kinds, checked_states, collide, from_the_tops
 
-# Newton's method on a convex function halves its error at worst, and squares it soon.
+# Newton steps on a convex function: at worst a step halves the error, near the root it squares the error.
 LANDING_STEPS = 80
 
 
 @dataclass(frozen=True)
 class CylinderCollision(StatusCounts):
-    """What became of the disks, the first axis of every array running over them.
+    """The results of `collide_cylinder` for n disks.
 
     Attributes
     ----------
     position : array of shape (n, 2)
-        (y1', y3') = (x1, alpha) where the disk is back at height 0, unfolded.
+        (y1', y3') = (x1, alpha) at the return to height 0, unfolded.
     velocity : array of shape (n, 3)
         Outgoing (v1, v2, omega).
     time : array of shape (n,)
-        From height 0 to height 0.
+        The time from height 0 to height 0.
     contacts : array of int, shape (n,)
     status : array of int, shape (n,)
         Values of `Status`.
@@ -58,8 +58,8 @@ def collide_cylinder(
 ) -> CylinderCollision:
     """Collide disks on the cylinder M_cyl, where the contact (x1 + alpha, x2) moves on straight lines: K_cyl.
 
-    It is reflected specularly in the kinetic metric, so that -m v1 + J omega is conserved and its conjugate coordinate
-    moves uniformly: in the plane across chi the motion is the billiard in the foreshortened wall,
+    The velocity is reflected specularly in the kinetic metric, so -m v1 + J omega is conserved and its conjugate
+    coordinate moves uniformly. In the plane orthogonal to chi the motion is the billiard in the foreshortened wall:
 
         theta' = trace(wall.foreshorten(disk), (x1 + alpha)/scale, theta).theta,   psi' = pi - psi.
 
@@ -69,7 +69,7 @@ def collide_cylinder(
     wall : Wall
         Of segments and arcs, circular or elliptic.
     scale : float
-        eps, greater than 0: the size of the wall's unit of length.
+        eps, greater than 0: the wall's unit of length, in units of the disk's radius.
     position : array_like, shape (n, 2)
         (y1, y3) = (x1, alpha) at height 0.
     velocity : array_like, shape (n, 3)
@@ -120,24 +120,24 @@ def collide_cylinder(
 
 @dataclass(frozen=True)
 class ModifiedCollision(StatusCounts):
-    """What became of the disks, the first axis of every array running over them.
+    """The results of `collide_modified` for n disks.
 
     Attributes
     ----------
     position : array of shape (n, 2)
-        (y1', y3') = (x1, alpha), straightened, where the lowest satellite is back at the level of the tops, unfolded;
-        where the disk did not come back the last position of the true disk.
+        (y1', y3') = (x1, alpha), straightened and unfolded, at the return of the lowest satellite to the level of the
+        tops. If the disk did not come back, the last position of the true disk.
     velocity : array of shape (n, 3)
         Outgoing (v1, v2, omega).
     contacts : array of int, shape (n,)
     two_satellites : array of bool, shape (n,)
         Whether more than one satellite touched the wall.
     inside : array of bool, shape (n,)
-        Where the map is that of the paper: the disk came back, alpha is in Z before and after, so that one satellite
-        alone is within the depth of the wall, and v2 > J^(-1/2) sin(rho/2) for unit velocities, so that eta is one to
-        one. There K~ is an involution. Elsewhere the values are what the same formulas give, and nothing is claimed.
+        Whether the paper defines the map: the disk came back; alpha is in Z before and after, so only one satellite is
+        within the depth of the wall; and v2 > J^(-1/2) sin(rho/2) for unit velocities, so eta is one to one. There K~
+        is an involution. Elsewhere the values follow from the same formulas without a guarantee.
     status : array of int, shape (n,)
-        Values of `Status`, those of the true collision.
+        Values of `Status`, from the true collision.
     """
 
     position: Floats
@@ -159,23 +159,24 @@ def collide_modified(
     max_contacts: int = MAX_COLLISIONS,
     threads: int | None = None,
 ) -> ModifiedCollision:
-    """The modified law K~ = eta^(-1) o K o eta: the true collision in the coordinates of the cylinder.
+    """Collide disks by the modified law K~ = eta^(-1) o K o eta, the true collision in coordinates of the cylinder.
 
-    A state of the cylinder is (x1, alpha) at height 0. The same disk, bent, has its lowest satellite at the level of
-    the tops; eta takes it back along its path to height 0, the true disk collides, and eta^(-1) follows it until its
-    lowest satellite leaves the level of the tops, and straightens that. As the scale tends to 0, K~ tends to K_cyl,
-    the law of `collide_cylinder` (Lemma 5.2 (iii)). Where alpha is nearest to k rho, K_cyl is to be taken at
-    alpha - k rho: the cylinder's line x1 + alpha is unrolled, the satellite is not.
+    A state of the cylinder is (x1, alpha) at height 0. Bending it gives a disk with its lowest satellite at the level
+    of the tops. eta moves the bent disk back along its path to height 0; then the true disk collides. eta^(-1) moves
+    the disk until its lowest satellite is at the level of the tops again, and straightens this configuration. As the
+    scale tends to 0, K~ tends to K_cyl, the law of `collide_cylinder` (Lemma 5.2 (iii)). If k rho is the multiple of
+    rho nearest to alpha, compare with K_cyl at alpha - k rho: the cylinder's line x1 + alpha is unrolled, the satellite
+    is not.
 
     Parameters
     ----------
     disk, wall, scale, position, velocity, spacing, max_contacts, threads
-        As in `collide`; the position is that on the cylinder.
+        As in `collide`; the position is on the cylinder.
 
     Returns
     -------
     ModifiedCollision
-        Its mask ``inside`` says where the map is defined as in the paper.
+        The mask ``inside`` tells for which disks the paper defines the map.
 
     Raises
     ------
@@ -187,7 +188,7 @@ def collide_modified(
 
     Examples
     --------
-    A disk that falls straight down into a crevice comes straight back:
+    A disk that falls vertically into a crevice is retroreflected:
 
     >>> from asperity import geometry as geo
     >>> notch = geo.Wall.from_vertices([(0, 0), (0, -0.5), (1, -0.5), (1, 0)])
@@ -214,17 +215,17 @@ def collide_modified(
 
 
 def _straightened(charts: RollingCharts, position: Floats, velocity: Floats) -> Floats:
-    """eta^(-1): down along the velocity until the lowest satellite is at the level of the tops, straightened."""
+    """Return eta^(-1): the straightened configuration with the lowest satellite at the level of the tops."""
     time = _landing(charts, position[:, 1], velocity)
     low = np.stack([position[:, 0], np.zeros(len(time)), position[:, 1]], axis=-1) + time[:, None] * velocity
     return charts.straighten(low)[:, [0, 2]]
 
 
 def _landing(charts: RollingCharts, alpha: Floats, velocity: Floats) -> Floats:
-    """The time at which the lowest satellite comes to the level of the tops.
+    """Return the time at which the lowest satellite reaches the level of the tops.
 
-    Its height is convex while it is the lowest one, so that Newton's method comes from above and passes no root; where
-    the next satellite takes over first, the search goes on from there.
+    The height of a satellite is convex while it is the lowest, so Newton's method passes no root. If another satellite
+    becomes the lowest first, the search continues from that time.
     """
     v2, omega = velocity[:, 1], velocity[:, 2]
     time = np.zeros(len(alpha))

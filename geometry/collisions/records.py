@@ -1,6 +1,6 @@
-"""The wall, the ring of satellites and the masses as the tables and numbers of the compiled collision.
+"""The wall, the satellites and the masses as arguments of the compiled collision.
 
-Lengths are in units of the wall, so that the disk's radius is 1/scale.
+Lengths are in units of the wall, so the disk's radius is 1/scale.
 """
 
 from __future__ import annotations
@@ -21,18 +21,16 @@ from ..tracing.threads import new_flag
 if TYPE_CHECKING:
     from ..scene.scene import Scene
 
-# A bound that is attained only by a satellite on the deepest point of the wall half-way between two others; the room
-# is for rounding.
+# Relative allowance for rounding in bounds on the reach of satellites and on the depth of the disk.
 ROOM = 1e-9
-# Positions carry a few rounding errors of their size each, as those of rays do (`scene/tolerances`).
+# Relative error of positions, a few rounding errors of their size, as for rays (`scene/tolerances`).
 SLACK = 16.0 * EPS
 
 
 class Ground(NamedTuple):
     """The wall: its period, whether satellites pass from cell to cell below its tops, and the tables of its scene.
 
-    ``exact_arcs`` are the arcs as `refined_arcs` has them, and ``stop`` is the flag that ends a collision before its
-    time.
+    ``exact_arcs`` is the table of `refined_arcs`; ``stop`` is the flag that interrupts a collision.
     """
 
     cell: float
@@ -46,10 +44,11 @@ class Ground(NamedTuple):
 
 
 class Ring(NamedTuple):
-    """The satellites, and the disk that carries them.
+    """The satellites and their disk.
 
-    Farther than ``reach`` from the lowest point a satellite is above the wall, ``-floor`` is as low as the disk can be,
-    and by rounding a satellite may be off by ``slack``. The last two are the sine and cosine of half the spacing.
+    At an angle of more than ``reach`` from the lowest point a satellite is above the wall; ``-floor`` is the least
+    height of the disk; ``slack`` bounds the rounding error of a satellite's position. ``half_sine`` and ``half_cosine``
+    are the sine and cosine of half the spacing.
     """
 
     scale: float
@@ -62,7 +61,7 @@ class Ring(NamedTuple):
 
 
 class Rolling(NamedTuple):
-    """A disk on the cylinder: the scale of the wall, its depth, and how far off the contact may be by rounding."""
+    """A disk on the cylinder: scale of the wall, depth of the wall, bound on the rounding error of the contact."""
 
     scale: float
     deepest: float
@@ -70,7 +69,7 @@ class Rolling(NamedTuple):
 
 
 class DiskResults(NamedTuple):
-    """The arrays that the compiled collision fills, with a row for each disk; see `RigidCollision`."""
+    """The arrays that the compiled collision fills, one row for each disk; see `RigidCollision`."""
 
     position: Floats
     velocity: Floats
@@ -80,7 +79,7 @@ class DiskResults(NamedTuple):
     status: NDArray[np.uint8]
 
     def part(self, block: slice) -> DiskResults:
-        """Those of some disks."""
+        """Return the results of the disks in ``block``."""
         return DiskResults(
             self.position[block], self.velocity[block], self.time[block],
             self.contacts[block], self.two_satellites[block], self.status[block],
@@ -88,7 +87,7 @@ class DiskResults(NamedTuple):
 
 
 def results_for(count: int) -> DiskResults:
-    """Room for so many disks."""
+    """Return empty results for ``count`` disks."""
     return DiskResults(
         np.empty((count, 2)), np.empty((count, 3)), np.empty(count),
         np.empty(count, np.int64), np.empty(count, np.bool_), np.empty(count, np.uint8),
@@ -96,7 +95,7 @@ def results_for(count: int) -> DiskResults:
 
 
 def ground_of(scene: Scene) -> Ground:
-    """The tables of a wall; circles and ellipses have the same columns and become one table."""
+    """Return the tables of a wall, with circles and ellipses, which have the same columns, in one table."""
     from ..tracing.double_double.arcs import refined_arcs
 
     none = np.empty((0, ARC_COLUMNS))
@@ -111,7 +110,7 @@ def ground_of(scene: Scene) -> Ground:
 
 
 def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
-    """The numbers of a ring above a wall of this scale."""
+    """Return the satellites above a wall of the given scale."""
     half = 0.5 * satellites.spacing
     return Ring(
         scale,
@@ -125,12 +124,12 @@ def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:
 
 
 def mass_fractions(disk: Disk) -> tuple[float, float]:
-    """Mass and inertia in the unit m + J: laws know only their ratio."""
+    """Return mass and inertia in the unit m + J; laws depend on their ratio only."""
     total = disk.mass + disk.inertia
     return disk.mass / total, disk.inertia / total
 
 
 def position_rounding(scene: Scene, farthest: float) -> float:
-    """How far off a satellite may be by rounding: of the wall's size and of its distance from the disk's centre."""
+    """Return a bound on the rounding error of a satellite's position, from the wall's size and ``farthest``."""
     size = float(scene.hollows[:, SIZE].max()) if len(scene.hollows) else 0.0
     return SLACK * (size + scene.cell + farthest)

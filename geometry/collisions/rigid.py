@@ -1,4 +1,4 @@
-"""The true disk against a rough wall: the deterministic collision of Rudzis 2022, section 1.3."""
+"""The deterministic collision of a disk with a rough wall (Rudzis 2022, section 1.3)."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from .records import DiskResults, ground_of, mass_fractions, results_for, ring_o
 
 @dataclass(frozen=True)
 class RigidCollision(StatusCounts):
-    """What became of the disks, the first axis of every array running over them.
+    """The results of `collide` for n disks.
 
     Attributes
     ----------
     position : array of shape (n, 2)
-        (x1, alpha) where the disk is back at x2 = 0, both unfolded; elsewhere where it was last.
+        (x1, alpha) at the return to x2 = 0, both unfolded; the last position if the disk did not come back.
     velocity : array of shape (n, 3)
-        Outgoing (v1, v2, omega), v2 > 0 where it came back; elsewhere the last one.
+        Outgoing (v1, v2, omega) with v2 > 0; the last velocity if the disk did not come back.
     time : array of shape (n,)
-        From the start to there.
+        The time from the start to this position.
     contacts : array of int, shape (n,)
-        How often a satellite touched the wall.
+        Number of contacts of satellites with the wall.
     two_satellites : array of bool, shape (n,)
-        Whether more than one satellite touched it.
+        Whether more than one satellite touched the wall.
     status : array of int, shape (n,)
-        Values of `Status`: ``ESCAPED`` is back at x2 = 0, ``CORNER`` and ``GRAZING`` name contacts that double
-        precision does not settle (also two satellites at one time), ``BOUNCE_LIMIT`` one that does not come back.
+        Values of `Status`. ``ESCAPED``: the disk came back to x2 = 0. ``CORNER`` and ``GRAZING``: double precision does
+        not resolve a contact, for example two simultaneous contacts. ``BOUNCE_LIMIT``: the disk did not come back.
     """
 
     position: Floats
@@ -58,14 +58,14 @@ def collide(
     max_contacts: int = MAX_COLLISIONS,
     threads: int | None = None,
 ) -> RigidCollision:
-    r"""Collide disks with satellites with a rough wall: the map K^{Sigma, eps}.
+    r"""Collide a disk with satellites and a rough wall: the map K^{Sigma, eps}.
 
-    The disk's rim carries satellites S_k = (x1 + sin(alpha + k rho), x2 - cos(alpha + k rho)), which alone touch the
-    wall. The wall, ``scale`` times as large as ``wall``, has its tops at height -1, so that the disk at x2 = 0 just
-    clears it. The disk flies freely and is reflected where a satellite meets the wall, specularly in the kinetic
-    metric, with the normal (k1/m, k2/m, (k1 cos(alpha + j rho) + k2 sin(alpha + j rho))/J) up to its length, where k
-    is the wall's. It conserves the energy, preserves the measure <w, e2> dx1 dalpha dw, and is an involution if the
-    input is minus the incoming velocity (Rudzis 2022, section 1.3.5).
+    Only the satellites S_k = (x1 + sin(alpha + k rho), x2 - cos(alpha + k rho)) on the disk's rim touch the wall. The
+    wall is ``wall`` enlarged by ``scale``, with its tops at height -1, so the disk at x2 = 0 is just above the tops.
+    The disk moves freely between contacts. A contact reflects the velocity specularly in the kinetic metric, with the
+    normal (k1/m, k2/m, (k1 cos(alpha + j rho) + k2 sin(alpha + j rho))/J) up to its length, where j is the satellite
+    and k the wall's normal. The map conserves the energy, preserves the measure <w, e2> dx1 dalpha dw, and is an
+    involution if the input is minus the incoming velocity (Rudzis 2022, section 1.3.5).
 
     Parameters
     ----------
@@ -73,17 +73,19 @@ def collide(
     wall : Wall
         Of segments and arcs, circular or elliptic.
     scale : float
-        eps, greater than 0: the wall's period becomes ``scale * wall.period`` with the disk's radius as unit.
+        eps, greater than 0: the period is ``scale * wall.period`` in units of the disk's radius.
     position : array_like, shape (n, 2)
-        (x1, alpha) at x2 = 0; alpha in radians, any finite numbers.
+        (x1, alpha) at x2 = 0, finite; alpha in radians.
     velocity : array_like, shape (n, 3)
         Incoming (v1, v2, omega) with v2 < 0.
     spacing : float, optional
-        rho, a divisor of 2 pi. By default the least of at least eps^0.4 for which three satellites cannot touch.
+        rho, 2 pi over a whole number; by default the least spacing of at least eps^0.4 at which no three satellites
+        reach the wall.
     max_contacts : int
-        Disks that are still there after so many contacts end with ``Status.BOUNCE_LIMIT``.
+        Disks still near the wall after ``max_contacts`` contacts end with ``Status.BOUNCE_LIMIT``.
     threads : int, optional
-        Number of threads; by default one a processor that the process may use. The result does not depend on it.
+        Number of threads, by default one for each processor that the process may use. The result does not depend on
+        it.
 
     Returns
     -------
@@ -97,17 +99,16 @@ def collide(
 
     Notes
     -----
-    Positions are kept in units of the wall, relative to its cell, so that nothing is lost at small scales except what
-    the rounding of x1 and alpha themselves means there. The first contact is found by steps that provably pass no root
-    (see `compiled.contact`). Cost: .2 to .5 microseconds a contact on a wall of few pieces; every piece of a hollow is
-    tested.
+    Positions are computed in units of the wall, relative to its cell. So small scales lose no accuracy except by the
+    rounding of x1 and alpha. The first contact is found by steps that provably pass no root (see `compiled.contact`).
+    Cost: 0.2 to 0.5 microseconds per contact on a wall of few pieces; every piece of a hollow is tested.
 
     Source: Rudzis 2022, sections 1.3.1 to 1.3.5, and Proposition 3.2 with the angle alpha + j rho (eq. 3.26 prints
     alpha - j rho).
 
     Examples
     --------
-    Above a flat wall the lowest satellite at alpha = 0 is reflected like a smooth disk:
+    On a flat wall the disk is reflected like a smooth disk if its lowest satellite is at alpha = 0:
 
     >>> from asperity import geometry as geo
     >>> hit = geo.collide(geo.Disk(), geo.flat(), 0.01, [[0.5, 0.0]], [[0.0, -1.0, 0.0]])
@@ -137,10 +138,7 @@ def collide(
 
 
 def at_the_tops(wall: Wall, scale: float, position: Floats, velocity: Floats) -> Floats:
-    """Where disks at x2 = 0 would come to the level of the highest points, in the coordinates of ``wall.cell``.
-
-    Above that level nothing touches the wall, and the disk flies freely.
-    """
+    """Return where disks from x2 = 0 reach the level of the highest points, in the coordinates of ``wall.cell``."""
     x, level = wall.origin
     time = (scale * level / velocity[:, 1])[:, np.newaxis]
     return np.asarray(position + time * velocity[:, [0, 2]] - [scale * x, 0.0])
@@ -149,7 +147,7 @@ def at_the_tops(wall: Wall, scale: float, position: Floats, velocity: Floats) ->
 def from_the_tops(
     wall: Wall, scale: float, position: Floats, start: Floats, velocity: Floats, results: DiskResults
 ) -> None:
-    """Turn positions and times that began at ``start`` into those of disks that begin and end at x2 = 0."""
+    """Convert, in place, results of disks from ``start`` to results of disks that begin and end at x2 = 0."""
     level = scale * wall.origin[1]
     if wall.origin == (0.0, 0.0):
         return
@@ -162,7 +160,7 @@ def from_the_tops(
 
 
 def check_kinds(disk: Disk, wall: Wall) -> None:
-    """Refuse what is not a disk and a wall of segments and arcs."""
+    """Raise an InputError unless ``disk`` is a Disk and ``wall`` a Wall of segments and arcs."""
     instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
     beziers = sum(isinstance(piece, Bezier) for path in (wall.pieces, *wall.islands) for piece in path)

@@ -1,1 +1,1 @@
-"""Pictures of walls with rays, and of collisions of the disk."""
+"""Plots of walls with rays, and of collisions of the disk."""

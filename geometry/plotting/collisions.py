@@ -1,4 +1,4 @@
-"""Pictures of the true disk: a collision satellite by satellite, and the configurations that a wall leaves free."""
+"""Plots of the disk with satellites: the path of a collision, and a section of the configuration space."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from .walls import LEVEL, RAY_COLOURS, SOLID
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Points of a satellite's path in one flight: it is nearly straight.
+# Number of points on a satellite's nearly straight path between two contacts.
 FLIGHT_POINTS = 40
-# How much free space is shown above the tops, in depths of the wall, and how many cells beside the contacts.
+# Free space shown above the tops, in depths of the wall, and cells shown beside the contacts.
 FREE, MARGIN = 1.0, 1.0
-# Pixels of one side of a section of the configuration space.
+# Pixels per side of a section of the configuration space.
 SECTION = 500
 MOST_CONTACTS = 200
 
@@ -31,7 +31,7 @@ MOST_CONTACTS = 200
 def collision_path(
     disk: Disk, wall: Wall, scale: float, position: ArrayLike, velocity: ArrayLike, spacing: float | None = None
 ) -> Floats:
-    """Configurations (x1, x2, alpha) of one disk from height 0 through every contact to height 0, shape (k + 2, 3).
+    """Return the configurations (x1, x2, alpha) of one disk at height 0, at k contacts, and at height 0 again.
 
     Parameters
     ----------
@@ -39,6 +39,10 @@ def collision_path(
         As in `collide`.
     position : array_like, shape (2,)
     velocity : array_like, shape (3,)
+
+    Returns
+    -------
+    ndarray, shape (k + 2, 3)
 
     Raises
     ------
@@ -61,7 +65,7 @@ def collision_path(
             f"position, velocity: expected a disk that comes back after at most {MOST_CONTACTS} contacts, got {state} "
             f"after {contacts}"
         )
-    # the first part of each run goes to the contact after its last one; heights follow from the times
+    # a run limited to k contacts ends at contact k + 1; the heights follow from the times
     states = [(start[0], moving[0], 0.0)]
     legs = [collide(disk, wall, scale, start, moving, spacing, max_contacts=k) for k in range(1, contacts)]
     states += [(leg.position[0], leg.velocity[0], float(leg.time[0])) for leg in [*legs, whole]]
@@ -83,13 +87,13 @@ def _first_time(
     disk: Disk, wall: Wall, scale: float, start: Floats, moving: Floats, spacing: float | None,
     after: tuple[Floats, Floats, float],
 ) -> float:  # fmt: skip
-    """When the first contact is: both velocities are known, and where the flight after it ends."""
+    """Return the time of the first contact from the velocities before and after it and the state ``after``."""
     configuration, w, end = after
     change = w[[0, 2]] - moving[0, [0, 2]]
     reached = configuration - start[0] - end * w[[0, 2]]
     # start + v first + w (end - first) = position
     if not np.any(change):
-        # only v2 changed: it came back to height 0, or touched again at a height that v2 alone does not tell
+        # only v2 changed: the time follows from the return to height 0
         return float(end * w[1] / (w[1] - moving[0, 1]))
     return float(-(change @ reached) / (change @ change))
 
@@ -103,20 +107,20 @@ def draw_collision(
     spacing: float | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Draw one collision near the wall: the rim at every contact, and the paths of the satellites that come near.
+    """Draw one collision near the wall: the rim at every contact, and the paths of the satellites near the wall.
 
     Parameters
     ----------
     disk, wall, scale, position, velocity, spacing
         As in `collision_path`.
     ax : matplotlib Axes, optional
-        A new figure is made if there is none.
+        By default the axes of a new figure.
 
     Returns
     -------
     matplotlib Axes
-        Lengths in units of the wall. Dots are satellites at height 0 and at every contact, lines their paths; the rim
-        between them, dashed, does not touch the wall.
+        Lengths are in units of the wall. Dots are the satellites at height 0 and at every contact, lines are their
+        paths. The rim between satellites, dashed, does not touch the wall.
 
     Examples
     --------
@@ -159,7 +163,7 @@ def draw_collision(
 
 
 def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Floats) -> None:
-    """The rim of the disk at start, contacts and end, with its satellites."""
+    """Draw the rim of the disk with its satellites at start, contacts and end."""
     angles = np.linspace(-1.5 * space.spacing, 1.5 * space.spacing, 4 * FLIGHT_POINTS)
     for configuration in path:
         x1, x2, alpha = configuration / space.scale
@@ -172,17 +176,17 @@ def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Float
 
 
 def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | None = None) -> Axes:
-    """Draw the section x2 = ``height`` of the free configurations over two cells and two spacings.
+    """Draw the section of the configuration space at one ``height`` of the lowest satellite.
 
-    Free space is white. Inside the bands alpha in Z, marked at the side, the solid is a bent cylinder over the wall,
-    x1 + sin(alpha) constant; in the gaps between them two satellites are below the tops and two cylinders cross.
+    The section covers two cells and two spacings. Free configurations are white. For alpha in Z the solid is a bent
+    cylinder over the wall, x1 + sin(alpha) constant. In the coloured bands two satellites may be below the tops, and
+    two cylinders cross.
 
     Parameters
     ----------
     space : ConfigurationSpace
     height : float
-        x2 in units of the depth of the scaled wall, in (-1, 0): -0.5 is half-way down. Measured from where the lowest
-        satellite half-way between two others touches the tops, so that the section meets the solid for every alpha.
+        Height of the lowest satellite relative to the tops, in units of the depth of the scaled wall, in (-1, 0).
     ax : matplotlib Axes, optional
 
     Returns

@@ -1,4 +1,4 @@
-"""Pictures of walls and of rays in them."""
+"""Plots of walls and of rays in them."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ if TYPE_CHECKING:
     from ..curves.curve import Curve
     from ..walls.wall import Wall
 
-# Okabe and Ito's colours, which stay apart for colour-blind readers.
+# Okabe and Ito's colours, which colour-blind readers can distinguish.
 RAY_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 SOLID, LEVEL = "0.82", "0.5"
-# Curves are drawn within this fraction of the picture's size, and corners nearer to each other than it are drawn as
-# one: a tenth of a pixel in a picture a thousand pixels wide.
+# Tolerance of curves, and distance below which points are merged, relative to the size of the plot: a tenth of a pixel
+# at 1000 pixels.
 OUTLINE_TOLERANCE = 1e-4
-# How much of the two neighbouring cells is drawn beside the cell, and of free space above it, in periods.
+# Parts of the neighbouring cells beside the cell, and free space above it, in periods.
 MARGIN, FREE = 0.12, 0.3
-# Both axes have one scale if the depth is within these fractions of the period; a shallower or deeper wall would be a
-# line, and its vertical axis says how much it is stretched.
+# Depths, in periods, between which both axes have the same scale. The plot of a shallower or deeper wall is stretched,
+# and the label of the vertical axis gives the factor.
 SHALLOWEST, DEEPEST = 0.04, 3.0
-# Height over width of the picture of one cell of a wall that is stretched.
+# Height over width of the plot of one cell of a stretched wall.
 SHALLOW_SHAPE, DEEP_SHAPE = 0.55, 1.6
-# Outlines with more points than this are drawn with a thin pen, which does not blot their details.
+# Number of points above which an outline is drawn with a thin line.
 FINE_POINTS = 2000
-# Rays that rise less than this in the picture leave it sideways.
+# Slope in the plot below which a ray leaves it sideways.
 FLATTEST = 0.2
-# A ray that wanders farther through the cells of an open wall is followed this many cells to either side.
+# Number of neighbouring cells, on either side, in which rays in an open wall are drawn.
 MOST_CELLS = 2
 
 
@@ -45,16 +45,16 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     ----------
     wall : Wall
     x, theta : array_like
-        Entry points and incoming angles in (0, pi); they broadcast, and may be empty.
+        Entry points and incoming angles in (0, pi), radians; they broadcast, and may be empty.
     ax : matplotlib Axes, optional
-        A new figure is made if there is none.
+        By default the axes of a new figure.
 
     Returns
     -------
     matplotlib Axes
-        Lengths are in the units of the wall. A dot marks where a ray enters, a ring where it leaves; a ray that does
-        not escape ends in a cross. Both axes have the same scale unless the wall is very shallow or very deep; the
-        label of the vertical axis then says by what factor it is stretched.
+        Lengths are in the units of the wall. A dot marks the entry of a ray, a ring its exit; a ray that does not
+        escape ends in a cross. Both axes have the same scale if the depth is 0 or from 0.04 to 3 periods; otherwise
+        the label of the vertical axis gives the factor by which y is stretched.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
 
 
 def vertical_stretch(wall: Wall) -> float:
-    """How many times larger y is drawn than x: 1 unless the wall is very shallow or very deep.
+    """Return the scale of y over the scale of x: 1 unless the wall is very shallow or very deep.
 
     Examples
     --------
@@ -110,14 +110,14 @@ def vertical_stretch(wall: Wall) -> float:
 
 
 def _heights(wall: Wall) -> tuple[float, float]:
-    """Top and bottom of the picture: where free space and the solid end."""
+    """Return y at the top and at the bottom of the plot."""
     shallow = 0.0 < wall.depth < SHALLOWEST * wall.period
     free = wall.depth if shallow else FREE * max(wall.period, wall.depth)
     return free, -wall.depth - 0.25 * free
 
 
 class _Ray:
-    """The path of one ray: where it comes from, its points inside, where it goes."""
+    """The path of one ray: the start of its arrival, its points in the wall, the end of its departure."""
 
     def __init__(self, wall: Wall, x: float, theta: float, free: float) -> None:
         from ..tracing.tracing import trace, trajectory
@@ -133,17 +133,17 @@ class _Ray:
 
 
 def _up_to(height: float, theta: float, stretch: float) -> Floats:
-    """The vector along theta that rises by ``height``, or less where it is flat in the picture."""
+    """Return the vector along theta that rises by ``height``, or by less if it is flat in the plot."""
     direction = np.array([np.cos(theta), np.sin(theta)])
     return np.asarray(height * direction / max(direction[1], FLATTEST * abs(direction[0]) / stretch))
 
 
 def _draw_solid(ax: Axes, wall: Wall, cells: Sequence[int], floor: float) -> None:
-    # a tenth of a pixel in either direction
+    # a tenth of a pixel in each direction
     step = OUTLINE_TOLERANCE * np.array([wall.period, -floor])
     outline = _thinned(wall.outline(float(step.min())), step)
     pen = 1.2 if len(outline) <= FINE_POINTS else 0.6
-    # the last point of a cell is the first of the next
+    # the last point of a cell is the first point of the next cell
     path = np.concatenate([*(outline[:-1] + np.array([k * wall.period, 0.0]) for k in cells), outline[-1:]])
     path[-1, 0] = (cells[-1] + 1) * wall.period
     below = np.array([[path[-1, 0], floor], [path[0, 0], floor]])
@@ -163,7 +163,7 @@ def _loop(island: Sequence[Curve], tolerance: float) -> Floats:
 
 
 def _thinned(points: Floats, step: Floats) -> Floats:
-    """Leave out points in the same rectangle of sides ``step`` as the one before: a wall may have 10^5 pieces."""
+    """Remove points in the same rectangle of sides ``step`` as their predecessor; a wall may have 10^5 pieces."""
     cells_of = np.floor(points / step)
     keep = np.any(cells_of[1:] != cells_of[:-1], axis=1)
     keep[-1] = True
@@ -171,7 +171,7 @@ def _thinned(points: Floats, step: Floats) -> Floats:
 
 
 def _draw_ray(ax: Axes, ray: _Ray, colour: str) -> None:
-    """One trajectory: an arrow in, the path, an arrow out; a dot where it enters, a ring where it leaves."""
+    """Draw one trajectory: the path with arrows in and out, a dot at the entry, and a ring at the exit."""
     ends = [ray.departure] if ray.departure is not None else []
     path = np.vstack([ray.arrival, ray.points, *ends])
     ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=1.1, zorder=3)

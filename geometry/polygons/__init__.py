@@ -1,1 +1,1 @@
-"""The rays into polygonal hollows, divided exactly into beams of equal itinerary."""
+"""Exact division of the rays into polygonal hollows into beams of equal itinerary."""

@@ -1,4 +1,4 @@
-"""The rays into a polygonal hollow, divided exactly into beams of equal itinerary."""
+"""Exact division of the rays into a polygonal hollow into beams of equal itinerary."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ MAX_BEAMS = 200_000
 
 @dataclass(frozen=True, eq=False)
 class Beams:
-    r"""Where a polygonal hollow sends every ray, as a list of pieces on which the law is one formula.
+    r"""The law of a polygonal hollow as a list of pieces, each with one formula.
 
-    Row k: for low < theta < high and X uniform over the hollow's opening, with probability
-    sine + cosine cot(theta) the ray leaves at theta' = sign theta + offset after so many bounces. A *leaf* is the set
-    of all rays with one itinerary; it has a row for every interval of theta between two vertices of its polygon.
+    Piece k: for low < theta < high and X uniform over the hollow's opening, with probability
+    sine + cosine cot(theta) the ray leaves at theta' = sign theta + offset after ``bounces`` bounces. A *leaf* is the
+    set of all rays with one itinerary; it has one piece for every interval of theta between vertices of its polygon.
 
     Parameters
     ----------
     sign : array of int8
         +1 or -1.
     offset : array
-        Radians; equal isometries are equal within an ulp or two.
+        Radians; the offsets of equal isometries agree within one or two ulp.
     low, high : arrays
-        The piece's interval of theta, radians.
+        The interval of theta of the piece, radians.
     sine, cosine : arrays
         The probability times sin(theta) is sine sin(theta) + cosine cos(theta).
     leaf, bounces : arrays of int
-        The number of the leaf, and of its reflections.
+        The index of the leaf, and the number of reflections.
     unresolved : float
-        Share of the opening's flux, sin(theta)/2 dtheta dx/width, whose outgoing angle was not resolved.
+        Fraction of the opening's flux, sin(theta)/2 dtheta dx/width, without resolved outgoing angle.
     unresolved_low, unresolved_high, unresolved_sine, unresolved_cosine : arrays
-        Where that flux is, in pieces likewise.
+        The pieces of the unresolved flux.
     defect : float
-        Distance of the flux of all pieces together from 1.
+        Absolute difference between the total flux of all pieces and 1.
     rounding : float
         Bound on the fraction of the flux that double precision may have put into the wrong leaf.
     complete : bool
-        Whether ``unresolved`` met the tolerance; if not, the budget of beams ran out.
+        Whether ``unresolved`` met the tolerance; if not, the limit of beams was reached.
     """
 
     sign: NDArray[np.int8]
@@ -82,11 +82,11 @@ class Beams:
         return int(self.leaf[-1]) + 1 if len(self.leaf) else 0
 
     def flux(self) -> Floats:
-        """Share of the opening's flux in each piece, shape (pieces,)."""
+        """Return the fraction of the opening's flux in each piece, shape (pieces,)."""
         return _flux(self.low, self.high, self.sine, self.cosine)
 
     def resolved(self) -> float:
-        """Share of the opening's flux in all pieces together."""
+        """Return the fraction of the opening's flux in all pieces together."""
         return float(self.flux().sum())
 
 
@@ -97,21 +97,22 @@ def beams_of(
     max_beams: int = MAX_BEAMS,
     mirror_symmetric: bool = False,
 ) -> Beams:
-    """Sort the rays into a polygonal hollow into beams that are reflected alike.
+    """Divide the rays into a polygonal hollow into beams of equal itinerary.
 
-    The hollow is cut into triangles and carried along by unfolding; a beam is a convex polygon in the projective plane
-    of lines, which every triangle divides by the line through its third vertex. The largest beam is divided first.
+    The hollow is triangulated, and the triangles are unfolded along the rays. A beam is a convex polygon in the
+    projective plane of lines; every triangle divides it by the line through its third vertex. The largest beam is
+    divided first.
 
     Parameters
     ----------
     hollow_vertices : array_like of shape (n, 2)
         The chain from (left, 0) to (right, 0), with the hollow above it: ``wall.vertices[h.first : h.last + 1]``.
     tolerance : float
-        Stop when the unresolved fraction of the flux is no more than this.
+        Largest unresolved fraction of the flux.
     max_beams : int
-        Stop when there are so many beams; cavities with narrow necks never resolve completely.
+        Limit on the number of beams; cavities with narrow necks never resolve completely.
     mirror_symmetric : bool
-        The hollow is its own mirror image: carry half of the rays, those with theta < pi/2, and mirror the result.
+        Whether the hollow is its own mirror image: then only rays with theta < pi/2 are divided, and mirrored.
 
     Returns
     -------
@@ -120,17 +121,17 @@ def beams_of(
     Raises
     ------
     InputError
-        If the chain is no hollow; see `triangulated`.
+        If the chain is not a hollow; see `triangulated`.
     WallError
-        If it crosses itself.
+        If the chain crosses itself.
 
     Notes
     -----
-    Cost: about a microsecond a beam, once compiled.
+    Cost: about 1 microsecond per beam, once compiled.
 
     Examples
     --------
-    A right-angled notch: one reflection, or two and straight back.
+    A right-angled notch reflects once, or twice with retroreflection:
 
     >>> beams = beams_of([(0, 0), (0.5, -0.5), (1, 0)])
     >>> sorted({(int(n), int(s)) for n, s in zip(beams.bounces, beams.sign)})
@@ -175,18 +176,18 @@ def beams_of(
 
 
 def _flux(low: Floats, high: Floats, sine: Floats, cosine: Floats) -> Floats:
-    """Half the integral of sine sin(theta) + cosine cos(theta), as products that do not cancel on short intervals."""
+    """Return half the integral of sine sin(theta) + cosine cos(theta), without cancellation on short intervals."""
     middle, half = 0.5 * (low + high), np.sin(0.5 * (high - low))
     return np.asarray(half * (sine * np.sin(middle) + cosine * np.cos(middle)))
 
 
 def _flux_of(rows: Floats) -> Floats:
-    """The flux of each row of `pieces_of`."""
+    """Return the flux of each row of `pieces_of`."""
     return _flux(*rows[:, (PIECE_LOW, PIECE_HIGH, PIECE_SINE, PIECE_COSINE)].T)
 
 
 def _with_mirror_images(rows: Floats, tags: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
-    """The rows and tags of `pieces_of` with those of the mirror image: both angles replaced by pi minus them."""
+    """Return the rows and tags of `pieces_of` and of the mirror image, with theta and theta' replaced by pi - theta."""
     low, high, sine, cosine, offset = rows.T
     offset = np.where(tags[:, TAG_SIGN] > 0, -offset, 2.0 * np.pi - offset)
     images, named = np.column_stack([np.pi - high, np.pi - low, sine, -cosine, offset]), tags.copy()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.rounding import EPS, UNIT_ROUNDOFF
 
-# Rounding of (b - a) x (c - a), as a fraction of the sum of its two products: Shewchuk 1997, ccwerrboundA.
+# Rounding error of (b - a) x (c - a), relative to the sum of its two products: Shewchuk 1997, ccwerrboundA.
 CROSS_ULPS = 3.0 + 16.0 * EPS
 
 Vector = tuple[int, int]
@@ -20,10 +20,10 @@ Vector = tuple[int, int]
 
 @dataclass(frozen=True, eq=False)
 class ExactPoints:
-    """Points with predicates that are right whatever the rounding; points are named by their index.
+    """Points, given by their index, with exact predicates.
 
-    Doubles are integers times a power of two. Where double precision does not settle a sign, it is that of an
-    expression in these integers, which Python evaluates exactly.
+    Doubles are integers times a power of two. If double precision does not resolve a sign, Python evaluates the
+    expression exactly in these integers.
 
     Parameters
     ----------
@@ -40,25 +40,25 @@ class ExactPoints:
 
     @cached_property
     def _lattice(self) -> list[Vector]:
-        """The points in a unit that divides them all."""
+        """The coordinates as integer multiples of a common unit."""
         ratios = [value.as_integer_ratio() for value in self.points.ravel().tolist()]
         unit = max(denominator for _, denominator in ratios)
         whole = [numerator * (unit // denominator) for numerator, denominator in ratios]
         return list(zip(whole[::2], whole[1::2], strict=True))
 
     def turn(self, a: int, b: int, c: int) -> int:
-        """1 if the path a, b, c turns left, -1 if right, 0 if the points are in line."""
+        """Return 1 if the path a, b, c turns left, -1 if it turns right, 0 if the points are collinear."""
         return int(self.sides(a, b, [c])[0])
 
     def sides(self, a: int, b: int, others: Sequence[int] | NDArray[np.int64]) -> NDArray[np.int8]:
-        """On which side of the line from a to b each other point lies: 1 left, -1 right, 0 on it."""
+        """Return the side of the line from a to b on which each other point lies: 1 left, -1 right, 0 on the line."""
         start, (along, up) = self.points[a], self.points[b] - self.points[a]
         offset = self.points[others] - start
         first, second = along * offset[:, 1], up * offset[:, 0]
         cross = first - second
         signs: NDArray[np.int8] = np.sign(cross).astype(np.int8)
         doubtful = np.abs(cross) <= CROSS_ULPS * UNIT_ROUNDOFF * (np.abs(first) + np.abs(second))
-        # products of exact zeros are zero, for all others the sign is not certain
+        # if both products are exact zeros, the sign is certain
         doubtful &= (first != 0.0) | (second != 0.0)
         for i in doubtful.nonzero()[0].tolist():
             value = self._cross(a, b, int(others[i]))
@@ -66,18 +66,18 @@ class ExactPoints:
         return signs
 
     def is_between(self, a: int, b: int, c: int) -> bool:
-        """Whether the angle at b between the ways to a and to c is more than a right angle."""
+        """Whether the angle at b between the directions to a and to c is more than a right angle."""
         (ax, ay), (cx, cy) = self._step(b, a), self._step(b, c)
         return ax * cx + ay * cy < 0
 
     def are_parallel(self, a: int, b: int) -> bool:
-        """Whether the step from point a to the next one is parallel to that from b to the next one."""
+        """Whether the step from point a to point a + 1 is parallel to the step from point b to point b + 1."""
         (ax, ay), (bx, by) = self._step(a, a + 1), self._step(b, b + 1)
         return ax * by == ay * bx
 
     def enters(self, triangle: Sequence[int], start: int, end: int) -> bool:
-        """Whether a segment meets the open triangle, whose corners are counterclockwise."""
-        # its part inside every side so far, as fractions of integers with positive denominators
+        """Whether a segment meets the open triangle with counterclockwise corners."""
+        # the part inside all sides so far, as integer fractions with positive denominators
         low, high = (0, 1), (1, 1)
         for k in range(3):
             a, b = triangle[k], triangle[(k + 1) % 3]

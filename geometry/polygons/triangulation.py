@@ -17,12 +17,12 @@ from .compiled.codes import FIRST_WALL, OPENING
 from .predicates import ExactPoints
 
 Integers = NDArray[np.int64]
-# Directions in (0, pi] of parallel edges differ by no more than a few rounding errors: an ulp of pi is 2^-51.
+# Difference up to which edges are tested for being parallel, a few rounding errors of directions in (0, pi].
 PARALLEL = 32.0 * UNIT_ROUNDOFF
 
 
 class Mesh(NamedTuple):
-    """A triangulation as compiled loops take it: coordinates of the vertices, and the arrays of `Triangulation`."""
+    """A triangulation for compiled functions: coordinates of the vertices, and the arrays of `Triangulation`."""
 
     x: Floats
     y: Floats
@@ -35,27 +35,27 @@ class Mesh(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Triangulation:
-    """A hollow cut into triangles along diagonals, in its own units: (left, 0) is the origin, the size is about 1.
+    """A hollow cut into triangles along diagonals, with origin (left, 0) and a size of about 1.
 
-    The lengths are divided by ``unit``, a power of two, hence without rounding. Ears are clipped by index, so chains
-    that touch themselves (plates of zero thickness) keep their two sides apart. Triangles of no area occur where
-    vertices are in line; they connect edges like any other.
+    The lengths are divided by ``unit``, a power of two, hence without rounding. Ears are clipped by index, so the two
+    sides of a chain that touches itself (a plate of zero thickness) remain distinct. Collinear vertices give triangles
+    of no area, which connect edges like all others.
 
     Parameters
     ----------
     vertices : array of shape (n, 2)
         The chain from the left to the right end of the opening, translated and scaled.
     unit : float
-        The length that has become 1.
+        The length that is scaled to 1.
     corners : array of shape (n - 2, 3)
         Vertex indices of each triangle, counterclockwise.
     beyond : array of shape (3 (n - 2),)
-        What lies beyond edge k (from corner k to corner k + 1) of triangle t, at 3 t + k: the edge of another
+        At 3 t + k the neighbour at edge k (from corner k to corner k + 1) of triangle t: the edge of another
         triangle, or OPENING, or FIRST_WALL - e for the wall edge from vertex e to vertex e + 1.
     turn_high, turn_low : arrays of shape (n - 1,)
-        The direction of each wall edge in radians, as an unevaluated sum. Parallel edges have equal directions.
+        The direction of each wall edge in radians, as an unevaluated sum; equal for parallel edges.
     entrance : int
-        The edge, in the numbering of ``beyond``, that is the opening.
+        The number of the opening, as an index of ``beyond``.
     """
 
     vertices: Floats
@@ -73,7 +73,7 @@ class Triangulation:
 
     @property
     def tables(self) -> Mesh:
-        """What the compiled loops take."""
+        """The triangulation for compiled functions."""
         x, y = np.ascontiguousarray(self.vertices.T)
         return Mesh(x, y, self.corners, self.beyond, self.turn_high, self.turn_low, self.entrance)
 
@@ -84,7 +84,7 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     Parameters
     ----------
     hollow_vertices : array_like of shape (n, 2)
-        The chain from (left, 0) to (right, 0) with the hollow above it; it may touch but not cross itself.
+        The chain from (left, 0) to (right, 0) with the hollow above it; the chain may touch but not cross itself.
 
     Returns
     -------
@@ -93,14 +93,14 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     Raises
     ------
     InputError
-        If the chain does not run from left to right between two points at height 0, or rises above it.
+        If the chain does not run from left to right between two points at height 0, or rises above height 0.
     WallError
         If no triangulation exists, because the chain crosses itself.
 
     Notes
     -----
-    Ear clipping; cost n^2 for common walls, n^3 at worst. Signs are decided by exact rational arithmetic wherever
-    double precision does not settle them.
+    By ear clipping; cost n^2 for common walls, n^3 at worst. Signs that double precision does not resolve are computed
+    in exact rational arithmetic.
 
     Examples
     --------
@@ -139,9 +139,9 @@ def _checked(hollow_vertices: ArrayLike) -> Floats:
 
 
 def _clipped(chain: ExactPoints, slits_first: bool = False) -> tuple[Integers, Integers]:
-    """Clip ears until nothing is left; the edges remember what lies beyond them.
+    """Clip all ears; return the corners of the triangles and the neighbours of their edges.
 
-    Parts of the hollow that hang together by a point or by a slit of no width need ``slits_first``, which is slower.
+    Hollows whose parts are connected by a point or by a slit of no width need ``slits_first``, which is slower.
     """
     count = len(chain.points)
     ring = list(range(count))
@@ -166,7 +166,7 @@ def _clipped(chain: ExactPoints, slits_first: bool = False) -> tuple[Integers, I
                 beyond[link[owner]] = 3 * triangle + side
         link[a] = 3 * triangle + 2
         if len(ring) == 3:
-            # the last triangle's third side is an edge of the ring as well
+            # the third side of the last triangle is an edge of the ring, too
             beyond[3 * triangle + 2] = link[c]
             if link[c] >= 0:
                 beyond[link[c]] = 3 * triangle + 2
@@ -176,9 +176,10 @@ def _clipped(chain: ExactPoints, slits_first: bool = False) -> tuple[Integers, I
 
 
 def _next_ear(chain: ExactPoints, ring: list[int], first: int, slits_first: bool) -> int:
-    """Position in the ring of a vertex that can be cut off, or -1.
+    """Return the index in the ring of a vertex to cut off, or -1.
 
-    A true ear, or else a vertex in line with its neighbours, or else the end of a slit of no width; or that first.
+    The vertex is a true ear, else a vertex between collinear neighbours, else the end of a slit of no width. With
+    ``slits_first`` the end of a slit has priority.
     """
     size = len(ring)
     straight, slit = -1, -1
@@ -201,7 +202,7 @@ def _next_ear(chain: ExactPoints, ring: list[int], first: int, slits_first: bool
 
 
 def _surrounds(chain: ExactPoints, loop: list[int], point: int) -> bool:
-    """Whether a loop winds around a point: then a fold that ends there is a plate in the hollow, not a slit of it."""
+    """Whether a loop winds around a point; a fold that ends there is then a plate inside the hollow, not a slit."""
     winding, height = 0, chain.points[:, 1]
     for start, end in zip(loop, [*loop[1:], loop[0]], strict=True):
         if height[start] <= height[point] < height[end]:
@@ -225,9 +226,9 @@ def _is_ear(chain: ExactPoints, ring: list[int], k: int) -> bool:
 
 
 def _directions(chain: ExactPoints) -> tuple[Floats, Floats]:
-    """Directions of the edges modulo pi, in two doubles, the same for edges that are exactly parallel.
+    """Return the directions of the edges modulo pi, as two doubles, equal for exactly parallel edges.
 
-    In extended precision where the machine has it: then 10^4 reflections turn by a sum that is good to an ulp.
+    In extended precision if the machine has it: the rotation of 10^4 reflections then has an error of about one ulp.
     """
     wide = np.diff(chain.points.astype(np.longdouble), axis=0)
     flip = (wide[:, 1] < 0) | ((wide[:, 1] == 0) & (wide[:, 0] < 0))

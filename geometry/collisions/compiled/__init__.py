@@ -1,1 +1,1 @@
-"""The compiled collision of the disk: flights, first contacts and reflections."""
+"""The compiled collision of the disk: free motion, first contacts and reflections."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-# position: of the disk, in units of its radius.
+# position of the disk, in units of its radius
 X1 = 0  # x of the centre
 ALPHA = 1  # angle of the disk, radians
 # velocity

@@ -1,15 +1,15 @@
-"""The position of a satellite of the flying disk, and its first contact with a piece of the wall: compiled.
+"""The position of a satellite of the moving disk, and its first contact with a piece of the wall: compiled.
 
-A satellite meets a line or an upright conic where F = 0, see below.
+A satellite meets a line or an upright conic at F = 0, see below.
 
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
-bounds the third one. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is a
-safe step; where the parabola has none, F has none. The steps converge quadratically because c tends to F''. All roots
-of F are visited in their order, in both directions, until one lies on the piece.
+bounds the third derivative. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is
+a safe step; if the parabola has no root, F has none. The steps converge quadratically because c tends to F''. All
+roots of F are visited in order, downward and upward crossings, until one lies on the piece.
 
-**No face is met from behind.** A satellite that leaves one piece within rounding of another one has F = 0 there, too.
-Whether it lies in front of that one is decided by the pieces' own positions, see `sides`: not of the other face of
-a plate without thickness, nor of the other side of a sharp peak.
+**No face is met from behind.** A satellite that leaves one piece within rounding of another piece has F = 0 on both.
+The exact positions of the pieces decide whether it starts in front of the other piece, see `sides`. So the opposite
+face of a plate of zero thickness or of a sharp peak is not hit.
 
 Lengths are in units of the wall, so the disk's radius is 1/scale and the wall's tops are at height 0. In the time t a
 disk with velocities (v1, v2) and spin omega moves a satellite at the angle a from the lowest point by
@@ -20,8 +20,8 @@ which is evaluated by products, without cancellation. A line or an upright conic
 
 F(D) = f + g.D - curvature |D|^2/2     (y multiplied by the arc's stretch; curvature 0 for lines),
 
-where f and g belong to the start of the flight. The tables are those of the planar tracer, see `scene/scene`, with
-circles and ellipses in one table ``arcs``.
+where f and g are constants at the start of the motion. The tables are those of the planar tracer, see `scene/scene`,
+with circles and ellipses in one table ``arcs``.
 """
 
 from __future__ import annotations
@@ -65,27 +65,27 @@ from ...tracing.double_double.sides import ARC as CURVED
 from ...tracing.double_double.sides import LINE as STRAIGHT
 from ...tracing.double_double.sides import Arrival, Face, in_front_at
 
-# The series of `turning` are cut after the tenth power: below this angle the rest is less than 3e-18 of the sum.
+# Angle below which `turning` uses series up to the tenth power; the omitted terms are below 3e-18 of the sum.
 SMALL_TURN = 0.1
 S3, S5, S7, S9 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362880.0
 V2, V4, V6, V8, V10 = 1.0 / 2.0, -1.0 / 24.0, 1.0 / 720.0, -1.0 / 40320.0, 1.0 / 3628800.0
-# A contact is clear, or double precision does not settle it; the codes are those of the statuses of rays.
+# Code of a contact that double precision resolves; the other codes are statuses of rays.
 CLEAR = ESCAPED
-# numba compiles a function again for every literal that it is called with, but not for constants of these types
+# Constants with types, because numba compiles a function again for every literal argument.
 NOTHING, ZERO, NO = np.int64(-1), np.int64(0), np.bool_(False)
-# Of the slack, 16 rounding errors, a root's own error may be this fraction.
+# Largest error of a root, as a fraction of the slack of 16 rounding errors.
 ROOT_FRACTION = 1.0 / 16.0
-# Incidences below 1e-6 radians are treated as that one, so that the slack stays far below the pieces' lengths.
+# Largest factor of the slack at shallow incidence (1e-6 radians); it keeps the slack far below the pieces' lengths.
 WIDEST_SLACK = 1e6
-# A near tangency halves its distance at every step at worst, from the wall's size to its rounding in about 100 steps.
-# The others are for disks that sink slowly while they turn fast: a step is a few of the wall's sizes on the rim.
+# Limit on steps. Near a tangency a step at worst halves the distance, which takes about 100 steps from the wall's size
+# to its rounding. Disks that sink slowly and rotate fast need more: a step is a few sizes of the wall along the rim.
 ROOT_STEPS = 100_000
-# Circles and ellipses together, a number that no kind of piece of the planar tracer has.
+# Kind of circles and ellipses together, a number that no kind of piece of the planar tracer has.
 ARC = 8
 
 
 class Motion(NamedTuple):
-    """A flight: the velocities, the rate of the disk's angle, the disk's radius, and a bound of a satellite's speed."""
+    """Free motion: velocities, rate of the disk's angle, radius of the disk, and a bound on a satellite's speed."""
 
     v1: float
     v2: float
@@ -96,7 +96,7 @@ class Motion(NamedTuple):
 
 
 class State(NamedTuple):
-    """Displacement of a satellite since the start of a flight, and the sine and cosine of its angle."""
+    """Displacement of a satellite since the start of the motion, and the sine and cosine of its angle."""
 
     dx: float
     dy: float
@@ -105,7 +105,7 @@ class State(NamedTuple):
 
 
 class Touching(NamedTuple):
-    """Where a satellite touches the wall: kind and number of the piece, and the hollow, -1 on the tops."""
+    """The piece that a satellite touches: kind and number of the piece, and the hollow, -1 on the tops."""
 
     kind: int
     piece: int
@@ -113,9 +113,9 @@ class Touching(NamedTuple):
 
 
 class Path(NamedTuple):
-    """A satellite during a flight: where it starts, sine and cosine of its angle there, the flight, and the slack.
+    """A moving satellite: starting position, sine and cosine of the angle there, the motion, and the slack.
 
-    By rounding it may be off by the slack.
+    The slack bounds the rounding error of the position.
     """
 
     x: float
@@ -126,7 +126,7 @@ class Path(NamedTuple):
 
 
 class Span(NamedTuple):
-    """A part [t, end) of a flight, and the `turning` until t."""
+    """A time interval [t, end), and the `turning` until t."""
 
     t: float
     end: float
@@ -145,17 +145,17 @@ class Touch(NamedTuple):
 
 @inlined
 def flight(v1, v2, omega, scale):
-    """The flight of a disk of radius 1/scale."""
+    """Return the free motion of a disk of radius 1/scale."""
     return Motion(v1, v2, omega, scale * omega, 1.0 / scale, math.sqrt(v1 * v1 + v2 * v2) + abs(omega))
 
 
 @inlined
 def turning(angle):
-    """Sine of an angle and 1 - its cosine, without cancellation and quickly where it is small."""
+    """Return sin(angle) and 1 - cos(angle), without cancellation and quickly for small angles."""
     if abs(angle) < SMALL_TURN:
         z = angle * angle
         z2 = z * z
-        # in pairs, so that no product waits for more than four others
+        # in pairs, for short chains of dependent products
         sine = angle + angle * z * (S3 + z * S5 + z2 * (S7 + z * S9))
         return sine, z * (V2 + z * V4 + z2 * (V6 + z * V8 + z2 * V10))
     half = math.sin(0.5 * angle)
@@ -164,9 +164,9 @@ def turning(angle):
 
 @inlined
 def satellite_after(t, rotation, turn, motion):
-    """Displacement (2) of a satellite after the time t, and the sine and cosine of its angle then.
+    """Return the State of a satellite after the time t.
 
-    ``turn`` is (sin a, cos a) at the start, and ``rotation`` is the `turning` since then.
+    ``turn`` is (sin a, cos a) at the start; ``rotation`` is the `turning` since the start.
     """
     sine, cosine = turn
     sin_d, versed_d = rotation
@@ -177,7 +177,7 @@ def satellite_after(t, rotation, turn, motion):
 
 @inlined
 def towards_line(level, g1, g2, turn, motion):
-    """F of a line with f = level along a flight: (level, rate, a, b) for level + rate t + a sin d + b (1 - cos d)."""
+    """Return F of a line with f = level: (level, rate, a, b) for F = level + rate t + a sin d + b (1 - cos d)."""
     sine, cosine = turn
     a, b = motion.radius * (g1 * cosine + g2 * sine), motion.radius * (g2 * cosine - g1 * sine)
     return level, g1 * motion.v1 + g2 * motion.v2, a, b
@@ -185,7 +185,7 @@ def towards_line(level, g1, g2, turn, motion):
 
 @inlined
 def line_after(line, t, rotation, motion):
-    """F of a line after the time t and its first two derivatives."""
+    """Return F of a line after the time t and its first two derivatives."""
     level, rate, a, b = line
     sin_d, versed_d = rotation
     f1 = rate + motion.spin * (a + b * sin_d - a * versed_d)
@@ -195,7 +195,7 @@ def line_after(line, t, rotation, motion):
 
 @inlined
 def conic_after(conic, t, rotation, turn, motion):
-    """F of a conic after the time t, two derivatives, and b0 and b1: the third one up to t + s is at most b0 + b1 s."""
+    """Return F of a conic after the time t, F', F'', and b0 and b1: |F'''| is at most b0 + b1 s up to t + s."""
     level, g1, g2, curvature, stretch = conic
     dx, dy, sine, cosine = satellite_after(t, rotation, turn, motion)
     dy *= stretch
@@ -212,7 +212,7 @@ def conic_after(conic, t, rotation, turn, motion):
 
 @inlined
 def safe_step(f, f1, c):
-    """First positive root of the parabola f + f1 t + c t^2/2 with f >= 0, or inf; 0 only where f = 0 > f1."""
+    """Return the first positive root of the parabola f + f1 t + c t^2/2, f >= 0, or inf; 0 only if f = 0 > f1."""
     disc = f1 * f1 - 2.0 * c * f
     if f1 < 0.0:
         return 2.0 * f / (math.sqrt(disc) - f1) if disc >= 0.0 else np.inf
@@ -221,12 +221,12 @@ def safe_step(f, f1, c):
 
 @compiled
 def next_root(sign, leaving, line, conic, span, path, patience):
-    """-> (t, turned, code): first time in the span at which sign F falls through 0, inf if none; turning until then.
+    """-> (t, rotation, code): first time in the span at which sign F falls through 0, inf if none; `turning` until t.
 
-    F is that of a ``line``, see `towards_line`, or of a ``conic`` (f, g1, g2, curvature, stretch); the other one is
-    None. ``leaving`` says that F is 0 to rounding at the start of the span, a root that is not to be found again, and
-    ``patience`` is the longest time for which the bounds are worth having. Where the steps run out the time is the last
-    one up to which there is no root, and the code `BOUNCE_LIMIT`.
+    F is given by a ``line``, see `towards_line`, or by a ``conic`` (f, g1, g2, curvature, stretch); the other one is
+    None. ``leaving`` means that F is 0 to rounding at the start of the span; this root is not returned. ``patience`` is
+    the longest time for which the bounds on F are useful. After ROOT_STEPS steps the code is `BOUNCE_LIMIT`, and t is
+    the time up to which there is no root.
     """
     t, end, rotation = span
     turn, motion, slack = path.turn, path.motion, path.slack
@@ -242,14 +242,14 @@ def next_root(sign, leaving, line, conic, span, path, patience):
                 return t, rotation, GRAZING
             f = 0.0
         elif f <= 0.0:
-            # at the start: behind the piece by a rounding error
+            # at the start, the satellite is behind the piece by a rounding error
             return t, rotation, CLEAR if number > 0 else CORNER
         ahead = min(end - t, patience)
         doubt = (third + growth * ahead) * ahead
         step = safe_step(f, f1, f2 - doubt)
         if step >= ahead:
             if f2 - doubt > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
-                # so near a tangency that rounding decides between two roots and none
+                # near a tangency, where rounding decides between two roots and none
                 t -= f1 / f2
                 return t, turning(motion.spin * t), GRAZING
             if end - t <= patience:
@@ -258,7 +258,7 @@ def next_root(sign, leaving, line, conic, span, path, patience):
         before = t
         t += step
         rotation = turning(motion.spin * t)
-        # what F may still be there is its gap to the parabola; far below the slack it counts as 0
+        # F at the new t is at most its distance from the parabola; far below the slack it counts as 0
         if step < ahead and (doubt * step * step <= ROOT_FRACTION * slack or t == before):
             return t, rotation, CLEAR
     else:
@@ -268,7 +268,7 @@ def next_root(sign, leaving, line, conic, span, path, patience):
 
 @inlined
 def where_on_line(joints, lines, j, x, y, slack):
-    """How a point of the line through segment j lies to the segment: inside, and within the slack of a corner."""
+    """-> (inside, corner): whether a point of the line through segment j is on it, and within the slack of a corner."""
     along = (x - joints[j, JOINT_X]) * lines[j, EDGE_X] + (y - joints[j, JOINT_Y]) * lines[j, EDGE_Y]
     length = lines[j, LENGTH]
     from_start, from_end = along / length, length - along / length
@@ -279,9 +279,9 @@ def where_on_line(joints, lines, j, x, y, slack):
 
 @compiled
 def is_in_front(kind, number, own, x, y, slack, ground):
-    """-> bool: whether a satellite at (x, y) on one piece lies in front of another one, within the slack of it."""
+    """-> bool: whether a satellite at (x, y) on the piece ``own`` lies in front of another piece close by."""
     own_arc, arc = own.piece if own.kind == ARC else 0, number if kind == ARC else 0
-    # there are no Bezier pieces, and no flight: a face that it came through in that is not looked for
+    # without Bezier pieces, and without a test for faces passed from behind on the last path
     row, other, nowhere = ground.exact_arcs[own_arc], ground.exact_arcs[arc], (0.0, 0.0)
     start = Face(CURVED if own.kind == ARC else STRAIGHT, own.piece, row, row, nowhere)
     piece = Face(CURVED if kind == ARC else STRAIGHT, number, other, other, nowhere)
@@ -291,7 +291,7 @@ def is_in_front(kind, number, own, x, y, slack, ground):
 
 @inlined
 def line_form(number, is_own, path, ground):
-    """-> line: F of a line along a flight, see `towards_line`."""
+    """-> line: F of a line along a path, see `towards_line`."""
     joints, lines = ground.joints, ground.lines
     g1, g2 = lines[number, LINE_NORMAL_X], lines[number, LINE_NORMAL_Y]
     level = 0.0 if is_own else g1 * (path.x - joints[number, JOINT_X]) + g2 * (path.y - joints[number, JOINT_Y])
@@ -300,7 +300,7 @@ def line_form(number, is_own, path, ground):
 
 @inlined
 def conic_form(number, is_own, path, ground):
-    """-> conic: F of an arc along a flight, (f, g1, g2, curvature, stretch)."""
+    """-> conic: F of an arc along a path, (f, g1, g2, curvature, stretch)."""
     arcs = ground.arcs
     curvature, stretch = arcs[number, CURVATURE], arcs[number, STRETCH]
     rx, ry = path.x - arcs[number, START_X], stretch * (path.y - arcs[number, START_Y])
@@ -314,7 +314,7 @@ def stays_in_front(line, span, leaving, motion, slack):
     """-> bool: whether a line is certainly not met in the span."""
     here, rate, bend = line_after(line, span.t, span.rotation, motion)
     ahead = span.end - span.t
-    # F lies above a parabola that is not convex, and so above the lower one of its ends
+    # F lies above a concave parabola, and so above the lower of its end values
     doubt = motion.spin * motion.spin * abs(motion.omega) * ahead
     lowest = here + (rate + 0.5 * min(bend - doubt, 0.0) * ahead) * ahead
     return lowest > slack and (here > slack or (leaving and rate > 0.0))
@@ -322,9 +322,9 @@ def stays_in_front(line, span, leaving, motion, slack):
 
 @inlined
 def where_on_piece(kind, number, path, state, inward, ground):
-    """-> (inside, corner): how a point on the line or the conic of a piece lies to the piece; see `where_on_line`.
+    """-> (inside, corner): whether a point of the line or conic of a piece is on it; see `where_on_line`.
 
-    At a shallow incidence a rounding error across the piece is a longer way along it.
+    At shallow incidence a rounding error across the piece is a larger error along it.
     """
     x, y = path.x + state.dx, path.y + state.dy
     wide = path.slack * max(1.0, min(path.motion.fastest / abs(inward), WIDEST_SLACK))
@@ -339,7 +339,7 @@ def where_on_piece(kind, number, path, state, inward, ground):
 def first_on_piece(kind, number, own, path, span, size, ground):
     """-> (t, state, code): first contact in the span of one satellite with the front of one piece, inf if none.
 
-    ``own`` is the piece on which the flight starts, if any.
+    ``own`` is the piece on which the path starts, if any.
     """
     t, end, rotation = span
     motion, slack = path.motion, path.slack
@@ -361,7 +361,7 @@ def first_on_piece(kind, number, own, path, span, size, ground):
         return np.inf, satellite_after(t, rotation, path.turn, motion), CLEAR
     sign = 1.0 if here >= 0.0 or (here >= -slack and rate < 0.0) else -1.0
     if leaving:
-        # to the front, or, from the back of a face, away from it
+        # the side to which the satellite moves: the front of its own piece, either side of another one
         sign = 1.0 if is_own or rate > 0.0 else -1.0
     while True:
         rest = Span(t, end, rotation)
@@ -383,7 +383,7 @@ def first_on_piece(kind, number, own, path, span, size, ground):
             if inside:
                 return t, state, CORNER if corner else code
         if code == GRAZING:
-            # a tangency beside the piece: of a line it is the only one, and of a circle the way leads on outside
+            # a tangency beside the piece: a line has no other, and the path stays outside a circle
             return np.inf, state, CLEAR
         if code == CLEAR or inward < 0.0:
             sign = -sign
@@ -392,10 +392,10 @@ def first_on_piece(kind, number, own, path, span, size, ground):
 
 @inlined
 def first_in_hollow(h, own, came_from, path, span, ground):
-    """-> Touch: the first contact of one satellite with the pieces of the hollow h.
+    """-> Touch: the first contact of one satellite with the pieces of hollow h.
 
-    For an open wall the sides of the cell count as pieces; ``came_from`` is -1 or 1 for a satellite that has just come
-    in through the left or the right one.
+    The sides of the cell of an open wall count as pieces. ``came_from`` is -1 or 1 if the satellite has just entered
+    through the left or the right side.
     """
     hollows, joints, motion = ground.hollows, ground.joints, path.motion
     t, end, rotation = span

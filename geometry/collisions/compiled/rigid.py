@@ -1,7 +1,6 @@
-"""The compiled collision of the disk with satellites: flights and reflections until it is back at height 0.
+"""The compiled collision of the disk with satellites: free motion and reflections until its return to height 0.
 
-Only `collisions/rigid` and `collisions/cylinder` import this file, inside functions, because it loads numba. Lengths
-are in units of the wall, see `contact`.
+Loads numba. Lengths are in units of the wall, see `contact`.
 """
 
 from __future__ import annotations
@@ -55,18 +54,18 @@ from .contact import (
 )
 
 TOP = 7
-# Cells that one satellite may pass, and satellites that may pass the lowest point, in one flight.
+# Limit on the cells that one satellite passes, and on the satellites that pass the lowest point, between two contacts.
 MOST_CELLS = 1_000_000
 
-# Cells, or satellites, between two checks of the flag that tells a disk to end: a power of 2.
+# Cells, or satellites, between two reads of the flag that interrupts a disk: a power of 2.
 CELLS_A_CHECK = 1024
 
-# A time that no flight takes, but that is not infinite: bounds are multiplied by it.
+# A time longer than any motion, but finite, because bounds are multiplied by it.
 FOREVER = 1e30
 
 
 class Below(NamedTuple):
-    """A satellite that is below the tops: its number, its hollow (-1: there is none), and its cell's left end."""
+    """A satellite below the tops: its number, its hollow (-1: no such satellite), and the left end of its cell."""
 
     number: int
     hollow: int
@@ -74,7 +73,7 @@ class Below(NamedTuple):
 
 
 class Chosen(NamedTuple):
-    """A satellite that touches the wall: its number, where it is then, and the sine and cosine of its angle."""
+    """A satellite that touches the wall: its number, its position, and the sine and cosine of its angle."""
 
     number: int
     x: float
@@ -84,7 +83,7 @@ class Chosen(NamedTuple):
 
 @inlined
 def hollow_at(hollows, entry):
-    """The hollow over which a position of the cell lies, or -1 over a flat top."""
+    """Return the hollow whose opening contains a position of the cell, or -1 at a flat top."""
     h = last_hollow(entry, hollows)
     return h if h >= 0 and entry < hollows[h, RIGHT] else -1
 
@@ -102,9 +101,9 @@ def near_edge(hollows, entry, slack):
 
 @compiled
 def descent(path, span, ground):
-    """-> (t, turned, h, base, code): when and where a satellite comes below the tops in the span, inf if it does not.
+    """-> (t, rotation, h, base, code): the time at which a satellite comes below the tops in the span, or inf.
 
-    With the turning until then, the hollow (-1 where it meets a flat top) and its cell's left end.
+    Also the `turning` until t, the hollow (-1 at a flat top), and the left end of its cell.
     """
     x, y, turn, motion, slack = path
     t, end, rotation = span
@@ -122,9 +121,9 @@ def descent(path, span, ground):
         return t, rotation, 0, base, CLEAR
     entry = x + dx - base
     rising = motion.v2 + motion.omega * sine
-    # at a shallow incidence a rounding error of the height is a longer way along the tops
+    # at shallow incidence a rounding error of the height is a larger error along the tops
     near = near_edge(ground.hollows, entry, slack * max(1.0, motion.fastest / abs(rising)))
-    # one that rises from below the tops has not come in by a known way: it touches them together with another one
+    # a satellite that rises below the tops did not enter from above: it and another one touch at the same time
     return t, rotation, hollow_at(ground.hollows, entry), base, CORNER if near or rising >= 0.0 else CLEAR
 
 
@@ -132,14 +131,14 @@ def descent(path, span, ground):
 def first_contact(own, base, path, t, end, ground):
     """-> (Touch, h, base): the first contact in [t, end) of one satellite with the wall, its hollow and cell.
 
-    The flight starts on ``own``, of which the hollow is in the cell that begins at ``base``; above the tops that is -1.
+    The path starts on ``own``. Its hollow, -1 above the tops, is in the cell that begins at ``base``.
     """
     x, y, turn, motion, slack = path
     rotation = turning(motion.spin * t) if t > 0.0 else (0.0, 0.0)
     state = satellite_after(t, rotation, turn, motion)
     h = own.hollow
     if own.kind == TOP:
-        # it rises, and its path bends upward
+        # the satellite rises, and its path is convex
         return Touch(np.inf, NO_PIECE, -1, state, CLEAR), -1, base
     if h < 0:
         t, rotation, h, base, code = descent(path, Span(t, end, rotation), ground)
@@ -168,7 +167,7 @@ def first_contact(own, base, path, t, end, ground):
 
 @inlined
 def surface(kind, index, x, y, ground):
-    """The point (x, y) put back on the piece that it hit, and the unit normal there, towards the free side."""
+    """Return the point (x, y) projected onto the piece that is hit, and the unit normal towards the free side."""
     joints, lines, arcs = ground.joints, ground.lines, ground.arcs
     if kind == LINE:
         n1, n2 = lines[index, LINE_NORMAL_X], lines[index, LINE_NORMAL_Y]
@@ -191,10 +190,10 @@ def surface(kind, index, x, y, ground):
 
 @inlined
 def satellite_at(x, y, turn, j, ring):
-    """Where the j-th satellite after the one at (x, y) and the angle (sine, cosine) is, and its angle alike.
+    """Return the position and (sine, cosine) of the j-th satellite after the one at (x, y) and ``turn``.
 
-    It is a chord away, so that its position is not the difference of two of the disk's size. For neighbours, nearly all
-    that are asked for, no sine is computed.
+    The position is computed from a chord, without cancellation of numbers of the disk's size. For neighbours, by far
+    the most frequent case, no sine is computed.
     """
     half_sine, half_cosine = j * ring.half_sine, ring.half_cosine
     if abs(j) != 1:
@@ -208,9 +207,10 @@ def satellite_at(x, y, turn, j, ring):
 
 @inlined
 def lowest_until(time, angle, away, height, motion):
-    """A bound from below of a satellite's height until then; it starts at ``angle``, which grows if it turns ``away``.
+    """Return a lower bound on a satellite's height until ``time``.
 
-    The disk's lowest point starts at ``height``, and 1 - cos a is at least a^2/2 - a^4/24.
+    The satellite starts at ``angle``, which increases in absolute value if ``away``. The disk's lowest point starts at
+    ``height``, and 1 - cos a >= a^2/2 - a^4/24.
     """
     nearest = abs(angle) if away else max(abs(angle) - abs(motion.spin) * time, 0.0)
     square = nearest * nearest
@@ -219,7 +219,7 @@ def lowest_until(time, angle, away, height, motion):
 
 @inlined
 def out_of_reach_after(angle, motion, ring):
-    """When a satellite now at ``angle`` is out of reach, with a spacing to spare; after a turn it comes as another."""
+    """Return when a satellite at ``angle`` is out of reach by a spacing; after a full turn it counts as another one."""
     if motion.spin == 0.0:
         return np.inf
     ahead = -angle if motion.spin > 0.0 else angle
@@ -230,7 +230,7 @@ def out_of_reach_after(angle, motion, ring):
 def first_of_all(own, below, path, height, angle, end, ring, ground):
     """-> (t, Touching, base, Chosen, code): the first contact of any satellite before ``end``; t is ``end`` if none.
 
-    The path is that of satellite 0, which starts on ``own``; the disk is at ``height``.
+    ``path`` is the path of satellite 0, which starts on ``own``; the disk is at ``height``.
     """
     x, y, turn, motion, slack = path
     reach, rate = ring.reach, abs(motion.spin)
@@ -253,13 +253,13 @@ def first_of_all(own, below, path, height, angle, end, ring, ground):
         if beyond > 0.0 and (away or beyond >= rate * time):
             break
         if j != 0 and lowest_until(time, other, away, height, motion) <= 2.0 * slack:
-            # two contacts are at one time if the disk falls less than the slack between them
+            # two contacts are simultaneous if the disk falls less than the slack between them
             tie = slack / max(abs(motion.v2), motion.fastest / WIDEST_SLACK) if hit.kind != NO_PIECE else 0.0
             until = min(time + tie, out_of_reach_after(other, motion, ring))
             start = beyond / rate if beyond > 0.0 else 0.0
             x_other, y_other, turn_other = satellite_at(x, y, turn, j, ring)
             sine_other, _ = turn_other
-            # the path bends upward, so that it stays above its first tangent
+            # the path is convex, so it stays above its first tangent
             if start > 0.0 or y_other <= 0.0 or y_other + (motion.v2 + motion.omega * sine_other) * until < 0.0:
                 inside, left = (below.hollow, below.base) if j == below.number else (NOTHING, 0.0)
                 there = Path(x_other, y_other, turn_other, motion, slack)
@@ -279,10 +279,10 @@ def first_of_all(own, below, path, height, angle, end, ring, ground):
 
 @compiled
 def left_below(own, below, path, angle, time, chosen, ring, ground):
-    """-> Below: the neighbour of the satellite that touches the wall that is below the tops then.
+    """-> Below: the neighbour, if any, that is below the tops when the satellite ``chosen`` touches the wall.
 
-    Under an overhang its position does not tell its hollow; where it came in does. At most one satellite is below the
-    tops beside the one that touches.
+    Its hollow follows from the position where it came below the tops, not from its present position, which may be under
+    an overhang. At most one satellite besides ``chosen`` is below the tops.
     """
     if ground.is_open:
         return Below(ZERO, NOTHING, 0.0)
@@ -301,7 +301,7 @@ def left_below(own, below, path, angle, time, chosen, ring, ground):
                 x_other, y_other, turn_other = satellite_at(path.x, path.y, path.turn, j, ring)
                 start = 0.0
                 if abs(other) > ring.reach:
-                    # it came within reach on the way
+                    # the satellite came within reach after the start
                     start = (abs(other) - ring.reach) / abs(motion.spin)
                 there = Path(x_other, y_other, turn_other, motion, path.slack)
                 t, _, h, base, _ = descent(there, Span(start, time, turning(motion.spin * start)), ground)
@@ -312,7 +312,7 @@ def left_below(own, below, path, angle, time, chosen, ring, ground):
 
 @inlined
 def reflect(v1, v2, omega, n1, n2, turn, disk):
-    """Velocities after an impulse along the wall's normal n at a satellite: specular in the kinetic metric."""
+    """Return the velocities after an impulse along the wall normal n at a satellite: specular in the kinetic metric."""
     mass, inertia = disk
     sine, cosine = turn
     by_mass, by_inertia = 1.0 / mass, 1.0 / inertia
@@ -322,7 +322,7 @@ def reflect(v1, v2, omega, n1, n2, turn, disk):
     v1 += impulse * n1 * by_mass
     v2 += impulse * n2 * by_mass
     omega += impulse * arm * by_inertia
-    # one Newton step on the kinetic norm keeps rounding errors from adding up
+    # one Newton step on the kinetic norm prevents rounding errors from adding up
     energy = mass * (v1 * v1 + v2 * v2) + inertia * omega * omega
     scale = 1.5 - 0.5 * energy
     return scale * v1, scale * v2, scale * omega
@@ -330,7 +330,7 @@ def reflect(v1, v2, omega, n1, n2, turn, disk):
 
 @inlined
 def longest_flight(height, motion, ring):
-    """-> float: a time by which the disk is back, or would be lower than it can be; -inf if there is none."""
+    """-> float: a time by which the disk is back or lower than possible without contact; -inf if there is none."""
     if motion.v2 > 0.0:
         return max(-height / motion.v2, 0.0)
     if motion.v2 < 0.0:
@@ -342,10 +342,10 @@ def longest_flight(height, motion, ring):
 
 @inlined
 def collide_disk(entry, angle, velocity, disk, ring, limit, ground):
-    """-> (displacement, turn, time, velocity, contacts, two, status): one collision of a disk that comes down.
+    """-> (displacement, rotation, time, velocity, contacts, two, status): one collision of an incoming disk.
 
-    It is at height 0, its lowest satellite at ``angle`` from the lowest point. ``disk`` is (m, J) with m + J = 1. The
-    velocities have kinetic norm 1. ``two`` says whether two satellites took part.
+    The disk starts at height 0, its lowest satellite at ``angle`` from the lowest point. ``disk`` is (m, J) with
+    m + J = 1. The velocities have kinetic norm 1. ``two`` tells whether more than one satellite touched the wall.
     """
     scale, spacing = ring.scale, ring.spacing
     v1, v2, omega = velocity
@@ -387,7 +387,7 @@ def collide_disk(entry, angle, velocity, disk, ring, limit, ground):
 
 @inlined
 def unit_velocity(velocity, i, disk):
-    """-> (norm, unit): the kinetic norm of a disk's velocity, and that divided by it."""
+    """-> (norm, unit): the kinetic norm of a disk's velocity, and the velocity divided by its norm."""
     mass, inertia = disk
     norm = math.sqrt(mass * (velocity[i, V1] ** 2 + velocity[i, V2] ** 2) + inertia * velocity[i, OMEGA] ** 2)
     return norm, (velocity[i, V1] / norm, velocity[i, V2] / norm, velocity[i, OMEGA] / norm)
@@ -395,7 +395,7 @@ def unit_velocity(velocity, i, disk):
 
 @compiled
 def collide_disks(position, velocity, disk, ring, limit, ground, results):
-    """Collide a block of disks; fills the results, see `DiskResults`."""
+    """Collide a block of disks into ``results``, see `DiskResults`."""
     scale, spacing = ring.scale, ring.spacing
     width = scale * ground.cell
     for i in range(position.shape[0]):
@@ -419,7 +419,7 @@ def collide_disks(position, velocity, disk, ring, limit, ground, results):
 
 @inlined
 def roll_disk(entry, velocity, disk, rolling, limit, ground):
-    """-> (displacement, turn, time, velocity, contacts, status): one collision on the cylinder.
+    """-> (displacement, rotation, time, velocity, contacts, status): one collision on the cylinder.
 
     The contact moves on a straight line with the velocity (v1 + omega, v2) and starts at (position, 0).
     """
@@ -460,7 +460,7 @@ def roll_disk(entry, velocity, disk, rolling, limit, ground):
 
 @compiled
 def roll_disks(position, velocity, disk, rolling, limit, ground, results):
-    """Collide a block of disks on the cylinder; fills the results, see `DiskResults`."""
+    """Collide a block of disks on the cylinder into ``results``, see `DiskResults`."""
     scale = rolling.scale
     for i in range(position.shape[0]):
         if is_raised(ground.stop):

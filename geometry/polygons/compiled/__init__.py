@@ -1,1 +1,1 @@
-"""The compiled loop that splits beams, and its tables."""
+"""The compiled function that splits beams, and its tables."""

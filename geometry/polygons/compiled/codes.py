@@ -1,7 +1,7 @@
-"""Codes of an edge of a triangle of a hollow beyond which the opening or a wall lies."""
+"""The codes in `Triangulation.beyond` for edges of triangles at the opening or at a wall."""
 
 from __future__ import annotations
 
-# Codes in `Triangulation.beyond`: at least 0 another triangle's edge; else the opening, or `FIRST_WALL - edge`.
+# Numbers >= 0 are edges of other triangles; a wall edge e has the code FIRST_WALL - e.
 OPENING = -1
 FIRST_WALL = -2

@@ -1,12 +1,9 @@
-"""The tables of the compiled loop that splits beams, and the heap that holds the largest beam on top.
-
-A slot of ``corners``, ``whole`` and ``real`` is one beam.
-"""
+"""The columns of the tables of the function that splits beams; a slot of ``corners``, ``whole``, ``real`` is a beam."""
 
 from __future__ import annotations
 
-# corners[slot, i]: vertex i of the beam's polygon, a line, counterclockwise in (theta, p).
-LINE_P = 0  # its height over the origin times sin(theta)
+# corners[slot, i]: vertex i of the beam's polygon, which is a line; counterclockwise in (theta, p).
+LINE_P = 0  # x at height 0 times sin(theta)
 LINE_S = 1  # sin(theta)
 LINE_C = 2  # cos(theta)
 CUT_X = 3  # the unfolded point whose functional vanishes on the edge to vertex i + 1
@@ -15,10 +12,10 @@ VERTEX_COLUMNS = 5
 
 # whole[slot], integers.
 COUNT = 0  # number of vertices
-EDGE = 1  # the triangle's edge by which the beam comes in
+EDGE = 1  # the triangle's edge through which the beam enters
 SIGN = 2  # 1 or -1: orientation of the unfolding isometry
 BOUNCES = 3
-LEAF = 4  # 1 for a beam that has left
+LEAF = 4  # 1 for a beam that has left the hollow
 WHOLE_COLUMNS = 5
 
 # real[slot]: the flux, then the unfolding isometry V -> R V + T in two parts each, and the rounding errors of T.
@@ -33,13 +30,13 @@ ERROR_X = 7
 ERROR_Y = 8
 REAL_COLUMNS = 9
 
-# wall_lines: a row for each edge of the hollow.
+# wall_lines: one row for each edge of the hollow.
 WALL_NORMAL_X = 0  # unit normal
 WALL_NORMAL_Y = 1
-WALL_DISTANCE = 2  # of the line from the origin, along the normal
+WALL_DISTANCE = 2  # distance of the line from the origin, along the normal
 WALL_COLUMNS = 3
 
-# The rows of `pieces_of`: an interval of theta (radians), the probability times sin(theta), the offset of theta'.
+# Rows of `pieces_of`: an interval of theta (radians), the probability times sin(theta), the offset of theta'.
 PIECE_LOW = 0
 PIECE_HIGH = 1
 PIECE_SINE = 2  # factor of sin(theta)
@@ -47,7 +44,7 @@ PIECE_COSINE = 3  # factor of cos(theta)
 PIECE_OFFSET = 4  # radians
 PIECE_COLUMNS = 5
 
-# Its tags, integers.
+# Tags of `pieces_of`, integers.
 TAG_LEAF = 0  # number of the leaf
 TAG_SIGN = 1
 TAG_BOUNCES = 2

@@ -1,4 +1,4 @@
-"""The heap of the compiled loop that splits beams, with the largest beam on top, and copies of beams. Loads numba."""
+"""The heap of beams, with the beam of largest flux on top, and copies of beams: compiled. Loads numba."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .columns import FLUX, VERTEX_COLUMNS
 
 
 class BeamTables(NamedTuple):
-    """The tables of beams, see `columns`, and the heap: slots, as many as the loop says."""
+    """The tables of beams, see `columns`, and the heap of slots, whose size is stored elsewhere."""
 
     corners: Floats
     real: Floats
@@ -23,7 +23,7 @@ class BeamTables(NamedTuple):
 
 @inlined
 def push(heap, size, real, slot):
-    """Put a beam on the heap; returns its new size."""
+    """Put a beam on the heap; return the new size of the heap."""
     i = size
     heap[i] = slot
     while i > 0:
@@ -37,7 +37,7 @@ def push(heap, size, real, slot):
 
 @inlined
 def pop(heap, size, real):
-    """Take the beam of most flux off the heap; returns it and the new size."""
+    """Remove the beam of largest flux from the heap; return its slot and the new size of the heap."""
     top = heap[0]
     size -= 1
     heap[0] = heap[size]
@@ -57,7 +57,7 @@ def pop(heap, size, real):
 
 @inlined
 def copied(slot, real, whole, new):
-    """Copy a beam's numbers, but for its polygon, to a new slot."""
+    """Copy the numbers of a beam, without its polygon, to a new slot."""
     for k in range(real.shape[1]):
         real[new, k] = real[slot, k]
     for k in range(whole.shape[1]):

@@ -1,9 +1,9 @@
-"""The compiled loop that splits beams at the vertices of a triangulated hollow.
+"""The compiled function that splits beams at the vertices of a triangulated hollow.
 
-A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0, and an
-unfolded vertex (X, Y) is the functional f = X s - Y c - p, positive where it lies right of the line. A beam is a convex
-polygon of such vectors. The generators have p, s and abs(c) of one sign, and cutting only mixes them with positive
-weights: every component keeps its relative accuracy down to grazing. `columns` says where a beam's numbers stand.
+A line of direction theta is the vector (p, s, c) with s = sin theta, c = cos theta, p = x s at height 0. An unfolded
+vertex (X, Y) is the functional f = X s - Y c - p, positive if the vertex lies right of the line. A beam is a convex
+polygon of such vectors. The generators have p, s and abs(c) of one sign, and cutting combines them with positive
+weights only, so every component has full relative accuracy down to grazing angles. `columns` describes the tables.
 """
 
 from __future__ import annotations
@@ -62,32 +62,32 @@ from .columns import (
 from .heap import BeamTables, copied, pop, push, put
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
-# f is a sum of five products of numbers with one to three rounding errors each; every term is counted in `f`'s size.
+# Rounding error of f, in eps times the sum of the absolute terms: five products of numbers with one to three errors.
 FUNCTIONAL_ULPS = 8.0
-# T gains 2 d R n at a reflection: d, n, R and the two products have one rounding error each.
+# Rounding error of 2 d R n, by which a reflection changes T: d, n, R and the two products have one error each.
 STEP_ULPS = 4.0
 DONE, BUDGET = 0, 1
-# The open flux is a running sum; it is added up anew this often.
+# Number of splits after which the running sum of the open flux is computed anew.
 RECOUNT = 4096
-# A beam may pass this many triangles for every beam that the budget allows.
+# Limit on the triangles passed by all beams, per beam allowed.
 STEPS_A_BEAM = 64
-# Slots of the tables, and vertices of a beam, to begin with.
+# Initial number of slots in the tables, and of vertices per beam.
 ROOM, WIDE = 1024, 12
 
 
 @_compile
 def reduced(high, low):
-    """An angle in two doubles, modulo 2 pi, in [-pi, pi] within rounding."""
+    """Return an angle, given as two doubles, modulo 2 pi in [-pi, pi] within rounding."""
     turns = np.rint(high / (2.0 * PI))
     if turns != 0.0:
-        # turns is 1 or 2 at most, so its products are exact
+        # turns is at most 2, so its products are exact
         high, low = add((high, low), (-2.0 * turns * PI, -2.0 * turns * PI_REST))
     return high, low
 
 
 @_compile
 def offset_of(sign, turn, turn_low, middle):
-    """The offset of theta' = sign (theta + pi - turn), modulo 2 pi, for which the angle ``middle`` leaves upwards."""
+    """Return the offset of theta' = sign (theta + pi - turn), modulo 2 pi such that ``middle`` leaves upwards."""
     offset = add((sign * PI, sign * PI_REST), (-sign * turn, -sign * turn_low))
     turns = np.rint((sign * middle + offset[0] - 0.5 * PI) / (2.0 * PI))
     return add(offset, (-2.0 * turns * PI, -2.0 * turns * PI_REST))[0]
@@ -95,7 +95,7 @@ def offset_of(sign, turn, turn_low, middle):
 
 @_compile
 def wall_lines(x, y, turn_high):
-    """The lines of a hollow's walls, one a row: unit normal and distance from the origin, from the nearer end."""
+    """Return the lines of a hollow's edges: unit normal and distance from the origin, computed at the nearer end."""
     lines = np.empty((turn_high.shape[0], WALL_COLUMNS))
     for e in range(turn_high.shape[0]):
         lines[e, WALL_NORMAL_X], lines[e, WALL_NORMAL_Y] = -math.sin(turn_high[e]), math.cos(turn_high[e])
@@ -106,9 +106,10 @@ def wall_lines(x, y, turn_high):
 
 @inlined
 def polygon_flux(polygon, count):
-    """The integral of dp dtheta over a polygon of lines, positive if counterclockwise, as a fan of triangles.
+    """Return the integral of dp dtheta over a polygon of lines, positive if counterclockwise.
 
-    That of a triangle is -det(a, b, c) sqrt(2 / product of 1 + cos over the three differences of angle).
+    The polygon is cut into triangles. The integral over a triangle is -det(a, b, c) sqrt(2 / product of 1 + cos over
+    the three differences of angles).
     """
     total = 0.0
     p, s, c = polygon[0, LINE_P], polygon[0, LINE_S], polygon[0, LINE_C]
@@ -125,7 +126,7 @@ def polygon_flux(polygon, count):
 
 @inlined
 def clip(polygon, count, values, wanted, edge_x, edge_y, out):
-    """The part of a polygon where the functional has the wanted sign; returns its number of vertices."""
+    """Write the part of a polygon with functional of the sign ``wanted`` to ``out``; return its number of vertices."""
     size = 0
     for i in range(count):
         j = i + 1 if i + 1 < count else 0
@@ -152,9 +153,9 @@ def clip(polygon, count, values, wanted, edge_x, edge_y, out):
 
 
 class Apex(NamedTuple):
-    """The third vertex of a beam's triangle, unfolded, and the rounding errors of its coordinates; the two sides there.
+    """The third vertex of a beam's triangle, unfolded, bounds on its rounding errors, and the two edges at the vertex.
 
-    ``left`` is the edge of the triangle left of the beam, ``right`` that on the right.
+    ``left`` is the edge on the left of the vertex as seen by the beam, ``right`` the edge on its right.
     """
 
     x: float
@@ -166,10 +167,10 @@ class Apex(NamedTuple):
 
 
 class Signs(NamedTuple):
-    """On which sides of the lines of a beam an apex lies.
+    """The signs of an apex's functional on a beam.
 
-    ``positive`` and ``negative`` say which signs the functional has. ``rounding`` bounds the flux of what lies beyond
-    the line of an apex that divides the beam by less than rounding.
+    ``positive`` and ``negative`` tell whether each sign occurs. If the apex divides the beam only within rounding,
+    ``rounding`` bounds the flux on the other side.
     """
 
     positive: bool
@@ -179,7 +180,7 @@ class Signs(NamedTuple):
 
 @inlined
 def enter(edge, slot, beams, mesh, distance):
-    """-> bool: take a beam through an edge of its triangle: on to the next one, back from a wall, or out (True)."""
+    """-> bool: move a beam through an edge into the next triangle, reflect it at a wall, or let it leave (True)."""
     real, whole = beams.real, beams.whole
     code = mesh.beyond[edge]
     if code >= 0:
@@ -211,7 +212,7 @@ def enter(edge, slot, beams, mesh, distance):
 
 @inlined
 def entrance_beams(beams, mesh, entrances):
-    """-> int: fill in the beams of rays with theta < pi/2, or of all if ``entrances`` is 2; return the heap's size."""
+    """-> int: set the beams of rays with theta < pi/2, or of all rays if ``entrances`` is 2; return the heap's size."""
     width, queue = mesh.x[mesh.x.shape[0] - 1], 0
     for half in range(entrances):
         polygon = beams.corners[half]
@@ -232,7 +233,7 @@ def entrance_beams(beams, mesh, entrances):
 
 @inlined
 def apex_of(slot, beams, mesh):
-    """-> Apex: of the triangle that a beam enters."""
+    """-> Apex: the apex of the triangle that a beam enters."""
     real, edge = beams.real, beams.whole[slot, EDGE]
     sign = float(beams.whole[slot, SIGN])
     triangle, side = edge // 3, edge % 3
@@ -241,7 +242,7 @@ def apex_of(slot, beams, mesh):
     sine, cosine = math.sin(real[slot, TURN]), math.cos(real[slot, TURN])
     sine, cosine = sine + real[slot, TURN_LOW] * cosine, cosine - real[slot, TURN_LOW] * sine
     xx, xy, yx, yy = cosine * x, -sign * sine * y, sine * x, sign * cosine * y
-    # the side of the triangle between its apex and the vertex of the edge that lies left of the beam, or right
+    # the sides of the triangle from the apex to the left and the right end of the edge that the beam crosses
     left, right = (side + 1) % 3, (side + 2) % 3
     if sign < 0.0:
         left, right = right, left
@@ -257,7 +258,7 @@ def apex_of(slot, beams, mesh):
 
 @inlined
 def signs_of(polygon, count, apex, values):
-    """-> Signs: fill in the values of an apex's functional at the vertices of a beam, 0 within rounding."""
+    """-> Signs: set ``values`` to an apex's functional at the vertices of a beam, 0 within rounding."""
     doubtful, doubt = False, 0.0
     positive, negative = False, False
     low, high = 0, 0
@@ -279,7 +280,7 @@ def signs_of(polygon, count, apex, values):
             high = i
     rounding = 0.0
     if doubtful and not (positive and negative):
-        # what lies beyond the line, by at most `doubt` in p, over at most the beam's range of angles
+        # the part on the other side: at most `doubt` in p, over at most the beam's range of angles
         spread = polygon[high, LINE_S] * polygon[low, LINE_C] - polygon[high, LINE_C] * polygon[low, LINE_S]
         rounding = 0.5 * math.pi * doubt * abs(spread)
     return Signs(positive, negative, rounding)
@@ -287,9 +288,9 @@ def signs_of(polygon, count, apex, values):
 
 @inlined
 def cut_rounding(polygon, count, apex, rounding):
-    """-> float: a bound, added to ``rounding``, of the flux on the wrong side of the line through an apex.
+    """-> float: ``rounding`` plus a bound on the flux on the wrong side of the line through an apex.
 
-    The line is misplaced by at most ``doubt`` in p over the cut's range of angles.
+    The error of the line is at most ``doubt`` in p over the cut's range of angles.
     """
     for i in range(count):
         if polygon[i, CUT_X] == apex.x and polygon[i, CUT_Y] == apex.y:
@@ -322,7 +323,7 @@ def with_room(beams, used, count):
 
 @inlined
 def queue_flux(beams, queue):
-    """-> float: flux of the beams on the heap."""
+    """-> float: total flux of the beams on the heap."""
     total = 0.0
     for i in range(queue):
         total += beams.real[beams.heap[i], FLUX]
@@ -331,9 +332,9 @@ def queue_flux(beams, queue):
 
 @inlined
 def cut_beam(slot, new, apex, values, room, beams, rounding):
-    """-> float: divide a beam by the line through an apex, its right part to a new slot; adds to ``rounding``.
+    """-> float: divide a beam at an apex, and return the new ``rounding``.
 
-    ``room`` are two polygons to work in.
+    The part right of the apex goes to slot ``new``. ``room`` is work space, two polygons.
     """
     polygon, count = beams.corners[slot], beams.whole[slot, COUNT]
     first, second = room
@@ -352,8 +353,8 @@ def cut_beam(slot, new, apex, values, room, beams, rounding):
 def split_beams(mesh, tolerance, max_beams, entrances):
     """-> (corners, real, whole, used, rounding, splits, status): the beams of all rays, the largest divided first.
 
-    Of the rays with theta < pi/2 if ``entrances`` is 1. The tables have ``used`` slots; ``rounding`` is a bound of
-    flux.
+    If ``entrances`` is 1, only rays with theta < pi/2. ``used`` slots of the tables are used; ``rounding`` bounds the
+    flux in wrong leaves.
     """
     distance = wall_lines(mesh.x, mesh.y, mesh.turn_high)[:, WALL_DISTANCE]
     beams = BeamTables(
@@ -417,7 +418,7 @@ def split_beams(mesh, tolerance, max_beams, entrances):
 
 @_compile
 def pieces_of(corners, real, whole, used, width):
-    """Cut every polygon at the angles of its vertices; rows: low, high, sine, cosine, offset, and slot, sign, ..."""
+    """-> (rows, tags): the pieces of all beams, cut at the angles of the vertices; for their columns see `columns`."""
     most = 0
     for slot in range(used):
         most += whole[slot, COUNT]
@@ -435,7 +436,7 @@ def pieces_of(corners, real, whole, used, width):
         middle = 0.5 * (cuts[0] + cuts[count - 1])
         offset = offset_of(sign, real[slot, TURN], real[slot, TURN_LOW], middle)
         if whole[slot, LEAF] == 1 and not 0.0 <= sign * middle + offset <= PI:
-            # no ray can leave downwards: a sliver within rounding of a corner
+            # no ray leaves downwards: this is a sliver within rounding of a corner
             whole[slot, LEAF] = 0
         for k in range(count - 1):
             if cuts[k + 1] <= cuts[k]:
