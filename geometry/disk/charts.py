@@ -131,9 +131,8 @@ class RollingCharts:
     def bend(self, configuration: ArrayLike) -> Floats:
         """Return H_1 (eq. 4.43), or H_eps (eq. 3.54), of configurations (..., 3).
 
-        The map takes the straightened configurations M_cyl with alpha in Z^0 to the configurations M of the disk. If
-        rho is a whole multiple of the wall's period, this holds for every alpha (eq. 5.71, corrected). For these alpha
-        `bend` o `roll_linear` = `roll`.
+        The map takes M_cyl with alpha in Z^0 to the configuration space M; with every alpha if rho is a whole multiple
+        of the wall's period (eq. 5.71, corrected). For alpha in Z^0, `bend` o `roll_linear` = `roll`.
         """
         y1, y2, alpha = _split("configuration", configuration, 3)
         return _join((*rolling.bend(y1, y2, self.residual(alpha), self.scale), alpha))

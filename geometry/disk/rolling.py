@@ -115,9 +115,9 @@ def transfer_differential(bar: Any, velocity: Vector, scale: Any, xp: Any = np) 
 
 
 def gap_radius(depth: Any, spacing: Any, xp: Any = np) -> Any:
-    """Return delta_0 of section 4.1, Claim 4.2.1.
+    """Return delta_0, beyond which from odd multiples of rho/2 adjacent heights differ by more than ``depth``.
 
-    If alpha is further than delta_0 from all odd multiples of rho/2, adjacent satellites differ in height by more than
-    ``depth``. The heights differ by 2 sin(rho/2) sin(rho/2 - bar), so delta_0 is sharp.
+    The heights of adjacent satellites differ by 2 sin(rho/2) sin(rho/2 - bar), so the radius delta_0 is sharp (section
+    4.1, Claim 4.2.1).
     """
     return xp.asin(depth / (2 * xp.sin(spacing / 2)))

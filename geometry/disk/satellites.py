@@ -10,8 +10,7 @@ from ...core.checks import positive_number
 from ...core.errors import InputError
 from . import rolling
 
-# Power of the scale in the default spacing. The theorem needs spacing -> 0 and scale/spacing^2 -> 0, a power in
-# (0, 1/2).
+# Power of the scale in the default spacing, in (0, 1/2): the theorem needs spacing -> 0 and scale/spacing^2 -> 0.
 SPACING_POWER = 0.4
 # Least number of satellites; with fewer, the lowest satellite may be at the side of the disk.
 FEWEST = 4
@@ -33,9 +32,8 @@ class Satellites:
     Raises
     ------
     InputError
-        If there are fewer than 4 satellites, or the depth is not less than 1 - cos(spacing), so that at most two
-        satellites are below the wall's tops, and less than cos(spacing/2), so that no satellite at the side of the
-        disk touches the wall.
+        If there are fewer than 4 satellites, or the depth is not less than both 1 - cos(spacing) (at most two
+        satellites touch the wall) and cos(spacing/2) (no satellite at the side of the disk touches the wall).
 
     Source: Rudzis 2022, section 1.3.1, eq. 1.38, and Proposition 4.1 (vi).
 
