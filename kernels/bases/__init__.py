@@ -1,1 +1,1 @@
-"""The invariant measures, and orthonormal bases of functions of the angle with their quadrature."""
+"""The invariant measures, and orthonormal bases of functions of the angle with their quadrature rules."""

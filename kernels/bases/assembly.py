@@ -1,4 +1,4 @@
-"""Sums of products e_i(theta) e_j(theta') over many pairs of angles, for each kind of basis."""
+"""Galerkin matrices: sums of weighted products e_i(theta) e_j(theta') over many pairs of angles, for every basis."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from ...core.checks import Floats
 from .basis import Basis
 from .panels import Panels
 
-# Values of basis functions held at a time.
+# Limit on the values of basis functions in memory at a time.
 CHUNK = 2**21
 
 
 def one_blas_thread() -> AbstractContextManager[Any]:
-    """BLAS on one thread: its threads spin, and a tall thin product gets slower by a hundred on a busy machine."""
+    """Limit BLAS to one thread: on a busy machine its waiting threads can slow a tall thin product a hundredfold."""
     return _blas().limit(limits=1, user_api="blas")  # type: ignore[no-any-return]
 
 
@@ -31,7 +31,7 @@ def _blas() -> Any:
 
 
 def overlaps(basis: Basis, functions: Callable[[Floats], Floats], edges: Floats) -> Floats:
-    """<e_i, f_j>, shape (n, k), for functions f_j that are smooth between the edges: values of shape (angles, k)."""
+    """<e_i, f_j>, shape (n, k); ``functions`` returns f_j, smooth between the edges, with shape (angles, k)."""
     angle, weight = basis.measure.quadrature(edges, basis.nodes_per_interval)
     return np.asarray(basis.evaluate(angle).T @ (weight[:, None] * functions(angle)))
 
@@ -56,7 +56,7 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
 
 
 def add_masses(total: Floats, basis: Basis, source: NDArray[np.int64], target: NDArray[np.int64], mass: Floats) -> None:
-    """Add masses that go from cells to cells of a partition to the Galerkin matrix ``total``."""
+    """Add masses transported from ``source`` to ``target`` cells of a partition to the Galerkin matrix ``total``."""
     flux = np.bincount(source * basis.size + target, weights=mass, minlength=total.size).reshape(total.shape)
     total += basis.normalisation[:, None] * flux * basis.normalisation
 
@@ -64,7 +64,7 @@ def add_masses(total: Floats, basis: Basis, source: NDArray[np.int64], target: N
 def add_blocks(
     total: Floats, basis: Panels, source: NDArray[np.int64], target: NDArray[np.int64], values: Floats, images: Floats
 ) -> None:
-    """Add outer products of values on the panel ``source`` with images on the panel ``target``."""
+    """Add outer products of ``values`` on the panel ``source`` with ``images`` on the panel ``target`` to ``total``."""
     width = basis.degree + 1
     panels = basis.size // width
     cell = source * panels + target

@@ -1,4 +1,4 @@
-"""The base class of the bases of L^2(sin theta d theta)."""
+"""The base class of orthonormal bases of functions of the angle."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ AngleFunction = Callable[[Floats], Floats]
 class Basis(ABC):
     """An orthonormal family e_0, ..., e_{n-1} in L^2 of a probability measure on (0, pi).
 
-    A kernel P is represented by the matrix S with entries <e_i, P e_j>, whatever the family. Two bases are equal where
-    their functions are.
+    In every basis the matrix S with entries <e_i, P e_j> represents a kernel P. Two bases are equal if they are of the
+    same class with the same parameters.
     """
 
     @property
     def is_partition(self) -> bool:
-        """Whether the functions are normalised indicators of cells, so that matrices of cell-to-cell masses exist."""
+        """Whether the functions are normalised indicators of cells; only then are masses from cell to cell defined."""
         return False
 
     @property
     def local_part(self) -> Basis:
-        """The functions that vanish outside some interval between edges; the whole basis but where it adds others."""
+        """The basis of those functions that vanish outside one interval between edges; by default the whole basis."""
         return self
 
     @property
     def polynomials_besides(self) -> int:
-        """The number of polynomials in cos(theta) on the whole of (0, pi) that stand beside the local part."""
+        """The number of polynomials in cos(theta) on the whole of (0, pi) that the basis adds to its local part."""
         return 0
 
     @property
@@ -57,7 +57,7 @@ class Basis(ABC):
     @property
     @abstractmethod
     def nodes_per_interval(self) -> int:
-        """Gauss nodes between two edges that integrate products of two functions to rounding."""
+        """Number of Gauss nodes between two edges that integrate products of two functions to rounding."""
 
     @property
     @abstractmethod
@@ -70,17 +70,17 @@ class Basis(ABC):
 
     @property
     def weights(self) -> Floats:
-        """Squared coefficients of the constant 1, shape (n,), sum 1: the measures of the cells of a partition."""
+        """Squared coefficients of the constant 1, shape (n,), sum 1; for a partition, the measures of the cells."""
         return np.asarray(self.constant**2)
 
     @property
     def normalisation(self) -> Floats:
-        """Value of each e_i on its cell for a partition, ones elsewhere: P.array = heights S / heights."""
+        """Value h_i of each e_i on its cell for a partition, ones for other bases: P.array[i, j] = h_i S_ij / h_j."""
         return np.ones(self.size)
 
     @abstractmethod
     def key(self) -> tuple[object, ...]:
-        """What tells this basis from others: hashable."""
+        """A hashable value that determines the basis within its class."""
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and isinstance(other, Basis) and self.key() == other.key()
@@ -89,21 +89,21 @@ class Basis(ABC):
         return hash((type(self).__name__, self.key()))
 
     def index(self, angle: ArrayLike) -> NDArray[np.int64]:
-        """The number of the interval between edges in which each angle lies."""
+        """The index of the interval between edges that contains each angle."""
         return cell_among(self.edges, np.asarray(angle, dtype=np.float64))
 
     def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> bool:
-        """Add the sum of weight e_i(incoming) e_j(outgoing) to ``total``; returns False where the basis has no own way.
+        """Add the sum of weight e_i(incoming) e_j(outgoing) to ``total``, or return False if the basis cannot.
 
-        `asperity.kernels.bases.assembly.add_products` does it for those.
+        `asperity.kernels.bases.assembly.add_products` then computes the sum from the values of the functions.
         """
         return False
 
     @abstractmethod
     def coarsened(self) -> tuple[Basis, Floats] | None:
-        """A basis of a subspace of about half the size, with the (coarse, n) matrix of its coefficients in this one.
+        """A basis of a subspace of about half the size, and the (coarse, n) matrix R of its coefficients in this basis.
 
-        ``None`` where there is none. The Galerkin matrix on the subspace is then R S R^T: two grids from one matrix.
+        ``None`` if there is no such subspace. The subspace has the Galerkin matrix R S R^T, so S serves two grids.
         """
 
     def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:

@@ -1,4 +1,4 @@
-"""Piecewise constant functions of the angle: the cells of histograms and of Ulam's method."""
+"""Piecewise constant functions of the angle, the basis of histograms and of Ulam's method."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from .basis import Basis
 from .intervals import cell_among
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
-# Smooth functions times the weight are integrated to rounding by this many Gauss nodes on a cell: the error is about
-# (width / 4)^(2 nodes) / (2 nodes)!, below 1e-17 for widths up to 1 and up to pi.
+# Numbers of Gauss nodes that integrate a smooth function times the weight to rounding on cells of width up to NARROW
+# and up to pi. The error is about (width / 4)^(2 nodes) / (2 nodes)!, below 1e-17 in both cases.
 NODES_NARROW, NODES_WIDE, NARROW = 8, 20, 1.0
 
 
@@ -26,9 +26,9 @@ class Bins(Basis):
     Parameters
     ----------
     divisions : int or array_like
-        A number of bins, then all of equal measure; or the edges, increasing from 0 to pi, in radians.
+        The number of bins, which then have equal measure; or the edges, increasing from 0 to pi, in radians.
     weight : {"sin", "sin2"}
-        ``"sin"`` for theta and sin(theta) d theta, ``"sin2"`` for psi and sin(psi)^2 d psi.
+        The measure: ``"sin"`` for theta and sin(theta) d theta, ``"sin2"`` for psi and sin(psi)^2 d psi.
 
     Raises
     ------
@@ -37,8 +37,8 @@ class Bins(Basis):
 
     Notes
     -----
-    Equal measure means equal in u = -cos(theta) for ``"sin"`` (Rudzis 2022, section 1.2.2). A Galerkin matrix on n
-    such bins has order 2 for smooth kernels.
+    For ``"sin"``, bins of equal measure have equal width in u = -cos(theta) (Rudzis 2022, section 1.2.2). For smooth
+    kernels the eigenvalues of the Galerkin matrix on n such bins converge with order 2.
 
     Examples
     --------
@@ -100,11 +100,11 @@ class Bins(Basis):
         return (self._measure.name, self._edges.tobytes())
 
     def index(self, angle: ArrayLike) -> NDArray[np.int64]:
-        """Number of the bin that holds each angle; bins contain their left edges, and the last one pi."""
+        """Index of the bin that contains each angle; a bin contains its left edge, and the last bin contains pi."""
         angle = np.asarray(angle, dtype=np.float64)
         if not self._equal or self._measure != SINE:
             return cell_among(self._edges, angle)
-        # Equal measure: the bin is known up to rounding from the measure; compare with its edges, which decide.
+        # Bins of equal measure: the cdf gives the bin up to rounding; the comparison with the edges corrects it.
         guess = (np.sin(0.5 * angle) ** 2 * self.size).astype(np.int64)
         guess = np.minimum(guess, self.size - 1)
         guess += (angle >= self._edges[guess + 1]) & (guess < self.size - 1)
@@ -135,7 +135,7 @@ class Bins(Basis):
 
 
 def _equal_edges(n: int, measure: AngularMeasure) -> Floats:
-    # the upper half mirrors the lower one bit by bit, so that J permutes the bins exactly
+    # The upper edges are computed from the lower ones by pi - x, so that J permutes the bins exactly.
     lower = measure.quantile(np.arange(n // 2 + 1) / n)
     if n % 2 == 0:
         lower[-1] = 0.5 * np.pi

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats
 from .measure import SINE
 
-# Halvings, after which an interval of angles has no width left.
+# Number of halvings that shrink an interval of angles to the spacing of float64.
 BISECTIONS = 60
 
 
 def joined_lists(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The row that each entry belongs to, and its position there, of rows with so many entries.
+    """For lists of lengths ``number`` joined end to end: the index of each entry's list, and its position in the list.
 
     Examples
     --------
@@ -27,7 +27,7 @@ def joined_lists(number: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np
 
 
 def cell_among(edges: Floats, position: ArrayLike) -> NDArray[np.intp]:
-    """The cell [edges[i], edges[i + 1]) that holds each position; what is beyond an end is in the cell next to it.
+    """The index i of the cell [edges[i], edges[i + 1]) of each position; positions beyond an end get the end's cell.
 
     Examples
     --------
@@ -38,7 +38,7 @@ def cell_among(edges: Floats, position: ArrayLike) -> NDArray[np.intp]:
 
 
 def edges_inside(edges: Floats, low: Floats, high: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """All edges strictly between low[i] and high[i], of all i end to end: the number i of each, and the edge.
+    """All edges strictly between low[i] and high[i], for all i: the indices i and the edges, as flat arrays.
 
     Examples
     --------
@@ -51,7 +51,7 @@ def edges_inside(edges: Floats, low: Floats, high: Floats) -> tuple[NDArray[np.i
 
 
 def between_cuts(owner: NDArray[np.intp], cut: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
-    """The intervals between neighbouring cuts of the same owner, those of no length left out: owner, low, high.
+    """The intervals of positive length between neighbouring cuts of the same owner: owner, low, high.
 
     Examples
     --------
@@ -65,7 +65,7 @@ def between_cuts(owner: NDArray[np.intp], cut: Floats) -> tuple[NDArray[np.intp]
 
 
 def without_extremal(angles: Floats, number: int) -> tuple[Floats, float]:
-    """Sorted angles but for so many of them, half at either end, and the measure of what lies beyond those that stay.
+    """Sorted angles without ``number`` of them, half at either end, and the SINE measure outside the others' range.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def without_extremal(angles: Floats, number: int) -> tuple[Floats, float]:
 
 
 def bisected(low: Floats, high: Floats, before: Callable[[Floats], NDArray[np.bool_]]) -> Floats:
-    """Where, between ``low`` and ``high``, what is true ``before`` that angle ceases to be; one an interval."""
+    """The angle in each interval (low, high) at which ``before`` changes from true to false, by bisection."""
     low, high = low.copy(), high.copy()
     if low.size:
         for _ in range(BISECTIONS):

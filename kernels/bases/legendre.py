@@ -12,8 +12,8 @@ from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
 # Products of two functions, times the weight, oscillate at most 2 n times as fast as cos(theta). On an interval of
-# length h, Gauss needs about n h / 2 nodes to follow them and DIGITS more to reach rounding (with 16 they are 1e-12
-# off, with 17 1e-13); DEGREES a panel keep the rules short.
+# length h, Gauss rules need about n h / 2 nodes to resolve them and DIGITS more to reach rounding (the error is 1e-12
+# with 16, 1e-13 with 17). One panel per DEGREES_PER_PANEL degrees keeps the rules short.
 DEGREES_PER_PANEL = 16
 DIGITS = 18
 
@@ -79,8 +79,8 @@ class Legendre(Basis):
 
     def evaluate(self, angle: ArrayLike) -> Floats:
         angle = np.asarray(angle, dtype=np.float64)
-        # Recurrence for the differences of neighbours with 1 - cos = 2 sin^2(angle/2): near 0 nothing cancels, and
-        # angles beyond pi/2 are mirrored, e_l(pi - angle) = (-1)^l e_l(angle).
+        # The recurrence for e_(l + 1) - e_l in 1 - cos = 2 sin^2(angle/2) has no cancellation near 0. Angles beyond
+        # pi/2 are mirrored: e_l(pi - angle) = (-1)^l e_l(angle).
         mirrored = angle > 0.5 * np.pi
         versine = 2.0 * np.sin(0.5 * np.where(mirrored, np.pi - angle, angle)) ** 2
         values = np.ones((self.n, *angle.shape))
@@ -109,8 +109,8 @@ class Legendre(Basis):
 def legendre_moments(local: Floats, weight: Floats, degree: int) -> Floats:
     """Sums over the nodes of weights times L_0, ..., L_degree, shape (degree + 1, cells).
 
-    ``local`` are the nodes in (-1, 1) and ``weight`` their weights, shapes (cells, nodes). By the three-term recurrence
-    (k + 1) L_(k + 1) = (2 k + 1) t L_k - k L_(k - 1), so that only two polynomials are held at a time.
+    ``local`` are the nodes in (-1, 1) and ``weight`` their weights, shapes (cells, nodes). The three-term recurrence
+    (k + 1) L_(k + 1) = (2 k + 1) t L_k - k L_(k - 1) needs two polynomials in memory at a time.
 
     Examples
     --------

@@ -1,6 +1,6 @@
 """The invariant measures of reflection: sin(theta) d theta for angles, sin(psi)^2 d psi for the roll angle.
 
-This is the one home of the weights: no other file multiplies by a sine.
+No other file of the package multiplies by these weights.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from ...core.errors import InputError
 
 WeightName = Literal["sin", "sin2"]
 
-# Below this width the closed form x - sin(x) loses more than a digit, and eight terms of its series lose none.
+# Below this width the closed form x - sin(x) loses more than one digit, and eight terms of its series lose none.
 SERIES_WIDTH = 0.5
 NEWTON_STEPS = 60
-# The double next to each end of (0, pi): what rounding puts on an end is moved here. 1e-300 keeps sin and cot finite.
+# Angles that rounding puts on an end of (0, pi) are moved to these values. With 1e-300, sin and cot stay finite.
 SMALLEST_ANGLE = 1e-300
 LARGEST_ANGLE = float(np.nextafter(np.pi, 0.0))
 
@@ -61,7 +61,7 @@ class AngularMeasure:
         """The angle below which a fraction ``probability`` in [0, 1] of the measure lies."""
         fraction = np.asarray(probability, dtype=np.float64)
         if self.name == "sin":
-            # arcsin of the smaller half keeps full relative accuracy at both ends of (0, pi)
+            # arcsin of the smaller of p and 1 - p gives full relative accuracy at both ends of (0, pi)
             lower = 2.0 * np.arcsin(np.sqrt(np.minimum(fraction, 0.5)))
             upper = np.pi - 2.0 * np.arcsin(np.sqrt(np.minimum(1.0 - fraction, 0.5)))
             return np.where(fraction <= 0.5, lower, upper)
@@ -77,13 +77,13 @@ class AngularMeasure:
 
     def sample(self, size: int | tuple[int, ...], rng: np.random.Generator) -> Floats:
         """Draw angles from the measure."""
-        # 1 - U is in (0, 1]: the angle 0 never comes, and pi is moved into the open interval
+        # 1 - U lies in (0, 1], so the angle 0 does not occur; pi is clipped to the open interval.
         return np.asarray(np.clip(self.quantile(1.0 - rng.random(size)), SMALLEST_ANGLE, LARGEST_ANGLE))
 
     def quadrature(self, edges: ArrayLike, order: int) -> tuple[Floats, Floats]:
         """Gauss-Legendre nodes (angles) and weights, ``order`` of them between each two neighbouring edges.
 
-        Returns flat arrays; the weights contain the density, so that they sum to the measure of the whole.
+        Returns flat arrays. The weights contain the density and sum to the measure of the whole interval.
         """
         angle, weight = gauss_rule(edges, order)
         return angle, weight * self.density(angle)
@@ -100,7 +100,7 @@ def _gauss_on_unit_interval(order: int) -> tuple[Floats, Floats]:
 def gauss_rule(edges: ArrayLike, order: int) -> tuple[Floats, Floats]:
     """Gauss-Legendre rule for d angle, ``order`` nodes between each two neighbouring edges; flat arrays.
 
-    The nodes lie in the open interval (0, pi) also where rounding would put them on its ends.
+    The nodes are clipped to the open interval (0, pi).
 
     Examples
     --------
@@ -113,7 +113,7 @@ def gauss_rule(edges: ArrayLike, order: int) -> tuple[Floats, Floats]:
 
 
 def gauss_on_intervals(low: Floats, high: Floats, order: int) -> tuple[Floats, Floats]:
-    """As `gauss_rule`, on any intervals."""
+    """Gauss-Legendre rule for d angle, ``order`` nodes on each interval (low[i], high[i]); flat arrays."""
     nodes, weights = _gauss_on_unit_interval(order)
     centre, half = 0.5 * (high + low), 0.5 * (high - low)
     angle = np.clip(centre[:, None] + half[:, None] * nodes, SMALLEST_ANGLE, LARGEST_ANGLE)
@@ -121,7 +121,7 @@ def gauss_on_intervals(low: Floats, high: Floats, order: int) -> tuple[Floats, F
 
 
 def measure_by_name(name: str) -> AngularMeasure:
-    """Return the measure called ``"sin"`` or ``"sin2"``; anything else raises an InputError."""
+    """Return the measure called ``"sin"`` or ``"sin2"``; raises InputError for any other name."""
     if name == "sin":
         return SINE
     if name == "sin2":

@@ -1,4 +1,4 @@
-"""The flip J f(theta) = f(pi - theta) in a basis."""
+"""The matrix of the mirror map J f(theta) = f(pi - theta) in a basis, and bases whose span J maps to itself."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .legendre import Legendre
 from .panels import Panels
 from .tensor import TensorBasis
 
-# Edges that mirror each other to this distance are mirror images: pi - x rounds by at most one spacing of pi.
+# Edges x and pi - y closer than this count as equal; pi - x has a rounding error of at most one spacing of pi.
 MIRROR_TOLERANCE = 8.0 * np.spacing(np.pi)
 
 
@@ -28,7 +28,7 @@ def is_mirror_symmetric(basis: Basis) -> bool:
 
 
 def reflection_matrix(basis: Basis) -> Floats:
-    """The matrix <e_i, J e_k>, orthogonal if `is_mirror_symmetric` holds; in a tensor basis every angle is flipped.
+    """The matrix <e_i, J e_k>, orthogonal if `is_mirror_symmetric` holds; in a tensor basis J mirrors every angle.
 
     Examples
     --------
@@ -51,9 +51,9 @@ def reflection_matrix(basis: Basis) -> Floats:
 
 
 def mirror_refinement(basis: Basis) -> tuple[Basis, Floats]:
-    """A basis whose span contains that of ``basis`` and is kept by J, and the coefficients of ``basis`` in it.
+    """A basis with a J-invariant span that contains the span of ``basis``, and the coefficients of ``basis`` in it.
 
-    The second value R has shape (coarse, fine); a Galerkin matrix S on the refinement gives R S R^T on ``basis``.
+    The second value R has shape (coarse, fine). The Galerkin matrix S on the refinement gives R S R^T on ``basis``.
     """
     if is_mirror_symmetric(basis):
         return basis, np.eye(basis.size)

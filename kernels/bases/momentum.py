@@ -1,4 +1,4 @@
-"""The components of a direction as a basis: the constant, cos(theta) and sin(theta)."""
+"""The basis of the components of a direction: the constant, cos(theta) and sin(theta)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .measure import SINE, AngularMeasure
 
 # Products of two of the functions times the weight are trigonometric polynomials of degree 3 on (0, pi).
 GAUSS_NODES = 20
-# <sin, 1> and the norm of what is left of sin(theta), for sin(theta)/2 d theta: its square is 2/3 - pi^2/16.
+# <sin, 1> and the norm of sin - <sin, 1> for the measure sin(theta)/2 d theta; the squared norm is 2/3 - pi^2/16.
 MEAN_SINE = 0.25 * np.pi
 SINE_NORM = float(np.sqrt(2.0 / 3.0 - np.pi**2 / 16.0))
 
@@ -22,7 +22,7 @@ SINE_NORM = float(np.sqrt(2.0 / 3.0 - np.pi**2 / 16.0))
 class Directions(Basis):
     """1, cos(theta) and sin(theta), made orthonormal for sin(theta)/2 d theta.
 
-    All that the mean momentum of reflected particles asks of a law is its matrix in this basis.
+    A law's matrix in this basis determines the mean momentum of the particles that it reflects.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Piecewise polynomials in the angle on panels that may be graded towards difficult angles."""
+"""Piecewise polynomials in the angle, on panels that can be graded towards singular angles."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from .measure import SINE, AngularMeasure, WeightName
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Degree 2 p polynomials times a sine on a panel of width up to pi: with p + EXTRA_NODES Gauss nodes the first
-# Chebyshev coefficient of the sine that is missed is (pi/2)^(2 EXTRA_NODES) / ((2 EXTRA_NODES)! 2^(2 EXTRA_NODES - 1)).
+# p + EXTRA_NODES Gauss nodes integrate degree 2 p polynomials times a sine on a panel of width up to pi: the first
+# missed Chebyshev coefficient of the sine is (pi/2)^(2 EXTRA_NODES) / ((2 EXTRA_NODES)! 2^(2 EXTRA_NODES - 1)).
 EXTRA_NODES = 11
-# Graded panels: each is RATIO of its neighbour, down to SMALLEST times the distance to the next special angle.
-# A function that behaves like theta^s at grazing is then missed by SMALLEST^(s + 1) in L^2(sin theta d theta).
+# Graded panels shrink by the factor RATIO down to SMALLEST times half the distance to the next special angle. The
+# L^2(sin theta d theta) error for a function that behaves like theta^s at grazing is then SMALLEST^(s + 1).
 RATIO, SMALLEST = 0.35, 1e-4
 WIDEST = np.pi / 24
-# Breakpoints xi (1 +- 1/N) of a circular arc are followed until their spacing falls below this fraction of xi.
+# Breakpoints xi (1 +- 1/N) of a circular arc become panel edges until their spacing falls below this fraction of xi.
 BREAKPOINT_SPACING = 0.05
 
 
@@ -37,7 +37,7 @@ class Panels(Basis):
     edges : array_like
         Panel edges, increasing from 0 to pi, in radians.
     degree : int
-        Largest degree on each panel; functions ``p (degree + 1), ..., p (degree + 1) + degree`` live on panel p.
+        Largest degree on each panel; the functions ``p (degree + 1), ..., p (degree + 1) + degree`` belong to panel p.
     weight : {"sin", "sin2"}
         The measure.
 
@@ -74,22 +74,22 @@ class Panels(Basis):
         Parameters
         ----------
         wall : Wall
-            The pieces of its ``cell`` are looked at.
+            The wall; the panels depend on the pieces of its ``cell``.
         degree : int
             Degree on each panel.
         smallest : float
-            Width of the smallest panel as a fraction of its distance to the next special angle.
+            Width of the smallest panel at grazing, relative to half the distance to the next critical angle.
 
         Notes
         -----
-        The rows of the law of a circular arc of half angle xi have breakpoints at theta = xi (1 +- 1/N) and at their
-        mirror images; they accumulate at xi, towards which the panels are graded instead of following them all.
+        The conditional distributions of a circular arc of half angle xi have breakpoints at theta = xi (1 +- 1/N) and
+        at the mirror images. They accumulate at xi; panels are graded towards xi, down to the root of ``smallest``.
         """
         return cls.for_arc(_single_arc_half_angle(wall), degree, smallest)
 
     @classmethod
     def for_arc(cls, half_angle: float | None, degree: int = 6, smallest: float = SMALLEST) -> Panels:
-        """Panels as `for_wall` makes them for one circular arc; None for any other wall."""
+        """The panels of `for_wall` for one circular arc of this half angle, in radians; None means any other wall."""
         smallest = number_between("smallest", smallest, 1e-12, 0.5)
         special = [0.0, np.pi]
         followed: list[float] = []
@@ -116,7 +116,7 @@ class Panels(Basis):
 
     @property
     def order(self) -> int:
-        """Declared order of eigenvalues in the panel width, for smooth kernels."""
+        """Order of convergence of eigenvalues in the panel width, for smooth kernels."""
         return 2 * (self.degree + 1)
 
     @property
@@ -133,7 +133,7 @@ class Panels(Basis):
         return (self._cells.key(), self.degree)
 
     def local(self, angle: ArrayLike) -> tuple[NDArray[np.int64], Floats]:
-        """The panel of each angle and the values of its own functions there, shape ``angle.shape + (degree + 1,)``."""
+        """The panel of each angle and the values of this panel's functions, shape ``angle.shape + (degree + 1,)``."""
         angle = np.asarray(angle, dtype=np.float64)
         panel = self._cells.index(angle)
         return panel, np.einsum("...k,...ki->...i", self.legendre(angle, panel), self._coefficients[panel])
@@ -144,9 +144,9 @@ class Panels(Basis):
         return np.asarray(np.polynomial.legendre.legvander((2.0 * angle - low - high) / (high - low), self.degree))
 
     def of_legendre(self, moments: Floats) -> Floats:
-        """Integrals of the functions, shape (..., size), from those of the panels' Legendre polynomials.
+        """Integrals of the functions, shape (..., size), from the integrals of the panels' Legendre polynomials.
 
-        ``moments`` has shape (..., panels, degree + 1).
+        These integrals, ``moments``, have shape (..., panels, degree + 1).
         """
         flat = moments.reshape(-1, *moments.shape[-2:])
         transformed = np.matmul(np.moveaxis(flat, 1, 0), self._coefficients)
@@ -172,7 +172,7 @@ class Panels(Basis):
         return None if merged is None else (Panels(merged[0].edges, 0, self.measure.name), merged[1])
 
     def _orthonormalise(self) -> Floats:
-        """Per panel the upper triangular matrix that turns Legendre polynomials into orthonormal functions."""
+        """The upper triangular matrix of each panel that turns Legendre polynomials into orthonormal functions."""
         angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
         shape = (self._cells.size, self.nodes_per_interval)
         panel = np.repeat(np.arange(shape[0]), shape[1])
@@ -201,8 +201,8 @@ def _single_arc_half_angle(wall: Wall) -> float | None:
 def _graded_edges(special: list[float], followed: list[float], smallest: float) -> Floats:
     """Edges at all given angles, graded geometrically on both sides of the special ones, at most WIDEST apart.
 
-    Grazing (the first two special angles, 0 and pi) is approached down to ``smallest``, the others to its root:
-    the eigenfunctions are singular at grazing and have ever weaker breakpoints towards the others.
+    At grazing (the angles 0 and pi) the smallest panel has the relative width ``smallest``, because the eigenfunctions
+    are singular there. At other special angles it has the square root: the breakpoints get weaker towards these.
     """
     marks = np.unique(special)
     edges = [marks, np.asarray(followed)]
@@ -226,5 +226,5 @@ def _grading(smallest: float) -> Floats:
     return np.asarray(RATIO ** np.arange(1, levels + 1, dtype=np.float64))
 
 
-# For questions to laws whose answer is the same on all panels.
+# For queries of laws whose answer is the same on all panels.
 ONE_PANEL = Panels([0.0, np.pi], 0)

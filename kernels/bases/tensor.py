@@ -24,18 +24,18 @@ def _kron(parts: Sequence[Floats]) -> Floats:
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class TensorBasis(Basis):
-    """All products e_i(theta) f_k(psi), the last factor running fastest: the basis of ``P.tensor(Q)``.
+    """All products e_i(theta) f_k(psi), with the last factor's index running fastest; the basis of ``P.tensor(Q)``.
 
     Parameters
     ----------
     factors : tuple of Basis
-        One basis an angle, two or more; factors that are tensor bases themselves are flattened.
+        One basis for each angle, at least two. Factors that are tensor bases are flattened.
 
     Raises
     ------
     InputError
-        If there are fewer than two factors; and by `measure`, `edges` and `nodes_per_interval`, which every factor
-        has for itself.
+        If there are fewer than two factors. The properties `measure`, `edges` and `nodes_per_interval` always raise it:
+        they exist for each factor, not for the product.
 
     Examples
     --------
@@ -91,7 +91,7 @@ class TensorBasis(Basis):
         return self.factors
 
     def evaluate(self, angle: ArrayLike) -> Floats:
-        """Values of all products at points whose last axis has one angle a factor; shape ``(..., n)``."""
+        """Values of all products, shape ``(..., n)``, at points whose last axis holds one angle per factor."""
         angle = np.asarray(angle, dtype=np.float64)
         if angle.ndim == 0 or angle.shape[-1] != len(self.factors):
             raise InputError(f"angle: expected a last axis of length {len(self.factors)}, got shape {angle.shape}")
@@ -102,12 +102,12 @@ class TensorBasis(Basis):
         return values
 
     def project(self, function: Callable[[Floats], Floats], order: int | None = None) -> Floats:
-        """Coefficients of a function of points whose last axis has one angle a factor, shape (n,)."""
+        """Coefficients, shape (n,), of a function of points whose last axis holds one angle per factor."""
         rules = [f.measure.quadrature(f.edges, order or f.nodes_per_interval) for f in self.factors]
         grid = np.stack(np.meshgrid(*[rule[0] for rule in rules], indexing="ij"), axis=-1)
         values = np.asarray(function(grid), dtype=np.float64)
         for factor, (angle, weight) in zip(self.factors, rules, strict=True):
-            # contract the first remaining axis; the new axis goes to the end, so that the order is kept
+            # Contract the first remaining axis. The new axis goes to the end, which preserves the order of factors.
             values = np.tensordot(values, weight[:, None] * factor.evaluate(angle), axes=(0, 0))
         return values.ravel()
 
