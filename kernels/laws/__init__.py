@@ -1,1 +1,1 @@
-"""Reflection laws: their algebra, and the laws that need no wall."""
+"""Reflection laws: the algebra of laws, and the laws that are defined without a wall."""

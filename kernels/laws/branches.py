@@ -1,4 +1,4 @@
-"""Finite lists of branches: merging equal ones, chaining laws, and the breakpoints of a chain."""
+"""Finite lists of branches: merging equal branches, composing laws, and the breakpoints of compositions."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.intervals import edges_inside
 
-# Two isometries computed in different ways differ by a few roundings of numbers up to 2 pi.
+# Angles of the same isometry computed by different formulas differ by a few roundings of numbers up to 2 pi.
 SAME_ANGLE = 16.0 * EPS
-# Merging compares all pairs, and the number of branches of a chain grows exponentially unless they merge.
+# Merging compares all pairs, and the number of branches of a composition grows exponentially unless they merge.
 MOST_BRANCHES = 64
 
 # Probabilities and outgoing angles, shape theta.shape + (branches,).
@@ -32,19 +32,19 @@ def joined(parts: Sequence[tuple[Floats, float]]) -> tuple[Floats, float]:
 
 
 class Branching(Protocol):
-    """What a chain asks of its laws."""
+    """The methods of a law that `chained` and `chained_breakpoints` use."""
 
     def branches(self, theta: Floats, /) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles at incoming angles."""
 
     def breakpoints(self, limit: int, /) -> tuple[Floats, float]:
-        """Where the branches change, at most about ``limit`` of them, and the measure of those left out."""
+        """Angles where the branches change, about ``limit`` at most, and the measure with breakpoints left out."""
 
 
 def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
-    """Add up branches with equal outgoing angles; slots left with probability 0 get the angle of the first used one.
+    """Add up branches with equal outgoing angles; slots of probability 0 get the angle of the first used slot.
 
-    The order of slots stays, so that a slot that was one isometry between two breakpoints remains so.
+    The order of slots does not change, so a slot that is one isometry between two breakpoints remains one isometry.
     """
     probability, outgoing = probability.copy(), clipped_inside(outgoing)
     slots = probability.shape[-1]
@@ -59,7 +59,7 @@ def merged(probability: Floats, outgoing: Floats) -> tuple[Floats, Floats]:
 
 
 def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats]:
-    """The branches of laws applied one after the other, merged after each."""
+    """The branches of a composition of laws, merged after each law."""
     probability, outgoing = np.ones((*theta.shape, 1)), theta[..., None]
     for law in laws:
         step, angle = law.branches(outgoing)
@@ -76,9 +76,9 @@ def chained(laws: Sequence[Branching], theta: Floats) -> tuple[Floats, Floats]:
 
 
 def chained_breakpoints(laws: Sequence[Branching], limit: int) -> tuple[Floats, float]:
-    """Breakpoints of a chain, and the probability of those left out; none are known unless all laws know theirs.
+    """Breakpoints of a composition, and the measure where breakpoints were left out; inf unless all laws know theirs.
 
-    They are those of the first law, and where its branches meet breakpoints of the rest.
+    These are the breakpoints of the first law and the angles that its branches map to breakpoints of later laws.
     """
     if not laws:
         return np.empty(0), 0.0
@@ -93,18 +93,18 @@ def chained_breakpoints(laws: Sequence[Branching], limit: int) -> tuple[Floats, 
             sources = preimages(partial(chained, laws[:index]), between, each[index][0])
             found = np.unique(np.concatenate([found, sources]))
     except InputError:
-        # the laws before the last have no branches, or together too many
+        # The laws before the last do not list branches, or have too many.
         return np.empty(0), math.inf
     return found, min(left_out, 1.0)
 
 
 def preimages(branches: Branches, breakpoints: Floats, targets: Floats) -> Floats:
-    """Angles that some branch maps to a target, for every interval between breakpoints; both are sorted."""
+    """Angles that a branch maps to a target, found for every interval between breakpoints; both inputs are sorted."""
     low, high = breakpoints[:-1], breakpoints[1:]
     proper = high > low
     low, high = low[proper], high[proper]
     probe = low + np.array([[0.25], [0.75]]) * (high - low)
-    # both probes in one call, so that a slot is the same isometry in both
+    # Both probes in one call, so that a slot is the same isometry in both.
     probability, angle = branches(probe)
     sign = np.sign(angle[1] - angle[0])
     offset = angle[0] - sign * probe[0][:, None]

@@ -1,4 +1,4 @@
-"""One rectangular crevice: the widths that a ray crosses, modulo 2, and the probability of retroreflection."""
+"""One rectangular crevice: the number d of widths that a ray crosses, and the probability of retroreflection."""
 
 from __future__ import annotations
 
@@ -9,17 +9,16 @@ import numpy as np
 from ...core.checks import Floats
 from ..bases.measure import SINE
 
-# d = 2 r |cot theta| carries a relative error of about 2 eps. Above the first number that is too much for the rest of a
-# division by 2, which is then found in double-double arithmetic, and above the second in as many digits as it takes.
-# Both numbers are those of the given float64 theta and r, however fast the rest changes with them.
+# d = 2 r |cot theta|, with r depth over width, has a relative error of about 2 eps in float64. Above the first limit
+# d mod 2 needs double-double arithmetic, above the second multiple precision. Theta and r count as exact numbers.
 LARGEST_PLAIN, LARGEST_DOUBLE_DOUBLE = 2.0**6, 2.0**48
-# Bits beyond those of d itself.
+# Guard bits beyond the bits of d itself.
 MORE_BITS = 80
 SPACING = float(np.spacing(np.pi))
 
 
 def crossings_modulo_two(height_to_width: float, theta: Floats) -> Floats:
-    """d mod 2, in [0, 2], with an error below 1e-13 for every float64 theta.
+    """d mod 2 for d = 2 ``height_to_width`` |cot theta|, in [0, 2], with an error below 1e-13 for every float64 theta.
 
     Examples
     --------
@@ -30,7 +29,7 @@ def crossings_modulo_two(height_to_width: float, theta: Floats) -> Floats:
     theta = np.asarray(theta, dtype=np.float64)
     with np.errstate(over="ignore"):
         crossings = np.asarray(2.0 * height_to_width / np.abs(np.tan(theta)))
-    # theta = pi/2 is the float64 nearest to it
+    # tan is finite at the float64 nearest to pi/2.
     rest = np.asarray(np.mod(np.where(crossings <= LARGEST_PLAIN, crossings, 0.0), 2.0))
     many = crossings > LARGEST_PLAIN
     if np.any(many):
@@ -45,7 +44,7 @@ def crossings_modulo_two(height_to_width: float, theta: Floats) -> Floats:
 def _in_many_digits(height_to_width: float, theta: float) -> float:
     import mpmath
 
-    # d is below 2^(exponent of r - exponent of the sine + 2), and the sine not below the spacing of float64 at pi
+    # d is below 2^(exponent of r - exponent of the sine + 2); the sine is at least the spacing near pi.
     bits = math.frexp(height_to_width)[1] - math.frexp(min(theta, SPACING))[1] + MORE_BITS
     with mpmath.workprec(max(bits, 0) + MORE_BITS):
         return float(mpmath.fmod(2 * mpmath.mpf(height_to_width) * abs(mpmath.cot(mpmath.mpf(theta))), 2))
@@ -58,7 +57,7 @@ def crevice_retro(height_to_width: float, theta: Floats) -> Floats:
 
 
 def crevice_breakpoints(height_to_width: float, limit: int) -> tuple[Floats, float]:
-    """The angles where d is a whole number, at most about ``limit``, and the measure of the angles beyond them."""
+    """The angles where d is a whole number, about ``limit`` at most, and the measure of the angles beyond them."""
     last = max((limit - 1) // 2, 0)
     if last == 0:
         return np.empty(0), 1.0

@@ -21,26 +21,26 @@ from .law import Law, set_properties
 
 DensityFunction = Callable[[Floats, Floats], Floats]
 
-# A density known to single precision integrates to 1 within this; one with a wrong constant does not.
+# Tolerance for the integral 1 of a conditional density; it admits densities known to single precision.
 ROW_TOLERANCE = 1e-7
-# Rounding may make a density that is 0 slightly negative, in proportion to its largest value.
+# Rounding can make a zero density negative by this fraction of its largest value.
 NEGATIVE_TOLERANCE = 1e-12
-# Two sides of detailed balance, or of the mirror symmetry, agree to this fraction of the largest flux: far above the
-# rounding of a formula, far below any asymmetry that is meant.
+# The two sides of detailed balance, or of the mirror symmetry, may differ by this fraction of the largest flux. It is
+# far above the rounding of a formula and far below an intended asymmetry.
 SYMMETRY_TOLERANCE = 1e-9
-# Panels in theta' tried in turn when rows are integrated, with this number of Gauss nodes on each.
+# Numbers of panels in theta' tried in turn for the integrals of conditional densities, and Gauss nodes on each panel.
 PANEL_COUNTS = (16, 32, 64, 128, 256, 512, 1024)
 GAUSS_NODES = 16
 CHECK_NODES = 8
-# Gauss nodes on a cell of a grid, and on a panel of the law's own where those are narrower.
+# Gauss nodes on a cell of a grid, or on a panel of the law if that is narrower.
 CELL_NODES = 6
-# Means of functions are settled where two rules differ by no more than this fraction of the function's largest value;
-# each panel is cut into so many parts at most. A function that jumps is not settled by these.
+# The mean of a function has converged if two rules differ by at most this fraction of the function's largest value.
+# Each panel is cut into at most MOST_PARTS parts. Means of discontinuous functions do not converge by this.
 SETTLED, MOST_PARTS = 1e-13, 8
-# Rows sampled from a tabulated cdf use this many cells on each panel.
+# Cells on each panel in the table of the cdf that is sampled.
 CELLS_PER_PANEL = 16
 PROBES = 24
-# Evaluations of the density held in memory at a time.
+# Limit on the values of the density in memory at a time.
 CHUNK = 2**20
 
 
@@ -50,26 +50,26 @@ class DensityLaw(Law):
     Parameters
     ----------
     density : callable
-        ``density(theta, theta_out)`` of two arrays that broadcast, radians; values of the broadcast shape.
+        ``density(theta, theta_out)`` of two arrays that broadcast, in radians; returns the broadcast shape.
     breakpoints : array_like, optional
-        Outgoing angles at which the density jumps or has a kink, for whatever incoming angle.
+        Outgoing angles at which the density jumps or has a kink, independent of the incoming angle.
 
     Attributes
     ----------
     outgoing_breakpoints : ndarray
-        The angles given, in increasing order.
+        The given breakpoints inside (0, pi), in increasing order.
     reversible, mirror_symmetric : bool
-        Measured: sin(theta) p(theta, theta') is symmetric, p(pi - theta, pi - theta') = p(theta, theta'), both on a
-        grid of probes within 1e-9 of the largest value.
+        Whether sin(theta) p(theta, theta') is symmetric, and whether p(pi - theta, pi - theta') = p(theta, theta').
+        Both are measured on a grid of 24 probes, within 1e-9 of the largest value.
     sampling_error : float
-        Largest difference, on the probes, between the cdf that `sample` inverts and the one by quadrature.
+        Largest difference, on the probes, between the cdf that `sample` inverts and the cdf by quadrature.
 
     Raises
     ------
     InputError
-        If the density is not vectorised, not finite, negative, or a row does not integrate to 1 within 1e-7.
+        If the density is not vectorised, not finite or negative, or does not integrate to 1 within 1e-7.
     AccuracyError
-        If the rows cannot be integrated with 1024 panels; ``defect`` is the difference of two quadratures.
+        If 1024 panels do not resolve the density in theta'; ``defect`` is the difference of two quadratures.
 
     Examples
     --------
@@ -102,7 +102,7 @@ class DensityLaw(Law):
     def __setattr__(self, name: str, value: object) -> None:
         raise FrozenInstanceError(f"{type(self).__name__} is immutable: cannot set {name}")
 
-    # ---- what a subclass with a formula of its own replaces ---------------------------------------------------
+    # ---- methods that a subclass with its own formula overrides -----------------------------------------------
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
         """p(theta, theta') with respect to d theta', in the shape to which the two arguments broadcast."""
         theta, theta_out = np.asarray(theta, dtype=np.float64), np.asarray(theta_out, dtype=np.float64)
@@ -131,7 +131,7 @@ class DensityLaw(Law):
 
     @property
     def resolution(self) -> float:
-        """Width of the narrowest feature of p(theta, .), pi where the coarsest panels resolve it."""
+        """Width of the narrowest feature of p(theta, .), in radians; pi if the coarsest panels resolve the density."""
         return np.pi if self._panel_count == PANEL_COUNTS[0] else np.pi / self._panel_count
 
     def incoming_edges(self, edges: Floats) -> Floats:
@@ -139,11 +139,11 @@ class DensityLaw(Law):
         return self._grid(self._panel_count)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Those of the outgoing angle: by detailed balance they are some of the incoming one too."""
+        """The outgoing breakpoints, which by detailed balance are incoming ones too; there may be others."""
         return self.outgoing_breakpoints, math.inf
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """Gauss rules between the edges, cut by those of the law's own panels where these are narrower."""
+        """Cell masses by Gauss rules between the edges; if the law's panels are narrower, their edges cut the cells."""
         step = max(1, CHUNK // (CELL_NODES * edges.size))
         parts = [self._cell_masses(theta[start : start + step], edges) for start in range(0, theta.size, step)]
         below = Distribution.of_cells(np.concatenate(parts)).below
@@ -161,11 +161,11 @@ class DensityLaw(Law):
         cell = row * cells + cell_among(edges, 0.5 * (low + high))
         return np.asarray(np.bincount(cell, weights=mass, minlength=theta.size * cells).reshape(-1, cells))
 
-    # ---- what every law does ---------------------------------------------------------------------------------
+    # ---- sampling, expectations and adjoint ------------------------------------------------------------------
     def adjoint(self) -> Law:
-        """The law with density sin(theta') p(theta', theta) / sin(theta); itself if it is reversible.
+        """The law with density sin(theta') p(theta', theta) / sin(theta); the law itself if it is reversible.
 
-        Raises an InputError if this law does not preserve sin(theta) d theta, for then its adjoint is no law.
+        Raises InputError if this law does not preserve sin(theta) d theta, because the adjoint is then not a law.
         """
         if self.reversible:
             return self
@@ -182,7 +182,7 @@ class DensityLaw(Law):
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         flat = theta.reshape(-1)
         if not flat.size:
-            # the shape of a value is known to the function alone
+            # Only the function determines the shape of its values.
             value = np.asarray(function(np.empty(theta.shape)), dtype=np.float64)
             return np.empty(theta.shape + value.shape[theta.ndim :])
         step = max(1, CHUNK // self.evaluations)
@@ -195,7 +195,7 @@ class DensityLaw(Law):
         found, height = self._means(function, theta, 1)
         unsettled, parts = np.arange(theta.size), 2
         while unsettled.size and parts <= MOST_PARTS:
-            # as many values at a time as with the coarsest panels
+            # Keeps the number of values in memory at its value for the coarsest panels.
             step = max(1, theta.size // parts)
             starts = range(0, unsettled.size, step)
             finer = [self._means(function, theta[unsettled[start : start + step]], parts) for start in starts]
@@ -208,7 +208,7 @@ class DensityLaw(Law):
         return found
 
     def _means(self, function: AngleFunction, theta: Floats, parts: int) -> tuple[Floats, float]:
-        """The means with each panel cut into so many parts, and the largest modulus of the function there."""
+        """The means with each panel cut into ``parts`` parts, and the largest absolute value of the function."""
         outgoing, weight = self._conditional_quadrature(split_panels(self.panels(theta), parts), GAUSS_NODES)
         weight = weight * self.density(theta[:, None], outgoing)
         weight /= np.sum(weight, axis=1, keepdims=True)
@@ -226,7 +226,7 @@ class DensityLaw(Law):
         return outgoing.reshape(theta.shape)
 
     def __repr__(self) -> str:
-        # the user's function, which may be any callable
+        # The user's function may be any callable.
         return f"DensityLaw({getattr(self._function, '__name__', repr(self._function))})"
 
     # ---- construction ----------------------------------------------------------------------------------------
@@ -237,7 +237,7 @@ class DensityLaw(Law):
         edges = self._grid(self._panel_count)
         fraction = np.arange(CELLS_PER_PANEL) / CELLS_PER_PANEL
         inner = (edges[:-1, None] + fraction * np.diff(edges)[:, None]).ravel()
-        # A jump of the density is approached from both sides.
+        # Both sides of each jump of the density.
         gap, jumps = 4.0 * EPS, self.outgoing_breakpoints
         return np.unique(np.concatenate([inner, [np.pi], jumps - gap, jumps + gap]))
 
@@ -286,7 +286,7 @@ class DensityLaw(Law):
 
 
 def split_panels(edges: Floats, parts: int) -> Floats:
-    """Edges in the last axis, with each interval cut into so many equal parts.
+    """The edges in the last axis, with each interval cut into ``parts`` equal parts.
 
     Examples
     --------
@@ -299,13 +299,13 @@ def split_panels(edges: Floats, parts: int) -> Floats:
 
 
 def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
-    """The intervals into which edges and the panels of each row together cut (0, pi).
+    """The intervals into which ``edges`` and each row of ``panels`` together cut (0, pi).
 
-    Returns the number of the row, both ends, and the width as a fraction of that of the panel.
+    Returns for each interval the index of the row, both ends, and its width as a fraction of the panel's width.
     """
     rows, count = len(panels), edges.size
     merged = np.concatenate((panels, np.broadcast_to(edges, (rows, count))), axis=1)
-    # The panel of an interval is the one whose left edge came last.
+    # The panel of an interval has the last left edge at or before the interval.
     widths = np.concatenate((np.diff(panels, axis=1), np.zeros((rows, 1 + count))), axis=1)
     number = np.concatenate((np.arange(panels.shape[1]), np.zeros(count, dtype=np.int64)))
     order = np.argsort(merged, axis=1, kind="stable")
@@ -318,7 +318,7 @@ def cut_by_edges(panels: Floats, edges: Floats) -> tuple[NDArray[np.int64], Floa
 
 
 def _probes() -> Floats:
-    # Off every symmetric or rational angle, where a density is likely to jump.
+    # No probe is a rational multiple of pi, where a density is likely to jump.
     return np.asarray(np.pi * (np.arange(PROBES) + 0.5 * np.sqrt(5.0) - 1.0) / PROBES)
 
 
@@ -327,14 +327,14 @@ def _cell_masses(edges: Floats, value: Floats) -> Floats:
 
 
 def _inverse_cdf(edges: Floats, value: Floats, draw: Floats) -> Floats:
-    """Invert the cdf of the piecewise linear density with the values ``value``, shape (rows, edges), row by row."""
+    """Invert the cdf of the piecewise linear density in each row of ``value``, shape (rows, edges)."""
     cumulative = np.cumsum(_cell_masses(edges, value), axis=1)
     target = draw * cumulative[:, -1]
     cell = np.minimum(np.sum(cumulative <= target[:, None], axis=1), edges.size - 2)
     row = np.arange(draw.size)
     rest = target - np.where(cell > 0, cumulative[row, np.maximum(cell - 1, 0)], 0.0)
     left, right, width = value[row, cell], value[row, cell + 1], edges[cell + 1] - edges[cell]
-    # left t + (right - left) t^2 / (2 width) = rest, in the form that does not cancel
+    # The root t of left t + (right - left) t^2 / (2 width) = rest, in a form without cancellation.
     root = np.sqrt(np.maximum(left * left + 2.0 * (right - left) * rest / width, 0.0))
     step = np.divide(2.0 * rest, left + root, out=np.zeros_like(rest), where=left + root > 0.0)
     outgoing: Floats = edges[cell] + np.minimum(step, width)

@@ -17,7 +17,7 @@ from .law import Combination, specular
 
 @dataclass(frozen=True, init=False, repr=False)
 class LambertianLaw(DensityLaw):
-    """The law that forgets the incoming angle: theta' has the density sin(theta')/2."""
+    """The law whose outgoing angle has the density sin(theta')/2 for every incoming angle."""
 
     reversible = True
     mirror_symmetric = True
@@ -31,7 +31,7 @@ class LambertianLaw(DensityLaw):
         return np.broadcast_to(SINE.density(theta_out), shape)
 
     def expectations(self, basis: Basis) -> Expectations:
-        """The integrals of the basis."""
+        """The integrals of the basis functions, the same at every incoming angle."""
         return Unconditional(basis)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
@@ -42,7 +42,7 @@ class LambertianLaw(DensityLaw):
 
 
 def lambertian() -> LambertianLaw:
-    """Diffuse reflection: theta' has the density sin(theta')/2 whatever theta was (Rudzis 2022, section 1.2.5).
+    """Diffuse reflection: theta' has the density sin(theta')/2 for every theta (Rudzis 2022, section 1.2.5).
 
     Examples
     --------
@@ -55,8 +55,8 @@ def lambertian() -> LambertianLaw:
 def maxwell(diffuse_fraction: float) -> Combination:
     """The law of Maxwell and Smoluchowski: diffuse with probability ``diffuse_fraction`` in [0, 1], else specular.
 
-    Its eigenvalues are 1 on constants, 1 - a on even functions of cos(theta) of mean zero and -(1 - a) on odd ones,
-    a the diffuse fraction, in the paper's convention; in the specular frame 1 - a on both.
+    Let a be the diffuse fraction. In the paper's convention the eigenvalues are 1 on constants, 1 - a on even functions
+    of cos(theta) of mean zero, and -(1 - a) on odd functions. In the specular frame both are 1 - a.
 
     Examples
     --------

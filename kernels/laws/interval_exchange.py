@@ -1,4 +1,4 @@
-"""Symmetric matrices as involutions: exchanges of intervals of angles."""
+"""Involutions with a given symmetric matrix: exchanges of intervals of angles."""
 
 from __future__ import annotations
 
@@ -17,30 +17,30 @@ from ..matrices.matrix import KernelMatrix
 from .distribution import Distribution
 from .law import Law
 
-# Fluxes that differ by less, relative to a cell, are equal; smaller masses are rounding and are left where they are.
+# Fluxes that differ by less than this fraction of a cell are equal; fluxes below NO_MASS are rounding errors.
 FLUX_TOLERANCE = 1e-9
 NO_MASS = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class IntervalExchangeLaw(Law):
-    r"""A deterministic law with a given symmetric matrix: cell i is cut into pieces, piece (i, j) changes places with
-    piece (j, i).
+    r"""A deterministic law with a given symmetric matrix: it exchanges piece (i, j) of cell i with piece (j, i) of
+    cell j.
 
-    The pieces of cell i stand in the order of j and have the masses of the flux, so that the exchange keeps
-    sin(theta) d theta and is an involution; on the cells it is exactly the matrix.
+    The pieces of cell i are sorted by j and have the masses of the flux. The exchange therefore preserves
+    sin(theta) d theta and is an involution, and its matrix on the cells is exactly the given one.
 
     Parameters
     ----------
     matrix : KernelMatrix
-        On `Bins` in theta, with a symmetric flux whose rows sum to the weights, both within 1e-9 of a cell.
+        A matrix on `Bins` in theta, with a symmetric flux whose rows sum to the weights, both within 1e-9 of a cell.
 
     Attributes
     ----------
     starts, widths : ndarray, shape (pieces,)
         Pieces in increasing order, as fractions of sin(theta)/2 d theta.
     partner : ndarray of int, shape (pieces,)
-        The piece with which each changes places.
+        The piece with which each piece is exchanged.
 
     Raises
     ------
@@ -49,9 +49,9 @@ class IntervalExchangeLaw(Law):
 
     Notes
     -----
-    Any symmetric law is thus a limit of involutions, and those are limits of walls' laws: the first step from a law to
-    a wall. Images are computed from fractions of the measure, so that within 1e-8 of 0 and pi they are good to 1e-8
-    only. Source: A. Plakhov, "Exterior Billiards" (2012), ch. 4; Rudzis 2022, section 1.2.5.
+    Every symmetric law is thus a limit of involutions, which are limits of laws of walls. Images are computed from
+    fractions of the measure; within 1e-8 of 0 and pi they are accurate to 1e-8 only. Source: A. Plakhov, "Exterior
+    Billiards" (2012), ch. 4; Rudzis 2022, section 1.2.5.
 
     Examples
     --------
@@ -76,7 +76,7 @@ class IntervalExchangeLaw(Law):
         flux, edges = self._checked_flux(), self.matrix.basis.edges
         row, column = np.nonzero(flux > NO_MASS)
         widths = flux[row, column]
-        # rows are laid out one after the other from the left end of their cells: no error adds up across cells
+        # The pieces of each cell start at its left end, so that rounding errors do not add up across cells.
         inside = np.cumsum(widths)
         first = np.searchsorted(row, np.arange(self.matrix.size))
         before = inside - widths
@@ -89,7 +89,7 @@ class IntervalExchangeLaw(Law):
             object.__setattr__(self, name, value)
 
     def image(self, theta: Floats) -> Floats:
-        """The outgoing angle of every incoming one."""
+        """The outgoing angle of every incoming angle."""
         fraction = SINE.cdf(theta)
         piece = np.clip(np.searchsorted(self.starts, fraction, side="right") - 1, 0, self.starts.size - 1)
         moved = fraction + (self.starts[self.partner[piece]] - self.starts[piece])
@@ -97,11 +97,11 @@ class IntervalExchangeLaw(Law):
         return clipped_inside(np.where(self.partner[piece] == piece, theta, angle))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """All angles between two pieces."""
+        """All angles between two pieces; none are left out."""
         return np.asarray(SINE.quantile(self.starts[1:])), 0.0
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The image is the one atom."""
+        """One atom at the image of each angle."""
         return Distribution.of_atoms(edges, self.image(theta)[:, None], np.ones((theta.size, 1)))
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:

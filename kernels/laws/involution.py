@@ -18,16 +18,16 @@ from .distribution import Distribution
 from .law import Law, RandomMap
 
 PROBES = 4096
-# Width of a probe pair in probability. Rounding of the map (1e-16 or so) then shows as 1e-10 in the slope.
+# Width of a probe pair in probability. Rounding of the map by about 1e-16 then changes the slope by about 1e-10.
 PAIR_MASS = 1e-6
 SLOPE_TOLERANCE = 1e-5
 RETURN_TOLERANCE = 1e-9
-# Pairs that straddle a jump of the map: with fewer than 10^4 jumps their fraction stays below this.
+# Bound on the fraction of pairs with a jump of the map between them, for maps with fewer than 10^4 jumps.
 JUMP_FRACTION = 0.01
-# Equal cells of the probability are hit by equally many probes, up to one probe at each side of a jump.
+# Cells of equal probability receive equal numbers of probes, up to one probe at each side of a jump.
 CELLS = 32
 CELL_TOLERANCE = 0.25
-# A measure-preserving map keeps measures of intervals; rounding of the map and of the measure stays below this.
+# Bound on the rounding error of the measure of an interval under a measure-preserving map.
 JUMP_TOLERANCE = 1e-9
 
 
@@ -35,22 +35,22 @@ JUMP_TOLERANCE = 1e-9
 class InvolutionLaw(Law):
     """The law theta' = T(theta) of a measure-preserving involution T.
 
-    Reversibility forces T to be an involution: T(T(theta)) = theta and sin(theta) d theta is preserved.
+    A reversible deterministic law has T(T(theta)) = theta and preserves sin(theta) d theta.
 
     Parameters
     ----------
     map : callable
-        Vectorised, from angles in (0, pi) to angles in (0, pi), radians.
+        Vectorised function from angles to angles, both in (0, pi), in radians.
 
     Raises
     ------
     InputError
-        If, on 4096 probes, T leaves (0, pi), T(T(theta)) differs from theta by more than 1e-9, or T does not
-        preserve sin(theta) d theta: it stretches probability anywhere but at isolated jumps, or fills a cell twice.
+        If, on 4096 probes, T leaves [0, pi], T(T(theta)) differs from theta by more than 1e-9, or T does not preserve
+        sin(theta) d theta: it stretches probability elsewhere than at isolated jumps, or fills cells unequally.
 
     Notes
     -----
-    Source: Rudzis 2022, section 1.2.5, corrected: deterministic laws are measure-preserving *involutions*.
+    Source: Rudzis 2022, section 1.2.5, corrected: T must be an *involution*, not only measure-preserving.
 
     Examples
     --------
@@ -70,7 +70,7 @@ class InvolutionLaw(Law):
     def __post_init__(self) -> None:
         if not callable(self.map):
             raise InputError(f"map: expected a function from angles to angles, got {self.map!r}")
-        # An irrational offset keeps probes off jumps at rational fractions.
+        # With an irrational offset no probe hits a jump at a rational fraction.
         fraction = (np.arange(PROBES) + np.sqrt(2.0) - 1.0) / PROBES
         theta, beside = SINE.quantile(fraction), SINE.quantile(fraction - PAIR_MASS)
         image = self._mapped(theta)
@@ -115,16 +115,16 @@ class InvolutionLaw(Law):
             )
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Where the map jumps or turns round, as far as 4096 probes show it."""
+        """The angles where the map jumps or reverses direction, as far as 4096 probes show them."""
         return jumps_of_map(self.map), 0.0
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The image is the one atom."""
+        """One atom at the image of each angle."""
         image = np.asarray(self.map(theta), dtype=np.float64)
         return Distribution.of_atoms(edges, clipped_inside(image)[:, None], np.ones((theta.size, 1)))
 
     def random_map(self) -> RandomMap:
-        """The map, whatever the number."""
+        """The map T, independent of the uniform number."""
         return lambda x, theta: (np.asarray(self.map(theta), dtype=np.float64), None)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
@@ -134,12 +134,12 @@ class InvolutionLaw(Law):
         return np.asarray(function(self._mapped(theta)), dtype=np.float64)
 
     def __repr__(self) -> str:
-        # the user's function, which may be any callable
+        # The user's function may be any callable.
         return f"InvolutionLaw({getattr(self.map, '__name__', repr(self.map))})"
 
 
 def jumps_of_map(map_angle: Callable[[Floats], Floats]) -> Floats:
-    """Where a measure-preserving map jumps or turns round: there the measure between two images changes."""
+    """The angles where a measure-preserving map jumps or reverses direction, found from the measure between images."""
     probe = SINE.quantile((np.arange(PROBES) + 0.5) / PROBES)
     image = SINE.cdf(np.asarray(map_angle(probe), dtype=np.float64))
     broken = np.abs(np.abs(np.diff(image)) - SINE.mass(probe[:-1], probe[1:])) > JUMP_TOLERANCE

@@ -1,4 +1,4 @@
-"""A law of isometries as a table: isometries, intervals of angles and probabilities at their ends."""
+"""Tables of isometries: the isometries of a law, the intervals of angles where they act, and their probabilities."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from .crevice import crevice_breakpoints, crevice_retro
 
 Whole = NDArray[np.int64]
 
-# Offsets are sums of a few angles of the wall, computed in different ways: dozens of roundings of numbers below 2 pi.
+# Offsets that differ by less are equal: they are sums of a few angles of the wall, with dozens of roundings below 2 pi.
 SAME_OFFSET = 64.0 * np.pi * EPS
-# Rows of a table that misses nothing sum to 1 within the rounding of their many terms; below this it is made good.
+# Sums of probabilities that differ from 1 by less than this differ by rounding; they are normalised.
 ROUNDED_SUM = 1e-9
-# Candidates a query looks at are held at a time.
+# Limit on the candidate pieces of a query in memory at a time.
 CHUNK = 2**21
-# Buckets of the index hold about this many entries a piece in all.
+# Approximate number of entries in the index for each piece.
 ENTRIES_PER_PIECE = 4.0
 
 
 @dataclass(frozen=True)
 class Crevice:
-    """A rectangular hollow: infinitely many pieces that accumulate at grazing, so it is listed by its shape.
+    """A rectangular hollow, given by its shape because it has infinitely many pieces, which accumulate at grazing.
 
     Parameters
     ----------
     fraction : float
-        Its opening as a fraction of the period.
+        The opening as a fraction of the period.
     height_to_width : float
-        Depth over width, r. With d = 2 r |cot theta|, retroreflection has probability ``fraction`` times the distance
-        from d to the nearest even number, specular reflection the rest of ``fraction``.
+        Depth over width, r. With d = 2 r |cot theta|, the probability of retroreflection is ``fraction`` times the
+        distance from d to the nearest even number; the rest of ``fraction`` is specular reflection.
     exchanged : bool
-        Whether the two outcomes are exchanged: so it is in the specular frame.
+        Whether the two outcomes are exchanged, as in the specular frame.
     """
 
     fraction: float
@@ -52,18 +52,18 @@ class Crevice:
 class IsometryTable:
     r"""Pieces theta' = sign theta + offset for low < theta < high, and rectangular crevices.
 
-    On a piece the probability is a + b cot(theta); times sin(theta) it is a sinusoid, given here by its values at the
-    two ends. Between them it is the sum of two terms that are not negative, so that nothing cancels,
+    On a piece the probability is p(theta) = a + b cot(theta). The sinusoid p(theta) sin(theta) is given by its values
+    ``start`` and ``end`` at the two ends. Between them it is the sum of two non-negative terms, without cancellation:
 
         p(theta) sin(theta) = (start sin(high - theta) + end sin(theta - low)) / sin(high - low).
 
     Parameters
     ----------
     sign, offset, low, high, start, end : array_like, shape (pieces,)
-        One entry a piece; no piece is longer than pi/2.
+        One entry for each piece; no piece is longer than pi/2.
     crevices : tuple of Crevice
     unresolved : float
-        A bound of the fraction of the measure for which the table sends rays back without knowing where they go.
+        Upper bound on the measure of unresolved rays, which the table retroreflects by convention.
 
     Examples
     --------
@@ -99,7 +99,7 @@ class IsometryTable:
         for name, column in zip(names, columns, strict=True):
             object.__setattr__(self, name, frozen(column[used]))
 
-    # ---- how tables are made -----------------------------------------------------------------------------------
+    # ---- constructors ------------------------------------------------------------------------------------------
     @classmethod
     def of_pieces(
         cls,
@@ -111,7 +111,7 @@ class IsometryTable:
         cosine: ArrayLike,
         unresolved: float = 0.0,
     ) -> IsometryTable:
-        """The table of pieces with probability ``sine + cosine cot(theta)``, of any length; they are cut at pi/2."""
+        """The table of pieces of any length with probability ``sine + cosine cot(theta)``; pieces are cut at pi/2."""
         columns = np.broadcast_arrays(*np.atleast_1d(sign, offset, low, high, sine, cosine))
         sign, offset, low, high, sine, cosine = (np.asarray(column, dtype=np.float64) for column in columns)
         right = 0.5 * np.pi
@@ -133,12 +133,12 @@ class IsometryTable:
 
     @classmethod
     def of_crevice(cls, fraction: float, height_to_width: float) -> IsometryTable:
-        """One rectangular crevice."""
+        """The table of one rectangular crevice, whose opening is ``fraction`` of the period."""
         return cls(*(np.empty(0),) * 6, crevices=(Crevice(fraction, height_to_width),))
 
     @classmethod
     def joined(cls, tables: Iterable[IsometryTable]) -> IsometryTable:
-        """The sum of tables whose fractions sum to 1."""
+        """The sum of tables, whose probabilities should sum to 1."""
         parts = list(tables)
         if not parts:
             raise InputError("tables: expected at least one, got none")
@@ -157,23 +157,23 @@ class IsometryTable:
         return IsometryTable(*columns, crevices=crevices, unresolved=fraction * self.unresolved)
 
     def mirrored(self) -> IsometryTable:
-        """The table of the mirror image of the wall: both angles replaced by pi minus them."""
+        """The table of the mirror image of the wall: both angles theta become pi - theta."""
         offset = np.where(self.sign > 0.0, -self.offset, 2.0 * np.pi - self.offset)
         columns = (self.sign, offset, np.pi - self.high, np.pi - self.low, self.end, self.start)
         return IsometryTable(*columns, crevices=self.crevices, unresolved=self.unresolved)
 
     def in_specular_frame(self) -> IsometryTable:
-        """The table with outgoing angles replaced by pi minus them."""
+        """The table with every outgoing angle theta' replaced by pi - theta'."""
         crevices = tuple(replace(crevice, exchanged=not crevice.exchanged) for crevice in self.crevices)
         columns = (-self.sign, np.pi - self.offset, *self._columns()[2:])
         return IsometryTable(*columns, crevices=crevices, unresolved=self.unresolved)
 
-    # ---- what it says ------------------------------------------------------------------------------------------
+    # ---- queries -----------------------------------------------------------------------------------------------
     @cached_property
     def isometries(self) -> tuple[Floats, Floats, Whole]:
-        """Sign and offset of the different isometries, and the number of the one that each piece belongs to.
+        """Sign and offset of the different isometries, and the index of the isometry of each piece.
 
-        The first two are specular reflection and retroreflection, whether the table has them or not.
+        The first two isometries are always specular reflection and retroreflection, even if the table lacks them.
         """
         sign = np.concatenate([[-1.0, 1.0], self.sign])
         offset = np.concatenate([[np.pi, 0.0], self.offset])
@@ -182,7 +182,7 @@ class IsometryTable:
         fresh |= np.diff(offset[order], prepend=-np.inf) > SAME_OFFSET
         number = np.empty(order.size, dtype=np.int64)
         number[order] = np.cumsum(fresh) - 1
-        # rows at the first piece of each group; the two ideal ones come first, so that they keep their exact offsets
+        # Each group takes the offset of its first piece. The ideal isometries come first and keep exact offsets.
         _, first = np.unique(number, return_index=True)
         rank = np.argsort(np.argsort(first))
         where = np.sort(first)
@@ -190,17 +190,17 @@ class IsometryTable:
 
     @cached_property
     def ends(self) -> Floats:
-        """The different ends of pieces inside (0, pi): the breakpoints of the law, those of crevices apart."""
+        """The distinct ends of pieces inside (0, pi): the breakpoints of the law without those of crevices."""
         ends = np.unique(np.concatenate([self.low, self.high]))
         return ends[(ends > 0.0) & (ends < np.pi)]
 
     def mass(self) -> float:
-        """The total measure of all pieces and crevices: 1 but for rounding where the table is complete."""
+        """The total measure of all pieces and crevices: 1 up to rounding if the table is complete."""
         middle, half = 0.5 * (self.low + self.high), 0.5 * (self.high - self.low)
         return float(np.sum(np.sin(half) * self.density(middle)) + sum(crevice.fraction for crevice in self.crevices))
 
     def density(self, theta: Floats, piece: Whole | slice = slice(None)) -> Floats:
-        """p(theta) sin(theta) of one piece for each angle."""
+        """p(theta) sin(theta) of the given piece at each angle."""
         low, high = self.low[piece], self.high[piece]
         raised = self.start[piece] * np.sin(high - theta) + self.end[piece] * np.sin(theta - low)
         return np.asarray(raised / np.sin(high - low))
@@ -208,8 +208,7 @@ class IsometryTable:
     def conditionals(self, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Probability, sign and offset of the branches at each angle, shape ``theta.shape + (branches,)``.
 
-        Between two breakpoints every slot is one isometry. Unused slots have probability 0 and repeat the first
-        isometry.
+        Between two breakpoints every slot is one isometry. Unused slots have probability 0 and the first isometry.
         """
         incoming = angles("theta", theta)
         flat = incoming.ravel()
@@ -233,12 +232,12 @@ class IsometryTable:
         return filled.reshape(shape), sign[which].reshape(shape), offset[which].reshape(shape)
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
-        """Probabilities and outgoing angles, as `conditionals`."""
+        """Probabilities and outgoing angles of the branches of `conditionals`."""
         probability, sign, offset = self.conditionals(theta)
         return probability, clipped_inside(sign * np.asarray(theta, dtype=np.float64)[..., None] + offset)
 
     def _entries(self, theta: Floats) -> tuple[Whole, Whole, Floats]:
-        """All (angle, isometry, probability) with pieces of the same isometry still apart."""
+        """All (angle, isometry, probability); pieces with the same isometry are not yet merged."""
         number = self.isometries[2]
         first, members = self._index
         buckets = first.size - 1
@@ -252,7 +251,7 @@ class IsometryTable:
             query = begin + owner
             piece = members[first[bucket[query]] + group]
             at = theta[query]
-            # a breakpoint belongs to the piece on its right
+            # A breakpoint belongs to the piece on its right.
             inside = (self.low[piece] <= at) & (at < self.high[piece])
             query, piece, at = query[inside], piece[inside], at[inside]
             found.append((query, number[piece], self.density(at, piece) / np.sin(at)))
@@ -267,7 +266,7 @@ class IsometryTable:
 
     @cached_property
     def _index(self) -> tuple[Whole, Whole]:
-        """For every bucket of angles the pieces that meet it: first entries, and the list."""
+        """The pieces that meet each bucket of angles: the offset of each bucket's list, and the joined lists."""
         width = float(np.sum(self.high - self.low))
         buckets = int(np.clip(ENTRIES_PER_PIECE * self.low.size * np.pi / max(width, 1e-300), 1, 2**20))
         left = np.clip((self.low * (buckets / np.pi)).astype(np.int64) - 1, 0, buckets - 1)
@@ -282,7 +281,7 @@ class IsometryTable:
         return self.sign, self.offset, self.low, self.high, self.start, self.end
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Ends of pieces and breakpoints of crevices, about ``limit`` at most, and the measure of those left out."""
+        """Ends of pieces and breakpoints of crevices, about ``limit`` at most, and the measure with others left out."""
         lists, left_out = [self.ends], 0.0
         for crevice in self.crevices:
             breakpoints, omitted = crevice_breakpoints(crevice.height_to_width, max(limit // len(self.crevices), 1))
@@ -292,6 +291,6 @@ class IsometryTable:
         surplus = self.ends.size - limit
         if surplus <= 0:
             return found, left_out
-        # too many everywhere: those nearest to pi/2 stay
+        # Drop the breakpoints nearest to grazing.
         found, beyond = without_extremal(found, surplus)
         return found, min(left_out + beyond, 1.0)

@@ -1,4 +1,4 @@
-"""Reflection laws P~(theta, d theta') on (0, pi) and their algebra: sums, products, powers and the other convention."""
+"""Reflection laws P~(theta, d theta') on (0, pi) and their algebra: sums, products, powers and change of convention."""
 
 from __future__ import annotations
 
@@ -21,48 +21,48 @@ from .branches import chained, chained_breakpoints, joined, merged
 from .distribution import Distribution
 from .isometry_table import IsometryTable
 
-# Half the spacing of rng.random(): draws of exactly 0, an entry through a tip of the wall, become this instead.
+# Half the spacing of rng.random(). It replaces draws of exactly 0, for which the ray would enter at a tip of the wall.
 SMALLEST_DRAW = 2.0**-54
-# The ends of (0, 1) in double precision.
+# Smallest and largest float64 in (0, 1), up to subnormal numbers.
 SMALLEST, LARGEST = np.finfo(np.float64).tiny, np.nextafter(1.0, 0.0)
-# Weights such as 0.1, ..., 0.4 typed in decimals sum to 1 within a few roundings; a forgotten term does not.
+# Decimal weights such as 0.1, ..., 0.4 sum to 1 within a few roundings; a sum with a forgotten term differs by more.
 WEIGHT_TOLERANCE = 1e-12
-# More evaluations than this for one incoming angle are not a computation that anybody wants to wait for.
+# `apply` refuses more evaluations than this for one incoming angle.
 MOST_EVALUATIONS = 10**7
-# Entry points of a driven law, each an atom of its distribution.
+# Entry points of a driven law that `distribution` uses, each an atom.
 ENTRY_POINTS = 4096
-# Nested calls of `apply` beyond this would meet Python's own limit on recursion.
+# Limit on nested calls of `apply`; more would exceed Python's recursion limit.
 DEEPEST_POWER = 100
 
-# From uniform numbers and incoming angles: the outgoing angles and, for traced rays, which of them escaped.
+# A map from uniform numbers and incoming angles to the outgoing angles and, for traced rays, whether each ray escaped.
 RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
 
 
 class Law(ABC):
     """A Markov kernel P~(theta, d theta') on the half circle (0, pi).
 
-    In the paper's convention theta' = theta is retroreflection and theta' = pi - theta is specular.
+    In the paper's convention theta' = theta is retroreflection and theta' = pi - theta is specular reflection.
 
     Attributes
     ----------
     reversible : bool or None
-        Whether P~ is symmetric with respect to sin(theta) d theta; None where it is not known.
+        Whether P~ is symmetric with respect to sin(theta) d theta; None if unknown.
     mirror_symmetric : bool or None
-        Whether P~ commutes with J f(theta) = f(pi - theta); None where it is not known.
+        Whether P~ commutes with J f(theta) = f(pi - theta); None if unknown.
     frame : {"paper", "specular"}
         ``"specular"`` after `in_specular_frame`, where specular reflection is the identity (Feres' convention).
     evaluations : int
-        At how many outgoing angles `apply` evaluates its function for one incoming angle: its cost.
+        Number of outgoing angles at which `apply` evaluates its function for one incoming angle; this is its cost.
     exact_apply : bool
-        Whether `apply` gives expectations to rounding, of any function. Where it is a quadrature the answer is no, and
-        `asperity.spectral.enclosures` asks for errors that it can know otherwise.
+        Whether `apply` gives expectations of any function to rounding. It is False if `apply` uses a quadrature;
+        `asperity.spectral.enclosures` then needs error bounds from another source.
 
     Notes
     -----
-    Laws compose as operators, ``first @ second``, and both must be in the same frame. In the paper's frame the
-    outgoing angle of one collision is the next incoming angle as it stands: the velocity is reversed in between. In
-    the specular frame it is pi minus that: the particle flies across a straight channel to the mirror image of the
-    wall, so powers of ``law.in_specular_frame()`` are the collisions in a channel.
+    Laws compose as operators, ``first @ second``, and both must be in the same frame. The outgoing angle of one
+    collision is the incoming angle of the next. In the paper's frame the velocity is thus reversed in between. In the
+    specular frame the particle crosses a straight channel to the mirror image of the wall, so powers of
+    ``law.in_specular_frame()`` describe repeated collisions in a channel.
     """
 
     reversible: bool | None = None
@@ -71,23 +71,23 @@ class Law(ABC):
     evaluations: int = 1
     exact_apply: bool = False
 
-    # A law is an operator, not an array: numpy must leave ``0.3 * law`` to us.
+    # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * law`` to this class.
     __array_ufunc__ = None
 
-    # ---- what a law does -------------------------------------------------------------------------------------
+    # ---- sampling and expectations ---------------------------------------------------------------------------
     def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
-        """Draw one outgoing angle for every incoming angle ``theta``; same shape, radians in (0, pi)."""
+        """Draw one outgoing angle for every incoming angle ``theta``; the same shape, radians in (0, pi)."""
         return self._sample(angles("theta", theta), generator(rng))
 
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
-        """The operator: E[f(Theta') | theta], for a vectorised f whose values have shape ``theta.shape + extra``."""
+        """The expectation E[f(Theta') | theta] of a vectorised f, whose values have shape ``theta.shape + extra``."""
         return self._apply(function, angles("theta", theta))
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and outgoing angles of a law made of isometries theta' = +-theta + const.
 
-        Returns two arrays of shape ``theta.shape + (branches,)``; branches with equal isometry are merged, unused
-        slots have probability 0 and the angle of another branch. Raises an InputError for laws of another kind.
+        Returns two arrays of shape ``theta.shape + (branches,)``. Branches with equal isometry are merged; unused
+        slots have probability 0 and the angle of another branch. Raises InputError for other laws.
         """
         raise InputError(
             f"{self!r} is not a finite mixture of isometries, so it has no branches; use sample() or apply()"
@@ -101,39 +101,39 @@ class Law(ABC):
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         """`apply` for checked arguments."""
 
-    # ---- what a law may know besides; each has a default ------------------------------------------------------
+    # ---- optional properties, each with a default -------------------------------------------------------------
     @property
     def closed_form(self) -> Law | None:
-        """The same law as one with formulas of its own; None where there is none, or this is it.
+        """The same law as an object with closed formulas; None if there is none or if this object is it.
 
-        Compound laws have none as a whole; `asperity.kernels.laws.structure.fold` puts in those of their parts.
+        It is None for compound laws; `asperity.kernels.laws.structure.fold` replaces their parts by closed forms.
         """
         return None
 
     @property
     def exact_law(self) -> Law | None:
-        """The closed form, or else the same law as a table of isometries, which may take a second to find."""
+        """The closed form, or else the same law as a table of isometries, whose computation may take a second."""
         return self.closed_form
 
     @property
     def is_isometric(self) -> bool:
         """Whether the law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
 
-        False for compound laws; `asperity.kernels.laws.structure.made_of_isometries` asks their parts.
+        False for compound laws; `asperity.kernels.laws.structure.made_of_isometries` examines their parts.
         """
         return False
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Increasing incoming angles in (0, pi) between which P~(theta, .) varies smoothly, about ``limit`` at most.
 
-        Also returns the probability under sin(theta)/2 d theta of the angles where others were left out; inf where
-        the law does not know whether there are others.
+        Also returns the measure under sin(theta)/2 d theta of the angles whose breakpoints were left out, or inf if
+        the law does not know all its breakpoints.
         """
         return np.empty(0), math.inf
 
     @property
     def outgoing_breakpoints(self) -> Floats:
-        """Outgoing angles at which densities jump or have a kink, whatever the incoming angle, as far as known."""
+        """The known outgoing angles at which densities jump or have a kink for every incoming angle."""
         return np.empty(0)
 
     def random_map(self) -> RandomMap | None:
@@ -141,24 +141,24 @@ class Law(ABC):
         return None
 
     def isometry_table(self) -> IsometryTable | None:
-        """All isometries of the law with their probabilities; None if it has others, or they cannot be listed."""
+        """All isometries of the law with their probabilities; None if the law is no such mixture or cannot list it."""
         return None
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """P~(theta_k, .) for every theta_k, with its atoms if the law knows them; ``edges`` go from 0 to pi.
 
-        By default the expectations of indicator functions.
+        The default computes the expectations of indicator functions.
         """
         below = self.apply(lambda angle: (angle[..., None] < edges).astype(np.float64), theta)
         return Distribution.without_atoms(np.maximum.accumulate(below, axis=1))
 
     def expectations(self, basis: Basis) -> Expectations:
-        """E[e_j(Theta') | theta] of all functions of a basis, with errors if the law knows them; by default `apply`."""
+        """E[e_j(Theta') | theta] for all functions of a basis, with errors if known; the default uses `apply`."""
         return ByApply(basis, self.apply, self.evaluations)
 
     # ---- the algebra -----------------------------------------------------------------------------------------
     def adjoint(self) -> Law:
-        """The adjoint kernel in L^2(sin theta d theta); the law itself where it is reversible."""
+        """The adjoint kernel in L^2(sin theta d theta); the law itself if it is reversible."""
         if self.reversible:
             return self
         raise InputError(
@@ -167,11 +167,11 @@ class Law(ABC):
         )
 
     def in_specular_frame(self) -> Law:
-        """P_F = P~ J: the law in Feres' convention, where specular reflection is the identity; twice gives it back."""
+        """P_F = P~ J, the law in Feres' convention, where specular reflection is the identity; an involution."""
         return SpecularFrame.of(self)
 
     def __matmul__(self, other: Law) -> Law:
-        """First this law, then the other."""
+        """This law followed by the other."""
         if not isinstance(other, Law):
             return NotImplemented
         return Composition.of(self, other)
@@ -197,8 +197,8 @@ class Law(ABC):
 class BranchLaw(Law):
     """A law made of isometries theta' = sign theta + offset, whose probabilities are smooth between breakpoints.
 
-    Subclasses give `branches` and `breakpoints`. Between two neighbouring breakpoints every slot of `branches` is one
-    fixed isometry with a smooth probability, so that quadrature between them is exact to rounding.
+    Subclasses define `branches` and `breakpoints`. Between two neighbouring breakpoints every slot of `branches` is
+    one fixed isometry with a smooth probability, so that quadrature between breakpoints is exact to rounding.
     """
 
     reversible = True
@@ -206,7 +206,7 @@ class BranchLaw(Law):
 
     @property
     def is_isometric(self) -> bool:
-        """True."""
+        """Always True."""
         return True
 
     @abstractmethod
@@ -214,18 +214,18 @@ class BranchLaw(Law):
 
     @abstractmethod
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the
-        probability under sin(theta)/2 d theta of the angles, mostly near grazing, where more were left out."""
+        """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the measure
+        under sin(theta)/2 d theta of the angles, mostly near grazing, whose breakpoints were left out."""
 
     def random_map(self) -> RandomMap:
-        """The branch in whose fraction of (0, 1) the number lies."""
+        """The map that takes the branch in whose part of (0, 1) the number lies."""
         return lambda x, theta: (self._branch_taken(x, theta), None)
 
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         return self._branch_taken(rng.random(theta.shape), theta)
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The branches are atoms."""
+        """The branches as atoms."""
         probability, outgoing = self.branches(theta)
         return Distribution.of_atoms(edges, outgoing, probability)
 
@@ -249,22 +249,22 @@ class BranchLaw(Law):
 class DrivenLaw(Law):
     """A law theta' = reflect(X, theta) with X uniform in (0, 1): the reflection of a ray that enters at random.
 
-    Subclasses give `reflect`. Unless they know better, expectations are midpoint sums over ``evaluations`` entry
-    points: the error falls like 1/evaluations where `reflect` jumps, and like its square elsewhere.
+    Subclasses define `reflect`. By default expectations are midpoint sums over ``evaluations`` entry points. Their
+    error is proportional to 1/evaluations if `reflect` jumps and to 1/evaluations^2 otherwise.
     """
 
     evaluations = 256
 
     @abstractmethod
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
-        """Outgoing angle for the entry point ``x`` in (0, 1), as a fraction of the period, and the angle ``theta``."""
+        """Outgoing angle for the entry point ``x``, a fraction of the period in (0, 1), and the angle ``theta``."""
 
     def random_map(self) -> RandomMap:
-        """`reflect`."""
+        """The map `reflect`."""
         return lambda x, theta: (self.reflect(x, theta), None)
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """Equally spaced entry points, each an atom."""
+        """One atom for each of 4096 equally spaced entry points."""
         x = (np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS
         outgoing = self.reflect(x, theta[:, None])
         return Distribution.of_atoms(edges, outgoing, np.full(outgoing.shape, 1.0 / ENTRY_POINTS))
@@ -279,18 +279,18 @@ class DrivenLaw(Law):
 
 
 def entry_inside(x: Floats) -> Floats:
-    """Move uniform numbers that fell on an end of (0, 1) to the nearest float64 inside it."""
+    """Clip uniform numbers to the open interval (0, 1)."""
     return np.asarray(np.clip(x, SMALLEST, LARGEST))
 
 
 def set_properties(law: Law, **properties: object) -> None:
-    """Set attributes of a law under construction; afterwards it is immutable."""
+    """Set attributes of an immutable law during its construction."""
     for name, value in properties.items():
         object.__setattr__(law, name, value)
 
 
 def entry_points(x: ArrayLike) -> Floats:
-    """Return ``x`` as float64, every one in the open interval (0, 1), or raise an InputError."""
+    """Return ``x`` as float64; raises InputError unless every value lies in the open interval (0, 1)."""
     array = finite_array("x", x)
     bad = ~((array > 0.0) & (array < 1.0))
     if bad.any():
@@ -307,13 +307,13 @@ def entry_points(x: ArrayLike) -> Floats:
 class Combination(Law):
     """A weighted sum of laws, ``0.3 * law + 0.7 * other``.
 
-    It is a law once its weights are non-negative and sum to 1; `sample`, `apply`, `branches` and `adjoint` raise an
-    InputError until then.
+    It is a law if its weights are non-negative and sum to 1; otherwise `sample`, `apply`, `branches` and `adjoint`
+    raise InputError.
 
     Parameters
     ----------
     terms : tuple of (float, Law)
-        Weights and laws, all in the same frame; sums are kept flat.
+        Weights and laws, all in the same frame; ``+`` flattens nested sums.
 
     Raises
     ------
@@ -357,7 +357,7 @@ class Combination(Law):
         return abs(math.fsum(weight for weight, _ in self.terms) - 1.0) <= WEIGHT_TOLERANCE
 
     def terms_checked(self) -> tuple[tuple[float, Law], ...]:
-        """The terms, or an InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
+        """The terms; raises InputError if a weight is negative or the weights do not sum to 1 within 1e-12."""
         for index, (weight, law) in enumerate(self.terms):
             if weight < 0.0:
                 raise InputError(f"weights: expected non-negative ones, got {weight!r} for term {index}, {law!r}")
@@ -434,7 +434,7 @@ class Combination(Law):
 def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
     """The law that follows ``laws[k]`` with probability ``weights[k]``.
 
-    Raises an InputError if the numbers of laws and weights differ, a weight is negative or they do not sum to 1.
+    Raises InputError if the numbers of laws and weights differ, a weight is negative or the weights do not sum to 1.
 
     Examples
     --------
@@ -451,7 +451,7 @@ def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
 
 
 def common_frame(laws: Sequence[Law], verb: str) -> Frame:
-    """The frame that all the laws are in, or an InputError that says what could not be done."""
+    """The common frame of the laws; raises InputError if their frames differ, with ``verb`` in its message."""
     for law in laws[1:]:
         if law.frame != laws[0].frame:
             raise InputError(
@@ -462,16 +462,16 @@ def common_frame(laws: Sequence[Law], verb: str) -> Frame:
 
 
 def _sum_property(promises: Sequence[bool | None]) -> bool | None:
-    """Whether a sum has a property that the terms have, have not, or are not known to have."""
+    """Whether a sum has a property that each term has (True), lacks (False) or may have (None)."""
     if all(promises):
         return True
-    # One term without it spoils the sum only if no other term can make up for it.
+    # The sum certainly lacks the property only if one term lacks it and all others have it; two terms can cancel.
     certain = [known for known in promises if known is True]
     return False if len(certain) == len(promises) - 1 and False in promises else None
 
 
 def as_factor(law: Law) -> str:
-    """The name of a law as a factor."""
+    """The text of a law as a factor of a product."""
     return f"({law!r})" if isinstance(law, (Combination, Composition)) else repr(law)
 
 
@@ -482,12 +482,12 @@ class Composition(Law):
     Parameters
     ----------
     laws : tuple of Law
-        The first one first, all in the same frame; compositions are kept flat.
+        The laws in their order of application, all in the same frame; nested compositions are flattened.
 
     Raises
     ------
     InputError
-        If there are no laws or their frames differ: P~ @ Q_F would confuse theta with pi - theta between the two.
+        If there are no laws or their frames differ: P~ @ Q_F would confuse theta with pi - theta between the factors.
 
     Examples
     --------
@@ -514,9 +514,9 @@ class Composition(Law):
 
     @staticmethod
     def of(first: Law, second: Law) -> Law:
-        """First one law, then the other; bilinear, so that ``0.6 * law @ other`` is 0.6 times the composition.
+        """The first law followed by the second, bilinear: ``0.6 * law @ other`` is 0.6 times the composition.
 
-        A combination whose weights sum to 1 is kept whole.
+        A combination whose weights sum to 1 remains one factor.
         """
         for index, law in enumerate((first, second)):
             if isinstance(law, Combination) and not law.sums_to_one:
@@ -558,8 +558,8 @@ class Composition(Law):
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
 
-    `apply` evaluates its function at ``evaluations ** n`` angles and raises an InputError where that is out of reach:
-    use ``discretise(law, basis) ** n`` there.
+    `apply` evaluates its function at ``law.evaluations ** n`` angles. It raises InputError above 10^7 angles or for
+    n > 100; use ``discretise(law, basis) ** n`` then.
 
     Examples
     --------
@@ -577,7 +577,7 @@ class Power(Law):
             self, frame=self.law.frame, mirror_symmetric=self.law.mirror_symmetric or self.exponent == 0 or None
         )
         set_properties(self, reversible=self.law.reversible or self.exponent == 0 or None)
-        # A float: whole numbers of 10^5 digits serve nobody.
+        # Computed in float64: the exact integer can have 10^5 digits.
         grown = math.exp(min(self.exponent * math.log(self.law.evaluations), 700.0))
         set_properties(self, evaluations=round(grown))
 
@@ -618,7 +618,7 @@ class Power(Law):
 
 
 def atoms_of(law: Law, theta: Floats, edges: Floats) -> Distribution | None:
-    """The branches of a law as atoms; None where it has none, or too many."""
+    """The branches of a law as atoms; None if it cannot list branches or has too many."""
     try:
         probability, outgoing = law.branches(theta)
     except InputError:
@@ -627,7 +627,7 @@ def atoms_of(law: Law, theta: Floats, edges: Floats) -> Distribution | None:
 
 
 def as_base(law: Law) -> str:
-    """The name of a law before an exponent or a method."""
+    """The text of a law before an exponent or a method call."""
     return f"({law!r})" if isinstance(law, Power) else as_factor(law)
 
 
@@ -648,8 +648,8 @@ def _pulled_back(law: Law, function: AngleFunction) -> AngleFunction:
 class SpecularFrame(Law):
     """P J, f -> P(J f) with J f(theta) = f(pi - theta): the law in the other frame.
 
-    Of a law in the paper's frame this is P_F, Feres' convention: specular reflection is the identity. P_F is
-    self-adjoint exactly if P~ is and commutes with J; a mirror-symmetric wall suffices.
+    For a law P~ in the paper's frame this is P_F, the law in Feres' convention, where specular reflection is the
+    identity. If P~ is self-adjoint, P_F is self-adjoint exactly if P~ commutes with J, as for mirror-symmetric walls.
 
     Source: Rudzis 2022, section 1.2.6, with the convention that its formula needs (P~u - u is small for flat walls).
 
@@ -672,7 +672,7 @@ class SpecularFrame(Law):
 
     @staticmethod
     def of(law: Law) -> Law:
-        """The law in the other frame; of a law that was moved there, the law itself; of a sum, term by term."""
+        """The law in the other frame: for a `SpecularFrame` its inner law, for a sum the sum of transformed terms."""
         if isinstance(law, SpecularFrame):
             return law.law
         if isinstance(law, Combination):
@@ -680,7 +680,7 @@ class SpecularFrame(Law):
         return SpecularFrame(law)
 
     def adjoint(self) -> Law:
-        """(P J)* = J P*, written as J (P* J) J with J a law of this frame."""
+        """(P J)* = J P*, written as J (P* J) J, where J is a law in this frame."""
         if self.reversible:
             return self
         transformed = SpecularFrame.of(self.law.adjoint())
@@ -718,7 +718,7 @@ class SpecularFrame(Law):
         return self.law.distribution(theta, (np.pi - edges)[::-1]).mirrored()
 
     def expectations(self, basis: Basis) -> Expectations:
-        """By those of the law in a basis that is mirror-symmetric; by `apply` in others."""
+        """Expectations from the inner law if the basis is mirror-symmetric, else by `apply`."""
         if not is_mirror_symmetric(basis):
             return super().expectations(basis)
         return Mirrored(basis, self.law.expectations(basis), self.mirror_symmetric is True)
@@ -758,11 +758,11 @@ class IsometryLaw(BranchLaw):
         return np.ones((*theta.shape, 1)), outgoing[..., None]
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """None at all."""
+        """No breakpoints, and none left out."""
         return np.empty(0), 0.0
 
     def isometry_table(self) -> IsometryTable:
-        """The one isometry."""
+        """The table of this single isometry."""
         return IsometryTable.sent_back(1.0) if self.retro else IsometryTable.flat(1.0)
 
     def __repr__(self) -> str:
@@ -781,7 +781,7 @@ def specular() -> IsometryLaw:
 
 
 def retroreflection() -> IsometryLaw:
-    """Retroreflection, theta' = theta: the particle goes back where it came from.
+    """Retroreflection, theta' = theta in the paper's convention: the particle leaves in the direction it came from.
 
     Examples
     --------

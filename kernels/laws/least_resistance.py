@@ -15,9 +15,9 @@ from ..bases.measure import SINE, gauss_on_intervals
 from .distribution import Distribution
 from .law import Law
 
-# From here on rays are split, in x = theta - pi/2: where the partner 3 x - pi of x would be grazing.
+# Rays are split from this x = theta - pi/2 on, at which the partner 3 x - pi is grazing.
 SPLIT_BEGINS = np.pi / 6.0
-# Gauss nodes on intervals that double from 1/1000 of (b, pi - 3 b) on: x' has a branch point 1/200 to the left of b.
+# Gauss nodes on intervals that double from 1/1024 of (b, pi - 3 b) on, because x' has a branch point at b - 0.005.
 NODES, DOUBLINGS = 16, 10
 
 
@@ -25,22 +25,22 @@ NODES, DOUBLINGS = 16, 10
 class LeastResistanceLaw(Law):
     r"""The minimiser of E[1 + cos(theta' - theta)] among all symmetric laws.
 
-    With x = theta - pi/2 and x' = theta' - pi/2, both between -pi/2 and pi/2, and 0 <= x (for x < 0 the mirror image):
+    Let x = theta - pi/2 and x' = theta' - pi/2, both in (-pi/2, pi/2). For x >= 0 (for x < 0 by mirror symmetry):
 
     - x < pi/6: specular, x' = -x;
     - pi/6 < x < b: x' = 3 x - pi with probability p(x) = -3 cos(3 x)/cos(x), else x' = -x;
     - b < x < pi - 3 b: sin(x') = sin(x) - sin(b) - sin(3 b);
     - pi - 3 b < x: x' = (x - pi)/3.
 
-    b = 0.5537931... is fixed by 2 cos(2 b) = int from b to pi - 3 b of sin(x - x') dx. So near-grazing rays are sent
-    back at a steeper angle, and in a narrow range rays do one or the other: no map does that, involutions come
-    arbitrarily near (`IntervalExchangeLaw`).
+    The number b = 0.5537931... solves 2 cos(2 b) = int from b to pi - 3 b of sin(x - x') dx. Near-grazing rays are
+    returned at a steeper angle. For pi/6 < x < b both outcomes occur, so the law is not deterministic, but
+    deterministic involutions approximate it arbitrarily well (`IntervalExchangeLaw`).
 
     Notes
     -----
-    It is optimal because a potential certifies it: phi even, phi(x) = cos(2 x)/2 for x < b, and
-    phi'(x) = -sin(x - x') beyond, satisfies phi(x) + phi(y) <= cos(x - y) for all x and y, with equality exactly where
-    the law puts its mass. `extremal_resistance` checks the inequality. Its resistance is 0.987823750351586; A. Plakhov
+    A potential proves that the law is optimal. The even function phi with phi(x) = cos(2 x)/2 for 0 <= x < b and
+    phi'(x) = -sin(x - x') for x > b satisfies phi(x) + phi(y) <= cos(x - y) for all x and y, with equality exactly on
+    the support of the law. `extremal_resistance` checks the inequality. The resistance is 0.987823750351586; A. Plakhov
     (Arch. Ration. Mech. Anal. 194, 2009) published 0.9878.
 
     Examples
@@ -59,11 +59,11 @@ class LeastResistanceLaw(Law):
 
     @property
     def split_ends(self) -> float:
-        """b, the end of the range where rays are split."""
+        """The number b, the end of the range of x in which rays are split."""
         return _split_ends()
 
     def images(self, theta: Floats) -> tuple[Floats, Floats]:
-        """Probabilities and outgoing angles, shape ``theta.shape + (2,)``: the specular one first."""
+        """Probabilities and outgoing angles, shape ``theta.shape + (2,)``; the specular outcome is the first."""
         x = np.asarray(theta, dtype=np.float64) - 0.5 * np.pi
         size = np.abs(x)
         away = np.clip(np.where(size < self.split_ends, -3.0 * np.cos(3.0 * size) / np.cos(size), 1.0), 0.0, 1.0)
@@ -73,21 +73,21 @@ class LeastResistanceLaw(Law):
         return np.stack([1.0 - away, away], axis=-1), clipped_inside(image + 0.5 * np.pi)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Where the formula changes."""
+        """The angles where the formula changes; none are left out."""
         x = np.array([SPLIT_BEGINS, self.split_ends, np.pi - 3.0 * self.split_ends])
         return 0.5 * np.pi + np.concatenate((-x[::-1], x)), 0.0
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """Two atoms."""
+        """Two atoms at each incoming angle."""
         probability, outgoing = self.images(theta)
         return Distribution.of_atoms(edges, outgoing, probability)
 
     def potential(self, theta: Floats) -> Floats:
-        """phi, the certificate: phi(theta) + phi(theta') <= cos(theta' - theta), with equality on the law."""
+        """The potential phi: phi(theta) + phi(theta') <= cos(theta' - theta), with equality on the law's support."""
         size = np.abs(np.asarray(theta, dtype=np.float64) - 0.5 * np.pi)
         b = self.split_ends
         last = np.pi - 3.0 * b
-        # the integral of sin(x - x'), cumulated over the sorted angles of its range; beyond it is elementary
+        # Cumulative integral of sin(x - x') over the sorted x from b to pi - 3 b; beyond, the integral is elementary.
         middle = np.unique(np.concatenate(([b], np.clip(size, b, last).ravel(), _graded(b))))
         table = np.concatenate(([0.0], np.cumsum(_turning(middle[:-1], middle[1:], b))))
         carried = table[np.searchsorted(middle, np.clip(size, b, last))]
@@ -105,19 +105,19 @@ class LeastResistanceLaw(Law):
         return float(mass @ np.sum(probability * np.cos(outgoing - angle[:, None]), axis=1) / mass.sum())
 
     def flux(self, cells: Bins) -> Floats:
-        """The mass of sin(theta)/2 d theta that goes from each cell to each other one, shape (n, n), to rounding."""
+        """The mass of sin(theta)/2 d theta that goes from each cell to each cell, shape (n, n), to rounding."""
         b = self.split_ends
         edges = cells.edges - 0.5 * np.pi
         edges = np.concatenate((edges, -edges))
         ends = [0.0, SPLIT_BEGINS, b, np.pi - 3.0 * b, 0.5 * np.pi]
-        # the edges, and what is mapped to them
+        # Breakpoints, edges of cells, and preimages of the edges.
         middle_range = np.arcsin(np.clip(np.sin(edges) + np.sin(b) + np.sin(3.0 * b), -1.0, 1.0))
         cuts = np.concatenate((ends, edges, (edges + np.pi) / 3.0, np.pi + 3.0 * edges, middle_range))
         cuts = np.unique(np.clip(cuts, 0.0, 0.5 * np.pi))
         low, high = cuts[:-1], cuts[1:]
         middle = 0.5 * (low + high)
         whole = SINE.mass(low + 0.5 * np.pi, high + 0.5 * np.pi)
-        # -3 cos(3 x)/2 is the density of what is not specular in the range of splitting
+        # In the range of splitting, the rays that are not reflected specularly have the density -3 cos(3 x)/2.
         split = 0.5 * (np.sin(3.0 * low) - np.sin(3.0 * high))
         away = np.where(middle < SPLIT_BEGINS, 0.0, np.where(middle < b, split, whole))
         theta, flux = middle + 0.5 * np.pi, np.zeros((cells.size, cells.size))
@@ -139,7 +139,7 @@ class LeastResistanceLaw(Law):
 
 
 def partners(size: Floats, b: float) -> Floats:
-    """x' for x between pi/6 and pi/2, of the rays that are not reflected specularly."""
+    """x' of the rays that are not reflected specularly, for x between pi/6 and pi/2."""
     middle = np.arcsin(np.clip(np.sin(size) - np.sin(b) - np.sin(3.0 * b), -1.0, 1.0))
     outer = np.where(size < b, 3.0 * size - np.pi, (size - np.pi) / 3.0)
     return np.where((size > b) & (size < np.pi - 3.0 * b), middle, outer)
@@ -151,7 +151,7 @@ def _graded(b: float) -> Floats:
 
 
 def _turning(low: Floats, high: Floats, b: float) -> Floats:
-    """Integrals of sin(x - x') over intervals in the range where x' is given by a difference of sines."""
+    """Integrals of sin(x - x') over intervals between b and pi - 3 b."""
     x, weight = gauss_on_intervals(low, high, NODES)
     return np.asarray((weight * np.sin(x - partners(x, b))).reshape(-1, NODES).sum(axis=1))
 

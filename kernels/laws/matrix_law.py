@@ -1,4 +1,4 @@
-"""The law of a kernel matrix, whose outgoing angles have a piecewise constant density."""
+"""The law of a kernel matrix, whose outgoing angle has a piecewise constant density in cos(theta)."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from ..matrices.matrix import KernelMatrix
 from .density import GAUSS_NODES, NEGATIVE_TOLERANCE, SYMMETRY_TOLERANCE, DensityLaw
 from .law import set_properties
 
-# Rows that were divided by their sum add up to 1 within a few roundings; rows of a matrix whose flux was symmetrised
-# instead do not, and are no law.
+# Rows divided by their sums add up to 1 within a few roundings. Rows of a matrix with symmetrised flux may not; such a
+# matrix is not a law.
 ROW_SUM_TOLERANCE = 1e-9
 
 
@@ -27,7 +27,7 @@ class MatrixLaw(DensityLaw):
     Parameters
     ----------
     matrix : KernelMatrix or array_like, shape (n, n)
-        A matrix on `Bins` in theta, or a plain row-stochastic array, whose bins are then equal in cos(theta).
+        A matrix on `Bins` in theta, or a row-stochastic array; an array stands for bins of equal width in cos(theta).
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class MatrixLaw(DensityLaw):
     edges : ndarray, shape (n + 1,)
         Angles between the bins, from 0 to pi.
     reversible, mirror_symmetric : bool
-        Measured on the matrix.
+        Computed from the matrix; ``mirror_symmetric`` is None if the bins are not symmetric about pi/2.
 
     Raises
     ------
@@ -89,7 +89,7 @@ class MatrixLaw(DensityLaw):
         set_properties(self, reversible=bool(np.max(np.abs(flux - flux.T)) <= SYMMETRY_TOLERANCE * np.max(flux)))
         even = bool(np.max(np.abs(masses - masses[::-1])) <= SYMMETRY_TOLERANCE)
         mirror = bool(np.max(np.abs(array - array[::-1, ::-1])) <= SYMMETRY_TOLERANCE)
-        # On bins that are not symmetric about pi/2 the entries alone do not tell.
+        # On bins that are not symmetric about pi/2 the entries do not determine the mirror symmetry.
         set_properties(self, mirror_symmetric=mirror if even else None)
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
@@ -102,7 +102,7 @@ class MatrixLaw(DensityLaw):
         return np.broadcast_to(self.edges, (*theta.shape, self.edges.size))
 
     def adjoint(self) -> MatrixLaw:
-        """The law of W^-1 P^T W, W the masses of the bins; an InputError if P does not preserve sin(theta) d theta."""
+        """The law of W^-1 P^T W with bin masses W; raises InputError if P does not preserve sin(theta) d theta."""
         if self.reversible:
             return self
         reverse = self.array.T * self._masses / self._masses[:, None]
@@ -127,7 +127,7 @@ class MatrixLaw(DensityLaw):
         cumulative = np.cumsum(self.array, axis=1)
         cumulative /= cumulative[:, -1:]
         start, size = cell_among(self.edges, theta), self._masses.size
-        # One search in all rows at once: row i occupies the values from i to i + 1, which costs log2(n) of 53 bits.
+        # One search covers all rows: row i occupies the values from i to i + 1. This costs log2(n) of 53 bits.
         rows = cumulative + np.arange(size)[:, None]
         cell = np.searchsorted(rows.ravel(), start + rng.random(theta.shape), side="right") - size * start
         cell = np.clip(cell, 0, size - 1)
@@ -147,7 +147,7 @@ def _bin_edges(basis: Basis, size: int) -> Floats:
 
 
 def _uniform_between(low: Floats, high: Floats, fraction: Floats) -> Floats:
-    """The angle that splits the probability of (low, high) in the given ratio, accurate at both ends of (0, pi)."""
+    """The angle below which ``fraction`` of the measure of (low, high) lies, accurate at both ends of (0, pi)."""
     upper = low >= 0.5 * np.pi
     low, high = np.where(upper, np.pi - high, low), np.where(upper, np.pi - low, high)
     fraction = np.where(upper, 1.0 - fraction, fraction)

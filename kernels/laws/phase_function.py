@@ -1,4 +1,4 @@
-"""The Henyey-Greenstein law: the reference kernel of every spectral method."""
+"""The Henyey-Greenstein law, whose known spectrum makes it the reference kernel of the spectral methods."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from .density import GAUSS_NODES, DensityLaw
 
 @dataclass(frozen=True, repr=False)
 class HenyeyGreensteinLaw(DensityLaw):
-    r"""Scattering of the direction on the sphere with the Henyey-Greenstein phase function, seen in cos(theta).
+    r"""The law of cos(theta) if the direction on the sphere is scattered with the Henyey-Greenstein phase function.
 
     With u = cos(theta), the kernel with respect to du' is
 
         k(u, u') = sum over l of (2 l + 1)/2 g^l P_l(u) P_l(u')
                  = (1 - g^2) E(m) / (pi (A - B) sqrt(A + B)),    m = 2 B / (A + B),
 
-    A = 1 + g^2 - 2 g u u', B = 2 g sin(theta) sin(theta'), E the complete elliptic integral. It is reversible with
-    respect to sin(theta) d theta, has the eigenvalues g^l on Legendre polynomials, and HG(g) HG(h) = HG(g h).
+    A = 1 + g^2 - 2 g u u', B = 2 g sin(theta) sin(theta'), E the complete elliptic integral. The law is reversible with
+    respect to sin(theta) d theta, has the eigenvalue g^l on the polynomial P_l, and satisfies HG(g) HG(h) = HG(g h).
 
     Parameters
     ----------
     g : float
-        Mean cosine of the scattering angle, -1 < g < 1. In the paper's convention g -> 1 tends to retroreflection
-        (theta' = theta), g -> -1 to specular reflection (theta' = pi - theta), and g = 0 is Lambertian.
+        Mean cosine of the scattering angle, -1 < g < 1. In the paper's convention the law tends to retroreflection
+        (theta' = theta) for g -> 1 and to specular reflection (theta' = pi - theta) for g -> -1; g = 0 is Lambertian.
 
     Notes
     -----
-    Source: L. G. Henyey and J. L. Greenstein, Astrophys. J. 93 (1941) 70; the azimuthal mean in closed form.
+    Source: L. G. Henyey and J. L. Greenstein, Astrophys. J. 93 (1941) 70. The azimuthal mean has the closed form above.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class HenyeyGreensteinLaw(DensityLaw):
         object.__setattr__(self, "evaluations", (2 * self._doublings() + 4) * GAUSS_NODES)
 
     def eigenvalue(self, degree: int) -> float:
-        """g^l, the eigenvalue of the Legendre polynomial of degree l in cos(theta)."""
+        """The eigenvalue g^l of the Legendre polynomial of degree l in cos(theta)."""
         return float(self.g ** whole_number("degree", degree, 0))
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats:
@@ -65,16 +65,16 @@ class HenyeyGreensteinLaw(DensityLaw):
 
         theta, theta_out = np.asarray(theta, dtype=np.float64), np.asarray(theta_out, dtype=np.float64)
         weight = 2.0 * SINE.density(theta_out)
-        # g < 0 is g > 0 followed by theta' -> pi - theta'. A - B and A + B as sums of squares do not cancel.
+        # g < 0 is g > 0 followed by theta' -> pi - theta'. As sums of squares, A - B and A + B have no cancellation.
         g, target = abs(self.g), theta_out if self.g >= 0.0 else np.pi - theta_out
         least = (1.0 - g) ** 2 + 4.0 * g * np.sin(0.5 * (theta - target)) ** 2
         most = (1.0 - g) ** 2 + 4.0 * g * np.sin(0.5 * (theta + target)) ** 2
-        # E(m) = 2 R_G(0, 1 - m, 1) in Carlson's form takes 1 - m = (A - B)/(A + B), which is accurate near m = 1
+        # Carlson's form E(m) = 2 R_G(0, 1 - m, 1) needs 1 - m = (A - B)/(A + B), which is accurate near m = 1.
         elliptic = 2.0 * elliprg(0.0, least / most, 1.0)
         return np.asarray(weight * (1.0 - g) * (1.0 + g) * elliptic / (np.pi * least * np.sqrt(most)))
 
     def panels(self, theta: Floats) -> Floats:
-        """Edges that double their distance from the peak, whose width is about 1 - |g|."""
+        """Edges whose distances from the peak double; the width of the peak is about 1 - |g|."""
         distance = (1.0 - abs(self.g)) * 2.0 ** np.arange(self._doublings())
         peak = (theta if self.g >= 0.0 else np.pi - theta)[..., None]
         ends = np.zeros_like(peak)
@@ -83,18 +83,18 @@ class HenyeyGreensteinLaw(DensityLaw):
 
     @property
     def resolution(self) -> float:
-        """Width of the peak, 1 - |g|."""
+        """Width 1 - |g| of the peak, in radians."""
         return 1.0 - abs(self.g)
 
     def incoming_edges(self, edges: Floats) -> Floats:
-        """Integrals between edges change where the peak passes an edge: distances from there that double."""
+        """Angles whose distances from the edges double, because the integrals change where the peak passes an edge."""
         centre = edges if self.g >= 0.0 else np.pi - edges[::-1]
         distance = self.resolution * 2.0 ** np.arange(self._doublings())
-        # up to the middle between two edges, from where the next edge is nearer
+        # Distances end at the middle between two edges, beyond which the next edge is nearer.
         half = 0.5 * np.diff(centre)[:, None]
         right, left = centre[:-1, None] + distance, centre[1:, None] - distance
         near = distance <= half
-        # no interval between two edges is wider than the peak where both are near
+        # Edges between one and two peak widths apart get a middle, so that no interval is wider than the peak.
         halved = (0.5 * self.resolution < half) & (half < self.resolution)
         middle = 0.5 * (centre[1:] + centre[:-1])[halved[:, 0]]
         return np.unique(np.concatenate((centre[1:-1], middle, right[near], left[near])))
@@ -105,7 +105,7 @@ class HenyeyGreensteinLaw(DensityLaw):
     def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
         g, draw = abs(self.g), rng.random(theta.shape)
         azimuth = 2.0 * np.pi * rng.random(theta.shape)
-        # The inverse cdf of the phase function, as sin^2 and cos^2 of half the scattering angle: nothing cancels.
+        # The inverse cdf of the phase function, as sine and cosine of half the scattering angle, without cancellation.
         scale = 1.0 - g + 2.0 * g * draw
         half_sine = (1.0 - g) * np.sqrt((1.0 - draw) * (1.0 + g * draw)) / scale
         half_cosine = (1.0 + g) * np.sqrt(draw * (1.0 - g + g * draw)) / scale
@@ -122,7 +122,7 @@ class HenyeyGreensteinLaw(DensityLaw):
 def henyey_greenstein(g: float) -> HenyeyGreensteinLaw:
     """The Henyey-Greenstein law with mean cosine ``g``, -1 < g < 1; see `HenyeyGreensteinLaw`.
 
-    Raises an InputError if g is not in that range.
+    Raises InputError if g is not in this range.
 
     Examples
     --------

@@ -11,26 +11,26 @@ from ...core.errors import InputError
 from .law import Combination, Composition, Law, Power, SpecularFrame
 
 Fact = TypeVar("Fact")
-# Asked of a law to see whether it lists isometries.
+# Breakpoint limit and incoming angle (in radians) of the test whether a law lists isometries.
 FEW_BREAKPOINTS, PROBE = 8, 1.0
 
 
 @dataclass(frozen=True)
 class Rules(Generic[Fact]):
-    """How a fact about laws passes through the algebra.
+    """The rules by which `fold` computes a property ("fact") of a compound law from the facts of its parts.
 
     Parameters
     ----------
     leaf : callable
-        The fact of a law that is not a combination of others.
+        From a law that is not compound to its fact.
     mixture : callable
-        From the (weight, fact) pairs of a weighted sum; terms of weight 0 are left out.
+        From the (weight, fact) pairs of a weighted sum, without terms of weight 0.
     chain : callable
-        From the facts of laws applied one after the other, the first one first; of none for the identity.
-    turned : callable
-        From the fact of a law to that of the law in the other frame.
+        From the facts of composed laws, in their order of application; an empty list stands for the identity.
+    mirrored : callable
+        From the fact of a law to the fact of the law in the other frame.
     whole : callable, optional
-        From a law that is made of others, and what its parts say, to the fact; by default what the parts say.
+        From a compound law and the fact computed from its parts to the final fact; by default the latter.
     """
 
     leaf: Callable[[Law], Fact]
@@ -41,11 +41,11 @@ class Rules(Generic[Fact]):
 
 
 def fold(law: Law, rules: Rules[Fact]) -> Fact:
-    """The fact of a law from those of its parts; a wall whose law is known in closed form counts as that law.
+    """The fact of a law computed from the facts of its parts; a law with a closed form is replaced by that form.
 
     Examples
     --------
-    How many reflections a law makes in the mean:
+    The mean number of reflections of a law:
 
     >>> from asperity.kernels import retroreflection, specular
     >>> count = Rules(lambda law: 1.0, lambda terms: sum(w * n for w, n in terms), sum, lambda n: n)
@@ -65,30 +65,30 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
 
 
 def is_compound(law: Law) -> bool:
-    """Whether `fold` takes the law apart into others."""
+    """Whether the law is a sum, composition, power or change of frame of other laws."""
     return isinstance(law, (Combination, Composition, Power, SpecularFrame))
 
 
 def has_chain(law: Law) -> bool:
-    """Whether laws follow one another somewhere in the law, so that the numbers of their branches multiply."""
+    """Whether the law contains a composition or power, so that numbers of branches multiply."""
     return fold(law, Rules(lambda _: False, lambda terms: any(fact for _, fact in terms), lambda _: True, lambda f: f))
 
 
 def holds_of_all(law: Law, test: Callable[[Law], bool]) -> bool:
-    """Whether every part of a law that is no combination of others keeps a promise."""
+    """Whether every part of a law that is not compound passes the test."""
     return fold(law, Rules(test, lambda terms: all(fact for _, fact in terms), all, lambda fact: fact))
 
 
 def made_of_isometries(law: Law) -> bool:
     """Whether a law is by theorem a mixture of isometries theta' = +-theta + const for almost every angle.
 
-    So are the laws of walls of straight pieces, specular reflection, retroreflection, and all that is made of them.
+    Such laws are the laws of walls of straight pieces, specular reflection, retroreflection, and compounds of these.
     """
     return holds_of_all(law, lambda part: part.is_isometric)
 
 
 def lists_branches(law: Law) -> bool:
-    """Whether every part of a law answers when asked for its isometries: more than that it is made of them."""
+    """Whether every part of a law lists its isometries and breakpoints; stronger than `made_of_isometries`."""
     return holds_of_all(law, _answers)
 
 
