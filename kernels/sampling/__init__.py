@@ -1,1 +1,1 @@
-"""Kernel matrices from sampled rays, with their sampling errors."""
+"""Kernel matrices estimated from sampled rays, with their sampling errors."""

@@ -1,4 +1,4 @@
-"""From counted pairs of angles to kernel matrices: estimates, their errors, and the test of symmetry."""
+"""Kernel matrices from counted pairs of angles: estimates, sampling errors and the test of symmetry."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
 
 Counts: TypeAlias = NDArray[np.int64]
 
-# Parts of independent rays whose spread gives errors: 32 tell it within an eighth, and its shape.
+# Batches of independent rays whose spread gives the error; 32 batches determine the spread within an eighth.
 BATCHES = 32
-# Beyond this the replicates are not kept: they serve error estimates of eigenvalues, for which counts do as well.
+# Replicates of more bytes in all are not stored. They serve error estimates of eigenvalues, for which counts suffice.
 LARGEST_REPLICATES = 2**28
-# Over the degrees of freedom of the spread, the fraction of the dimensions that is not counted on: the estimate of
-# their number is too large where a few of them rule. The coverage of simulated normal parts, of eleven spectra, is 93.6
-# to 96.4 % of 8 parts, and 94.6 to 95.8 % of 32.
+# The estimated number of dimensions is reduced by UNSURE_DIMENSIONS / (degrees of freedom of the spread), because the
+# estimate is too large if a few dimensions dominate. For simulated normal parts with eleven spectra, the coverage is
+# 93.6 to 96.4 % with 8 parts and 94.6 to 95.8 % with 32.
 UNSURE_DIMENSIONS = 1.5
-# Entries of a part that are compared with those of the others; of larger arrays some rows, of fewer dimensions.
+# Entries of a part that are compared with those of the other parts; larger arrays are compared in some rows only.
 MOST_COMPARED = 2**20
 WORST_NAMED = 8
 
@@ -42,7 +42,7 @@ WORST_NAMED = 8
 class SampledArray:
     """A symmetric array from samples with its error, replicates and raw symmetry defect.
 
-    The error is the 95 % quantile of the Frobenius norm of what the rays' randomness does.
+    The error is the 95 % quantile of the Frobenius norm of the sampling error.
     """
 
     symmetric: Floats
@@ -60,7 +60,7 @@ def count_pairs(basis: Basis, incoming: Floats, outgoing: Floats) -> Counts:
 
 
 def sum_products(basis: Basis, incoming: Floats, outgoing: Floats, weight: Floats | None = None) -> Floats:
-    """Sum over the pairs of e_i(theta) e_j(theta'), shape (n, n)."""
+    """Weighted sum of e_i(theta) e_j(theta') over the pairs, shape (n, n); the weights are 1 by default."""
     total = np.zeros((basis.size, basis.size))
     add_products(total, basis, incoming, outgoing, np.ones(incoming.size) if weight is None else weight)
     return total
@@ -74,15 +74,15 @@ def array_from_counts(
     Parameters
     ----------
     parts : sequence of (n, n) arrays
-        One array for pairs that are independent; several, of batches of the same size or replicates of a randomised
-        Sobol sequence, for others. Weights may stand for counts in the latter case.
+        One array for independent pairs. Otherwise one array for each batch, all of one size, or for each replicate of
+        a randomised Sobol sequence; these may hold sums of weights instead of counts.
     basis : Basis
-        The partition that was counted in.
+        The partition whose cells were counted.
     symmetrise : bool
-        False: P[i, j] = C_ij / N_i, so that rows sum to 1. True: every pair counts both ways, and the flux is
-        (C_ij + C_ji) / (2 N).
+        False: P[i, j] = C_ij / N_i, so that rows sum to 1. True: every pair counts in both directions, and the flux
+        is (C_ij + C_ji) / (2 N).
     independent : bool
-        Whether the pairs are independent, so that counts are multinomial; else errors come from the parts.
+        Whether the pairs are independent, so that counts are multinomial; otherwise the parts give the error.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def array_from_counts(
         z_score = reversibility_z_score(np.asarray(counts, dtype=np.int64))
     else:
         for part in parts:
-            # the part's influence on the estimate: its numerators minus its denominators times the whole estimate
+            # The influence of a part on the estimate: its numerators minus its denominators times the estimate.
             if symmetrise:
                 excess = (part + part.T) / (2.0 * number) - float(part.sum()) / number * flux
             else:
@@ -119,8 +119,7 @@ def array_from_counts(
 def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, keeps_measure: bool) -> SampledArray:
     """The estimate from means of e_i(theta) e_j(theta') over batches of one size or replicates of a Sobol sequence.
 
-    What is known is put in: P 1 = 1, and where the law keeps the measure also the same for the adjoint. Errors are
-    those of the spread over these.
+    P 1 = 1 is enforced, and P* 1 = 1 if the law keeps the measure. The spread of the means gives the error.
     """
     raw = np.mean(means, axis=0)
     scale = float(np.linalg.norm(raw)) or 1.0
@@ -137,7 +136,7 @@ def array_from_sums(means: Sequence[Floats], basis: Basis, *, symmetrise: bool, 
 
 
 def half_width(symmetric: Floats, replicates: Sequence[Replicate]) -> float:
-    """What the randomness of the rays has in the error of a matrix from several parts of them."""
+    """The 95 % quantile of the sampling error of a matrix from the matrices of several parts of the rays."""
     found = _Replicates(symmetric, len(replicates))
     for part in replicates:
         found.add(np.asarray(part - symmetric))
@@ -145,7 +144,7 @@ def half_width(symmetric: Floats, replicates: Sequence[Replicate]) -> float:
 
 
 class _Replicates:
-    """The arrays of the parts, collected one by one; sparse where that is smaller, dropped if too large."""
+    """The arrays of the parts, collected one by one; stored as sparse arrays if smaller, not stored if too large."""
 
     def __init__(self, symmetric: Floats, number: int) -> None:
         self.symmetric, self.number = symmetric, number
@@ -171,10 +170,11 @@ class _Replicates:
     def half_width(self) -> float:
         """The 95 % quantile of the norm of the error of the mean of the parts.
 
-        With one dimension that is Student's; with d equally important ones the square over its estimate follows F with
-        d and (parts - 1) d degrees of freedom. In general d is (tr C)^2 / tr C^2, C the covariance of the parts, and
-        the ratio is that F whose numbers of degrees belong to w = (tr C^2)^3 / (tr C^3)^2 <= d, drawn together to the
-        variance of d: so that mean, variance and skewness of the square are those of normal parts.
+        In one dimension the error follows Student's t. In d equally important dimensions, the squared norm over its
+        estimate follows F with d and (parts - 1) d degrees of freedom. In general let C be the covariance of the parts,
+        d = (tr C)^2 / tr C^2 and w = (tr C^2)^3 / (tr C^3)^2 <= d. The quantile is taken from F with w and
+        (parts - 1) w degrees of freedom, and its distance from 1 is scaled by sqrt(w / d). The mean, variance and
+        skewness of the squared norm are then those of normal parts.
         """
         from scipy.special import fdtri
 
@@ -194,14 +194,14 @@ class _Replicates:
 def _dimensions(differences: Floats) -> tuple[float, float]:
     """(tr C)^2 / tr C^2 and (tr C^2)^3 / (tr C^3)^2 of normal vectors from their differences from their mean.
 
-    Means of products of traces of Wishart's matrices give (tr C)^2, tr C^2 and tr C^3 without bias. What no covariance
-    can have is moved to what one can: the second number is at most the first, and at least 1.
+    Means of products of traces of Wishart matrices give unbiased estimates of (tr C)^2, tr C^2 and tr C^3. They are
+    clipped to values possible for a covariance: the second number is at least 1 and at most the first.
     """
     freedom = len(differences) - 1
     gram = differences @ differences.T / freedom
     trace, square, cube = float(np.trace(gram)), float(np.sum(gram**2)), float(np.sum((gram @ gram) * gram))
     of_square = (square - trace**2 / freedom) * freedom**2 / ((freedom - 1) * (freedom + 2))
-    # a smaller fraction than that of rounding is none
+    # Smaller fractions are rounding errors.
     of_square = max(of_square, EPS * trace**2)
     squared = max(trace**2 - 2.0 * of_square / freedom, of_square)
     of_trace = math.sqrt(squared)
@@ -224,15 +224,15 @@ def _summed(parts: Sequence[Counts | Floats]) -> Counts | Floats:
 
 
 def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) -> tuple[float, float]:
-    """Mean and variance of the squared Frobenius norm of the error, where counts are multinomial."""
+    """Mean and variance of the squared Frobenius norm of the error for multinomial counts."""
     weights, normalisation = basis.weights, basis.normalisation
     if not symmetrise:
-        # an entry (i, j) of the array is C_ij times w_i h_i h_j / N_i, and each row a multinomial of its own
+        # Entry (i, j) of the array is C_ij w_i h_i h_j / N_i, and each row is an independent multinomial.
         rows = counts.sum(axis=1)
         mean, variance = _squared_norms(counts, normalisation**2, rows)
         scale = (weights * normalisation / rows) ** 2
         return float(scale @ mean), float(scale**2 @ variance)
-    # a pair is counted by half at each of its two places, or fully on the diagonal
+    # A pair counts one half at each of its two entries, or fully on the diagonal.
     number = float(counts.sum())
     squares = np.outer(normalisation, normalisation) ** 2 / number**2
     upper = np.triu_indices(len(weights), 1)
@@ -245,16 +245,16 @@ def _moments_of_counts(counts: Counts | Floats, basis: Basis, symmetrise: bool) 
 def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Floats) -> tuple[Floats, Floats]:
     """Mean and variance of sum_j w_j (C_j - N p_j)^2 for multinomial rows C of N pairs, both estimated from C.
 
-    The sum is that of k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
-    that its variance is N Var k(x, x) + 2 N (N - 1) E k(x, y)^2. Without the first term, which rules where most counts
-    are 0 or 1, counts would be taken for normal.
+    It equals the sum of k(x, y) = sum_j w_j (1[x = j] - p_j) (1[y = j] - p_j) over all pairs (x, y) of the N draws, so
+    its variance is N Var k(x, x) + 2 N (N - 1) E k(x, y)^2. The first term dominates if most counts are 0 or 1; without
+    it the counts would be treated as normal.
     """
-    number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs may be beyond int64
+    number = np.asarray(number, dtype=np.float64)  # the square of a number of pairs can exceed int64
     fraction = counts / number[:, None]
-    # without bias, as p^2 alone matters where counts are small
+    # An unbiased estimate of p^2, because the bias matters for small counts.
     square = np.maximum(fraction * (counts - 1.0) / np.maximum(number - 1.0, 1.0)[:, None], 0.0)
     spread = np.einsum("ij,j->i", fraction * (1.0 - fraction), weight)
-    # a single pair says nothing about its spread, which is then taken as large
+    # A single pair does not determine its spread, which is then overestimated.
     mean = np.where(number > 1, number**2 / np.maximum(number - 1.0, 1.0) * spread, fraction @ weight)
     tilted = weight * (1.0 - 2.0 * fraction)
     own = np.einsum("ij,ij->i", fraction, tilted**2) - np.einsum("ij,ij->i", fraction, tilted) ** 2
@@ -263,7 +263,7 @@ def _squared_norms(counts: Counts | Floats, weight: Floats, number: Counts | Flo
 
 
 def _quantile(mean: float, variance: float) -> float:
-    """The 95 % quantile of a norm, from the mean and the variance of its square, by a scaled chi-square of these."""
+    """The 95 % quantile of a norm, from a scaled chi-square with the given mean and variance of the squared norm."""
     from scipy.special import chdtri
 
     if mean == 0.0 or variance == 0.0:

@@ -1,4 +1,4 @@
-"""Kernel matrices from any pairs of incoming and outgoing angles, a user's own included."""
+"""Kernel matrices from given pairs of incoming and outgoing angles."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from ..matrices.defects import invariance_z_score
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from .counts import BATCHES, array_from_counts, array_from_sums, count_pairs, sum_products
 
-# Incoming angles whose bin totals lie this many standard deviations from the invariant measure were not drawn from it.
+# Incoming angles count as not invariant if their totals in bins deviate from the measure by this z-score.
 NOT_INVARIANT_Z = 4.0
-# The totals are looked at in the basis' own bins, or in this many where it has none.
+# Number of bins for these totals if the basis is not `Bins`.
 TEST_BINS = 32
-# Batches of weighted pairs whose spread gives their errors: smaller ones would have less even weights.
+# Batches of weighted pairs whose spread gives the error; in smaller batches the weights would be less even.
 WEIGHTED_BATCHES = 8
 
 
@@ -30,35 +30,35 @@ def estimate(
     *,
     invariant: bool | None = None,
 ) -> KernelMatrix:
-    r"""The matrix of the law behind pairs (theta, theta') that were measured, traced or simulated.
+    r"""Estimate the matrix of a law from measured, traced or simulated pairs (theta, theta').
 
     Parameters
     ----------
     theta_in, theta_out : array_like
-        Incoming and outgoing angles in (0, pi), radians, in the same shape; independent pairs.
+        Incoming and outgoing angles of independent pairs, in (0, pi), in radians, in the same shape.
     basis : Basis
         Bins, Legendre or Panels.
     symmetrise : bool
-        Count each pair both ways, as is right for a reversible law. The flux is then symmetric but rows of ``array``
-        sum to 1 within the sampling error only; `KernelMatrix.symmetry_defect` is still that of the raw pairs.
-        Without it rows sum to 1.
+        Whether each pair counts in both directions, which is valid for reversible laws. The flux is then symmetric, but
+        rows of ``array`` sum to 1 only within the sampling error; `KernelMatrix.symmetry_defect` still belongs to the
+        raw pairs. If False, rows sum to 1.
     invariant : bool, optional
-        Whether the incoming angles follow sin(theta) d theta. By default decided by a test of their totals in bins.
-        Where they do not, C - C^T says nothing about reversibility, and rows of counts are not even averages over
-        their bins; every pair is then weighted by the measure of the angles that are nearer to its own incoming
-        angle than to any other of its batch.
+        Whether the incoming angles follow sin(theta) d theta. By default a test of their totals in bins decides. If
+        they do not, C - C^T contains no information about reversibility, and counts are not averages over their bins.
+        Every pair is then weighted by the measure of the angles that are nearer to its incoming angle than to any
+        other incoming angle of its batch.
 
     Returns
     -------
     KernelMatrix
-        With the raw ``counts`` for Bins and in ``error`` the 95 % quantile of the sampling error, from the variance of
-        multinomial counts, or from the spread of batches: 32 in bases without cells, 8 of weighted pairs. The
-        truncation to the basis is not part of it.
+        The matrix, with the raw ``counts`` for Bins. Its ``error`` is the 95 % quantile of the sampling error, from
+        the variance of multinomial counts or from the spread of batches (32 in bases without cells, 8 of weighted
+        pairs). The truncation to the basis is not included.
 
     Raises
     ------
     InputError
-        If the shapes differ, an angle is outside (0, pi), or there are fewer pairs than can be estimated from.
+        If the shapes differ, an angle is outside (0, pi), or there are too few pairs.
     AccuracyError
         If a bin has no incoming pair; use more pairs or fewer bins.
 
@@ -116,7 +116,7 @@ def _follows_measure(incoming: Floats, basis: Basis) -> bool:
 
 
 def _batch_means(basis: Basis, incoming: Floats, outgoing: Floats, follows: bool) -> list[Floats]:
-    """Means of e_i(theta) e_j(theta') over batches, of at least two pairs."""
+    """Means of e_i(theta) e_j(theta') over batches of at least two pairs."""
     means, number = [], min(BATCHES, incoming.size // 2) if follows else WEIGHTED_BATCHES
     for batch in range(number):
         theta, image = incoming[batch::number], outgoing[batch::number]
@@ -126,7 +126,7 @@ def _batch_means(basis: Basis, incoming: Floats, outgoing: Floats, follows: bool
 
 
 def _nearest_measure(theta: Floats) -> Floats:
-    """Measure of the angles nearest to each; equal angles share theirs."""
+    """Measure of the angles nearest to each given angle, divided equally among equal angles."""
     distinct, owner, number = np.unique(theta, return_inverse=True, return_counts=True)
     middle = 0.5 * (distinct[1:] + distinct[:-1])
     mass = SINE.mass(np.concatenate(([0.0], middle)), np.concatenate((middle, [np.pi])))

@@ -1,4 +1,4 @@
-"""Matrices of laws by independent rays."""
+"""Matrices of laws from independent rays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .counts import BATCHES, LARGEST_REPLICATES, SampledArray
 from .rays import RaySums, progress_bar
 from .sobol import PARTS
 
-# About a second of traced rays.
+# Tracing this number of rays takes about a second.
 DEFAULT_SAMPLES = 2**20
 
 
@@ -20,8 +20,8 @@ def independent_rays(
 ) -> tuple[SampledArray, int, float]:
     """The matrix of a law from independent rays with incoming angles from the invariant measure; see `RaySums.array`.
 
-    In bases without cells errors come from the spread of 32 parts, of 8 where 32 matrices are too large to keep. A
-    chunk of rays depends on a number drawn from ``rng``, its part and its own index alone.
+    In bases without cells the error comes from the spread of 32 parts, or of 8 if 32 matrices are too large to store.
+    A chunk of rays depends only on numbers drawn from ``rng``, its part and its own index.
     """
     root = [int(word) for word in rng.integers(0, 2**63, size=2)]
     most = LARGEST_REPLICATES // (np.dtype(np.float64).itemsize * basis.size**2)
@@ -29,7 +29,7 @@ def independent_rays(
     sums = RaySums(law, basis, parts)
     chunk = sums.chunk
     sums.each = max(-(-samples // parts), 1)
-    # the map of a driven law tells besides which rays escaped
+    # The map of a driven law also returns whether each ray escaped.
     reflect = law.random_map() if isinstance(law, DrivenLaw) and law.closed_form is None else None
     with progress_bar(parts * sums.each) as bar:
         for part in range(parts):

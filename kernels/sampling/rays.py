@@ -17,22 +17,22 @@ from ..laws.law import Law
 from ..walls.traced_map import UNRESOLVED_TOLERANCE
 from .counts import SampledArray, array_from_counts, array_from_sums, count_pairs, sum_products
 
-# Rays at a time; more where adding up the matrices of counts would take longer than the rays.
+# Rays in a chunk: at least SMALLEST_CHUNK, and one for CELLS_A_RAY matrix entries, so that adding matrices is cheap.
 SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
 SLOW_SECONDS = 2.0
 
 
 class RaySums:
-    """Counts of pairs (theta, theta') of cells, or sums of e_i(theta) e_j(theta') over rays.
+    """Counts of rays from cell to cell, or sums of e_i(theta) e_j(theta') over rays, in several parts.
 
     Attributes
     ----------
     tables : ndarray of shape (parts, n, n)
-        Integers in bases of cells.
+        Integers if the basis is a partition.
     each : int
-        Rays of every part.
-    lost : int
-        Rays that did not escape, of all parts. They count as sent back.
+        Number of rays in every part.
+    unresolved : int
+        Number of rays in all parts that did not escape. They count as retroreflected.
     """
 
     def __init__(self, law: Law, basis: Basis, parts: int) -> None:
@@ -43,7 +43,7 @@ class RaySums:
 
     @property
     def chunk(self) -> int:
-        """Rays at a time; a power of two, which keeps the balance of the Sobol sequence."""
+        """Rays in a chunk: a power of two, which preserves the balance of the Sobol sequence."""
         cells = self.basis.size**2 if self.basis.is_partition else 0
         return max(SMALLEST_CHUNK, 1 << (cells // CELLS_A_RAY).bit_length())
 
@@ -57,14 +57,14 @@ class RaySums:
         self.unresolved += 0 if escaped is None else int(escaped.size - np.count_nonzero(escaped))
 
     def array(self, *, symmetrise: bool, mirrored: bool = False) -> tuple[SampledArray, int, float]:
-        """The matrix, the rays used, and the fraction of them that did not escape.
+        """The matrix, the number of rays used, and the fraction of rays that did not escape.
 
-        Twice that fraction times sup |e|^2 is in the error. With ``mirrored`` every ray counts with its mirror image.
+        The error includes twice this fraction times sup |e|^2. If ``mirrored``, every ray counts with its mirror image.
 
         Raises
         ------
         AccuracyError
-            If more than a fraction of 1e-4 did not escape, or a bin has no ray.
+            If more than 1e-4 of the rays did not escape, or a bin has no ray.
         """
         used = len(self.tables) * self.each
         fraction = self.unresolved / used
@@ -95,7 +95,7 @@ class RaySums:
 
 
 def progress_bar(total: int) -> AbstractContextManager[Any]:
-    """A bar for runs that take more than a few seconds."""
+    """A progress bar that appears after SLOW_SECONDS."""
     from tqdm import tqdm
 
     bar: AbstractContextManager[Any] = tqdm(

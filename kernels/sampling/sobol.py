@@ -1,4 +1,4 @@
-"""Rays of scrambled Sobol sequences, to which rays can be added."""
+"""Rays from scrambled Sobol sequences that can be continued."""
 
 from __future__ import annotations
 
@@ -14,23 +14,22 @@ from ..laws.law import Law, entry_inside
 from .counts import SampledArray
 from .rays import RaySums, progress_bar
 
-# Replicates of a Sobol sequence whose spread gives its error: eight tell it within a quarter. More would be less exact
-# replicates each.
+# Replicates of a Sobol sequence whose spread gives the error; eight determine the spread within a quarter. With more
+# replicates each would have fewer rays and be less accurate.
 PARTS = 8
-# Digits of the sequences: scrambling them takes a time like their number squared. What lies beyond is one random shift
-# of all points, so that none falls on a corner at a dyadic position but by chance.
+# Binary digits of the sequences; the time of scrambling grows like their square. The digits beyond are one random shift
+# of all points, so that points hit a corner at a dyadic position only by chance.
 SOBOL_BITS = 32
 
 
 class SobolSampler:
-    """Rays of a law that is driven by a uniform number, with incoming angles from the invariant measure.
+    """Sampler of rays of a law driven by one uniform number, with incoming angles from the invariant measure.
 
-    They are eight parts of the same number of rays. Each part is the same scrambled Sobol sequence after a random
-    digital shift of its own, which makes it a scrambled Sobol sequence itself; given the sequence the parts are
-    independent and have the same distribution, so that their spread is that of their mean. The sequence goes on where
-    it was: fewer rays are a part of more, so a pilot run costs nothing. Of a mirror-symmetric law they have
-    theta < pi/2, in a basis with that symmetry: every ray counts with its mirror image, and the sequence is twice as
-    dense.
+    The rays form eight parts of equal size. Each part is the same scrambled Sobol sequence with its own random digital
+    shift, so it is a scrambled Sobol sequence. Given the sequence, the parts are independent and identically
+    distributed, so their spread gives the error of their mean. Each call continues the same sequence, so the rays of a
+    pilot run are reused. If the law and the basis are mirror-symmetric, the rays have theta < pi/2 and every ray counts
+    with its mirror image, which makes the sequence twice as dense.
 
     Parameters
     ----------
@@ -61,12 +60,12 @@ class SobolSampler:
         self.beyond = source.random((PARTS, 2)) * 2.0**-SOBOL_BITS
 
     def sampled(self, samples: int, *, symmetrise: bool) -> tuple[SampledArray, int, float]:
-        """The matrix from at least so many rays, 8 times a power of two; see `RaySums.array`.
+        """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.array`.
 
         Raises
         ------
         InputError
-            If these are more than the sequence has points.
+            If the sequence has fewer points.
         """
         each = 1 << (max(-(-samples // PARTS), 1) - 1).bit_length()
         if each > 1 << SOBOL_BITS:
@@ -76,7 +75,7 @@ class SobolSampler:
             )
         with progress_bar(PARTS * max(each - self.sums.each, 0)) as bar:
             while self.sums.each < each:
-                # powers of two, which the sequence is balanced in
+                # The sequence is balanced in powers of two.
                 number = min(max(self.sums.chunk // PARTS, 1), each - self.sums.each, self.sums.each or each)
                 self._add(number)
                 self.sums.each += number
@@ -84,7 +83,7 @@ class SobolSampler:
         return self.sums.array(symmetrise=symmetrise, mirrored=self.halved)
 
     def _add(self, number: int) -> None:
-        """Add so many rays to every part."""
+        """Add ``number`` rays to every part."""
         digits = (self.sequence.random(number) * 2.0**SOBOL_BITS).astype(np.uint64)
         points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS + self.beyond[:, None]
         x, u = np.moveaxis(points, -1, 0)
