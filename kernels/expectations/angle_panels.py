@@ -1,4 +1,4 @@
-"""Panels in the incoming angle with conditional expectations at Kronrod nodes, smoothed at both ends."""
+"""Panels in the incoming angle, with conditional expectations at Kronrod nodes and integrals over the panels."""
 
 from __future__ import annotations
 
@@ -32,25 +32,25 @@ NODES = np.array([-x for x in _NODES[:-1]] + list(_NODES[::-1]))
 KRONROD = np.array(list(_KRONROD[:-1]) + list(_KRONROD[::-1]))
 GAUSS = np.array(list(_GAUSS[:-1]) + list(_GAUSS[::-1]))
 
-# theta = low + (high - low) s^2 (3 - 2 s): where pieces of a row appear or disappear, its means behave like a square
-# root, and cuts are made there.
+# The substitution theta = low + (high - low) s^2 (3 - 2 s). Panels end where pieces of a conditional distribution
+# appear or disappear; expectations behave like a square root there.
 _S = 0.5 * (1.0 + NODES)
 STRETCHED, SLOPES = _S * _S * (3.0 - 2.0 * _S), 3.0 * _S * (1.0 - _S)
 
 
 @dataclass
 class AnglePanels:
-    """Some panels; every array has one entry, or row, a panel.
+    """A set of panels; the first axis of every array runs over the panels.
 
     Attributes
     ----------
     low, high : array, shape (panels,)
-    angle, row_error : array, shape (panels, 15)
-        The nodes, and the errors of the rows there.
+    angle, mean_error : array, shape (panels, 15)
+        The nodes, and the errors of the expectations there.
     image : array, shape (panels, 15, size)
-        The means of the basis, E[e_j(Theta') | theta], at the nodes.
+        The expectations of the basis functions, E[e_j(Theta') | theta], at the nodes.
     error : array, shape (panels,)
-        Estimated error of the integral, but for that of the rows.
+        Estimated error of the integral, without the errors of the expectations.
     """
 
     low: Floats
@@ -62,7 +62,7 @@ class AnglePanels:
 
     @staticmethod
     def between(low: Floats, high: Floats, size: int) -> AnglePanels:
-        """Panels whose rows are not known yet."""
+        """Panels whose expectations are not computed yet."""
         angle = low[:, None] + (high - low)[:, None] * STRETCHED
         shape = angle.shape
         return AnglePanels(low, high, angle, np.zeros(shape), np.zeros((*shape, size)), np.zeros(len(low)))
@@ -73,11 +73,11 @@ class AnglePanels:
         return SINE.mass(self.low, self.high)
 
     def selected(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> AnglePanels:
-        """Those chosen by a mask or by their numbers."""
+        """The panels chosen by a mask or by indices."""
         return AnglePanels(*(getattr(self, field.name)[mask] for field in fields(self)))
 
     def joined(self, other: AnglePanels) -> AnglePanels:
-        """These and the other ones."""
+        """These panels followed by the other ones."""
         return AnglePanels(
             *(np.concatenate((getattr(self, field.name), getattr(other, field.name))) for field in fields(self))
         )
@@ -93,11 +93,11 @@ class AnglePanels:
         return self._integrals(KRONROD, basis)
 
     def differences(self, basis: Basis) -> Floats:
-        """The norms of the differences between the two rules."""
+        """The norms of the differences between Kronrod's and Gauss's rule, shape (panels,)."""
         return np.asarray(np.linalg.norm(self._integrals(KRONROD - GAUSS, basis), axis=(1, 2)))
 
     def mean_errors(self, basis: Basis) -> Floats:
-        """What the errors of the rows do to the integrals."""
+        """The errors of the integrals due to the errors of the expectations, shape (panels,)."""
         weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * KRONROD
         size = np.linalg.norm(basis.evaluate(self.angle), axis=2)
         return np.asarray(np.sum(weight * size * self.mean_error, axis=1))

@@ -1,4 +1,4 @@
-"""Conditional expectations of piecewise polynomials under the law of circular arcs, from the pieces of its rows."""
+"""Conditional expectations of piecewise polynomials under the law of circular arcs, by integrals over its pieces."""
 
 from __future__ import annotations
 
@@ -14,24 +14,25 @@ from ..bases.legendre import legendre_moments
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..bases.panels import Panels
 
-# theta' moves by less than half a panel on pieces of this fraction of it or less: with half the nodes what Gauss's rule
-# misses of a polynomial falls by the fraction to the power of its degree.
+# Pieces on which theta' covers at most this fraction of a panel get half the Gauss nodes, because the error of the rule
+# for a polynomial falls by this fraction to the power of its degree.
 SHORT_FRACTION = 0.1
-# sin(delta) on a piece, whose length is at most half of the widest panel, asks for this many nodes more than p/2 + 1.
+# Gauss nodes beyond degree // 2 + 1 for the factor sin(delta) on a piece, at most half as long as the widest panel.
 SINE_NODES = 2
-# Pieces held at a time.
+# Limit on the pieces in memory at a time.
 CHUNK = 2**17
-# exp(i theta' / 2 N) on a panel asks for this many Gauss nodes more than a polynomial of half the degree.
+# Gauss nodes beyond degree // 2 + 1 for the factor exp(i theta' / 2 N) on a panel.
 MORE_NODES = 3
-# Angles at which the variation of functions is looked at.
+# Angles at which the variation of functions is evaluated.
 SPREAD_PROBES = 9
-# Ends of pieces held at a time.
+# Limit on the ends of pieces in memory at a time.
 PIECES_AT_ONCE = 2**15
 
 
 class ArcPieces(NamedTuple):
-    """Pieces of rows, each of shape (pieces,): the number of the row; whether it is followed in the mirror; the ends of
-    delta; N; whether the piece holds all the rays with more hits; whether its row has no width.
+    """Pieces of conditional distributions, each of shape (pieces,): the index of the incoming angle; whether the ray is
+    mirrored; the ends of the chord's angle delta; the number of hits N; whether the piece stands for all rays with more
+    hits; whether the incoming angle has a single outgoing angle.
     """
 
     ray: NDArray[np.intp]
@@ -43,15 +44,15 @@ class ArcPieces(NamedTuple):
     alone: NDArray[np.bool_]
 
 
-# From incoming angles and the hits up to which rays are followed.
+# A function of the incoming angles and the largest number of hits of listed pieces.
 PiecesOfAngles: TypeAlias = Callable[[Floats, int], ArcPieces]
 
 
 class ArcLines(NamedTuple):
-    """Pieces of rows, each of shape (pieces,).
+    """Pieces of conditional distributions as lines theta' = offset + slope delta, each of shape (pieces,).
 
-    The number of the row; theta' = offset + slope delta for delta from lower to upper; the mass, not normalised; where
-    all of it leaves at one angle, ``single``, that angle; whether it has more hits than are followed.
+    The index of the incoming angle; slope and offset; the ends of delta; the mass, not normalised; the outgoing angle
+    if all mass leaves at one angle, and whether it does; whether the piece stands for all rays with more hits.
     """
 
     ray: NDArray[np.intp]
@@ -65,29 +66,29 @@ class ArcLines(NamedTuple):
     rest: NDArray[np.bool_]
 
     def of_angles(self, values: Floats, rows: int) -> Floats:
-        """Sums of the values of pieces over each row."""
+        """Sums of the values of the pieces of each incoming angle."""
         return np.asarray(np.bincount(self.ray, weights=values, minlength=rows), dtype=np.float64)
 
 
 def outgoing_lines(half_angle: float, pieces: ArcPieces, theta: Floats) -> ArcLines:
-    """The pieces of the rows at ``theta`` as lines."""
+    """The pieces of the conditional distributions at ``theta`` as lines."""
     base = np.where(pieces.mirrored, np.pi - theta[pieces.ray], theta[pieces.ray])
     slope = np.where(pieces.mirrored, 2.0, -2.0) * pieces.hits
     offset = np.where(pieces.mirrored, -base, np.pi + base)
     lower, upper = pieces.lower, np.maximum(pieces.upper, pieces.lower)
     alone = pieces.alone & ~pieces.rest
     mass = np.where(alone, 1.0, SINE.mass(lower, upper))
-    # rays with more hits than are followed leave together; a row of no width has one outgoing angle
+    # All rays with more hits leave at one angle; so do all rays of an incoming angle with a single outgoing angle.
     end = np.where(pieces.mirrored, half_angle, np.pi - half_angle)
     angle = np.where(pieces.rest, end, offset + slope * lower)
     return ArcLines(pieces.ray, slope, offset, lower, upper, mass, angle, pieces.rest | alone, pieces.rest)
 
 
 def arc_images(lines: ArcLines, panels: Panels, theta: Floats) -> tuple[Floats, Floats]:
-    r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (rows, functions), and the rows' errors.
+    r"""E[e_j(Theta') | theta] for all functions e_j on panels, shape (angles, functions), and the errors at each angle.
 
-    The outgoing angle is linear in the angle delta of the chord, of density sin(delta): on each piece between two
-    edges the functions are polynomials in delta, and a Gauss rule is exact but for the sine.
+    The outgoing angle is linear in the angle delta of the chord, which has the density sin(delta). Between two edges
+    the functions are polynomials in delta on each piece, so a Gauss rule is exact apart from the sine.
     """
     ray, slope, offset, lower, upper = lines[:5]
     single = lines.single
@@ -111,7 +112,7 @@ def arc_images(lines: ArcLines, panels: Panels, theta: Floats) -> tuple[Floats, 
     total = lines.of_angles(lines.mass, theta.size)
     moments = gathered.reshape(panels.degree + 1, theta.size, -1) / total[:, None]
     left = lines.of_angles(np.where(lines.rest, lines.mass, 0.0), theta.size)
-    # two angles of a function of sup norm 1
+    # Two values of a function of sup norm 1 differ by at most 2.
     return panels.of_legendre(moments.transpose(1, 2, 0)), 2.0 * left / total
 
 
@@ -134,15 +135,15 @@ def _add_moments(
 class ArcMeans:
     r"""E[v(Theta') | theta] for functions v with the coefficients ``vectors`` on panels.
 
-    On a piece with N hits theta' = o + s delta with s = -+2 N, so that the integral of v(theta') sin(delta) is the
-    imaginary part of exp(-i o/s)/s times the difference of two values of F_N(t), the integral of v(theta')
-    exp(i theta'/s) from 0 to t: a table at the edges, and one Gauss rule from the edge to t.
+    On a piece with N hits theta' = o + s delta with s = -+2 N. Let F_N(t) be the integral of v(theta') exp(i theta'/s)
+    from 0 to t. The integral of v(theta') sin(delta) over the piece is the imaginary part of exp(-i o/s)/s times the
+    difference of F_N at the two ends. F_N is tabulated at the edges, and one Gauss rule integrates from an edge to t.
 
     Parameters
     ----------
     half_angle : float
     pieces : callable
-        The pieces of the rows at incoming angles, followed up to so many hits.
+        Returns the pieces of the conditional distributions at incoming angles, up to a given number of hits.
     panels : Panels
     vectors : array of shape (n, k)
     """
@@ -158,7 +159,7 @@ class ArcMeans:
         self._tables: dict[int, NDArray[np.complex128]] = {}
 
     def __call__(self, theta: Floats, most_hits: int) -> tuple[Floats, Floats]:
-        """The means, shape (rows, k), and how much the rays with more hits can be off in the worst of the functions."""
+        """The expectations, shape (angles, k), and the error from rays with more hits, for the worst function."""
         lines = outgoing_lines(self.half_angle, self.pieces(theta, most_hits), theta)
         single, fraction = lines.single, lines.mass
         whole = lines.of_angles(fraction, theta.size)
@@ -176,7 +177,7 @@ class ArcMeans:
         return total / whole[:, None], left / whole * self._spread(most_hits)
 
     def _spread(self, most_hits: int) -> float:
-        """How much the functions vary where rays with more hits leave: within 2 xi/N of xi and of pi - xi."""
+        """Variation of the functions within 2 xi/N of xi and of pi - xi, where rays with more than N hits leave."""
         xi = self.half_angle
         near = xi + 2.0 * xi / most_hits * np.linspace(-1.0, 1.0, SPREAD_PROBES)
         values = []
@@ -208,7 +209,7 @@ class ArcMeans:
     def _up_to(self, most: int) -> NDArray[np.complex128]:
         """F_N at the edges for N = 1 ... most, shape (most, edges, k)."""
         if most not in self._tables:
-            # for many N at once: products of small matrices, one a panel
+            # Products of small matrices, one for each panel, for many N at once.
             phase = self._angle[:, None] / (2.0 * np.arange(1, most + 1)[:, None])
             whole = np.matmul(np.exp(1j * phase), self._weighted).transpose(1, 0, 2)
             empty = np.zeros((most, 1, whole.shape[2]))
@@ -216,7 +217,7 @@ class ArcMeans:
         return self._tables[most]
 
     def _moments(self, angle: Floats, cell: NDArray[np.intp], weight: Floats) -> Floats:
-        """Of nodes of shape (cells, nodes) with their weights: of these cells' polynomials, (cells, degree + 1)."""
+        """Moments of the cells' Legendre polynomials, (cells, degree + 1), by nodes and weights (cells, nodes)."""
         low, high = self.edges[cell, None], self.edges[cell + 1, None]
         local = (2.0 * angle - low - high) / (high - low)
         return legendre_moments(local, weight, self._polynomials.shape[1] - 1).T

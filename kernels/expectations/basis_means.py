@@ -1,4 +1,4 @@
-"""Conditional expectations theta -> E[e_j(Theta') | theta] of basis functions, as exact as each kind of law allows."""
+"""Conditional expectations theta -> E[e_j(Theta') | theta] of basis functions, with their errors if known."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from ..bases.measure import gauss_rule
 from ..bases.mirror import reflection_matrix
 from ..bases.panels import Panels
 
-# Values of functions held at a time.
+# Limit on the values of functions in memory at a time.
 VALUES_AT_ONCE = 2_000_000
-# Angles on an interval at which the height of functions is looked at.
+# Angles on an interval at which the largest absolute value of functions is sought.
 HEIGHT_PROBES = 5
 
-# From angles and the wanted error of the means of functions of sup norm 1: the means, shape (angles, functions), and
-# the errors, shape (angles,); nan where nothing is known of them.
+# A function of angles and the wanted error of expectations of functions of sup norm 1. It returns the expectations,
+# shape (angles, functions), and their errors, shape (angles,), nan if unknown.
 Means: TypeAlias = Callable[[Floats, float], tuple[Floats, Floats]]
 
 
 @dataclass(frozen=True)
 class Expectations(ABC):
-    """What a law makes of the functions of a basis: called like `Means`, it gives the means of all of them.
+    """The conditional expectations of all functions of a basis under a law; called like `Means`.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class Expectations(ABC):
     has_errors : bool
         Whether the errors are known.
     is_traced : bool
-        Whether rays are traced, which takes about a millisecond an angle, fifty times as long as closed forms.
+        Whether rays are traced. This takes about a millisecond per angle, fifty times as long as closed forms.
     """
 
     basis: Basis
@@ -58,7 +58,7 @@ class Expectations(ABC):
         return False
 
     def of(self, vectors: Floats) -> Means:
-        """The same for functions with the coefficients ``vectors``, shape (n, k); errors are those of the worst."""
+        """The expectations of functions with coefficients ``vectors``, shape (n, k), with errors for the worst one."""
         height = height_of(self.basis, vectors)
 
         def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
@@ -73,7 +73,7 @@ class Expectations(ABC):
 
 @dataclass(frozen=True)
 class ByApply(Expectations):
-    """By the operator of a law, whose errors are not known, at ``evaluations`` angles for each."""
+    """Expectations by `Law.apply`, without known errors, at ``evaluations`` outgoing angles for each incoming angle."""
 
     apply: Callable[[AngleFunction, ArrayLike], Floats]
     evaluations: int
@@ -91,7 +91,7 @@ class ByApply(Expectations):
 
 @dataclass(frozen=True)
 class Unconditional(Expectations):
-    """Those under sin(theta)/2 d theta, whatever the incoming angle."""
+    """Expectations under sin(theta)/2 d theta, the same for every incoming angle."""
 
     @property
     def has_errors(self) -> bool:
@@ -103,7 +103,7 @@ class Unconditional(Expectations):
 
 @dataclass(frozen=True)
 class Weighted(Expectations):
-    """Those of a sum of laws with their weights."""
+    """Expectations under a weighted sum of laws."""
 
     terms: tuple[tuple[float, Expectations], ...]
 
@@ -127,13 +127,13 @@ class Weighted(Expectations):
 
 @dataclass(frozen=True)
 class Mirrored(Expectations):
-    """Those of a law in the other frame, in a basis that is mirror-symmetric.
+    """Expectations under a law in the other frame, in a mirror-symmetric basis.
 
     Attributes
     ----------
     inner : Expectations
     adaptable : bool
-        Whether the law is mirror-symmetric: then panels that are adapted to it are, and errors are known on them too.
+        Whether the law is mirror-symmetric. Panels adapted to it are then mirror-symmetric, so that errors are known.
     """
 
     inner: Expectations
@@ -159,7 +159,7 @@ class Mirrored(Expectations):
 
 
 def weighted_means(terms: Sequence[tuple[float, Means]]) -> Means:
-    """Means under a sum of laws with their weights, from those of its terms."""
+    """The expectations under a weighted sum of laws, from the expectations under its terms."""
 
     def means(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         found = [(weight, *term(theta, tolerance)) for weight, term in terms]
@@ -170,7 +170,7 @@ def weighted_means(terms: Sequence[tuple[float, Means]]) -> Means:
 
 
 def height_of(basis: Basis, vectors: Floats) -> float:
-    """About the largest modulus of the functions with these coefficients, which polynomials often have at an end."""
+    """Approximate largest absolute value of the functions with these coefficients, from nodes and ends of intervals."""
     edges = basis.edges
     ends = np.concatenate((np.nextafter(edges[:-1], np.pi), np.nextafter(edges[1:], 0.0)))
     angle = np.append(gauss_rule(edges, HEIGHT_PROBES)[0], ends)
@@ -180,9 +180,9 @@ def height_of(basis: Basis, vectors: Floats) -> float:
 
 
 def means_of_basis(basis: Basis, nodes: Floats, weights: Floats, starts: NDArray[np.int64]) -> Floats:
-    """The means of all functions over rows of weighted angles, shape (rows, size).
+    """The weighted sums of all basis functions over groups of angles, shape (groups, size).
 
-    Row k owns ``nodes[starts[k]:starts[k + 1]]``.
+    Group k consists of ``nodes[starts[k]:starts[k + 1]]`` with their weights.
     """
     rows, size = len(starts) - 1, basis.size
     if basis.is_partition:
