@@ -1,1 +1,1 @@
-"""From a law to its matrix: one protocol, one file a method, and the choice between them."""
+"""Matrices of laws: the methods that compute them, one in each file, and the choice between the methods."""

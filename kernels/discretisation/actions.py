@@ -1,4 +1,4 @@
-"""Matrices of laws known by their action on functions."""
+"""Matrices of laws that are given by their action on functions."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from ..laws.structure import is_compound
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, MethodName, computed, rounding
 
-# Values of basis functions in `law.apply` that are affordable: about a second or two.
+# Limit on the values of basis functions in `law.apply`: one or two seconds of work.
 MOST_VALUES = 2**26
-# Numbers held at a time.
+# Limit on the numbers in memory at a time.
 CHUNK = 2**21
-# Breakpoints that panels begin with; the fraction of the tolerance that one of them may spend, and what rounding
-# leaves.
+# Number of breakpoints among the first panel edges; the fraction of the tolerance that the error of one panel may have;
+# and the error that rounding leaves.
 FIRST_BREAKPOINTS, PANEL_FRACTION, SETTLED = 32, 0.02, 1e-15
-# Angles are refined towards grazing, where angles of reflection vary on the scale of the angle itself.
+# First panel edges near grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
 
 class HasAction(Protocol):
-    """What is asked of a law known by its action on functions."""
+    """The methods of a law that `action_matrix` uses."""
 
     def apply(self, function: Callable[[Floats], Floats], theta: ArrayLike) -> Floats: ...
     def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
@@ -38,22 +38,22 @@ class HasAction(Protocol):
 
 
 class Actions:
-    """Any law that is not made of others and whose `apply` is accurate, by Kronrod's rule in the incoming angle."""
+    """Any law that is not compound and has an accurate `apply`, by Kronrod's rule in the incoming angle."""
 
     name: MethodName = "quadrature"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
         if is_compound(law):
             return False
-        # A law driven by an entry point averages over a fixed rule, unless it has an `_apply` of its own, which is then
-        # accurate for smooth functions: those of Legendre, not those with edges.
+        # `_apply` of a driven law is a fixed rule in the entry point. A subclass's own `_apply` is accurate for smooth
+        # functions such as Legendre's, not for functions with edges.
         own = type(law)._apply is not DrivenLaw._apply and isinstance(basis, Legendre)
         return not isinstance(law, DrivenLaw) or own
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error = action_matrix(law, basis, budget.tolerance)
         if law.reversible:
-            # an under-resolved angle of a reversible law shows as asymmetry
+            # For a reversible law an under-resolved angle causes asymmetry.
             error = max(error, float(np.linalg.norm(symmetric - symmetric.T)))
         how = "difference of the rules of Gauss and Kronrod, panel by panel"
         return computed(symmetric, basis, self.name, error + rounding(basis), how)
@@ -62,8 +62,8 @@ class Actions:
 def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Floats, float]:
     """<e_i, P e_j> by Kronrod's rule in theta with P e_j from ``law.apply``, and an estimate of its Frobenius error.
 
-    Panels between edges and breakpoints are halved until each is settled or the work exceeds about a second. The error
-    is the sum over the panels of the difference from Gauss's rule, which is safe where P e_j jumps on a panel.
+    Panels between edges and breakpoints are halved until each has converged or the work exceeds about a second. The
+    error is the sum over the panels of the difference from Gauss's rule, which is safe even if P e_j jumps on a panel.
     """
     breaks = law.breakpoints(FIRST_BREAKPOINTS)[0]
     edges = np.unique(np.concatenate((basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES, breaks)))
@@ -72,7 +72,7 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
     values = NODES.size * basis.size * max(int(law.evaluations), 1)
     while low.size:
         spent += values * low.size
-        # the next round is twice as large at most
+        # The next round is at most twice as large.
         last = spent + 2 * values * low.size > MOST_VALUES
         settled = np.zeros(low.size, dtype=np.bool_)
         step = max(1, CHUNK // max(values, basis.size**2))

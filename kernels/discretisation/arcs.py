@@ -1,4 +1,4 @@
-"""Matrices of the law of circular arcs: exact to rounding up to a number of hits, in any basis."""
+"""Matrices of the law of circular arcs in any basis, exact to rounding up to a number of hits."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from ..matrices.matrix import KernelMatrix
 from ..walls.circular_arc import CircularArcLaw
 from .method import Budget, MethodName, computed, rounding
 
-# Rays with more hits than this are a fraction of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13; they enter at xi, leave at
-# pi - xi, both within 2 xi / MOST_HITS, and are counted there.
+# A fraction of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13, of the rays has more hits than this. These rays enter at xi
+# and leave at pi - xi, both within 2 xi / MOST_HITS, and are counted at these angles.
 MOST_HITS = 8192
-# Gauss nodes on pieces so short that functions of the basis are as smooth as sin(delta) there, and on other pieces of
-# bases without polynomials.
+# Gauss nodes on pieces so short that the basis functions are as smooth there as sin(delta), and on longer pieces in
+# partitions.
 NODES_SHORT, NODES_CELL = 5, 14
 SHORT = 0.1
-# Nodes times basis functions, or cells met by a row, held at a time.
+# Limit on nodes times basis functions, or nodes times cells, in memory at a time.
 CHUNK = 2**21
 NOISE_PROBES = 5
-# Rows are integrals over delta in an interval of length 2 sin(xi) at most, with ends known to about pi eps.
+# Entries are integrals over delta in an interval of length 2 sin(xi) at most, whose ends are known to about pi eps.
 ROUNDING = 4.0 * np.pi * EPS
 
 
@@ -53,12 +53,12 @@ class Arcs:
 def arc_matrix(half_angle: float, basis: Basis) -> tuple[Floats, float]:
     r"""<e_i, P e_j> for focusing circular arcs of half angle xi, and an estimate of its Frobenius error.
 
-    With delta the chord's angle, S_ij is the integral of e_i(theta) e_j(theta') sin(delta) / (4 sin xi) over
-    |theta - xi| < delta < min(xi + theta, 2 pi - xi - theta), where theta' = pi + theta - 2 N delta for
+    Let delta be the chord's angle. S_ij is the integral of e_i(theta) e_j(theta') sin(delta) / (4 sin xi) over
+    |theta - xi| < delta < min(xi + theta, 2 pi - xi - theta). Here theta' = pi + theta - 2 N delta for
     (xi + theta)/(2 N + 1) < delta < (xi + theta)/(2 N - 1) and delta < pi/2, and the mirror image of this beyond
-    pi/2 (Rudzis 2022, section 2.2.3, corrected; see `CircularArcLaw`). For each N the domain is a polygon and theta'
-    is linear on it. The polygons are cut by the edges of the basis in theta and theta' into strips on which all
-    integrands are smooth, and Gauss rules do the rest.
+    pi/2 (Rudzis 2022, section 2.2.3, corrected; see `CircularArcLaw`). For each N the domain is a polygon on which
+    theta' is linear. The edges of the basis in theta and theta' cut the polygons into strips with smooth integrands,
+    which Gauss rules integrate.
     """
     total = np.zeros((basis.size, basis.size))
     error = ROUNDING * float(np.sqrt(basis.size)) / np.sin(half_angle)
@@ -76,7 +76,7 @@ def arc_matrix(half_angle: float, basis: Basis) -> tuple[Floats, float]:
 
 @dataclass(frozen=True)
 class _Strips:
-    """Intervals of theta with one number of hits, on which delta lies between two lines a theta + b."""
+    """Strips: intervals of theta with one number of hits, on which delta lies between two lines a theta + b."""
 
     hits: Floats
     low: Floats
@@ -93,7 +93,7 @@ class _Strips:
 def _strips(half_angle: float, edges: Floats) -> _Strips:
     whole = _polygons(half_angle)
     owners, angles = [np.arange(whole.hits.size)] * 2, [whole.low, whole.high]
-    # vertical cuts at the edges; slanted ones where the outgoing angle on a side of the polygon meets an edge
+    # Cuts at the edges in theta, and where the outgoing angle on a side of the polygon meets an edge.
     level = np.zeros((2, whole.hits.size))
     along = [np.stack((level[0] + 1.0, level[1]))]
     for side in (whole.lower, whole.upper):
@@ -161,7 +161,7 @@ def _add_strips(
 
 
 def _reach(strips: _Strips, edges: Floats) -> Floats:
-    """How far incoming and outgoing angles move along a strip, as a fraction of the basis' intervals around them."""
+    """Variation of incoming and outgoing angles along a strip, as a fraction of the basis' intervals around them."""
     length, middle, widths = strips.high - strips.low, 0.5 * (strips.low + strips.high), np.diff(edges)
 
     def interval(angle: Floats) -> Floats:
@@ -179,7 +179,7 @@ def _add_cut_strips(
 ) -> float:
     lower, upper = (side[0] * theta + side[1] for side in (strips.lower, strips.upper))
     upper = np.maximum(upper, lower)
-    # the outgoing angle falls with delta: cut it at the edges
+    # The outgoing angle decreases with delta; cut it at the edges.
     first = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * upper, side="right")
     last = np.searchsorted(edges, np.pi + theta - 2.0 * strips.hits * lower, side="left")
     number = np.maximum(last - first, 0) + 1
@@ -188,7 +188,7 @@ def _add_cut_strips(
     cut = (np.pi + theta[strip] - edges[above]) / (2.0 * strips.hits[strip])
     low = np.where(rank == 0, lower[strip], np.clip(cut, lower[strip], upper[strip]))
     high = np.where(rank == number[strip] - 1, upper[strip], np.append(low[1:], 0.0))
-    # the difference of two cosines as a product, so that it keeps its digits
+    # The difference of two cosines as a product, to avoid cancellation.
     mass = 2.0 * weight[strip] * np.sin(0.5 * (low + high)) * np.sin(0.5 * (high - low))
     incoming = np.pi - theta if mirrored else theta
     if basis.is_partition:
@@ -213,7 +213,7 @@ def _add_cut_strips(
                 panel, values = basis.local(outgoing)
                 image = (values * fraction).reshape(part.size, order, -1).sum(axis=1)
                 source, own = basis.local(incoming[owner])
-                # a piece ends at edges, so all its nodes are on the panel of the middle one
+                # A piece lies between edges, so all its nodes are on the panel of the middle node.
                 add_blocks(total, basis, source, panel[order // 2 :: order], own, image)
             else:
                 image = (basis.evaluate(outgoing) * fraction).reshape(part.size, order, -1).sum(axis=1)
@@ -222,7 +222,7 @@ def _add_cut_strips(
 
 
 def _add_rest(total: Floats, basis: Basis, half_angle: float, rest: float, mirrored: bool) -> float:
-    """Put the rays with too many hits where they are to first order; returns how much that can be off."""
+    """Add the rays with more than MOST_HITS hits at their limiting angles; returns a bound on the error of this."""
     spread = half_angle / MOST_HITS * np.linspace(-1.0, 1.0, NOISE_PROBES)
     sign, origin = (-1.0, np.pi) if mirrored else (1.0, 0.0)
     incoming = basis.evaluate(origin + sign * (half_angle + spread))

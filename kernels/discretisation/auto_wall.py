@@ -1,4 +1,4 @@
-"""The choice of `auto` for the law of a wall that has no closed form: five rules, in this order."""
+"""The method choice of `auto` for the law of a wall without closed form: five rules, tried in this order."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ from .method import QUICK_SEGMENTS, Budget, MethodName
 from .sampled import sobol_matrix
 from .traced import Traced
 
-# So many rays tell how many the tolerance needs: the error of a scrambled net falls like their number to a power of
-# about 3/4 where the integrand jumps across a curve, and is itself known to a factor 2 or so.
+# A pilot run of FIRST_RAYS rays predicts how many the tolerance needs. The error of a scrambled Sobol sequence falls
+# like the number of rays to the power -SOBOL_ORDER if the integrand jumps across a curve. It is known to a factor of 2.
 FIRST_RAYS, SOBOL_ORDER, SOBOL_MARGIN = 2**14, 0.75, 2.0
-# So many rays take long enough for a pilot run of traced angles, with as many segments: a ray has two or three.
+# From this number of rays on, traced angles get a pilot run with this number of segments; a ray has two or three.
 MANY_RAYS = 2**17
-# Traced angles that take longer than all rays must predict this fraction of their error.
+# Traced angles that take longer than all rays must predict at most this fraction of the rays' error.
 TRACED_ADVANTAGE = 0.5
 
 
 class AutoWall:
-    """Walls without closed form, by what predicts the tolerance soonest, or else the least error in a second or two.
+    """Walls without closed form, by the method predicted to meet the tolerance first, or to have the least error.
 
-    1. Isometries, if the wall has few pieces and these resolve: found in less time than a few rays.
-    2. As many rays as the tolerance needs, by a pilot run of a few, if that is less than all; adaptive quadrature
-       where it meets the tolerance with fewer segments.
-    3. Isometries of many pieces, if these resolve.
-    4. Adaptive quadrature, if its first angles predict half of the error of all rays.
-    5. All rays; of the last two the more exact matrix.
+    1. Isometries, if the wall has few pieces and its beams resolve; this takes less time than a few rays.
+    2. The number of rays that the tolerance needs by a pilot run, if that is less than ``budget.rays``; or adaptive
+       quadrature, if it meets the tolerance with fewer segments.
+    3. Isometries of many pieces, if their beams resolve.
+    4. Adaptive quadrature, if its first angles predict at most half of the error of ``budget.rays`` rays.
+    5. ``budget.rays`` rays. Of the last two, the more exact matrix.
 
-    Where the budget has more than a second for segments, as for a `resistance`, and the tolerance was not met, adaptive
-    quadrature goes on until they are spent.
+    This takes a second or two. If it misses the tolerance and the budget has more segments, as for `resistance`,
+    adaptive quadrature continues until they are used up.
     """
 
     name: MethodName = "auto"
@@ -70,19 +70,19 @@ class AutoWall:
 
 
 def _few_rays(law: WallLaw, sampler: SobolSampler, basis: Basis, budget: Budget) -> tuple[KernelMatrix | None, float]:
-    """The matrix within the tolerance by fewer rays than all, or None; and the error that all rays predict.
+    """The matrix within the tolerance by fewer than ``budget.rays`` rays, or None; and the predicted error of all rays.
 
-    The latter is infinite where a few rays do not tell.
+    The predicted error is inf if a few rays do not predict it.
     """
     predicted, number, affordable = math.inf, FIRST_RAYS, Traced().accepts(law, basis)
-    # not even an order of 1 in the number of rays would meet the tolerance: a pilot run is in vain
+    # Even an error of order 1 in the number of rays would miss the tolerance, so a pilot run is useless.
     if not affordable and budget.tolerance * budget.rays < 1.0:
         return None, predicted
     while number < budget.rays:
         try:
             found = sobol_matrix(sampler, basis, replace(budget, rays=number))
         except AccuracyError:
-            # a bin without rays, or rays that do not escape: these few are no measure
+            # A bin has no rays, or too many rays do not escape, so this number of rays predicts nothing.
             break
         error = float(found.error)
         if error <= budget.tolerance:
@@ -102,7 +102,7 @@ def _few_rays(law: WallLaw, sampler: SobolSampler, basis: Basis, budget: Budget)
 def _traced_or_all_rays(
     law: WallLaw, sampler: SobolSampler, basis: Basis, budget: Budget, predicted: float
 ) -> KernelMatrix:
-    """The more exact of the two; no rays where tracing angles predicts more, nor the reverse where rays will do."""
+    """The more exact of both matrices; one of the methods is skipped if the other suffices."""
     rays = _all_rays(sampler, basis, budget) if predicted <= budget.tolerance else None
     if rays is not None:
         predicted = float(rays.error)
@@ -118,7 +118,7 @@ def _traced_or_all_rays(
 
 
 def _all_rays(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix | None:
-    """The matrix by rays; None if too many do not escape, where traced angles count theirs in their error."""
+    """The matrix by rays; None if too many rays do not escape, which traced angles include in their error."""
     try:
         return sobol_matrix(sampler, basis, budget)
     except AccuracyError:

@@ -1,4 +1,4 @@
-"""Matrices of laws with a density and of deterministic laws, by rules on levels until two of them agree."""
+"""Matrices of laws with a density and of deterministic laws, by quadrature rules refined until two levels agree."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from ..laws.least_resistance import LeastResistanceLaw
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, MethodName, computed, rounding, until_settled
 
-# Evaluations of a density, and points of a map that are affordable: each is about a second or two.
+# Limits on the evaluations of a density and on the points of a map: one or two seconds of work each.
 MOST_DENSITY_VALUES, MOST_MAP_POINTS = 2**25, 2**20
-# Gauss nodes in theta' on an interval, by the largest fraction that it has of a panel on which the law's 16 nodes reach
-# rounding. The singularities are then 3/8 of the panel away from its ends, and q nodes on a fraction r miss rho^(-2 q)
-# with rho + 1/rho = 2 + 3/(2 r): 1e-12 or less in each case.
+# Gauss nodes in theta' on an interval, by the interval's fraction r of a panel on which the law's 16 nodes reach
+# rounding. Singularities are then at least 3/8 of the panel away from its ends, and the error of q nodes is rho^(-2 q)
+# with rho + 1/rho = 2 + 3/(2 r): at most 1e-12 in each case.
 FRACTIONS, FRACTION_NODES = np.array([1 / 32, 1 / 4]), (4, 8, 16)
-# Gauss nodes in theta on each interval of the coarsest level by rows: the most that are affordable. Rows that still
-# cost more than some seconds are left to product rules.
+# Gauss nodes in theta on each interval of the coarsest level of conditional distributions: the first affordable number.
+# If two levels cost more than MOST_CONDITIONAL_VALUES, some seconds, product rules are used instead.
 CONDITIONAL_NODES = (6, 4, 2)
 MOST_CONDITIONAL_VALUES = 2**27
-# Edges are their own mirror images within this.
+# Edges x and pi - y closer than this count as equal.
 MIRROR_TOLERANCE = 4.0 * EPS * np.pi
-# Numbers held at a time.
+# Limit on the numbers in memory at a time.
 CHUNK = 2**21
-# Evaluations of the density at a time when rows are cut into intervals of their own: a few arrays that stay in cache.
+# Evaluations of the density at a time for conditional distributions: the arrays then stay in cache.
 CONDITIONAL_CHUNK = 2**17
-# A map is mostly singular where it jumps, as a square root if it comes from grazing or goes there.
+# Grading of intervals at the jumps of a map, where it may have square-root singularities if it maps from or to grazing.
 GRADING = 0.25 ** np.arange(1.0, 17.0)
 
 
 class HasDensity(Protocol):
-    """What is asked of a law with a density."""
+    """The methods of a law that `density_matrix` uses."""
 
     def density(self, theta: ArrayLike, theta_out: ArrayLike) -> Floats: ...
     def panels(self, theta: Floats) -> Floats: ...
@@ -64,7 +64,7 @@ class Densities:
     name: MethodName = "quadrature"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        # the three smooth functions of Directions are integrated angle by angle, on the law's own panels: see Actions
+        # `Actions` integrates the three smooth functions of Directions for each incoming angle on the law's panels.
         return isinstance(law, DensityLaw) and not isinstance(basis, Directions)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
@@ -72,7 +72,7 @@ class Densities:
 
 
 class Maps:
-    """Deterministic laws, theta' = T(theta), by rules between the jumps of T that are halved."""
+    """Deterministic laws, theta' = T(theta), by rules on intervals between the jumps of T that are halved."""
 
     name: MethodName = "quadrature"
 
@@ -103,10 +103,10 @@ def _settled(symmetric: Floats, error: float, basis: Basis) -> KernelMatrix:
 
 
 def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, P e_j> by Gauss rules whose order doubles; the difference of the last two as error estimate.
+    """<e_i, P e_j> by Gauss rules whose order doubles, and the difference of the last two as error estimate.
 
-    Product rules, which do not see a peak narrower than the cells of a partition: there each row is integrated over
-    theta' by itself, between the edges of cells and of the law's own panels for that row.
+    Product rules miss a peak narrower than the cells of a partition. Each conditional distribution is then integrated
+    over theta' between the edges of the cells and of the law's panels at that incoming angle.
     """
     edges = np.unique(np.concatenate((basis.edges, law.outgoing_breakpoints)))
     if basis.is_partition and law.resolution < np.diff(edges).max():
@@ -114,7 +114,7 @@ def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Flo
         mirrored = law.mirror_symmetric is True and np.abs(edges + edges[::-1] - np.pi).max() <= MIRROR_TOLERANCE
         if mirrored:
             outer = np.append(outer[outer < 0.5 * np.pi - MIRROR_TOLERANCE], 0.5 * np.pi)
-        # two levels at least, or there is no estimate: the second has twice the nodes of the first
+        # The error estimate needs two levels; the second has twice the nodes of the first.
         cost = [3 * _conditional_cost(law, edges, outer, order) for order in CONDITIONAL_NODES]
         affordable = [order for order, each in zip(CONDITIONAL_NODES, cost, strict=True) if each <= MOST_DENSITY_VALUES]
         order = affordable[0] if affordable else CONDITIONAL_NODES[-1]
@@ -129,7 +129,7 @@ def _with_mirror_image(half: Floats) -> Floats:
 
 
 def _conditional_cost(law: HasDensity, edges: Floats, outer: Floats, order: int) -> int:
-    """About how often the density is evaluated: most intervals between cell edges are small fractions of a panel."""
+    """Approximate number of evaluations of the density; most intervals are small fractions of a panel."""
     panels: int = law.panels(outer[:1]).shape[-1]
     values: int = (outer.size - 1) * order * (FRACTION_NODES[0] * edges.size + FRACTION_NODES[-1] * panels)
     return values
@@ -165,7 +165,7 @@ def _conditional_rule(law: HasDensity, basis: Basis, edges: Floats, outer: Float
 def conditional_intervals(
     law: HasDensity, edges: Floats, theta: Floats
 ) -> tuple[NDArray[np.int64], Floats, Floats, NDArray[np.int64]]:
-    """Row, ends and number of Gauss nodes of the intervals into which cells and panels together cut (0, pi)."""
+    """The intervals into which cells and panels cut (0, pi): index of the angle, ends and number of Gauss nodes."""
     row, low, high, fraction = cut_by_edges(law.panels(theta), edges)
     nodes = np.asarray(FRACTION_NODES)[np.searchsorted(FRACTIONS, fraction)]
     return row, low, high, nodes
@@ -202,7 +202,7 @@ def _density_rule(law: HasDensity, basis: Basis, edges: Floats, order: int) -> F
 
 
 def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, e_j o T> for a measure-preserving map T, whose jumps are found first; the error as for a density."""
+    """<e_i, e_j o T> for a measure-preserving map T, and the difference of the last two levels as error estimate."""
     ends = np.concatenate(([0.0], jumps_of_map(map_angle), [np.pi]))
     width = np.diff(ends)[:, None] * GRADING
     graded = (ends[:-1, None] + width).ravel(), (ends[1:, None] - width).ravel()
@@ -233,7 +233,7 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
 
 
 def _crossings(map_angle: Callable[[Floats], Floats], basis: Basis, fine: Floats) -> Floats:
-    """Angles inside the given intervals at which the image passes from one cell to another, one an interval."""
+    """Angles at which the image passes from one cell to another, at most one in each of the given intervals."""
     inset = 1e-6 * np.diff(fine)
     low, high = fine[:-1] + inset, fine[1:] - inset
     first = basis.index(np.asarray(map_angle(low), dtype=np.float64))

@@ -1,4 +1,4 @@
-"""The matrix of a law in a basis, by the method that suits the law."""
+"""The function `discretise`, which computes the matrix of a law in a basis."""
 
 from __future__ import annotations
 
@@ -34,28 +34,28 @@ def discretise(
     Parameters
     ----------
     law : Law
-        Any law; of a combination each term is done by its best method.
+        Any law; for a combination each term is computed by its best method.
     basis : Basis
         Bins, Legendre or Panels for theta.
     method : {"auto", "exact", "quadrature", "qmc", "monte-carlo"}
-        ``"exact"``: laws of isometries, to rounding, plus a bound for beams of a polygonal wall that were not
-        resolved, or for breakpoints of a composition left out near grazing. ``"quadrature"``:
-        Gauss rules, refined until their error meets the tolerance or the work exceeds some seconds; what the error is
-        estimated from stands in its ``method``. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random
-        shifts of one; the error is from their spread; in a basis that is mirror-symmetric, as the law is, each ray
-        counts with its mirror image. ``"monte-carlo"``: independent rays; the error is from the variance of the
-        counts. The error of sampled matrices is a 95 % quantile. ``"auto"`` takes the first method of the table in
-        the notes that accepts the law; ``KernelMatrix.method`` says which kind it was.
+        ``"exact"``: laws of isometries, to rounding; the error includes a bound for unresolved beams of a polygonal
+        wall, or for breakpoints of a composition left out near grazing. ``"quadrature"``: Gauss rules, refined until
+        their error meets the tolerance or the work exceeds some seconds; ``error.method`` tells how the error is
+        estimated. ``"qmc"``: rays from 8 scrambled Sobol sequences, independent random shifts of one sequence, whose
+        spread gives the error; if law and basis are mirror-symmetric, each ray counts with its mirror image.
+        ``"monte-carlo"``: independent rays; the variance of the counts gives the error. The error of sampled matrices
+        is a 95 % quantile. ``"auto"``: the first method of the table in the notes that accepts the law;
+        ``KernelMatrix.method`` tells its kind.
     tolerance : float
-        Wanted Frobenius error of ``symmetric``. If it is not met the matrix says so: in its ``error`` and its repr.
+        Wanted Frobenius error of ``symmetric``. The ``error`` and the repr of the matrix show if it was not met.
     samples : int, optional
-        Number of rays where rays are sampled, of ``"auto"`` the largest; 2**20 by default. ``"qmc"`` rounds up to 8
-        times a power of two, for the quadrature of other driven laws it is the number of nodes.
+        Number of sampled rays, for ``"auto"`` the largest number; 2**20 by default. ``"qmc"`` rounds it up to 8 times
+        a power of two. For the quadrature of other driven laws it is the number of nodes.
     rng : numpy.random.Generator, optional
-        Source of randomness; by default a fixed one, so that results are reproducible.
+        Source of randomness. The default has a fixed seed, so that results are reproducible.
     symmetrise : bool
-        For sampled matrices of reversible laws: count each ray both ways. The flux is then symmetric, and rows of
-        ``array`` sum to 1 within the sampling error only.
+        Whether each ray counts in both directions, for sampled matrices of reversible laws. The flux is then symmetric,
+        and rows of ``array`` sum to 1 only within the sampling error.
 
     Returns
     -------
@@ -64,39 +64,39 @@ def discretise(
     Raises
     ------
     InputError
-        If the law does not have the method, the message says which it has; if an argument is not as described.
+        If the law does not have the method (the message lists its methods), or an argument is not as described.
     AccuracyError
         If a bin received no ray, or more than 1e-4 of the rays did not escape from a wall.
 
     Notes
     -----
-    The methods in the order in which ``"auto"`` asks them; each of the others asks those that bear its name.
+    ``"auto"`` tries the methods in this order; every other value of ``method`` tries the methods of its kind.
 
-    1. ``AutoWall`` (auto): a wall without closed form, by what predicts the tolerance soonest. Isometries of few
-       pieces; as many rays as the tolerance needs, where that is less than ``samples``; isometries of many pieces;
-       adaptive quadrature, unless a pilot run speaks against it; all rays; and of the last two the more exact matrix.
-    2. ``IsometryTables`` (exact): isometries on pieces of the angle, with probabilities; so are polygonal walls.
-    3. ``Isometries`` (exact): any other law that lists its isometries and is no composition.
+    1. ``AutoWall`` (auto): a wall without closed form, by the method predicted to meet the tolerance first: isometries
+       of few pieces; rays, if the tolerance needs fewer than ``samples``; isometries of many pieces; adaptive
+       quadrature, unless a pilot run predicts too large an error; all rays. Of the last two, the more exact matrix.
+    2. ``IsometryTables`` (exact): isometries on intervals of angles, with probabilities, such as polygonal walls.
+    3. ``Isometries`` (exact): any other law that lists its isometries and is not a composition.
     4. ``Diagonal`` (exact): Henyey-Greenstein scattering, in `Legendre`.
     5. ``Arcs`` (quadrature): circular arcs.
     6. ``Densities`` (quadrature): laws with a density.
     7. ``LeastResistance`` (quadrature): `LeastResistanceLaw`, in `Bins`.
     8. ``Maps`` (quadrature): deterministic laws.
-    9. ``Actions`` (quadrature): any other law that does not average over entry points; an own ``_apply`` of one that
-       does, in `Legendre`.
-    10. ``Traced`` (quadrature): walls of few pieces, for laws that they are a part of.
+    9. ``Actions`` (quadrature): any other law that does not average over entry points; in `Legendre` also laws that do
+       and define their own ``_apply``.
+    10. ``Traced`` (quadrature): walls of few pieces, as parts of other laws.
     11. ``Sobol`` (qmc): laws driven by one uniform number.
     12. ``Traced`` (quadrature): any wall.
     13. ``EntryPoints`` (quadrature): any other law that averages over entry points; ``samples`` nodes.
     14. ``MonteCarlo`` (monte-carlo): any law.
 
-    Methods 1 to 9 are asked for a law as a whole, then for its parts: a sum from its terms, a law in the other frame
-    from the law in this one, a composition from its factors, if none of them needs rays. Methods 10 to 14 are the last.
+    Methods 1 to 9 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the other
+    frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 14 come last.
 
-    A composition is discretised as the operator that it is: the result is the Galerkin matrix of the product, not
-    the product of Galerkin matrices, which differs unless the basis is invariant. Compositions are simplified by the
-    algebra first: isometries are moved through mirror-symmetric laws, scatterings joined, mixtures multiplied out.
-    They are then done by isometries, else by scatterings between isometries, else through adapted panels.
+    For a composition the result is the Galerkin matrix of the product, not the product of Galerkin matrices, which
+    differs unless the basis is invariant. Compositions are first simplified by the algebra: isometries are moved
+    through mirror-symmetric laws, scatterings joined, mixtures multiplied out. They are then computed by isometries,
+    else by scatterings between isometries, else through adapted panels.
 
     Examples
     --------
@@ -120,7 +120,7 @@ def discretise(
     source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
-    # asked for by name, quadrature may take some seconds
+    # Quadrature requested by name may take some seconds.
     segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise)
     return replace(

@@ -13,7 +13,7 @@ from ..laws.law import DrivenLaw, Law
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, MethodName, computed, rounding
 
-# Rays at a time.
+# Limit on the rays in memory at a time.
 CHUNK = 2**18
 FEWEST_ENTRY_POINTS = 4
 
@@ -33,9 +33,9 @@ class EntryPoints:
 
 
 def entry_matrix(law: DrivenLaw, basis: Basis, samples: int) -> tuple[Floats, float]:
-    """<e_i, P e_j> from about ``samples`` rays, and its difference from the rule with half the points in each.
+    """<e_i, P e_j> from about ``samples`` rays, and its difference from the rule with half the points in each variable.
 
-    Rays jump in the entry point, so the order is that of the midpoint rule at jumps, 1, and the difference is a safe
+    The outgoing angle jumps in the entry point. The midpoint rule then has order 1, and the difference is a safe
     estimate of the error.
     """
     fine = _product_rule(law, basis, samples, 2)
@@ -48,7 +48,7 @@ def _product_rule(law: DrivenLaw, basis: Basis, samples: int, split: int) -> Flo
     edges = np.append((basis.edges[:-1, None] + fraction * np.diff(basis.edges)[:, None]).ravel(), np.pi)
     angle, mass = SINE.quadrature(edges, 1 if basis.is_partition else basis.nodes_per_interval)
     if basis.is_partition:
-        # one node an interval does not integrate the weight itself exactly; the measure of the interval does
+        # One node per interval does not integrate the weight exactly; the measure of the interval does.
         mass = SINE.mass(edges[:-1], edges[1:])
     entries = max(samples // angle.size, FEWEST_ENTRY_POINTS)
     x = (np.arange(entries) + 0.5) / entries
@@ -72,7 +72,7 @@ def _add_masses(total: Floats, basis: Basis, angle: Floats, outgoing: Floats, ma
 
 
 def _mean_values(basis: Basis, outgoing: Floats) -> Floats:
-    """Mean over the entry points, without holding all values at once."""
+    """Mean of the basis functions over the entry points, in chunks that limit the memory."""
     step = max(1, CHUNK // (outgoing.shape[1] * basis.size))
     parts: list[Any] = [
         basis.evaluate(outgoing[start : start + step]).mean(axis=1) for start in range(0, outgoing.shape[0], step)

@@ -19,19 +19,19 @@ from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
 from .isometry_tables import bounded, table_matrix
 from .method import Budget, MethodName
 
-# A probability that is linear in cot(theta), times sin(theta), is a combination of sin and cos: Gauss with m nodes
-# misses it by about (width/2)^(2m)/(2m)!. Probabilities of compositions are products of such terms, smooth on the
-# scale of the distance to grazing; NARROW is measured in both, and 6 nodes leave (0.05)^12 / 12! there.
+# A probability linear in cot(theta), times sin(theta), is a combination of sin and cos. A Gauss rule with m nodes has
+# an error of about (width/2)^(2m)/(2m)! for it. Probabilities of compositions are products of such terms, smooth on the
+# scale of the distance to grazing. Pieces narrower than NARROW on both scales get 6 nodes: an error of 0.05^12 / 12!.
 NARROW, NODES_NARROW, NODES_WIDE = 0.1, 6, 20
-# Breakpoints that accumulate at grazing are followed until the omitted fraction is negligible or listing and using them
-# would take more than about a second.
+# Breakpoints that accumulate at grazing are listed until the omitted fraction is negligible or their use would take
+# more than about a second.
 FEWEST_BREAKPOINTS, BREAKPOINT_WORK, FUNCTION_WORK = 2**10, 2**20, 2**21
-# Nodes times branches held at a time.
+# Limit on nodes times branches in memory at a time.
 CHUNK = 2**22
 
 
 class Branching(Protocol):
-    """What is asked of a law here."""
+    """The methods of a law that `branch_matrix` uses."""
 
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]: ...
     def breakpoints(self, limit: int) -> tuple[Floats, float]: ...
@@ -40,12 +40,12 @@ class Branching(Protocol):
 
 
 class Isometries:
-    """Laws that list their isometries, by Gauss rules between the breakpoints of these."""
+    """Laws that list their isometries, by Gauss rules between their breakpoints."""
 
     name: MethodName = "exact"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        # the isometries of chains may be too many: see `chains`
+        # Chains can have too many isometries; see `products.Chain`.
         return lists_branches(law) and not has_chain(law)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
@@ -55,7 +55,7 @@ class Isometries:
 
 
 def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """The matrix of a law that lists its isometries, and a bound of its Frobenius error apart from rounding."""
+    """The matrix of a law that lists its isometries, and a bound on its Frobenius error apart from rounding."""
     table = law.isometry_table()
     if table is not None:
         return table_matrix(table, basis)
@@ -65,7 +65,7 @@ def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, 
     return branch_matrix(law, basis, tolerance)
 
 
-# Repeated teeth, and whether they are in the other frame: these have exact integrals up to grazing.
+# The law of repeated teeth (or None), and whether it is in the other frame. It has exact integrals up to grazing.
 REPEATED_TEETH: Rules[tuple[RepeatedTeethLaw, bool] | None] = Rules(
     lambda law: (law, False) if isinstance(law, RepeatedTeethLaw) else None,
     lambda terms: None,
@@ -75,12 +75,12 @@ REPEATED_TEETH: Rules[tuple[RepeatedTeethLaw, bool] | None] = Rules(
 
 
 def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, P e_j> for a law of isometries, and a bound of its Frobenius error apart from rounding.
+    """<e_i, P e_j> for a law of isometries, and a bound on its Frobenius error apart from rounding.
 
     The interval (0, pi) is cut at the breakpoints of the law, the edges of the basis and the angles that a branch maps
-    to edges. On each piece every integrand is smooth. Where the law leaves breakpoints near grazing out, a fraction m
-    of the measure, both the integral and its approximation are averages of e(theta) e(theta')^T over a measure of mass
-    m, so they differ by at most 2 m sup |e|^2, |e|^2 the sum of squares of the basis functions.
+    to edges. On each piece every integrand is smooth. Let m be the measure of angles near grazing whose breakpoints the
+    law leaves out. There, both the integral and its approximation are integrals of e(theta) e(theta')^T over a measure
+    of mass m, so they differ by at most 2 m sup |e|^2, with |e|^2 the sum of squares of the basis functions.
     """
     worst = 2.0 * largest_square_sum(basis)
     limit = FEWEST_BREAKPOINTS
@@ -100,7 +100,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     narrow = (width < NARROW) & (width < NARROW * near)
     order, order_narrow = NODES_WIDE, NODES_NARROW
     if not basis.is_partition:
-        # on a piece this short the functions of the basis are as smooth as the probabilities
+        # On such short pieces the functions of the basis are as smooth as the probabilities.
         order = max(order, basis.nodes_per_interval)
         tame = width * basis.nodes_per_interval < np.diff(basis.edges).min()
         narrow, order_narrow = narrow & tame, NODES_NARROW + 2
@@ -110,7 +110,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
 
 
 def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:
-    # large steps: every one adds up whole matrices
+    # Large steps, because every step adds whole matrices.
     step = max(CHUNK // (order * law.evaluations), 1)
     for start in range(0, low.size, step):
         angle, weight = gauss_on_intervals(low[start : start + step], high[start : start + step], order)

@@ -1,4 +1,4 @@
-"""The matrix of a law of isometries from its table, without samples and without a search for breakpoints."""
+"""The matrix of a law of isometries from its table, exact to rounding."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ from ..walls.crevice_tail import crevice_nodes, first_crossing
 from ..walls.rectangular import crevice_pieces
 from .method import Budget, MethodName, computed, isometric_rounding
 
-# Products of two functions of a basis times a sinusoid, on a piece of width w, vary like exp(n w) with n the
-# stiffness below. Gauss with m nodes misses (n w / 2)^(2m) / (2m)! of them: 3e-15 and less for these pairs of (n w, m),
-# relative to the measure of the piece; beyond, m = n w / 2 + MORE_NODES follows the oscillation.
+# On a piece of width w, products of two basis functions and a sinusoid vary like exp(n w), with the stiffness n of
+# `_nodes`. The error of a Gauss rule with m nodes, relative to the measure of the piece, is (n w / 2)^(2m) / (2m)!. It
+# is 3e-15 or less for these pairs (n w, m); beyond, m = n w / 2 + MORE_NODES resolves the oscillation.
 SHORT = ((1e-3, 2), (0.02, 3), (0.2, 5), (1.0, 8), (4.0, 14))
 MORE_NODES = 18
-# A width whose number of nodes does for the sinusoid on any shorter piece.
+# Shorter pieces get the number of nodes that a sinusoid needs on this width.
 FEW = 0.1
-# Pieces, or nodes, held at a time.
+# Limit on the pieces, or nodes, in memory at a time.
 CHUNK = 2**20
 
 
 class IsometryTables:
-    """Laws that are a table of isometries, by masses and Gauss rules on every piece of it."""
+    """Laws that have a table of isometries, by masses and Gauss rules on every piece of the table."""
 
     name: MethodName = "exact"
 
@@ -51,18 +51,18 @@ class IsometryTables:
 
 
 def bounded(symmetric: Floats, basis: Basis, omitted: float, how: str) -> KernelMatrix:
-    """The exact matrix whose error apart from rounding has a bound."""
-    # two Markov kernels cannot be further apart than their norms together
+    """The exact matrix with the error bound ``omitted`` plus rounding."""
+    # The distance of two matrices is at most the sum of their norms.
     furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(basis.size))
     return computed(symmetric, basis, "exact", min(omitted + isometric_rounding(basis), furthest), how, "bound")
 
 
 def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
-    """<e_i, P e_j> of a table, and a bound of its Frobenius error apart from rounding.
+    """<e_i, P e_j> of a table, and a bound on its Frobenius error apart from rounding.
 
-    For partitions every piece is cut at the edges and at the angles that it maps to edges; the mass between two cuts
-    is elementary. For other bases there are Gauss nodes between the cuts. The bound: where a measure m is sent back
-    for want of knowledge, the law and its approximation differ by at most 2 m sup |e|^2, as in `branch_matrix`.
+    Every piece is cut at the edges and at the angles that it maps to edges. For partitions the mass between two cuts is
+    elementary; for other bases Gauss rules integrate between the cuts. If a measure m of unresolved rays is
+    retroreflected by convention, the matrix has an error of at most 2 m sup |e|^2, as in `branch_matrix`.
     """
     total = np.zeros((basis.size, basis.size))
     _add_table(table, basis, total)
@@ -84,7 +84,7 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
 
 
 def _add_table(table: IsometryTable, basis: Basis, total: Floats) -> None:
-    # pieces of a table are cut into about as many as the basis has cells on them
+    # Pieces of a table are cut into about as many parts as the basis has cells on them.
     step = max(CHUNK // (2 * basis.edges.size), 1)
     for begin in range(0, table.low.size, step):
         piece, low, high = _cut(table, basis, np.arange(begin, min(begin + step, table.low.size)))
@@ -101,7 +101,7 @@ def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[
     owner, cut = [piece, piece], [low, high]
     bounds = [(low, high, np.ones(piece.size), np.zeros(piece.size))]
     if not isinstance(basis, Legendre):
-        # polynomials have no edges where they are not smooth
+        # Polynomials are smooth, so their images need no cuts.
         sign, offset = table.sign[piece], table.offset[piece]
         ends = sign * low + offset, sign * high + offset
         bounds.append((np.minimum(*ends), np.maximum(*ends), sign, offset))
@@ -117,7 +117,7 @@ def _add_masses(
     table: IsometryTable, basis: Basis, piece: NDArray[np.int64], low: Floats, high: Floats, total: Floats
 ) -> None:
     middle = 0.5 * (low + high)
-    # the integral of a sinusoid is its value in the middle times 2 sin(width/2)
+    # The integral of a sinusoid is its value in the middle times 2 sin(width/2).
     mass = table.density(middle, piece) * np.sin(0.5 * (high - low))
     image = clipped_inside(table.sign[piece] * middle + table.offset[piece])
     add_products(total, basis, middle, image, mass)
@@ -139,12 +139,12 @@ def _add_nodes(
 
 
 def _nodes(basis: Basis, width: Floats) -> NDArray[np.int64]:
-    """Gauss nodes for every piece of the given width."""
+    """Number of Gauss nodes for pieces of the given widths."""
     if isinstance(basis, Legendre):
         return _nodes_for((basis.size + 1) * width)
     if isinstance(basis, Panels):
-        # a polynomial of degree d on a panel of width W grows by a factor exp(2 d^2 w / W) at most (Markov); on longer
-        # pieces the polynomial, of degree 2 p, adds p nodes to those of the sinusoid
+        # By Markov's inequality a polynomial of degree d on a panel of width W grows at most by exp(2 d^2 w / W). On
+        # longer pieces the polynomial, of degree 2 p, adds p nodes to those of the sinusoid.
         stiffness = 2.0 * (2.0 * basis.degree) ** 2 / float(np.diff(basis.edges).min()) + 1.0
         short = stiffness * width <= SHORT[-1][0]
         return np.where(short, _nodes_for(stiffness * width), _nodes_for(np.maximum(width, FEW)) + basis.degree)
@@ -152,7 +152,7 @@ def _nodes(basis: Basis, width: Floats) -> NDArray[np.int64]:
 
 
 def _nodes_for(reach: Floats) -> NDArray[np.int64]:
-    # a few lengths only: every different one is a call
+    # Multiples of 8, because every different number of nodes costs a call.
     number = 8 * np.ceil((0.5 * reach + MORE_NODES) / 8.0).astype(np.int64)
     for limit, nodes in reversed(SHORT):
         number = np.where(reach <= limit, nodes, number)

@@ -1,4 +1,4 @@
-"""What every method that makes a matrix is given, and what it gives back."""
+"""The protocol of the methods that compute matrices, their budget, and helpers for their errors."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from ..sampling.monte_carlo import DEFAULT_SAMPLES
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 
-# Ray segments, from one collision to the next, of traced conditional distributions: some seconds of work; where they
-# were not asked for, as many as take the time of two million rays.
+# Limits on the ray segments of traced conditional distributions of one matrix: some seconds of work; without an
+# explicit request for quadrature, the time of two million rays.
 MOST_SEGMENTS, QUICK_SEGMENTS = 40_000_000, 4_000_000
-# The error of traced matrices of nine walls fell like their segments to a power of 1.6 to 2.2, and all angles are done
-# again where they were too coarse. On fourteen walls this told apart those whose matrix was of use.
+# The error of a traced matrix falls like its segments to the power -ORDER (1.6 to 2.2 on nine walls). Angles that were
+# too coarse are computed again, which costs the factor DONE_AGAIN.
 ORDER, DONE_AGAIN = 1.75, 2.0
 SEED_WITHOUT_RNG = 0
-# Rounding of a matrix: the edges of n cells carry a rounding error each, which moves a fraction of about n eps of a
-# cell's measure; 1.2e-13 was measured where n eps is 1.1e-13.
+# Rounding error of a matrix with n functions, divided by n. Each edge of n cells has a rounding error that moves a
+# fraction of about n eps of a cell's measure; an error of 1.2e-13 was measured for n eps = 1.1e-13.
 ROUNDING = 8.0 * EPS
-# Edges and offsets of isometries are rounded to about an ulp. That moves a fraction of about n eps of each of some n
-# cells of a partition, and the n-th Legendre function, whose derivative has the norm n, by n eps: n^(3/2) eps in all.
+# Edges and offsets of isometries are rounded to about one ulp. This moves a fraction of about n eps of each of n cells
+# of a partition, and the n-th Legendre function, whose derivative has norm n, by n eps: n^(3/2) eps in all.
 DISPLACED = EPS
 
 
@@ -40,21 +40,21 @@ def _fixed_source() -> np.random.Generator:
 
 @dataclass(frozen=True)
 class Budget:
-    """What a method may spend on one matrix, and what for.
+    """The limits on the work for one matrix, and the wanted error.
 
     Parameters
     ----------
     tolerance : float
         Wanted Frobenius error of the symmetric matrix.
     rays : int
-        Sampled rays at most.
+        Limit on the sampled rays.
     segments : int
-        Ray segments of traced conditional distributions at most.
+        Limit on the ray segments of traced conditional distributions.
     fallback : float
-        The error that the next method promises, infinite if there is none: a larger one is of no use.
+        Predicted error of the next method, inf if there is none. A matrix with a larger error is not needed.
     rng : numpy.random.Generator
     symmetrise : bool
-        Whether sampled rays count both ways.
+        Whether sampled rays count in both directions.
     """
 
     tolerance: float
@@ -65,11 +65,11 @@ class Budget:
     symmetrise: bool = False
 
     def predicted(self, error: float, spent: int) -> float:
-        """What all segments are likely to make of an error that is left after so many of them."""
+        """The predicted error after all segments, from the error after ``spent`` segments."""
         return float(error / max(self.segments / (DONE_AGAIN * spent), 1.0) ** ORDER)
 
     def out_of_reach(self, error: float, spent: int) -> bool:
-        """Whether an error after so many segments speaks against one below the fallback.
+        """Whether the error predicted from ``spent`` segments exceeds the fallback error.
 
         Examples
         --------
@@ -82,27 +82,27 @@ class Budget:
 
 
 class Method(Protocol):
-    """One way to the matrices of some laws; a new one is entered in `methods.METHODS`, or in `methods.SAMPLED`.
+    """A method that computes the matrices of some laws; each is listed in `methods.METHODS` or `methods.SAMPLED`.
 
-    A method sees a law that is no wall with a closed form, but it may be a sum, a chain, or in the specular frame.
+    Walls with a closed form are replaced by it beforehand. The law may be a sum, a chain, or in the specular frame.
     """
 
     name: MethodName
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        """Whether the method has the matrix of this law in this basis."""
+        """Whether the method can compute the matrix of this law in this basis."""
         ...
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        """The symmetric array, its error and the evidence for it; what is known of the law is put in later."""
+        """The symmetric array, its error and the evidence for it; `discretise` adds the properties of the law."""
         ...
 
 
 class Recipe(Protocol):
-    """How the matrix of a law is made: by a method that takes it whole, or from the matrices of its parts."""
+    """The computation of the matrix of a law, by one method or from the matrices of its parts."""
 
     def has(self, wanted: MethodName, basis: Basis) -> bool:
-        """Whether the matrix can be made in this way."""
+        """Whether the matrix can be computed by this kind of method."""
         ...
 
     def without_rays(self, basis: Basis) -> bool:
@@ -110,29 +110,29 @@ class Recipe(Protocol):
         ...
 
     def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        """The matrix; only where `has` says so."""
+        """The matrix; valid only if `has` is True."""
         ...
 
 
 def computed(
     symmetric: Floats, basis: Basis, name: MethodName, error: float, how: str, kind: ErrorKind = "estimate"
 ) -> KernelMatrix:
-    """The matrix of a method that samples nothing."""
+    """The matrix of a method without sampling, with its error and the description of the error."""
     return KernelMatrix(symmetric, basis, frobenius_error(error, kind, how), method=name)
 
 
 def rounding(basis: Basis) -> float:
-    """What rounding leaves of a matrix, in the Frobenius norm."""
+    """The rounding error of a matrix in the Frobenius norm."""
     return ROUNDING * basis.size
 
 
 def isometric_rounding(basis: Basis) -> float:
-    """What rounding leaves of a matrix of isometries."""
+    """The rounding error of a matrix of isometries in the Frobenius norm."""
     return float(ROUNDING * basis.size + DISPLACED * basis.size**1.5)
 
 
 def until_settled(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:
-    """The first level that differs from the one before by no more than the tolerance, or the last; the difference."""
+    """The first level that differs from the previous one by at most the tolerance, or the last; and the difference."""
     current = next(levels)
     difference = np.inf
     for finer in levels:

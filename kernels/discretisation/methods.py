@@ -1,4 +1,4 @@
-"""The methods in the order in which `auto` asks them, and what they make of laws that are made of others."""
+"""The methods in the order in which `auto` tries them, and their application to compound laws."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ from .sampled import MonteCarlo, Sobol
 from .scattering import Diagonal
 from .traced import Traced
 
-# Without rays, but for AutoWall; the docstring of `discretise` states the table in this order.
+# Methods without rays, except AutoWall. The docstring of `discretise` states the table in this order.
 METHODS: tuple[Method, ...] = (
     AutoWall(), IsometryTables(), Isometries(), Diagonal(), Arcs(), Densities(), LeastResistance(), Maps(), Actions(),
 )  # fmt: skip
-# By rays: asked where nothing above accepts the law, nor can its matrix be made from those of its parts.
+# Methods with rays. They are tried if no method above accepts the law and its parts do not give its matrix.
 SAMPLED: tuple[Method, ...] = (Traced(), Sobol(), Traced(any_wall=True), EntryPoints(), MonteCarlo())
-# The methods of a law that is made of others, in the order in which a refusal names them.
+# The kinds of methods of a compound law, in the order of the error message.
 NAMES: tuple[MethodName, ...] = get_args(MethodName)[1:]
 
 
 def recipe(law: Law, wanted: MethodName) -> Callable[[Basis, Budget], KernelMatrix]:
-    """How the matrix of a law is made: by the first method that accepts it whole, or from its parts.
+    """The function of basis and budget that computes a law's matrix by the first method that accepts it, or by parts.
 
-    Raises an InputError, when it is called, if the law does not have the method.
+    This function raises InputError if the law does not have the wanted kind of method.
     """
 
     def made(basis: Basis, budget: Budget) -> KernelMatrix:
-        # independent rays need nothing but the law as it stands
+        # Independent rays use the law without simplification.
         found = _Law(law) if wanted == "monte-carlo" else _simplified(law)
         if wanted != "auto" and not found.has(wanted, basis):
             names = ", ".join(_names(found, basis))
@@ -57,19 +57,19 @@ def recipe(law: Law, wanted: MethodName) -> Callable[[Basis, Budget], KernelMatr
 
 
 class _Law:
-    """A law, by the first method that accepts it whole; or else from its parts, if it has any."""
+    """The computation of a law's matrix by the first method that accepts the law, else from its parts."""
 
     def __init__(self, law: Law, parts: Recipe | None = None) -> None:
         self.law, self.parts = law, parts
 
     @property
     def terms(self) -> Sequence[tuple[float, _Law]]:
-        """The weighted laws that it is a sum of."""
+        """The terms of the law as a weighted sum."""
         return self.parts.terms if isinstance(self.parts, _Sum) else ((1.0, self),)
 
     @property
     def factors(self) -> Sequence[Factor]:
-        """The laws that it is a chain of."""
+        """The factors of the law as a chain."""
         return self.parts.factors if isinstance(self.parts, (Chain, _Mirrored)) else (self,)
 
     def has(self, wanted: MethodName, basis: Basis) -> bool:
@@ -84,7 +84,7 @@ class _Law:
         method = self._method(wanted, basis)
         if method is not None:
             return method.matrix(self._law(wanted), basis, budget)
-        assert self.parts is not None  # anything else can be sampled, or `has` was not asked
+        assert self.parts is not None  # `has` was True, and any other law can be sampled
         return self.parts.matrix(wanted, basis, budget)
 
     def _method(self, wanted: MethodName, basis: Basis) -> Method | None:
@@ -98,15 +98,15 @@ class _Law:
         return next((method for method in named if method.accepts(self._law(wanted), basis)), None)
 
     def _law(self, wanted: MethodName) -> Law:
-        """The law; where it is to be computed, that of a polygonal wall as a table of isometries."""
+        """The law; for exact methods and quadrature, a polygonal wall becomes its table of isometries."""
         return _resolved(self.law) if wanted in ("exact", "quadrature") else self.law
 
 
 class _Sum:
-    """A weighted sum, each term by its own method."""
+    """The computation of a weighted sum, each term by its own method."""
 
     def __init__(self, terms: Sequence[tuple[float, _Law]]) -> None:
-        # of a sum in which some chains are too many to be multiplied out, the others may be simplified
+        # If the whole sum has too many chains to be multiplied out, single terms can still be simplified.
         self.parts = [(weight, _simplified(one.law) if isinstance(one.parts, Chain) else one) for weight, one in terms]
 
     @property
@@ -130,7 +130,7 @@ class _Sum:
             samples=sum(matrix.samples for _, matrix in sampled),
             unresolved=sum(weight * matrix.unresolved for weight, matrix in sampled),
             symmetrised=budget.symmetrise and bool(sampled),
-            # the other terms are not random: the evidence against symmetry is that of the sampled one
+            # The other terms are not random, so the sampled term alone has a raw symmetry defect.
             raw_defect=_scaled_defect(*single, total) if single else None,
             error=replace(total.error, method="sum over the terms: " + total.error.method),
             norm_bound=1.0,
@@ -138,7 +138,7 @@ class _Sum:
 
 
 class _Mirrored:
-    """A law in the other frame, by quadrature of the law in a basis that the flip keeps."""
+    """The computation of a law in the other frame, by quadrature of the law in a mirror-symmetric basis."""
 
     def __init__(self, inner: _Law) -> None:
         self.inner = inner
@@ -149,7 +149,7 @@ class _Mirrored:
 
     def has(self, wanted: MethodName, basis: Basis) -> bool:
         if wanted == "auto":
-            # where rays of the law would come first, rays of the law in the other frame are as good
+            # If rays are the best method of the law, rays of the law in the other frame are as good.
             return _names(self.inner, basis)[0] in ("exact", "quadrature")
         return wanted in ("exact", "quadrature") and self.inner.has(wanted, basis)
 
@@ -170,7 +170,7 @@ def _chain(parts: Sequence[_Law]) -> Recipe:
 
 
 def _simplified(law: Law) -> _Law | _Sum:
-    """Chains by the algebra first, as long as not too many come of them; of other laws only what they are made of."""
+    """The recipe of a law, whose chains are first simplified by the algebra unless this gives too many terms."""
     words = words_of(law) if has_chain(law) else None
     if words is None:
         return cast(_Law, fold(law, RULES))
@@ -178,12 +178,12 @@ def _simplified(law: Law) -> _Law | _Sum:
     return terms[0][1] if len(terms) == 1 else _Sum(terms)
 
 
-# Of every law that is made of others `_Law` asks the methods first, so all facts that these rules see are such.
+# `_Law` wraps every compound law and tries the methods first, so all facts in these rules are of type `_Law`.
 RULES: Rules[Any] = Rules(_Law, _Sum, _chain, _Mirrored, _Law)
 
 
 def _names(found: _Law | _Sum, basis: Basis) -> tuple[MethodName, ...]:
-    """The methods of a law, the best first."""
+    """The kinds of methods of a law, the best first."""
     if isinstance(found, _Law) and found.parts is None:
         law = _resolved(found.law)
         accepted = [method.name for method in METHODS + SAMPLED if method.accepts(law, basis)]
@@ -192,7 +192,7 @@ def _names(found: _Law | _Sum, basis: Basis) -> tuple[MethodName, ...]:
 
 
 def _resolved(law: Law) -> Law:
-    """The law; of a polygonal wall that is resolved into isometries, the table of these."""
+    """The law, or its table of isometries if it is a resolved polygonal wall."""
     return law.exact_law or law
 
 

@@ -1,4 +1,4 @@
-"""Matrices of chains of laws through piecewise polynomials that are refined where the factors are rough."""
+"""Matrices of chains of laws through piecewise polynomials on adaptively refined panels."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from .isometries import Isometries, isometric_matrix
 from .method import Budget, MethodName, Recipe, computed, isometric_rounding
 from .scattering import degrees_used, is_scattered, local_values, scattered_matrix, split
 
-# Panels of this width and degree to begin with; narrower ones follow the polynomials of a basis, n of them on (0, pi).
+# Width and degree of the first panels; panels of width OSCILLATION / n resolve the n polynomials of a Legendre basis.
 WIDEST, DEGREE, OSCILLATION = np.pi / 12.0, 9, 8.0
-# Functions in all: a product of two matrices of this size takes about a second. A basis with more cells than this gets
-# panels of the lowest degree whose last two show how the rest falls off.
+# Limit on the functions on all panels: a product of two matrices of this size takes about a second. A basis with more
+# cells gets panels of LOWEST_DEGREE, the lowest degree at which the last two coefficients show their decay.
 MOST_FUNCTIONS, LOWEST_DEGREE = 1600, 2
-# Breakpoints of a factor that edges are put at from the start, and edges nearer than this to each other.
+# Limit on the breakpoints of a factor among the first edges, and the distance below which edges are merged.
 BREAKPOINTS, SAME_EDGE = 16, 1e-10
-# Matrices of that size held at a time, and what they may take.
+# Number of matrices of this size in memory at a time, and the limit on their memory.
 MATRICES, MOST_GIGABYTES = 5, 4.0
-# Coefficients of a function that jumps on a panel fall off like 1/k, so that what a panel of degree 9 leaves out is
-# about twice what its last two functions hold; half as much again for singularities that are worse.
+# Ratio of the norm that a panel leaves out to the norm of its last two coefficients. Coefficients of a function that
+# jumps on a panel fall like 1/k, so the ratio is about 2 for degree 9; the rest is a margin for worse singularities.
 TAIL = 3.0
-# Images under isometries are compared with their projections at these fractions of a panel, as breakpoints may be too
-# dense for the last coefficients to show them; the norm from so few angles is taken this many times.
+# Images under isometries are compared with their projections at these fractions of a panel, because breakpoints can be
+# too dense to show in the last coefficients. The norm from so few angles is multiplied by PROBED.
 PROBES, PROBED = np.array([0.0711, 0.2939, 0.5387, 0.8123]), 2.0
-# Panels that together make up this fraction of the error are cut in so many: every time all factors are made again.
+# In each round, the panels with this fraction of the error are cut into PARTS parts, and all factors are recomputed.
 MARKED, PARTS = 0.9, 4
-# Whether a factor needs rays is asked for any panels.
+# Panels for the question whether a factor needs rays, whose answer is the same on all panels.
 ANY_PANELS = Panels(np.array([0.0, np.pi]), DEGREE)
-# Of scatterings nearer to a mirror than this the matrix is made as that of any other density.
+# Henyey-Greenstein laws that need more polynomials than this are treated like any other density.
 HIGHEST_DEGREE = 4096
 
 
 class Factor(Recipe, Protocol):
-    """A law of a chain, and the weighted laws that it is a sum of."""
+    """A law of a chain, and its terms as a weighted sum of laws."""
 
     law: Law
 
@@ -59,10 +59,10 @@ class Factor(Recipe, Protocol):
 
 
 class Chain:
-    """Laws one after the other: by isometries, else by scatterings between isometries, else through panels.
+    """A chain of laws: by isometries, else by scatterings between isometries, else through panels.
 
-    The first of these that meets the tolerance is taken, or else the most exact. Through panels go chains no part of
-    which needs rays.
+    The first of these matrices that meets the tolerance is returned, or else the most exact one. The method through
+    panels requires that no part of the chain needs rays.
     """
 
     def __init__(self, factors: Sequence[Factor]) -> None:
@@ -84,7 +84,7 @@ class Chain:
             try:
                 found.append(method(basis, budget))
             except InputError as reason:
-                # more branches than can be listed, or panels than can be held
+                # Too many branches to list, or too many panels for the memory.
                 reasons.append(reason)
             if found and float(found[-1].error) <= budget.tolerance:
                 break
@@ -118,9 +118,9 @@ class Chain:
 @dataclass(frozen=True)
 class _Level:
     symmetric: Floats
-    # fraction of the error of each panel, which is what the products between factors lose there
+    # Error on each panel from the projections between factors.
     truncated: Floats
-    # errors of the factors' matrices
+    # Error of the factors' matrices.
     factors: float
 
     @property
@@ -131,18 +131,18 @@ class _Level:
 def product_matrix(factors: Sequence[Factor], basis: Basis, budget: Budget) -> tuple[Floats, float]:
     r"""<e_i, P_1 P_2 ... e_j> with each factor's matrix on panels, and an estimate of its Frobenius error.
 
-    Between two factors stands the projection Q on the panels: what is lost there is <P_k* ... e_i, (1 - Q) P_{k+1} ...
-    e_j>, panel by panel at most the product of the norms of what the panel leaves out of either side. These are
-    estimated from the last coefficients on the panel, for isometries also from a few angles, and panels that lose much
-    are cut. One smooth side is enough.
+    Let Q be the projection on the panels between two factors. Its error is <P_k* ... e_i, (1 - Q) P_{k+1} ... e_j>. On
+    each panel it is at most the product of the norms that the panel leaves out of the two sides, so one smooth side is
+    enough. These norms are estimated from the last coefficients on the panel, for isometries also from a few angles.
+    Panels with large errors are cut.
 
     Parameters
     ----------
     factors : sequence of Factor
-        The first one first.
+        The factors in their order of application.
     basis : Basis
     budget : Budget
-        If the largest number of panels does not meet its tolerance, the error says so.
+        The returned error exceeds its tolerance if the largest number of panels does not meet it.
     """
     of_each = replace(budget, tolerance=budget.tolerance / (2.0 * len(factors)))
     edges = _first_edges([term.law for factor in factors for _, term in factor.terms], basis)
@@ -165,7 +165,7 @@ def product_matrix(factors: Sequence[Factor], basis: Basis, budget: Budget) -> t
 def _panels(edges: Floats, basis: Basis) -> Panels:
     lowest, highest = LOWEST_DEGREE, DEGREE
     if isinstance(basis, Panels):
-        # the last two functions of a panel are to be empty where nothing is left out
+        # Two degrees more than the basis, so that the last two coefficients vanish if nothing is left out.
         lowest, highest = (most + basis.degree for most in (lowest, LOWEST_DEGREE))
         highest = max(highest, DEGREE)
     degree = int(np.clip(MOST_FUNCTIONS // (edges.size - 1) - 1, lowest, highest))
@@ -186,7 +186,7 @@ def _level(chain: Sequence[Factor], basis: Basis, panels: Panels, budget: Budget
     with one_blas_thread():
         before, left = _passed_on(ends, [(factors[law], True) for law in laws], panels)
         _, right = _passed_on(ends, [(factors[law], False) for law in reversed(laws)], panels)
-    # the functions on either side of the k-th position between the factors
+    # Pairs the functions on both sides of each position between factors.
     truncated = sum(one * other for one, other in zip(left, reversed(right), strict=True))
     return _Level(before.T @ ends, np.asarray(truncated), float(sum(factors[law].error for law in laws)))
 
@@ -194,7 +194,7 @@ def _level(chain: Sequence[Factor], basis: Basis, panels: Panels, budget: Budget
 def _passed_on(
     functions: Floats, factors: Sequence[tuple[_OnPanels, bool]], panels: Panels
 ) -> tuple[Floats, list[Floats]]:
-    """The functions after all factors, or their adjoints, and what the panels leave out of them after each."""
+    """The functions after all factors or their adjoints, and the norms that the panels leave out after each factor."""
     left_out = [TAIL * _last_two(functions, panels)]
     for factor, adjoint in factors:
         image = (factor.matrix.T if adjoint else factor.matrix) @ functions
@@ -228,7 +228,7 @@ def _probed(law: Law, matrix: Floats, functions: Floats, panels: Panels) -> Floa
 
 @dataclass(frozen=True)
 class _OnPanels:
-    """A law as a weighted sum: weight, law, its matrix and the error of that."""
+    """A law as a weighted sum of terms: weight, law, its matrix and the matrix's error."""
 
     terms: list[tuple[float, Law, Floats, float]]
 
@@ -264,7 +264,7 @@ def _on_panels(factor: Factor, panels: Panels, budget: Budget) -> tuple[Floats, 
 
 
 def _nodes(basis: Basis, panels: Panels) -> int:
-    """Gauss nodes on a panel for products of a function of the basis and one of the panels."""
+    """Number of Gauss nodes on a panel for products of a basis function and a function of the panels."""
     widest = float(np.diff(panels.edges).max())
     return panels.nodes_per_interval + (int(np.ceil(0.5 * basis.n * widest)) if isinstance(basis, Legendre) else 0)
 

@@ -1,4 +1,4 @@
-"""Matrices of laws by rays: from nets, or independent ones."""
+"""Matrices of laws from sampled rays: scrambled Sobol sequences or independent rays."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class MonteCarlo:
 
 
 def sobol_matrix(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix:
-    """The matrix by at least ``budget.rays`` rays of a net, which goes on where it was."""
+    """The matrix from at least ``budget.rays`` rays of the sampler, which continues its Sobol sequence."""
     found = sampler.sampled(budget.rays, symmetrise=budget.symmetrise)
     return _sampled("qmc", found, basis, budget, f"spread of {PARTS} scrambled sequences")
 

@@ -1,7 +1,7 @@
 """Matrices of chains of isometries and Henyey-Greenstein scatterings, to rounding.
 
-A scattering is diagonal in Legendre polynomials, HG(g) = sum over l of |P_l> g^l <P_l|, so it cuts a chain into pieces
-of isometries alone, whose integrals against polynomials are exact: only what g^l leaves out is lost.
+A scattering is diagonal in Legendre polynomials: HG(g) = sum over l of |P_l> g^l <P_l|. It therefore cuts a chain into
+pieces of isometries, whose integrals against polynomials are exact. The only error is the truncation of the sum.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
 from .method import Budget, MethodName, computed
 
-# Polynomials that a scattering leaves with less than this factor are left out.
+# The sum over l ends where g^l is below this.
 NEGLIGIBLE = 1e-17
-# Polynomials of higher degree cost more than a fine basis does: |g| up to 0.96.
+# Polynomials of higher degree cost more than a fine basis. The limit corresponds to |g| up to 0.96.
 HIGHEST_DEGREE = 1024
-# Values of functions held at a time.
+# Limit on the values of functions in memory at a time.
 CHUNK = 2**21
 
-# The matrix of a chain of isometries in a basis, and a bound of its Frobenius error; None where none is known.
+# A function that returns the matrix of a chain of isometries in a basis, and a bound on its Frobenius error.
 IsometricMatrix = Callable[[Sequence[Law], Basis], tuple[Floats, float]]
 
 
 class Diagonal:
-    """Henyey-Greenstein scattering in Legendre polynomials, where it is diagonal."""
+    """Henyey-Greenstein scattering in Legendre polynomials, in which its matrix is diagonal."""
 
     name: MethodName = "exact"
 
@@ -51,11 +51,11 @@ class Diagonal:
 
 
 class JointBasis(Basis):
-    """The functions of a basis followed by the Legendre polynomials of degree below n; not orthonormal together."""
+    """The functions of a basis followed by the Legendre polynomials of degree below n; not an orthonormal family."""
 
     def __init__(self, basis: Basis, degrees: int) -> None:
         self.first, self.polynomials = basis, Legendre(degrees)
-        # short enough for one rule on each to follow the polynomials
+        # Intervals on which one Gauss rule resolves the polynomials.
         self._edges = split(basis.edges, DEGREES_PER_PANEL * np.pi / degrees)
 
     @property
@@ -99,7 +99,7 @@ class JointBasis(Basis):
         return self.polynomials.n
 
     def add_products(self, total: Floats, incoming: Floats, outgoing: Floats, weight: Floats) -> bool:
-        """As `asperity.kernels.bases.assembly.add_products`, with the local functions as a sparse matrix."""
+        """The same sum as `asperity.kernels.bases.assembly.add_products`, with sparse values of the local functions."""
         size = self.first.size
         step = max(1, CHUNK // self.polynomials.n)
         for start in range(0, incoming.size, step):
@@ -116,7 +116,7 @@ class JointBasis(Basis):
 
 
 def split(edges: Floats, widest: float) -> Floats:
-    """The edges with more between them, equally spaced, so that none is further than that from the next.
+    """The edges and equally spaced ones between them, so that neighbours are at most ``widest`` apart.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def split(edges: Floats, widest: float) -> Floats:
 
 
 def local_values(basis: Basis, angle: Floats) -> Any:
-    """Values of the functions of a basis, shape (angles, n), as a sparse matrix: most have a small support."""
+    """Values of the functions of a basis, shape (angles, n), as a sparse matrix."""
     from scipy.sparse import csr_array
 
     rows = np.arange(angle.size)
@@ -146,12 +146,12 @@ def local_values(basis: Basis, angle: Floats) -> Any:
 
 
 def degrees_used(law: HenyeyGreensteinLaw) -> int:
-    """How many polynomials the law leaves with more than a negligible factor; 1 for g = 0."""
+    """The number of polynomials P_l with a factor g^l that is not negligible; 1 for g = 0."""
     return 1 if abs(law.g) <= NEGLIGIBLE else 1 + int(np.ceil(np.log(NEGLIGIBLE) / np.log(abs(law.g))))
 
 
 def is_scattered(laws: Sequence[Law]) -> bool:
-    """Whether a chain is made of isometries and scatterings that are not too near to a mirror."""
+    """Whether a chain consists of isometries and at least one scattering, with |g| up to about 0.96."""
     scatterings = [law for law in laws if isinstance(law, HenyeyGreensteinLaw)]
     near = any(degrees_used(law) > HIGHEST_DEGREE for law in scatterings)
     others = [law for law in laws if not isinstance(law, HenyeyGreensteinLaw)]
@@ -159,17 +159,17 @@ def is_scattered(laws: Sequence[Law]) -> bool:
 
 
 def scattered_matrix(laws: Sequence[Law], basis: Basis, isometric: IsometricMatrix) -> tuple[Floats, float]:
-    """<e_i, P_1 P_2 ... e_j> for a chain of scatterings and isometries, and a bound of its Frobenius error.
+    """<e_i, P_1 P_2 ... e_j> for a chain of scatterings and isometries, and a bound on its Frobenius error.
 
-    Operators between orthonormal families have norms of at most 1, so that the errors of the pieces add up.
+    Matrices of Markov operators in orthonormal families have norms of at most 1, so the errors of the pieces add up.
 
     Parameters
     ----------
     laws : sequence of Law
-        Scatterings, one at least, and laws of isometries.
+        At least one scattering, and laws of isometries.
     basis : Basis
     isometric : callable
-        The matrix of a chain of isometries, also of none at all, and its error.
+        Returns the matrix of a chain of isometries, which may be empty, and its error.
     """
     pieces: list[tuple[Law, ...]] = [()]
     scatterings: list[HenyeyGreensteinLaw] = []
@@ -182,7 +182,7 @@ def scattered_matrix(laws: Sequence[Law], basis: Basis, isometric: IsometricMatr
     needed = [degrees_used(law) for law in scatterings]
     size = basis.size
     if isinstance(basis, Legendre):
-        # a scattering at an end of the chain sees the polynomials of the basis alone
+        # A scattering at an end of the chain acts on the polynomials of the basis only.
         for slot, piece in ((0, pieces[0]), (-1, pieces[-1])):
             needed[slot] = needed[slot] if piece else size
     degrees = min(max(needed), HIGHEST_DEGREE)

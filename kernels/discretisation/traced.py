@@ -1,4 +1,4 @@
-"""Matrices of the laws of traced walls to a tolerance: adaptive in the entry point and in the incoming angle."""
+"""Matrices of the laws of traced walls by quadrature that is adaptive in the entry point and the incoming angle."""
 
 from __future__ import annotations
 
@@ -25,48 +25,47 @@ from .method import MOST_SEGMENTS, Budget, MethodName, computed, rounding
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# At the limit on its ray segments a matrix is returned with the error reached so far. One angle may use at most this
-# fraction of the limit, but at least so many: in some steep Bezier hollows angles with a fiftieth are not complete, and
-# in bottles with a neck of a hundredth of their width they have no end. If another method can take over, it is less.
+# Fraction of a matrix's limit on ray segments that one angle may use, without and with another method to take over, and
+# the least such number. In some steep Bezier hollows a fiftieth does not complete an angle; in bottles with a neck of a
+# hundredth of their width no number does.
 ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
-# For the prediction of the cost: guesses, not measurements; walls differ by more than a factor of ten.
+# Guesses, not measurements, for the prediction of the cost; walls differ by more than a factor of ten.
 ANGLES_A_PIECE, SEGMENTS_A_CHANGE = 100, 400
-# The asymmetry shows errors that the panels and rows do not see, but only their antisymmetric part: if the symmetric
-# part is of the same size, their sum is about half of sqrt(2) times the asymmetry; the factor leaves a margin to that.
+# The asymmetry ||S - S^T|| shows the antisymmetric part of errors that the error estimates of panels and angles miss.
+# If the symmetric part has the same size, the whole error is sqrt(2)/2 times the asymmetry; the rest is a margin.
 ASYMMETRY_FACTOR = 2.0
-# The error of Kronrod's rule as a fraction of its difference from Gauss's, in the root of the mean square over the
-# positions in a panel where it may be: .38 at the root with which a piece appears, .26 at a breakpoint. Its mean over
-# the positions is 0.
+# Error of Kronrod's rule as a fraction of its difference from Gauss's rule. Its root mean square over the positions of
+# a singularity is 0.38 for the square root at which a piece appears and 0.26 for a breakpoint; its mean is 0.
 KRONROD_FRACTION = 0.5
-# Rows at a time, so that their nodes fit into memory.
+# Incoming angles computed at a time, so that their nodes fit into memory.
 ANGLES_AT_ONCE = 1500
-# The rows together may spend this fraction of the tolerance.
+# The errors of all conditional expectations together may be this fraction of the tolerance.
 MEAN_FRACTION = 0.1
 SMALLEST_MEAN_TOLERANCE = 1e-14
-# Tolerances are approached in stages by this ratio, from one that is no coarser than this: where no more than a coarse
-# result can be had, its rows are coarse as well.
+# The tolerance is approached in stages by this ratio, from a first one of at most COARSEST_STAGE. If only a coarse
+# result can be reached, its conditional expectations are coarse as well.
 STAGE_RATIO, COARSEST_STAGE = 1e-2, 0.1
-# The rows of a narrow panel may be coarser: the panel may spend this fraction of what all rows together may.
+# Conditional expectations on a panel of smaller measure may be coarser, up to the error of a panel of this measure.
 FAIR_FRACTION = 0.02
 COARSEST_MEAN = 1e-4
-# Where a half has this fraction of its panel's difference of the two rules, or more, the integrand is not smooth: a
-# kink leaves 1/8 or more of it, a smooth integrand 2^-14.
+# The integrand is not smooth if a part of a divided panel has at least this fraction of the panel's difference of the
+# rules. With halves, a kink leaves 1/8 or more, a smooth integrand 2^-14.
 SMOOTH_SHRINKING = 1e-3
-# A smooth half's difference of the two rules is an error of Gauss, not of Kronrod: it is scaled by the ratio that was
-# measured on the whole panel, at least this, times a margin.
+# On a smooth part the difference of the rules is the error of Gauss's rule, not of Kronrod's. It is scaled by the ratio
+# measured on the divided panel times RATIO_MARGIN, but at least by LEAST_RATIO.
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# A stage that would leave more than this fraction of the error is not begun, nor one that would need a jump by more
-# than this to be of use.
+# A stage begins only if its predicted error is below WORTHWHILE times the present error and tolerance, and below
+# LARGEST_JUMP times the fallback error.
 WORTHWHILE, LARGEST_JUMP = 0.5, 4.0
-# Cuts are no closer to each other and to the ends of a panel than this fraction of it: it is cut there already.
+# Least distance of cuts from each other and from the ends of a panel, as a fraction of the panel.
 LEAST_CUT = 1e-7
-# Functions beyond those asked for whose integrals also steer the panels, so that no symmetry hides an error. Of their
-# error, which is that of all products but with the constants, fewer functions have the fraction of an even spread,
-# times a margin: measured on 37 walls, one product has a tenth in the root of the mean square.
+# Smaller Legendre bases are extended to this many functions, so that no symmetry hides an error. The error then belongs
+# to all products except those with the constant; the wanted ones get their fraction of it times a margin. On 37 walls,
+# the root mean square of the fraction of one product was a tenth.
 FEWEST_FUNCTIONS, SPREAD_MARGIN = 4, 1.5
-# Rounds in which rows are done again that have overlooked a piece.
+# Limit on the rounds that recompute conditional expectations in which a piece was missed.
 MOST_MENDINGS = 8
 
 
@@ -76,7 +75,7 @@ class Traced:
     Parameters
     ----------
     any_wall : bool
-        Also walls whose rays, sampled, are likely to do better.
+        Whether walls are accepted for which sampled rays are likely to be more accurate.
     """
 
     name: MethodName = "quadrature"
@@ -97,13 +96,13 @@ class Traced:
 
 
 def is_affordable(wall: Wall, basis: Basis) -> bool:
-    """Whether adaptive rows are likely to beat the sampling of rays: few pieces, and few functions with edges.
+    """Whether adaptive quadrature is likely to beat the sampling of rays: few pieces, and few functions with edges.
 
-    A row has several changes of itinerary a piece, each found by about 30 rays, and a matrix needs about a thousand
-    rows for an error of 1e-6 and as many breakpoints in theta as pieces: the cost grows like the square of the pieces.
-    A change of cell costs as much as one of itinerary, in each row, and the rows of each cell are integrated anew.
-    Where the wall overhangs, rays stay in its cavities for long, and rows have changes without end. Where it does not
-    close, rays near grazing pass cells without number: measured on three walls with islands, rows were behind rays.
+    Each incoming angle has several changes of itinerary per piece, each found by about 30 rays. An error of 1e-6 needs
+    about a thousand angles and one breakpoint in theta per piece, so the cost grows like the square of the pieces. At
+    each angle a change of cell costs as much as a change of itinerary, and each cell in theta is integrated separately.
+    In overhanging walls rays stay in cavities for long, with an unbounded number of changes. In walls that do not
+    close, rays near grazing pass arbitrarily many cells; on three walls with islands sampled rays were better.
     """
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
     cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
@@ -113,14 +112,14 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
 
 
 def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
-    """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays that it took.
+    """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays used.
 
-    If the first angles speak against an error below ``budget.fallback``, these are all.
+    If the first angles predict an error above ``budget.fallback``, the computation ends with them.
 
-    A panel's error is half the difference of Kronrod's and Gauss's rule where the rows have a kink, and that difference
-    scaled by what dividing the panel showed where they are smooth. Signs differ from panel to panel: their errors, and
-    ASYMMETRY_FACTOR times the asymmetry of the result, which other errors than these would show, are the sides of
-    right angles. The errors of the rows, which may all have one sign, are added.
+    The error of a panel is half the difference of Kronrod's and Gauss's rule if the expectations have a kink there. If
+    they are smooth, it is this difference scaled by a ratio measured when the panel was divided. The errors of panels
+    differ in sign, so they are added in quadrature, together with ASYMMETRY_FACTOR times the asymmetry of the result,
+    which shows other errors. The errors of the expectations, which may all have one sign, are added linearly.
     """
     inner, fraction = basis, 1.0
     if isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS:
@@ -132,7 +131,7 @@ def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, flo
 
 
 def panel_edges(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float]:
-    """The cuts in theta that `traced_matrix` makes, from 0 to pi, and its error: for integrals by other means."""
+    """The cuts in theta that `traced_matrix` makes, from 0 to pi, and its error, for other quadratures in theta."""
     integrator = _Integrator(wall, basis, budget)
     _, error, _ = integrator.run()
     edges = np.union1d(integrator.panels.low, integrator.panels.high)
@@ -140,7 +139,7 @@ def panel_edges(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float
 
 
 class _Integrator:
-    """One matrix in the making."""
+    """The computation of one matrix: its panels, conditional distributions and error estimates."""
 
     def __init__(self, wall: Wall, basis: Basis, budget: Budget) -> None:
         self.basis, self.budget = basis, budget
@@ -154,7 +153,7 @@ class _Integrator:
             self.scale = float(basis.size)
         else:
             inside = basis.edges[1:-1]
-            # piecewise polynomials of this degree, integrated after a substitution of degree 3
+            # Piecewise polynomials of this degree are integrated after a substitution of degree 3.
             local = 0 if basis.is_partition else basis.nodes_per_interval
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
             middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
@@ -172,9 +171,9 @@ class _Integrator:
         self._add_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
-        """Divide panels until the error is small enough, or no segments are left: first for coarser tolerances.
+        """Divide panels, in stages of decreasing tolerance, until the error is small enough or no segments are left.
 
-        The best matrix on the way is returned: a stage that has to stop may leave its rows worse than it found them.
+        The matrix with the least error is returned, because an interrupted stage may increase the error.
         """
         tolerance = self.first_tolerance
         self._begin(tolerance)
@@ -190,10 +189,9 @@ class _Integrator:
             self._begin(tolerance)
 
     def _following(self, tolerance: float) -> float | None:
-        """The tolerance of the next stage; None at the end, and if what is left is for little more than the fallback.
+        """The tolerance of the next stage; None at the end, or if the fallback is likely to be as good.
 
-        The error after the first angles tells whether the segments will do; later ones do not, because errors fall by
-        jumps, when the last of the pieces that matter are seen.
+        Errors fall in jumps, when the last important pieces are found, so the prediction is a rough one.
         """
         if self.segments >= self.budget.segments or tolerance <= self.tolerance:
             return None
@@ -206,7 +204,7 @@ class _Integrator:
         return max(wanted, predicted) if predicted < hoped else None
 
     def _begin(self, tolerance: float) -> None:
-        """Begin a stage; rows whose error is too large for its tolerance are done again."""
+        """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
         self.mean_tolerance = max(MEAN_FRACTION * tolerance / self.scale, SMALLEST_MEAN_TOLERANCE)
         coarse = self.panels.mean_errors(self.basis) > 2.0 * MEAN_FRACTION * tolerance * np.maximum(
             self.panels.mass, FAIR_FRACTION
@@ -221,7 +219,7 @@ class _Integrator:
             error, panels, conditionals, hidden = self._measure()
             if error <= tolerance or self.segments >= self.budget.segments:
                 return
-            # errors that only the asymmetry shows lie in panels whose rules agree by chance
+            # Errors that only the asymmetry shows lie in panels whose rules agree by chance.
             goal = min(goal, max(tolerance - hidden, 0.25 * (panels + conditionals)))
             chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
             if not chosen.any():
@@ -229,7 +227,7 @@ class _Integrator:
             self._divide(chosen)
 
     def _measure(self) -> tuple[float, float, float, float]:
-        """The error now and its parts: that of the panels, that of the rows, and what the asymmetry tells."""
+        """The present error and its parts: from the panels, from the expectations, and from the asymmetry."""
         matrix, panels, conditionals, hidden = self._state()
         error = conditionals + math.hypot(panels, hidden)
         if error < self.best[1]:
@@ -237,7 +235,7 @@ class _Integrator:
         return error, panels, conditionals, hidden
 
     def _state(self) -> tuple[Floats, float, float, float]:
-        """The matrix, the errors that its panels and its rows are known to have, and what its asymmetry tells."""
+        """The matrix and its errors from the panels, from the expectations, and from the asymmetry."""
         matrix = np.zeros((self.basis.size, self.basis.size))
         step = max(1, VALUES_AT_ONCE // self.basis.size**2)
         for first in range(0, len(self.panels.low), step):
@@ -254,16 +252,16 @@ class _Integrator:
         return matrix, panels, conditionals, ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
 
     def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:
-        """The worst panels: those beyond which the others together have less than a part of the goal."""
+        """The panels to divide: the worst ones, so many that the others together have an error below goal / 4."""
         panels = self.panels
         able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.mean_errors(self.basis))
         order = np.argsort(panels.error)
         together = np.sqrt(np.cumsum(panels.error[order] ** 2))
         chosen = np.zeros(len(order), dtype=np.bool_)
         chosen[order[together > 0.25 * goal]] = True
-        # a panel far below the worst waits for a later round
+        # A panel with a much smaller error than the worst waits for a later round.
         chosen &= able & (panels.error > 0.02 * np.max(panels.error, where=able, initial=0.0))
-        # no more than what is left of the budget buys, at the cost of a row so far
+        # At most the number of panels that the remaining segments allow, at the mean cost of an angle so far.
         left = (self.budget.segments - self.segments) * self.angle_count / max(1, self.segments)
         most = int(left) // (2 * len(NODES))
         worst = np.zeros(len(order), dtype=np.bool_)
@@ -290,21 +288,21 @@ class _Integrator:
         self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, KRONROD_FRACTION * after)
 
     def _cuts(self, low: float, high: float) -> Floats:
-        """Where a panel is divided: at critical angles, in its middle if none is known inside it."""
+        """The angles at which a panel is divided: the critical angles inside it, or its middle if none is known."""
         margin = LEAST_CUT * (high - low)
         cuts = self.conditionals.critical_angles(low + margin, high - margin)
         cuts = cuts[np.concatenate(([True], np.diff(cuts) > margin))[: len(cuts)]]
         return cuts if len(cuts) else np.array([0.5 * (low + high)])
 
     def _add_panels(self, low: Floats, high: Floats) -> None:
-        """Append panels, with their rows."""
+        """Append panels and compute their expectations."""
         fresh = AnglePanels.between(low, high, self.basis.size)
         self._fill(fresh, np.ones(fresh.angle.shape, dtype=np.bool_))
         self.panels = self.panels.joined(fresh)
         self._recompute()
 
     def _recompute(self) -> None:
-        """Do rows again that turned out to have overlooked a piece."""
+        """Recompute the expectations at angles where a piece was missed."""
         for _ in range(MOST_MENDINGS):
             outdated = np.isin(self.panels.angle, list(self.conditionals.outdated))
             self.conditionals.outdated.clear()
@@ -313,7 +311,7 @@ class _Integrator:
             self._fill(self.panels, outdated)
 
     def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
-        """Compute the rows at these nodes, and from the panels' differences of the rules their errors."""
+        """Compute the expectations at the nodes of the mask, and the errors of their panels."""
         fraction = FAIR_FRACTION / np.maximum(panels.mass, np.finfo(np.float64).tiny)
         tolerance = np.minimum(self.mean_tolerance * np.maximum(1.0, fraction), COARSEST_MEAN)
         panel, node = np.nonzero(mask)
