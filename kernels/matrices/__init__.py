@@ -1,1 +1,1 @@
-"""Kernels as matrices in a basis: algebra, files, pictures and defects."""
+"""Matrices of kernels in a basis: algebra, files, pictures and defects."""

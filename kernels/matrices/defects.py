@@ -1,4 +1,4 @@
-"""Defects of kernels as numbers with a norm: the distances from symmetric and from stochastic ones."""
+"""Defects of kernels, which are distances from symmetric and stochastic kernels, and z-scores of sampled kernels."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ...core.checks import Floats
 
 # Statistics with fewer degrees of freedom than this carry no information.
 LEAST_FREEDOM = 1e-9
-# Far out the statistic of eight independent replicates follows Student's t; its degrees of freedom were fitted to
-# 40,000 trials with normal replicates of 1 to 1000 dimensions d as 3.4 d^0.27, which gives upper tails right to a
-# quarter up to z = 3.
+# In its tails the statistic of eight independent replicates follows Student's t. Its degrees of freedom, 3.4 d^0.27,
+# were fitted to 40,000 trials with normal replicates of 1 to 1000 dimensions d. Up to z = 3 the upper tails are
+# accurate to a quarter.
 FREEDOM_AT_ONE, FREEDOM_POWER = 3.4, 0.27
 SYMMETRY_NORM = "||(S - S^T)/2||_F / ||S||_F in an orthonormal basis"
 STOCHASTIC_NORM_CELLS = "largest |sum over j of P[i, j] - 1|"
@@ -21,16 +21,14 @@ STOCHASTIC_NORM = "||P 1 - 1|| in L^2 of the invariant probability measure"
 
 
 class Defect(float):
-    """A defect as a number, with the norm it is measured in and, for sampled kernels, its z-score.
-
-    It compares and prints as a float.
+    """A defect as a float with its norm and, for sampled kernels, its z-score.
 
     Attributes
     ----------
     norm : str
         The norm, in words.
     z_score : float or None
-        How many standard deviations the defect lies above what sampling alone gives; None for exact kernels.
+        Number of standard deviations by which the defect exceeds the mean effect of sampling; None for exact kernels.
 
     Examples
     --------
@@ -66,7 +64,7 @@ class Defect(float):
 
 
 class SymmetryDefect(Defect):
-    """Distance from reversibility: relative Frobenius norm of the antisymmetric part in an orthonormal basis."""
+    """The distance from reversibility: relative Frobenius norm of the antisymmetric part in an orthonormal basis."""
 
     __slots__ = ()
 
@@ -75,7 +73,7 @@ class SymmetryDefect(Defect):
 
 
 def relative_asymmetry(symmetric: Floats) -> float:
-    """||(S - S^T)/2||_F / ||S||_F, which is 0 for reversible kernels and does not depend on the size."""
+    """||(S - S^T)/2||_F / ||S||_F, which is 0 for reversible kernels and invariant under scaling."""
     whole = float(np.linalg.norm(symmetric))
     return float(np.linalg.norm(symmetric - symmetric.T)) / (2.0 * whole) if whole > 0.0 else 0.0
 
@@ -86,15 +84,15 @@ def reversibility_z_score(counts: NDArray[np.int64]) -> float:
     Parameters
     ----------
     counts : ndarray of int64, shape (n, n)
-        Raw counts C of independent pairs (incoming bin, outgoing bin), the incoming angles drawn from the invariant
-        measure. (Where they were not, C - C^T says nothing; `estimate` then compares fluxes by `replicate_z_score`.)
+        Raw counts C of independent pairs (incoming bin, outgoing bin), with incoming angles from the invariant measure.
+        For other incoming angles C - C^T is meaningless; `estimate` then compares fluxes by `replicate_z_score`.
 
     Notes
     -----
-    Given n = C_ij + C_ji, C_ij is binomial (n, 1/2) and independent for different pairs i < j, so that
-    Z = (C_ij - C_ji)/sqrt(n) has E Z^2 = 1 and Var Z^2 = 2 - 2/n exactly, for small counts too; n = 1 says nothing.
-    The sum of Z^2 over pairs is matched to a scaled chi-square by its two moments, which is then made normal by the
-    cube root (Wilson-Hilferty).
+    Given n = C_ij + C_ji, C_ij is binomial (n, 1/2) and independent for different pairs i < j. Therefore
+    Z = (C_ij - C_ji)/sqrt(n) has E Z^2 = 1 and Var Z^2 = 2 - 2/n exactly, also for small counts; pairs with n = 1 carry
+    no information. The sum of Z^2 over pairs is matched to a scaled chi-square by its two moments, and the cube root
+    (Wilson-Hilferty) makes it normal.
     """
     upper = np.triu_indices(counts.shape[0], 1)
     forth, back = counts[upper].astype(np.float64), counts.T[upper].astype(np.float64)
@@ -104,13 +102,13 @@ def reversibility_z_score(counts: NDArray[np.int64]) -> float:
 
 
 def replicate_z_score(antisymmetric: list[Floats]) -> float:
-    """The z-score of mean antisymmetric parts of some replicates, where counts are not independent.
+    """The z-score of the mean antisymmetric part from the parts A_r of several replicates, for dependent counts.
 
-    With A_r independent and of mean 0 the inner products <A_r, A_s>, r < s, are uncorrelated and of mean 0; their
-    average is compared with its standard error. The fewer dimensions the A_r vary in, the heavier the tails of this
-    ratio; so it is made normal through a Student distribution, whose degrees of freedom follow from that number of
-    dimensions, (trace C)^2 / trace C^2 with C the covariance, estimated from the A_r themselves. Replicates of one
-    sequence make up for each other: the score of noise is then lower, and does not accuse more often than it should.
+    If the A_r are independent with mean 0, the inner products <A_r, A_s>, r < s, are uncorrelated with mean 0; their
+    average is compared with its standard error. The fewer dimensions the A_r vary in, the heavier are the tails of this
+    ratio. A Student distribution makes the ratio normal. Its degrees of freedom follow from the number of dimensions,
+    (trace C)^2 / trace C^2 with C the covariance, estimated from the A_r. Replicates of one sequence are negatively
+    correlated, which lowers the score of noise, so false alarms are not more frequent.
     """
     from scipy.stats import norm, t
 
@@ -131,7 +129,7 @@ def replicate_z_score(antisymmetric: list[Floats]) -> float:
 def invariance_z_score(totals: NDArray[np.int64], weights: Floats) -> float:
     """The z-score of the hypothesis that incoming angles, counted in bins, were drawn from the invariant measure."""
     expected = float(totals.sum()) * weights
-    # Pearson's statistic of a multinomial has mean n - 1 and variance 2 (n - 1) + (sum 1/w - n^2 - 2 n + 2)/N
+    # Pearson's statistic of a multinomial has mean n - 1 and variance 2 (n - 1) + (sum 1/w - n^2 - 2 n + 2)/N.
     freedom = weights.size - 1
     variance = 2.0 * freedom + (np.sum(1.0 / weights) - weights.size**2 - 2.0 * freedom) / max(float(totals.sum()), 1.0)
     return _cube_root_score(float(np.sum((totals - expected) ** 2 / expected)), freedom, float(variance))

@@ -12,7 +12,7 @@ from ..bases.basis import Frame
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Densities of atoms reach the number of bins: the square root keeps the rest visible.
+# Atoms have densities up to the number of bins; with a square-root colour scale smaller densities remain visible.
 COLOUR_POWER = 0.5
 TICKS = ([0.0, 0.5 * np.pi, np.pi], ["0", "π/2", "π"])
 
@@ -20,8 +20,7 @@ TICKS = ([0.0, 0.5 * np.pi, np.pi], ["0", "π/2", "π"])
 def draw_kernel(edges: Floats, density: Floats, frame: Frame, ax: Axes | None = None) -> Axes:
     """Draw the density of P(theta, d theta') with respect to the invariant measure on the cells between edges.
 
-    Makes a figure of its own unless ``ax`` is given. The dashed line is retroreflection, the dotted one specular
-    reflection.
+    A new figure is made unless ``ax`` is given. A dashed line shows retroreflection, a dotted line specular reflection.
     """
     from matplotlib.colors import PowerNorm
 
