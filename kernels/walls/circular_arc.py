@@ -18,27 +18,26 @@ from ..expectations.basis_means import Expectations, Means
 from ..laws.distribution import Distribution
 from ..laws.law import DrivenLaw, entry_points
 
-# Rows jump where the number of hits N changes. Each of the first intervals gets its own Gauss rule; beyond MOST_HITS
-# hits, a fraction of rays of about 1/(4 N^2) and only for theta within xi/N of xi, the outgoing angle stays within xi/N
-# of pi - xi (or xi) and its mean within xi/N^2: for a smooth function what is neglected is below 1/(4 N^4) = 4e-12.
+# Each interval with a constant number of hits N <= MOST_HITS has its own Gauss rule. Rays with more hits are a fraction
+# of about 1/(4 N^2), for theta within xi/N of xi. Their outgoing angle lies within xi/N of pi - xi (or xi), and its
+# mean within xi/N^2. For a smooth function the error is below 1/(4 N^4) = 4e-12.
 MOST_HITS = 500
 FEWEST_HITS = 8
 NODES = 16
-# Evaluations of the function held in memory at a time.
+# Evaluations of the function per block.
 CHUNK = 2**14
 
 
 @dataclass(frozen=True)
 class CircularArcLaw(DrivenLaw):
-    r"""Focusing circular arcs of half angle xi, one a period.
+    r"""The law of focusing circular arcs of half angle xi, one arc per period, in closed form.
 
-    A chord of the circle is turned by the same angle at every hit. With X uniform in (0, 1) from the left tip,
+    Every hit rotates the ray's chord by the same angle. With X uniform in (0, 1) from the left tip,
 
         delta = arccos(X cos(theta - xi) + (1 - X) cos(theta + xi)),
         delta <= pi/2 :  N = ceil((xi + theta - delta) / (2 delta)),  theta' = theta - 2 N delta + pi,
 
-    and if delta > pi/2 the mirror image: theta -> pi - theta, delta -> pi - delta, theta' -> pi - theta'. N is the
-    number of hits.
+    where N is the number of hits. If delta > pi/2, replace theta, delta and theta' by pi minus themselves.
 
     Parameters
     ----------
@@ -48,13 +47,13 @@ class CircularArcLaw(DrivenLaw):
     Raises
     ------
     InputError
-        If it is not in that range.
+        If ``half_angle`` is not in (0, pi/2].
 
     Notes
     -----
-    Hits of a ray with N above about 1e8 are uncertain by N^2 eps, because the ray then ends at a tip within rounding;
-    the outgoing angle changes by 2 delta at such a tie. For fixed theta the law of delta is explicit, with density
-    sin(delta) / (2 sin(theta) sin(xi)), so `apply` needs no sampling in X: Gauss rules between the changes of N.
+    For N above about 1e8 the number of hits is uncertain by N^2 eps, because the ray ends at a tip within rounding; the
+    outgoing angle then changes by 2 delta. For fixed theta the angle delta has the density
+    sin(delta) / (2 sin(theta) sin(xi)), so `apply` uses Gauss rules between the changes of N.
 
     Source: Rudzis 2022, section 2.2.3, corrected (eqs. 2.15, 2.17, 2.18 as printed are wrong).
 
@@ -88,10 +87,9 @@ class CircularArcLaw(DrivenLaw):
         return np.asarray(self._rotation(entry_points(x), angles("theta", theta))[3].astype(np.int64))
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Incoming angles at which rows gain or lose an interval of X, and the probability of those left out.
+        """Incoming angles at which an interval of X appears or disappears, and the probability near the omitted ones.
 
-        They are theta = xi (1 + 1/k) and xi k/(k + 1), their mirror images, xi and pi/2 -+ xi; they accumulate at xi
-        and pi - xi, and those left out lie there.
+        They are xi (1 + 1/k), xi k/(k + 1), xi, pi/2 -+ xi and their mirror images, and accumulate at xi and pi - xi.
         """
         count = max((limit - 4) // 4, 1)
         k = np.arange(1.0, count + 1.0)
@@ -104,17 +102,17 @@ class CircularArcLaw(DrivenLaw):
         )
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The masses between the edges, as integrals of a sine."""
+        """The masses between the edges, by integrals of a sine."""
         return Distribution.of_cells(self.conditional_masses(theta, edges))
 
     def expectations(self, basis: Basis) -> Expectations:
-        """Of polynomials on panels piece by piece, with errors; of others by `apply`."""
+        """Conditional expectations, piece by piece and with errors for polynomials on panels, else by `apply`."""
         if isinstance(basis, Panels):
             return _OnPanels(basis, self.half_angle, self.pieces)
         return super().expectations(basis)
 
     def _rotation(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats, Floats]:
-        """Whether the ray is followed in the mirror, its angle there, the chord's angle delta <= pi/2, and N."""
+        """Whether the ray is mirrored, its (mirrored) angle, the chord's angle delta <= pi/2, and N."""
         angle, complement = mixed_arccos(x, theta, self.half_angle)
         right = angle > complement
         base = np.where(right, np.pi - theta, theta)
@@ -126,7 +124,7 @@ class CircularArcLaw(DrivenLaw):
         return self.means(function, theta)
 
     def means(self, function: AngleFunction, theta: Floats, nodes: int = NODES, most_hits: int = MOST_HITS) -> Floats:
-        """What `apply` gives, by Gauss rules of so many nodes where N is constant, N followed up to ``most_hits``."""
+        """E[f(Theta') | theta] by Gauss rules with ``nodes`` nodes where N is constant, for N up to ``most_hits``."""
         flat = theta.reshape(-1)
         starts = range(0, max(flat.size, 1), CHUNK)
         parts = [self._means(function, flat[start : start + CHUNK], nodes, most_hits) for start in starts]
@@ -144,7 +142,7 @@ class CircularArcLaw(DrivenLaw):
         return np.asarray(summed / total.reshape((-1,) + (1,) * (summed.ndim - 1)))
 
     def conditional_masses(self, theta: Floats, edges: Floats) -> Floats:
-        """P(theta, (edges[j], edges[j + 1])) for increasing edges, shape (rays, cells): sums of integrals of a sine."""
+        """P(theta, (edges[j], edges[j + 1])) for increasing edges, shape (angles, cells), by integrals of a sine."""
         ray, mirror, lower, upper, hits, rest, alone = self.pieces(theta)
         lower = np.where(rest, lower, np.minimum(lower, upper))
         found = np.zeros((theta.size, edges.size - 1))
@@ -153,7 +151,7 @@ class CircularArcLaw(DrivenLaw):
             part = slice(start, start + step)
             base = np.where(mirror[part], np.pi - theta[ray[part]], theta[ray[part]])
             mirrored = np.where(mirror[part, None], np.pi - edges, edges)
-            # theta' falls with delta, so the part of the piece below an edge has delta above this
+            # theta' decreases in delta: outgoing angles below an edge have delta above this value
             chord = (np.pi + base[:, None] - mirrored) / (2.0 * hits[part, None])
             chord = np.where(rest[part, None], np.where(mirrored > np.pi - self.half_angle, -1.0, 4.0), chord)
             high = np.maximum(upper[part], lower[part])[:, None]
@@ -168,9 +166,9 @@ class CircularArcLaw(DrivenLaw):
     ) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
         """Gauss rules in delta between the changes of N, for every theta and both sides.
 
-        Returns for each piece its ray and whether it is followed in the mirror, shape (pieces,), sorted by ray,
-        and the outgoing angles there and their weights (not normalised), shape (pieces, nodes). A piece with one
-        outcome has the weight of this at its nodes together.
+        Returns for each piece, sorted by incoming angle, the index of this angle and whether the piece is mirrored,
+        shape (pieces,), and the outgoing angles and their weights (not normalised), shape (pieces, nodes). A piece with
+        a single outgoing angle has this angle at all nodes.
         """
         ray, mirrored, lower, upper, hits, rest, alone = self.pieces(theta, most_hits)
         base = np.where(mirrored, np.pi - theta[ray], theta[ray])
@@ -181,12 +179,12 @@ class CircularArcLaw(DrivenLaw):
         return ray, mirrored, outgoing, weight
 
     def pieces(self, theta: Floats, most_hits: int = MOST_HITS) -> ArcPieces:
-        """The intervals of delta on which N is constant, for every theta and both sides, sorted by ray."""
+        """The intervals of delta on which N is constant, for every theta and both sides, sorted by incoming angle."""
         xi = self.half_angle
         base = np.stack([theta, np.pi - theta], axis=-1).reshape(-1)
         total = xi + base
         low, high = np.abs(base - xi), np.minimum(np.pi - np.abs(np.pi - total), 0.5 * np.pi)
-        # A degenerate row (theta below rounding of xi) keeps one piece of no width, with the right outcome.
+        # If theta is below the rounding of xi, one piece of zero width remains, with the right outgoing angle.
         alone = (np.abs(high - low) <= 0.0) & (base <= 0.5 * np.pi)
         fewest = np.maximum(np.ceil((total - high) / (2.0 * high)), 1.0)
         with np.errstate(divide="ignore"):
@@ -195,7 +193,7 @@ class CircularArcLaw(DrivenLaw):
         pieces = np.where((high > low) | alone, most - fewest + 2.0, 0.0).astype(np.intp)
         owner, order = joined_lists(pieces)
         hits = np.asarray(fewest[owner] + order, dtype=np.float64)
-        # The last piece of every row holds all the rays with more hits, at the mean of their outgoing angles.
+        # The last piece of every angle holds all rays with more hits, at the mean of their outgoing angles.
         rest = order == pieces[owner] - 1
         lower = np.where(rest, low[owner], np.maximum(low[owner], total[owner] / (2.0 * hits + 1.0)))
         upper = np.minimum(high[owner], total[owner] / (2.0 * hits - 1.0))
@@ -203,10 +201,10 @@ class CircularArcLaw(DrivenLaw):
 
 
 def followed_hits(tolerance: float) -> int:
-    """How many hits N to follow, so that integrals over theta of means of functions of slope 10 err by less.
+    """The number of hits N to follow, so that integrals over theta of means of functions of slope 10 meet a tolerance.
 
-    Rays with more hits are a fraction of 1/(4 N^2), for theta within xi/N of xi, and leave within 2 xi/N of their
-    position.
+    Rays with more hits are a fraction of 1/(4 N^2), occur for theta within xi/N of xi, and leave within 2 xi/N of
+    pi - xi (or xi).
     """
     return int(np.clip(np.ceil((100.0 / tolerance) ** 0.25), FEWEST_HITS, MOST_HITS))
 

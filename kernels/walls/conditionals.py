@@ -16,12 +16,12 @@ from ..bases.legendre import Legendre
 from ..expectations.basis_means import Expectations, means_of_basis
 from .hollow_conditionals import NO_LIMIT, HollowConditionals
 
-# Pieces of a wall up to which a row takes no more than some milliseconds.
+# Up to this number of pieces of a wall one conditional distribution takes a few milliseconds.
 MOST_PIECES = 64
-# The first of the Gauss rules on a piece that may be used for polynomials on panels.
+# Lowest Gauss rule on a piece that is used for polynomials on panels.
 PANEL_LEVEL = 2
-# A pilot run at some angles tells chaotic hollows: 31,000 and 71,000 flights an angle against 260 to 7,400 of 28 other
-# walls. One angle stops at so many.
+# A pilot run at 12 angles detects chaotic hollows: these take 31,000 to 71,000 ray segments per angle, 28 other walls
+# 260 to 7,400. One angle stops at MOST_PILOT_SEGMENTS.
 PILOT_ANGLES = np.linspace(0.13, 3.01, 12)
 PILOT_TOLERANCE = 1e-3
 MANY_SEGMENTS, MOST_PILOT_SEGMENTS = 15_000, 400_000
@@ -29,21 +29,22 @@ MANY_SEGMENTS, MOST_PILOT_SEGMENTS = 15_000, 400_000
 
 @dataclass(frozen=True)
 class AdaptiveConditionals:
-    """Rows P(theta, d theta') of a wall as weighted outgoing angles.
+    """Conditional distributions P(theta, d theta') of a wall as weighted outgoing angles.
 
     Attributes
     ----------
-    theta : array, shape (rows,)
+    theta : array, shape (angles,)
+        Incoming angles, radians.
     nodes, weights : arrays
-        Outgoing angles and their probabilities, row after row; the weights of a row sum to 1.
-    starts : array of int, shape (rows + 1,)
-        Row k owns ``nodes[starts[k]:starts[k + 1]]``.
-    error : array, shape (rows,)
+        Outgoing angles and their probabilities, one distribution after the other; the weights of each sum to 1.
+    starts : array of int, shape (angles + 1,)
+        The k-th conditional distribution has the nodes ``nodes[starts[k]:starts[k + 1]]``.
+    error : array, shape (angles,)
         Estimated error of the mean of a function of sup norm 1 and the degree asked for.
-    lost : array, shape (rows,)
-        Probability of rays that did not escape; they are sent back.
-    rays, flights : int
-        Number of rays traced, and of their flights from one collision to the next: what the rows have cost.
+    unresolved : array, shape (angles,)
+        Probability of rays that did not escape; they count as retroreflected.
+    rays, segments : int
+        Number of rays traced and of their ray segments.
     """
 
     theta: Floats
@@ -63,25 +64,24 @@ class AdaptiveConditionals:
 
 
 def is_few(wall: Wall) -> bool:
-    """Whether the wall has so few pieces that its rows are cheap: a row costs about their number squared."""
+    """Whether the wall has at most `MOST_PIECES` pieces; the cost per angle is about their number squared."""
     return len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
 
 
 def adaptive_conditionals(
     wall: Wall, theta: ArrayLike, tolerance: float = 1e-10, degree: int = 1, edges: ArrayLike = ()
 ) -> AdaptiveConditionals:
-    r"""Rows of a wall's law to a tolerance.
+    r"""Conditional distributions of a wall's law to a given tolerance.
 
     Parameters
     ----------
     wall : Wall
     theta : array_like
-        Incoming angles in (0, pi), radians; one row each, in this order.
+        Incoming angles in (0, pi), radians, in any order.
     tolerance : float
         Wanted error of the mean of a function of sup norm 1.
     degree : int
-        Highest degree, as a trigonometric polynomial, of the functions that the rows will be used for; 0 if they are
-        constant between the edges.
+        Highest degree, as trigonometric polynomials, of the averaged functions; 0 if constant between the edges.
     edges : array_like
         Outgoing angles where the functions are not smooth.
 
@@ -96,12 +96,11 @@ def adaptive_conditionals(
 
     Notes
     -----
-    For fixed theta the map from the entry point to theta' is analytic between changes of the itinerary. The changes
-    are found by bisection; between them Gauss rules take over. Near cusps and grazing there are infinitely many: what
-    is left undecided is counted in the error. The error is an estimate: a piece narrower than the distance of the
-    samples can be overlooked, unless a row next to it in theta has seen it. Held against references of a second method
-    (tests/reference_rows.py), 4 of 720 rows of 24 walls were further off than reported; in the median the report was
-    11 times the true error.
+    For fixed theta the map from the entry point to theta' is analytic between changes of the itinerary. Bisection finds
+    the changes; Gauss rules integrate between them. Near cusps and grazing there are infinitely many changes: the
+    undecided intervals count in the error. The error is an estimate: a piece narrower than the spacing of the samples
+    can be missed, unless it was found at a neighbouring angle. Compared with a second method, the true error exceeded
+    the reported one for 4 of 720 distributions of 24 walls; the median of reported over true error was 11.
 
     Examples
     --------
@@ -119,25 +118,25 @@ def adaptive_conditionals(
 
 
 class WallConditionals:
-    """Rows of one wall for one kind of functions; what is the same for all calls is made once."""
+    """Conditional distributions of one wall for one kind of functions, with data shared by all calls."""
 
     def __init__(
         self, wall: Wall, degree: int, edges: Floats, least_level: int = 0, most_segments: int = NO_LIMIT
     ) -> None:
         self.wall = wall.cell
         self.degree = degree
-        # of one row in one hollow; its error tells what it had to leave undone
+        # for one angle in one hollow; the error includes the intervals undecided at the limit
         self.most_segments = most_segments
-        # the first of the Gauss rules on a piece that may be used
+        # lowest Gauss rule on a piece
         self.least_level = least_level
-        # a writable copy: for read-only arrays all would be compiled again
+        # a writable copy: numba would compile again for read-only arrays
         self.edges = np.array(edges, dtype=np.float64)
-        # angles of earlier calls whose rows are now known to have overlooked a piece; the owner may clear it
+        # angles of earlier calls now known to have missed a piece; the caller may clear the set
         self.outdated: set[float] = set()
 
     @cached_property
     def _hollows(self) -> list[HollowConditionals]:
-        """The rows of one hollow of each shape."""
+        """The conditional distributions of one hollow of each shape."""
         task = self.degree, self.edges, self.least_level, self.most_segments
         return [HollowConditionals(self.wall.scene, k, *task) for k, _ in self._shapes]
 
@@ -147,7 +146,7 @@ class WallConditionals:
 
     @cached_property
     def _shapes(self) -> list[tuple[int, float]]:
-        """The number of one hollow of each shape, and the fraction of the period that all of this shape take."""
+        """The index of one hollow per shape, and the fraction of the period covered by all hollows of this shape."""
         from ...geometry.cells.hollow_shape import distinct_hollows
 
         wall = self.wall
@@ -160,7 +159,7 @@ class WallConditionals:
         ]
 
     def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveConditionals:
-        """Rows at checked angles."""
+        """The conditional distributions at checked angles."""
         incoming, group = np.unique(theta, return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
         np.minimum.at(tolerances, group, np.broadcast_to(tolerance, theta.shape))
@@ -193,20 +192,20 @@ class WallConditionals:
         )
 
     def _spent(self) -> tuple[int, int]:
-        """Rays and flights so far."""
+        """Rays and ray segments so far."""
         return sum(conditionals.rays for conditionals in self._hollows), sum(
             conditionals.segments for conditionals in self._hollows
         )
 
     def critical_angles(self, low: float, high: float) -> Floats:
-        """Angles in (low, high), increasing, where pieces appear or disappear: the most important ones known."""
+        """Known angles in (low, high), increasing, where the widest pieces appear or disappear."""
         found = [cut for conditionals in self._hollows for cut in conditionals.critical_angles(low, high)]
         return np.unique([angle for angle, _ in found])
 
 
 @dataclass(frozen=True)
 class TracedExpectations(Expectations):
-    """Those of the law of a wall of few pieces, by adaptive quadrature in the entry point."""
+    """Conditional expectations of a wall with few pieces, by adaptive quadrature in the entry point."""
 
     wall: Wall
 
@@ -233,7 +232,7 @@ class TracedExpectations(Expectations):
         return means, found.error + 2.0 * found.unresolved
 
     def are_costly(self) -> bool:
-        """Whether a pilot run at some angles takes very many ray segments."""
+        """Whether a pilot run takes more than `MANY_SEGMENTS` ray segments per angle."""
         conditionals = WallConditionals(self.wall, 1, np.empty(0), most_segments=MOST_PILOT_SEGMENTS)(
             PILOT_ANGLES, PILOT_TOLERANCE
         )

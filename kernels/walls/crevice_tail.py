@@ -1,10 +1,9 @@
-r"""Integrals of the law of a rectangular crevice near grazing, over any number of its periods at a fixed cost.
+r"""Quadrature for the law of a rectangular crevice near grazing, over any number of periods at a fixed cost.
 
-With d = 2 r cot(theta) a crevice retroreflects with probability q = distance from d to the nearest even number: a
-triangle wave in d. Near grazing d runs through arbitrarily many periods while everything else is smooth. The
-integral over the period number k is then a smooth function F(k), and a sum of many values of a smooth function is
-done by Gauss quadrature for sums: nodes and weights from the polynomials orthogonal on 0, 1, ..., N - 1 (Gram's, or
-discrete Chebyshev polynomials), exact for degree 2 n - 1.
+With d = 2 r cot(theta), a crevice retroreflects with probability q, the distance from d to the nearest even number: a
+triangle wave in d. Near grazing d runs through arbitrarily many periods, and the integral over the k-th period is a
+smooth function F(k). Sums of many F(k) are computed by Gauss quadrature for sums, from the polynomials orthogonal on
+0, 1, ..., N - 1 (Gram's, or discrete Chebyshev polynomials); n nodes are exact for degree 2 n - 1.
 """
 
 from __future__ import annotations
@@ -19,25 +18,24 @@ from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.panels import Panels
 
-# Periods nearer to theta = pi/2 than this value of d are listed one by one; it is even, so that a period starts there.
+# Periods with d below this value are listed one by one. The value is even, so a period starts there.
 FIRST_CROSSING = 16
 # Blocks of periods are uniform in arsinh(d / 2r) with this step. The integrand is singular at d = +-2 r i only, so a
-# block's half length is a quarter of the distance to the singularities or less: the Bernstein ellipse has a parameter
-# of at least 7.8, and n nodes miss 7.8^(-2n), 1e-18 for 10.
+# block's half length is at most a quarter of the distance to the singularities. The Bernstein ellipse has a parameter
+# of at least 7.8; the error of n nodes is 7.8^(-2n), 1e-18 for n = 10.
 BLOCK, BLOCK_NODES = 0.5, 10
-# Half a period is at most 1/64 of that distance: 5 nodes leave 128^(-10).
+# Half a period is at most 1/64 of the distance to the singularities: the error of 5 nodes is 128^(-10).
 HALF_NODES = 5
-# Polynomials of degree n in cos(theta) change by a factor exp(n w) over a width w: blocks of n w <= WIDEST need this
-# many nodes more, and half a period, n w <= 1/2, one more.
+# A polynomial of degree n in cos(theta) changes by a factor exp(n w) over a width w. Blocks with n w <= WIDEST need 4
+# additional nodes; half a period, with n w <= 1/2, needs one.
 WIDEST, MORE_BLOCK_NODES, MORE_HALF_NODES = 4.0, 4, 1
-# Beyond some d the triangle wave is replaced by its mean. Its integral differs from that of the mean by at most a
-# quarter of the integrand's largest value there (the antiderivative of q - 1/2 is below 1/8 in modulus, and a
-# monotone factor g gives 2 g/8); d is chosen such that this is NEGLIGIBLE.
+# Beyond some d the triangle wave q is replaced by its mean. The integral changes by at most NEGLIGIBLE, a quarter of
+# the integrand's largest value there, because the antiderivative of q - 1/2 is below 1/8 in modulus.
 NEGLIGIBLE = 1e-23
 
 
 def sum_rule(count: Floats, nodes: int) -> tuple[Floats, Floats]:
-    """Nodes and weights for sums over 0, 1, ..., count - 1, one row a count, all counts at least ``nodes``.
+    """Gauss nodes and weights for sums over 0, 1, ..., count - 1, one row per count; all counts are >= ``nodes``.
 
     Source: the recurrence of the Gram polynomials, beta_j = j^2 (N^2 - j^2) / (4 (4 j^2 - 1)), and Golub-Welsch.
 
@@ -51,7 +49,7 @@ def sum_rule(count: Floats, nodes: int) -> tuple[Floats, Floats]:
     """
     count = np.asarray(count, dtype=np.float64)[:, None]
     degree = np.arange(1.0, nodes)
-    # in units of the number of terms: numbers of order one, however many terms there are
+    # in units of the number of terms, so that the matrix entries are of order one
     beta = degree**2 * (1.0 - (degree / count) ** 2) / (4.0 * (4.0 * degree**2 - 1.0))
     jacobi = np.zeros((count.shape[0], nodes, nodes))
     group = np.arange(nodes - 1)
@@ -61,44 +59,42 @@ def sum_rule(count: Floats, nodes: int) -> tuple[Floats, Floats]:
 
 
 def first_crossing(basis: Basis) -> int:
-    """The d, an even number, up to which the periods of a crevice are to be listed one by one for this basis."""
+    """The even number d up to which the periods of a crevice are listed one by one for this basis."""
     stiffness = _stiffness(basis)
     return max(FIRST_CROSSING, stiffness + stiffness % 2)
 
 
 def _stiffness(basis: Basis) -> int:
-    """The number of polynomials in cos(theta) on the whole of (0, pi) that the basis has."""
+    """The number of basis functions that are polynomials in cos(theta) on all of (0, pi)."""
     return basis.size if isinstance(basis, Legendre) else basis.polynomials_besides
 
 
 def crevice_nodes(
     height_to_width: float, basis: Basis, times: int | None = None
 ) -> tuple[Floats, Floats, Floats, float]:
-    r"""Nodes for integrals of functions of the basis against the law of a crevice, for theta < pi/2 beyond the first
-    periods.
+    r"""Nodes and weights for integrals over the law of a crevice, for theta < pi/2 beyond the first periods.
 
     Parameters
     ----------
     height_to_width : float
-        r.
+        r, depth over width.
     basis : Basis
     times : int, optional
-        Instead of q the probability (1 + (q - 1)^times) / 2, that of rectangular teeth so many times.
+        If given, the probability (1 + (q - 1)^times) / 2 of this power of the law of rectangular teeth replaces q.
 
     Returns
     -------
     theta, specular, retro : arrays
-        Nodes in (0, arctan(2 r / first_crossing)), and the weights with which sums over the nodes give integrals of
-        (1 - q) f and of q f, sin(theta)/2 d theta, for f a product of two functions of the basis at angles
-        +-theta + const.
+        Nodes in (0, arctan(2 r / first_crossing)), and weights for the integrals of (1 - q) f and of q f with
+        respect to sin(theta)/2 d theta, where f is a product of two basis functions at angles +-theta + const.
     omitted : float
-        A bound of the measure that the replacement of q by its mean moves, for functions bounded by 1.
+        A bound of the error from replacing q by its mean, for functions bounded by 1.
     """
     r, begin = height_to_width, float(first_crossing(basis))
     angles, extra_block, extra_half = _cells(basis)
-    # sin(theta)^3 / (4 r) d d is the measure: (2 r)^2 / d^3 / 2 far out
+    # the measure is sin(theta)^3 / (4 r) d d, for large d (2 r)^2 / d^3 / 2
     mean_from = max(np.cbrt(0.125 / NEGLIGIBLE * (4.0 * r) * r), 2.0 * begin)
-    # the antiderivative of any probability less its mean is below 1/4 on half a period, that of q below 1/8
+    # the antiderivative of a probability minus its mean is below 1/4 on half a period; for q it is below 1/8
     omitted = min((0.25 if times is None else 0.5) * _density(np.array([mean_from]), r)[0], 1.0)
     inside = angles[angles < np.arctan2(2.0 * r, begin)]
     crossing = 2.0 * r / np.tan(inside[inside > np.arctan2(2.0 * r, mean_from)])
@@ -111,14 +107,14 @@ def crevice_nodes(
     half_nodes = HALF_NODES + extra_half + (times or 0) // 2
     nodes = BLOCK_NODES + extra_block
     parts = [_periods(first[whole], last[whole], nodes, half_nodes)]
-    # what is left of a period at either end of a block, each within one period
+    # the partial periods at both ends of a block
     left = np.minimum(2.0 * first, high)
     right = np.maximum(2.0 * last, left)
     parts.append(_pieces(np.concatenate([low, right]), np.concatenate([left, high]), half_nodes))
     at, weight, retro = (np.concatenate(column) for column in zip(*parts, strict=True))
     weight = weight * _density(at, r)
     theta = np.arctan2(2.0 * r, at)
-    # the mean, up to grazing
+    # the mean of q, up to grazing
     end = float(np.arctan2(2.0 * r, mean_from))
     edges = np.concatenate([[0.0], inside[inside < end], [end]])
     far, fraction = SINE.quadrature(np.unique(edges), max(basis.nodes_per_interval, nodes))
@@ -131,7 +127,7 @@ def crevice_nodes(
 
 
 def _cells(basis: Basis) -> tuple[Floats, int, int]:
-    """Angles below pi/2 at which blocks are cut, and the nodes that the functions of the basis need in addition."""
+    """Angles below pi/2 at which blocks are cut, and the additional nodes for blocks and half periods."""
     number = int(np.ceil(np.pi * _stiffness(basis) / WIDEST))
     regular = np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2]
     if isinstance(basis, Legendre):
@@ -151,7 +147,7 @@ def _density(crossing: Floats, r: float) -> Floats:
 
 
 def _periods(first: Floats, last: Floats, nodes: int, half_nodes: int) -> tuple[Floats, Floats, Floats]:
-    """Nodes d, weights and values of q for sums over the periods (2 k, 2 k + 2), first <= k < last."""
+    """Nodes d, weights and values of q for the periods (2 k, 2 k + 2), first <= k < last."""
     count = last - first
     few = count < nodes
     index = np.repeat(np.nonzero(few)[0], count[few].astype(np.int64))
@@ -189,7 +185,7 @@ def _pieces(low: Floats, high: Floats, nodes: int) -> tuple[Floats, Floats, Floa
     centre = np.concatenate([middle, middle])
     proper = high > low
     low, high, centre = low[proper], high[proper], centre[proper]
-    # distances from the middle of the period are exact, also where d itself is only known to a few digits
+    # distances from the middle of the period are exact, also where d itself has only a few digits
     inside, weight = gauss_on_intervals(np.zeros(low.size), high - low, nodes)
     offset = np.repeat(low - centre, nodes) + inside
     return np.repeat(centre, nodes) + offset, weight, np.clip(1.0 - np.abs(offset), 0.0, 1.0)

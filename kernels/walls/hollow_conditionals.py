@@ -1,4 +1,4 @@
-"""Conditional distributions of one hollow, which start from the itineraries of neighbouring angles."""
+"""Conditional distributions of one hollow, computed from the itineraries of neighbouring angles."""
 
 from __future__ import annotations
 
@@ -16,18 +16,19 @@ if TYPE_CHECKING:
     from ...geometry.itineraries.compiled.changes import Setting
     from ...geometry.scene.scene import Scene
 
-# Collisions after which a ray counts as lost, and those that count as flights where runs of them are done in one.
+# A ray is unresolved after MOST_COLLISIONS collisions. Where runs of collisions are computed in one step, at most
+# MOST_IN_RUNS of them count as ray segments.
 MOST_COLLISIONS, MOST_IN_RUNS = 100_000, 8
-# A row may take as many flights as it needs, unless its owner says otherwise; a ray in a channel as many collisions.
+# No limit on the ray segments of one conditional distribution, or on the collisions of a ray in a channel.
 NO_LIMIT = 2**62
-# Rounds in which rows are done again because a neighbour has a piece that they have overlooked.
+# Rounds in which conditional distributions are recomputed because a neighbour has a piece that they missed.
 MOST_ROUNDS = 8
-# Critical angles looked for at a time, and the least width of their pieces as a fraction of the widest of them.
+# Critical angles per search, and the least width of their pieces as a fraction of the widest piece.
 MOST_CUTS, CUT_FRACTION = 6, 0.1
 
 
 class Conditional(NamedTuple):
-    """Outgoing angles with the widths of the opening that go there, the error of their integral, and the width lost."""
+    """Outgoing angles, the widths of the opening that lead to them, the error of integrals, the unresolved width."""
 
     nodes: Floats
     widths: Floats
@@ -44,10 +45,10 @@ class _Pieces(NamedTuple):
 
 @dataclass
 class HollowConditionals:
-    """The rows of one hollow for one kind of functions; see `WallConditionals`.
+    """Conditional distributions of one hollow for one kind of functions; see `WallConditionals`.
 
-    A piece that is narrower than the distance of the samples can be overlooked in a row. Its neighbours in theta may
-    have seen it: so rows are compared with those on either side, whenever either was computed.
+    A piece narrower than the spacing of the samples can be missed at one angle and found at a neighbouring angle.
+    Therefore each new conditional distribution is compared with its two neighbours.
     """
 
     scene: Scene
@@ -66,13 +67,13 @@ class HollowConditionals:
 
     @property
     def width(self) -> float:
-        """That of the opening."""
+        """Width of the opening."""
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]]
         return float(right - left)
 
     @property
     def _setting(self) -> Setting:
-        """Made anew for each call, because an interrupted one goes on with its own."""
+        """Data of the compiled functions, new for each call: an interrupted call continues to use its own."""
         from ...geometry.itineraries.compiled.changes import Limits, setting_of
 
         scene = self.scene
@@ -83,7 +84,7 @@ class HollowConditionals:
         return setting_of(scene, self.hollow, limits, self.edges)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:
-        """Rows at angles that increase, and those angles of earlier calls whose rows are now known to be wrong."""
+        """Conditional distributions at increasing angles, and the angles of earlier calls now known to miss a piece."""
         found_conditionals: dict[float, Conditional] = {}
         asked, outdated = set(theta.tolist()), set[float]()
         pending = np.ones(len(theta), dtype=np.bool_)
@@ -119,16 +120,16 @@ class HollowConditionals:
             found_conditionals[angle] = Conditional(nodes[own], widths[own], float(errors[k]), float(unresolved[k]))
             own = slice(piece_starts[k], piece_starts[k + 1])
             low, high, label = (part[own].copy() for part in pieces)
-            # a row without flights for all its pieces has overlooked some, and says so
+            # at the limit of ray segments pieces are missing, and the error reports it: no comparison
             matters = np.inf if segments[k] >= self.most_segments else float(tolerances[k] * self.width)
             self._pieces[angle] = _Pieces(low, high, label, matters)
         self._theta = np.union1d(self._theta, theta)
         return found_conditionals
 
     def _seeds(self, angle: float, least: float) -> Floats:
-        """Where the samples of a row begin, in increasing order.
+        """Start samples at an angle, in increasing order.
 
-        Also in the pieces of the nearest rows that are known, and where this row has overlooked some.
+        They include the middles of the wide pieces at the nearest known angles, and the points of missed pieces.
         """
         from ...geometry.itineraries.compiled.march import wide_middles
         from ...geometry.itineraries.entry_nodes import first_nodes
@@ -141,12 +142,12 @@ class HollowConditionals:
             *(wide_middles(conditional.low, conditional.high, least) for conditional in known),
         ]
         if angle in self._pieces:
-            # its own changes are known already, up to the gaps that were left
+            # the changes of itinerary found before
             entries += [self._pieces[angle].low, self._pieces[angle].high]
         return np.sort(np.concatenate([*entries, np.array(self._missed.get(angle, []), dtype=np.float64)]))
 
     def _compare(self, theta: Floats) -> set[float]:
-        """The angles among these and their neighbours whose rows have overlooked pieces."""
+        """The angles among ``theta`` and their neighbours at which a piece was missed."""
         from ...geometry.itineraries.compiled.neighbours import find_missed
         from ...geometry.tracing.threads import interruptibly
 
@@ -167,9 +168,9 @@ class HollowConditionals:
         return set(angles[owner].tolist())
 
     def critical_angles(self, low: float, high: float) -> list[tuple[float, float]]:
-        """Angles in (low, high) where a piece appears or disappears, with the width of that piece in the nearest row.
+        """Angles in (low, high) where a piece appears or disappears, with the piece's width at the nearest known angle.
 
-        Only those that the rows known so far on either side of them show.
+        Only changes between two neighbouring known angles are found.
         """
         first = max(0, int(np.searchsorted(self._theta, low)) - 1)
         last = int(np.searchsorted(self._theta, high, side="right")) + 1

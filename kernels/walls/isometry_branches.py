@@ -1,4 +1,4 @@
-"""The isometry theta' = sign theta + offset of each branch of a law."""
+"""Sign and offset of the isometry theta' = sign theta + offset of each branch of a law."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, angles
 from ..laws.law import Law
 
-# Angles nearer to grazing than this many breakpoints are probed between the last breakpoint found and 0 or pi.
+# Breakpoints asked for. Angles nearer to grazing are probed between the last breakpoint and 0 or pi.
 BREAKPOINTS = 20_000
 
 
 def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Probability, sign and offset of every branch of a law at the angles ``theta``.
 
-    A law with a table says so itself. For others: between two breakpoints every branch is one isometry, so a second
-    angle of the same interval gives the sign.
+    They are read from the law's table if it has one. Otherwise a second angle gives the sign: between two breakpoints
+    every branch is one isometry.
 
     Parameters
     ----------
     law : Law
-        Made of isometries; other laws raise an InputError.
+        A law made of isometries; other laws raise an InputError.
     theta : array_like
         Incoming angles in (0, pi), radians.
 
@@ -46,7 +46,7 @@ def isometries(law: Law, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
     low, high = edges[right - 1], edges[right]
     # the midpoint towards the farther end of the interval
     second = 0.5 * (incoming + np.where(incoming - low > high - incoming, low, high))
-    # one call for both angles, so that the slots are the same
+    # one call for both angles, so that the branches have the same order
     probability, outgoing = law.branches(np.stack([incoming, second]))
     rises = (outgoing[1] - outgoing[0]) * (second - incoming)[..., None] >= 0.0
     sign = np.where(rises, 1.0, -1.0)

@@ -24,33 +24,33 @@ if TYPE_CHECKING:
     from ...geometry.polygons.beams import Beams
 
 BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
-# Angles looked at to tell how many branches there are: it is the cost of `apply`, and need not be exact.
+# Angles at which branches are counted. The count is the cost of `apply` and need not be exact.
 MOST_PROBES = 512
 
 
 @dataclass(frozen=True)
 class PolygonLaw(BranchLaw):
-    r"""The law P~ of a wall made of segments, without sampling: a finite list of isometries and their probabilities.
+    r"""The exact law P~ of a wall made of segments: a finite list of isometries with their probabilities.
 
-    Each hollow is resolved into beams, sets of rays that hit the same segments in the same order: all of them leave by
-    one isometry theta' = +-theta + const, and the probability of a beam given theta is piecewise linear in cot(theta).
+    Each hollow is resolved into beams, sets of rays that hit the same segments in the same order. A beam leaves by one
+    isometry theta' = +-theta + const. Its probability given theta is piecewise linear in cot(theta).
 
     Parameters
     ----------
     wall : Wall
-        Polygonal, and closing (conditions B5 and B5': it has no islands).
+        A polygonal wall that closes (conditions B5 and B5': it has no islands).
     tolerance : float
-        Share of a hollow's flux that may stay unresolved.
+        Fraction of a hollow's flux that may stay unresolved.
     max_beams : int
-        Beams a hollow at most; what is left then stays unresolved.
+        Limit on the beams per hollow; the rest of the flux stays unresolved.
 
     Attributes
     ----------
     unresolved : Estimate
-        A bound of the flux whose way through the wall was not found. Such rays are sent back, theta' = theta: the law
-        stays Markov and reversible, and its distance in total variation is at most this fraction.
+        A bound of the unresolved fraction of the flux. Unresolved rays count as retroreflected, theta' = theta: the law
+        stays Markov and reversible, and its error in total variation is at most this fraction.
     mirror_symmetric : bool or None
-        True if the wall's cell is; otherwise not known.
+        True if the wall's cell is mirror-symmetric, otherwise None (not known).
 
     Raises
     ------
@@ -59,13 +59,12 @@ class PolygonLaw(BranchLaw):
 
     Notes
     -----
-    The beams are computed on first use. Hollows of the same shape, also in another size or mirrored, are computed
-    once, and of those that are their own mirror images half; rectangles and isosceles triangles have closed forms, so
-    that a rectangle of any depth costs nothing.
+    The beams are computed on first use, once for hollows of the same shape, also scaled or mirrored. Rectangles of any
+    depth and isosceles triangles have closed forms.
 
     Examples
     --------
-    A corner of a right angle sends every ray back that hits both of its sides, whichever way it is turned.
+    A right-angled corner retroreflects every ray that hits both of its sides.
 
     >>> from asperity import geometry as geo
     >>> law = PolygonLaw(geo.triangular_teeth(np.pi / 2))
@@ -110,7 +109,7 @@ class PolygonLaw(BranchLaw):
         return IsometryTable.joined(parts)
 
     def _of_shape(self, shape: HollowShape, symmetric: bool) -> IsometryTable:
-        """The table of a hollow whose opening is the whole period."""
+        """The table of a hollow, scaled so that its opening is the whole period."""
         if shape.height_to_width is not None:
             return IsometryTable.of_crevice(1.0, shape.height_to_width)
         if shape.apex_angle is not None:
@@ -128,13 +127,13 @@ class PolygonLaw(BranchLaw):
 
     @property
     def unresolved(self) -> Estimate:
-        """The fraction of the flux that is sent back because its way through the wall was not found."""
+        """A bound of the unresolved fraction of the flux, which counts as retroreflected."""
         fraction = self._table.unresolved
         return Estimate(fraction, fraction, "bound", f"beams of at most {self.max_beams} a hollow")
 
     @cached_property
     def evaluations(self) -> int:  # type: ignore[override]
-        """The largest number of branches at an angle, of up to a few hundred angles spread over (0, pi)."""
+        """The largest number of branches at an angle, among up to `MOST_PROBES` angles spread over (0, pi)."""
         edges = np.concatenate([[0.0], self._table.ends, [np.pi]])
         edges = edges[:: edges.size // MOST_PROBES + 1]
         return int(self._table.conditionals(0.5 * (edges[:-1] + edges[1:]))[0].shape[-1])
@@ -152,7 +151,7 @@ class PolygonLaw(BranchLaw):
 
 
 def table_of_beams(beams: Beams) -> IsometryTable:
-    """The table of one hollow, its opening the whole period; unresolved beams are sent back."""
+    """The table of one hollow, whose opening is the whole period; unresolved beams are retroreflected."""
     columns = beams.sign, beams.offset, beams.low, beams.high, beams.sine, beams.cosine
     resolved = IsometryTable.of_pieces(*columns, unresolved=float(beams.rounding))
     parts = [resolved]

@@ -18,11 +18,11 @@ LARGEST_COUNT = 2.0**62
 
 @dataclass(frozen=True)
 class RectangularTeethLaw(BranchLaw):
-    r"""Rectangular teeth: a flat top on the first half of the period, a crevice on the second half.
+    r"""The law of rectangular teeth in closed form: a flat top on one half of the period, a crevice on the other.
 
-    With d = 2 r |cot theta|, the number of crevice widths that a ray crosses on its way down and up again,
-    specular reflection has probability 1 - {d}/2 if floor(d) is even and 1/2 + {d}/2 if it is odd; otherwise the
-    ray is retroreflected. That is 1 - (distance from d to the nearest even number)/2.
+    A ray crosses d = 2 r |cot theta| crevice widths on its way down and up. Specular reflection has probability
+    1 - {d}/2 if floor(d) is even and 1/2 + {d}/2 if it is odd, which is
+    1 - (distance from d to the nearest even number)/2. All other rays are retroreflected.
 
     Parameters
     ----------
@@ -32,13 +32,13 @@ class RectangularTeethLaw(BranchLaw):
     Raises
     ------
     InputError
-        If it is not a finite number above 0.
+        If ``height_to_width`` is not a finite number above 0.
 
     Notes
     -----
-    The law is that of the given float64 angle, to rounding, however many crossings it has. Where d is large it changes
-    completely from one float64 to the next; an angle that is not exact to its last digit has, for all that is known,
-    the mean over a period of d: specular with probability 3/4.
+    The probabilities are those of the given float64 angle, to rounding, for any number of crossings. Where d is large
+    they change completely from one float64 to the next: for an angle that is not exact to its last digit, use the mean
+    over a period of d, where specular reflection has probability 3/4.
 
     Source: Rudzis 2022, section 2.2.1, corrected (the even and odd cases are swapped in print).
 
@@ -61,7 +61,7 @@ class RectangularTeethLaw(BranchLaw):
         object.__setattr__(self, "height_to_width", positive_number("height_to_width", self.height_to_width))
 
     def crossings(self, theta: ArrayLike) -> Floats:
-        """d = 2 r |cot theta|: crevice widths crossed between entry and exit."""
+        """The number of crevice widths crossed between entry and exit, d = 2 r |cot theta|."""
         with np.errstate(over="ignore"):
             return np.asarray(2.0 * self.height_to_width / np.abs(np.tan(angles("theta", theta))))
 
@@ -72,11 +72,11 @@ class RectangularTeethLaw(BranchLaw):
         return np.stack([1.0 - retro, retro], axis=-1), np.stack([mirrored_angle(theta), theta], axis=-1)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """The angles where d is a whole number, cot theta = k / (2 r), and the probability beyond the last of them."""
+        """The angles |cot theta| = k / (2 r), where d is a whole number, and the probability beyond the last one."""
         return crevice_breakpoints(self.height_to_width, limit)
 
     def isometry_table(self) -> IsometryTable:
-        """Half of it flat tops, half of it crevices."""
+        """The table of flat tops and crevices, each half of the period."""
         return IsometryTable.joined([IsometryTable.flat(0.5), IsometryTable.of_crevice(0.5, self.height_to_width)])
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
@@ -86,30 +86,30 @@ class RectangularTeethLaw(BranchLaw):
         return np.where(np.mod(sides, 2.0) == 0.0, mirrored_angle(theta), theta)
 
     def hits(self, x: ArrayLike, theta: ArrayLike) -> NDArray[np.int64]:
-        """Number of reflections, a hit of the flat top counting as one; at most 2^62 are counted.
+        """Number of reflections, at most about 2^62; a hit of the flat top counts as one.
 
-        The parity is right; beyond 2^52 the number itself has the error of float64.
+        The parity is always right. Beyond 2^52 the number has the rounding error of float64.
         """
         x, theta = entry_points(x), angles("theta", theta)
         rest = crossings_modulo_two(self.height_to_width, theta)
-        # whole numbers of pairs, so that the parity is right where d has more digits than a float64
+        # counted in pairs, so that the parity is right where d has more digits than a float64
         pairs = np.rint(0.5 * (np.minimum(self.crossings(theta), LARGEST_COUNT) - rest)).astype(np.int64)
         sides = 2 * pairs + _sides_hit(x, theta, rest).astype(np.int64)
         return np.asarray(1 + np.where(x <= 0.5, 0, sides))
 
 
 def _sides_hit(x: Floats, theta: Floats, crossings: Floats) -> Floats:
-    # Distance, in crevice widths, from the entry point to the side that the ray flies towards.
+    # Distance, in crevice widths, from the entry point to the side that the ray moves towards.
     ahead = np.where(theta < 0.5 * np.pi, 2.0 * x - 1.0, 2.0 - 2.0 * x)
     return np.where(x <= 0.5, 0.0, np.maximum(np.ceil(crossings - ahead), 0.0))
 
 
 def crevice_pieces(height_to_width: float, last: int) -> IsometryTable:
-    """The pieces of a crevice with d < ``last``; the opening counts as the whole period."""
+    """The table of a crevice restricted to d < ``last``; its opening counts as the whole period."""
     number = np.arange(last)
     high = np.arctan2(2.0 * height_to_width, number)
     low = np.arctan2(2.0 * height_to_width, number + 1)
-    # at a whole number d = k one outcome is certain: retroreflection where k is odd
+    # at a whole number d = k the outcome is certain: retroreflection for odd k, specular reflection for even k
     start, end = (np.where(at % 2 == 1, np.sin(angle), 0.0) for at, angle in ((number + 1, low), (number, high)))
     one, zero = np.ones(last), np.zeros(last)
     other = np.sin(low) - start, np.sin(high) - end

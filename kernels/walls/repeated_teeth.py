@@ -18,17 +18,17 @@ from .crevice_tail import crevice_nodes, first_crossing
 
 # A polynomial of this degree in the triangle wave is still cheap to integrate.
 MOST_TIMES = 64
-# As many nodes as an isometry has on a wide interval.
+# The number of nodes for an isometry on a wide interval.
 LEAST_NODES = 20
 
 
 @dataclass(frozen=True)
 class RepeatedTeethLaw(BranchLaw):
-    r"""``RectangularTeethLaw(r) ** n``: specular or back, as every factor is.
+    r"""The law ``RectangularTeethLaw(r) ** n``, a mixture of specular reflection and retroreflection.
 
-    The law of rectangular teeth leaves functions with f(pi - theta) = f(theta) as they are, and multiplies those with
-    f(pi - theta) = -f(theta) by q - 1, q(theta) the distance of d = 2 r |cot theta| to the nearest even number. Hence
-    n of them retroreflect with probability (1 + (q - 1)^n) / 2.
+    The law of rectangular teeth leaves functions with f(pi - theta) = f(theta) unchanged. It multiplies functions with
+    f(pi - theta) = -f(theta) by q - 1, where q(theta) is the distance from d = 2 r |cot theta| to the nearest even
+    number. Hence its n-th power retroreflects with probability (1 + (q - 1)^n) / 2.
 
     Parameters
     ----------
@@ -59,19 +59,19 @@ class RepeatedTeethLaw(BranchLaw):
         return crevice_breakpoints(self.height_to_width, limit)
 
     def retro(self, distance: Floats) -> Floats:
-        """The probability of retroreflection for a distance q."""
+        """The probability of retroreflection for the distance q."""
         return np.asarray(0.5 * (1.0 + (distance - 1.0) ** self.times))
 
 
 def repeated_teeth_matrix(law: RepeatedTeethLaw, basis: Basis, exchanged: bool) -> tuple[Floats, float]:
-    """<e_i, P e_j>, and a bound of its Frobenius error apart from rounding, as in `table_matrix`.
+    """The matrix <e_i, P e_j>, and a bound of its Frobenius error without rounding, as in `table_matrix`.
 
     Parameters
     ----------
     law : RepeatedTeethLaw
     basis : Basis
     exchanged : bool
-        Whether the law is in the specular frame, where its two outcomes are exchanged.
+        Whether the law is in the specular frame, which exchanges its two outcomes.
     """
     total = np.zeros((basis.size, basis.size))
     r, begin = law.height_to_width, first_crossing(basis)
@@ -83,7 +83,7 @@ def repeated_teeth_matrix(law: RepeatedTeethLaw, basis: Basis, exchanged: bool) 
     mass = mass * basis.measure.density(near)
     back = law.retro(crevice_retro(r, near))
     far, specular, retro, omitted = crevice_nodes(r, basis, law.times)
-    # apart, because many small terms would be rounded like the large ones that they are added to
+    # separate sums: many small terms added to a large sum would lose digits
     for theta, mirrored, same in ((near, mass * (1.0 - back), mass * back), (far, specular, retro)):
         cases = (
             ((mirrored_angle(theta), same), (theta, mirrored))

@@ -1,4 +1,4 @@
-"""The map of a wall's rays by tracing: outgoing angles, and the mask of the rays that escaped."""
+"""Outgoing angles of a wall's rays by tracing, and the mask of the rays that escaped."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from ..laws.law import entry_points
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Rays that end in a corner, at a tangency or at the bounce limit are sent back (see `WallLaw`). Their fraction bounds
-# the error in total variation; above this it would show in a kernel estimated from a million rays.
+# Rays that end in a corner, at a tangency or at the bounce limit count as retroreflected (see `WallLaw`). Their
+# fraction bounds the error in total variation. A larger one would be visible in a kernel estimated from a million rays.
 UNRESOLVED_TOLERANCE = 1e-4
 
 
 def traced_reflection(wall: Wall, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
-    """Outgoing angles, and the mask of the rays that escaped; the others are sent back.
+    """Outgoing angles, and the mask of the rays that escaped; the other rays count as retroreflected.
 
     ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
     """

@@ -15,25 +15,24 @@ from ..laws.branches import merged
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw, entry_points
 
-# Breakpoints closer together than this are one breakpoint computed in two ways.
+# Breakpoints closer than this are one breakpoint computed by two formulas.
 BREAKPOINT_SPACING = 16.0 * EPS
-# A table has four pieces between two breakpoints; laws with more breakpoints than this have none.
+# Limit on the breakpoints of a table, which has four pieces between two breakpoints.
 MOST_LISTED_BREAKPOINTS = 2**17
 
 
 @dataclass(frozen=True)
 class TriangularTeethLaw(BranchLaw):
-    r"""Triangular teeth of apex angle psi, one hollow a period between two tips.
+    r"""The law of triangular teeth of apex angle psi, one hollow per period, in closed form.
 
-    A ray that passes the bottom of its hollow on its left (c > 0, with c the cosine of the angle h below) turns
-    around it; unfolded, the sides are rays from the bottom at multiples of psi, of which it crosses n = N - 1 or N,
-    N = ceil(2 theta / psi). With X uniform in (0, 1) from the left tip,
+    Unfolded, the sides of a hollow are half-lines from its bottom at multiples of psi. A ray that passes the bottom on
+    its left crosses n = N - 1 or n = N of them, N = ceil(2 theta / psi). With X uniform in (0, 1) from the left tip,
 
         h = arccos((1 - X) cos(theta - psi/2) + X cos(theta + psi/2)),
         n = floor((theta + h) / psi + 1/2),
         theta' = pi + theta - n psi (n even),  n psi - theta (n odd),
 
-    and if c < 0 the mirror image of this. As a distribution: c > 0 for X < X_c = cos(theta - psi/2) / D with
+    if cos(h) > 0, otherwise the mirror image. As a distribution: cos(h) > 0 for X < cos(theta - psi/2) / D with
     D = 2 sin(theta) sin(psi/2), and n = N - 1 for X < 2 sin((N - 1) psi/2) sin(N psi/2 - theta) / D.
 
     Parameters
@@ -44,7 +43,7 @@ class TriangularTeethLaw(BranchLaw):
     Raises
     ------
     InputError
-        If it is not in that range.
+        If ``angle`` is not in (0, pi).
 
     Notes
     -----
@@ -53,7 +52,7 @@ class TriangularTeethLaw(BranchLaw):
 
     Examples
     --------
-    Right-angled teeth are corner reflectors: every ray that hits both sides goes back where it came from.
+    Right-angled teeth are corner reflectors: every ray that hits both sides is retroreflected.
 
     >>> law = TriangularTeethLaw(np.pi / 2)
     >>> float(law.reflect(0.5, 1.5)), int(law.hits(0.5, 1.5))
@@ -71,12 +70,12 @@ class TriangularTeethLaw(BranchLaw):
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """Probabilities and angles, shape ``theta.shape + (4,)``.
 
-        In this order: left of the bottom with N - 1 hits, with N hits, right of it with N hits, with N - 1 hits,
-        where N is counted for theta on the left and for pi - theta on the right.
+        The order is: left of the bottom with N - 1 hits and with N hits, right of the bottom with N hits and with
+        N - 1 hits. N belongs to theta on the left and to pi - theta on the right.
         """
         theta = angles("theta", theta)
         mirror = np.pi - theta
-        # cos(theta - psi/2) as a sine keeps its digits where psi is close to pi
+        # cos(theta - psi/2) written as a sine is accurate for psi close to pi
         left = np.sin(theta + 0.5 * (np.pi - self.angle)) / (2.0 * np.sin(theta) * np.sin(0.5 * self.angle))
         left = np.clip(left, 0.0, 1.0)
         most, most_mirror = self._most_hits(theta), self._most_hits(mirror)
@@ -95,9 +94,9 @@ class TriangularTeethLaw(BranchLaw):
         return merged(probability, outgoing)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """The angles where N or an active bound on X changes; where there are too many, those nearest to pi/2."""
+        """The angles where N or an active bound on X changes; if there are too many, the ones nearest to pi/2."""
         psi = self.angle
-        # No ray passes on the left from theta = (pi + psi)/2 on, so larger multiples of psi/2 play no part.
+        # No ray with theta >= (pi + psi)/2 passes on the left, so larger multiples of psi/2 are no breakpoints.
         last = int(np.ceil((np.pi + psi) / psi))
         first = max(1, last - limit)
         around = np.floor(np.pi / psi) + np.array([-1.0, 0.0, 1.0])
@@ -116,7 +115,7 @@ class TriangularTeethLaw(BranchLaw):
         return without_extremal(breakpoints, max(breakpoints.size - limit, 0))
 
     def isometry_table(self) -> IsometryTable | None:
-        """The pieces between the breakpoints, or None where there are too many."""
+        """The pieces between the breakpoints, or None if there are too many."""
         if 4.0 * np.pi / self.angle > MOST_LISTED_BREAKPOINTS:
             return None
         breakpoints, _ = self.breakpoints(2 * MOST_LISTED_BREAKPOINTS)
@@ -124,7 +123,7 @@ class TriangularTeethLaw(BranchLaw):
         low, high = edges[:-1], edges[1:]
         middle = 0.5 * (low + high)
         most, most_mirror = self._most_hits(middle), self._most_hits(np.pi - middle)
-        # the four probabilities of `branches`, times sin(theta), which stays finite at the ends
+        # the four probabilities of `branches` times sin(theta), which are finite at the ends
         ends = []
         for theta in (low, high):
             sine, mirror = np.sin(theta), np.pi - theta
@@ -151,7 +150,7 @@ class TriangularTeethLaw(BranchLaw):
         return np.asarray(self._unfolded(entry_points(x), angles("theta", theta))[2].astype(np.int64))
 
     def _unfolded(self, x: Floats, theta: Floats) -> tuple[NDArray[np.bool_], Floats, Floats]:
-        """Whether the ray passes right of the bottom, its angle or else the mirror image's, and its hits."""
+        """Whether the ray passes right of the bottom, its angle (mirrored in this case), and its number of hits."""
         angle, complement = mixed_arccos(1.0 - x, theta, 0.5 * self.angle)
         right = angle > complement
         base = np.where(right, np.pi - theta, theta)
@@ -164,7 +163,7 @@ class TriangularTeethLaw(BranchLaw):
         return np.maximum(np.ceil(2.0 * theta / self.angle), 1.0)
 
     def _fraction_of_fewer(self, theta: Floats, most: Floats) -> Floats:
-        """The X below which a ray left of the bottom is hit N - 1 times: a product, so that nothing cancels."""
+        """The X below which a ray left of the bottom has N - 1 hits, as a product, which avoids cancellation."""
         return np.asarray(self._density_of_fewer(theta, most) / np.sin(theta))
 
     def _density_of_fewer(self, theta: Floats, most: Floats) -> Floats:

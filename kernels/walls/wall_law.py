@@ -1,4 +1,4 @@
-"""The law of a wall, in closed form where its hollows allow it, else by traced rays."""
+"""The law of a wall, in closed form if the hollows allow it, else by traced rays."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ if TYPE_CHECKING:
     from ...geometry.cells.hollow import Hollow
     from ...geometry.curves.curve import Curve
 
-# Widths add up to the period, and an arc is a semicircle, to this fraction: sums and angles of a handful of operations.
+# Relative tolerance, a few roundings, for the sum of widths against the period and for an arc against a semicircle.
 ROUNDED = 64.0 * EPS
 # The hollows with closed forms have at most this many pieces.
 MOST_PIECES_KNOWN = 3
-# Polygonal walls are resolved into beams where that takes about a second (a few microseconds a beam, the table and the
-# triangles included) and leaves so little that a kernel sampled with a million rays, good to 1e-3, could not show it.
+# Polygonal walls are resolved into beams where this takes about a second, at a few microseconds per beam, and where the
+# unresolved fraction of the flux is at most EXACT_ENOUGH. A kernel sampled with a million rays has an error of 1e-3.
 MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
-# Walls of more pieces are tried with fewer beams first; where what these leave is rounding, they do. Rough profiles of
-# 40 to 800 pieces resolved completely with 10 to 140 beams a piece, most with less than 50; cavities never do.
+# Walls with more than FEW_PIECES pieces are tried with fewer beams first. These suffice if they leave at most RESOLVED,
+# as most rough profiles of 40 to 800 pieces do with 50 beams per piece.
 FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
-# `apply` integrates functions as smooth as a trigonometric polynomial of this degree to this fraction of their size.
+# `apply` integrates trigonometric polynomials of this degree to this fraction of their sup norm.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 # Error of the distribution function at the edges of cells.
 CELL_TOLERANCE = 1e-9
@@ -49,10 +49,10 @@ CELL_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class WallLaw(DrivenLaw):
-    """The law P~ of a wall: a ray enters at a uniform point of the period.
+    """The law P~ of a wall, for rays that enter at a uniform point of the period.
 
-    `reflect` and `reflect_with_status` trace rays. `sample` and `apply` use the closed form if there is one, else they
-    trace; `branches`, `breakpoints` and `discretise` use the exact law if there is one.
+    `reflect` and `reflect_with_status` trace rays. `sample` and `apply` use the closed form if there is one and trace
+    rays otherwise. `branches`, `breakpoints` and `discretise` use the exact law if there is one.
 
     Parameters
     ----------
@@ -61,27 +61,26 @@ class WallLaw(DrivenLaw):
     Attributes
     ----------
     closed_form : Law or None
-        The exact law if the wall consists of flat tops and hollows that are isosceles triangles, rectangles (not
-        wider, all together, than the flat tops), or circular arcs up to a semicircle; a Combination if there are
-        several different ones. Recognised by their shape, whatever constructor made the wall.
+        A law in closed form, if the wall consists of flat tops and hollows that are isosceles triangles, rectangles
+        (in total not wider than the flat tops), or circular arcs up to a semicircle. A Combination if the hollows
+        differ. Hollows are recognised by their shape, not by the wall's constructor.
     exact_law : Law or None
-        The closed form; or else, for a polygonal wall that closes and is resolved within about a second, its
-        `PolygonLaw`. Computed on first use.
+        The closed form, or else the `PolygonLaw` of a polygonal wall that closes and is resolved within about a
+        second. Computed on first use.
     mirror_symmetric : bool or None
-        True if the wall's cell is; otherwise not known.
+        True if the wall's cell or its closed form is mirror-symmetric, otherwise None (not known).
 
     Raises
     ------
     AccuracyError
-        By `reflect`, `sample` and `apply` if more than a fraction of 1e-4 of the rays did not escape; ``defect`` is the
-        fraction.
+        In `reflect`, `sample` and `apply`, if more than a fraction of 1e-4 of the rays did not escape; ``defect`` is
+        this fraction.
 
     Notes
     -----
-    A ray that does not escape (corner, grazing, bounce limit) is returned as retroreflected, theta' = theta: on a set
-    of rays that the true map takes to itself the identity preserves sin(theta) dx d theta and is an involution, so
+    A ray that does not escape (corner, grazing, bounce limit) counts as retroreflected, theta' = theta. The true map
+    takes the set of these rays to itself, and the identity is an involution that preserves sin(theta) dx d theta. Hence
     the law stays Markov and reversible, and its error in total variation is at most the fraction of these rays.
-    `reflect_with_status` says which they were.
 
     Examples
     --------
@@ -99,7 +98,7 @@ class WallLaw(DrivenLaw):
 
     def __post_init__(self) -> None:
         instance("wall", self.wall, Wall, "geo.triangular_teeth(0.7)")
-        # An asymmetric cell may still have a symmetric law, so its absence proves nothing.
+        # An asymmetric cell may still have a symmetric law, hence None.
         object.__setattr__(self, "mirror_symmetric", True if self.wall.is_mirror_symmetric else None)
         if self.closed_form is not None:
             object.__setattr__(self, "evaluations", self.closed_form.evaluations)
@@ -107,12 +106,12 @@ class WallLaw(DrivenLaw):
 
     @property
     def is_isometric(self) -> bool:
-        """`is_polygonal`."""
+        """Whether the law is made of isometries: `is_polygonal`."""
         return self.is_polygonal
 
     @property
     def is_polygonal(self) -> bool:
-        """Whether every piece of the wall is straight, so that the law is made of isometries."""
+        """Whether every piece of the wall is straight."""
         return self.wall.is_polygonal
 
     @cached_property
@@ -127,7 +126,7 @@ class WallLaw(DrivenLaw):
         if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
             return None
         if len(wall.pieces) > FEW_PIECES:
-            # with the other beams what these leave falls by a hundred at most
+            # the other beams reduce the unresolved fraction at most by a factor of a hundred
             few = max(FEW_BEAMS, BEAMS_A_PIECE * len(wall.pieces))
             probe = PolygonLaw(wall, max_beams=min(few, MOST_BEAMS))
             if float(probe.unresolved) > 100.0 * EXACT_ENOUGH:
@@ -138,14 +137,14 @@ class WallLaw(DrivenLaw):
         return law if float(law.unresolved) <= EXACT_ENOUGH else None
 
     def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
-        """Outgoing angles by tracing, and the mask of the rays that escaped; the others are sent back.
+        """Outgoing angles by tracing, and the mask of the rays that escaped; the other rays count as retroreflected.
 
         ``x`` in (0, 1) is the entry point as a fraction of the period. Never raises an AccuracyError.
         """
         return traced_reflection(self.wall, x, theta)
 
     def random_map(self) -> RandomMap:
-        """`reflect_with_status`."""
+        """The map `reflect_with_status`."""
         return self.reflect_with_status
 
     def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
@@ -156,17 +155,17 @@ class WallLaw(DrivenLaw):
         return super().branches(theta) if self.exact_law is None else self.exact_law.branches(theta)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """Those of the exact law."""
+        """Breakpoints of the exact law; none are known without one."""
         return super().breakpoints(limit) if self.exact_law is None else self.exact_law.breakpoints(limit)
 
     def isometry_table(self) -> IsometryTable | None:
-        """That of the exact law, or None."""
+        """The table of the exact law, or None."""
         return None if self.exact_law is None else self.exact_law.isometry_table()
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """That of the exact law; else by adaptive quadrature in the entry point, of many pieces by equally spaced ones.
+        """The distributions of the exact law, or else by quadrature in the entry point, with flat tops as atoms.
 
-        Flat tops are atoms.
+        The quadrature is adaptive for walls with few pieces and equally spaced for others.
         """
         if self.exact_law is not None:
             return self.exact_law.distribution(theta, edges)
@@ -184,7 +183,7 @@ class WallLaw(DrivenLaw):
         return Distribution(below, (np.pi - theta)[:, None], flat[:, None])
 
     def expectations(self, basis: Basis) -> Expectations:
-        """Those of the exact law; else by adaptive quadrature in the entry point, of many pieces by `apply`."""
+        """Expectations of the exact law; else by adaptive quadrature in the entry point, or `apply` for many pieces."""
         if self.exact_law is not None:
             return self.exact_law.expectations(basis)
         if not is_few(self.wall):
@@ -206,9 +205,9 @@ class WallLaw(DrivenLaw):
     def conditionals(
         self, theta: ArrayLike, tolerance: float = APPLY_TOLERANCE, degree: int = APPLY_DEGREE
     ) -> AdaptiveConditionals:
-        """Conditional distributions of the traced law, each with its error.
+        """Conditional distributions by tracing, each with its error.
 
-        ``conditionals.mean(f)`` is what `apply` gives, and ``conditionals.error`` is its error.
+        ``conditionals.mean(f)`` equals `apply` of f, and ``conditionals.error`` is its error.
 
         Parameters
         ----------
@@ -217,12 +216,12 @@ class WallLaw(DrivenLaw):
         tolerance : float
             Wanted error of the mean of a function of sup norm 1.
         degree : int
-            The functions are as smooth as trigonometric polynomials of this degree.
+            Highest degree, as trigonometric polynomials, of the functions to be averaged.
 
         Returns
         -------
         AdaptiveConditionals
-            One row an angle, in their order.
+            One conditional distribution per angle, in the order of ``theta``.
 
         Raises
         ------
@@ -246,7 +245,7 @@ class WallLaw(DrivenLaw):
 
 
 def _closed_form(wall: Wall) -> Law | None:
-    """The sum of the laws of flat tops and hollows, by their fraction of the period, or None."""
+    """The laws of flat tops and hollows, weighted by their fractions of the period; None if a hollow has none."""
     if not wall.closes:
         return None
     wall = wall.cell
@@ -271,7 +270,7 @@ def _closed_form(wall: Wall) -> Law | None:
 
 
 def _of_hollow(wall: Wall, hollow: Hollow) -> Law | None:
-    """The closed form of one hollow; that of a rectangle has a flat top as wide as its crevice besides."""
+    """The closed form of one hollow, or None; for a rectangle, the law includes a flat top of the same width."""
     from ...geometry.cells.hollow_shape import HollowShape
 
     pieces = wall.pieces[hollow.first : hollow.last]

@@ -1,9 +1,9 @@
-"""Laws as weighted sums of words: compositions simplified by the algebra alone.
+"""Laws as weighted sums of words: compositions simplified by algebraic rules.
 
-A word is a chain of laws, the first one first; the empty word is the identity. As operators, for laws that keep
-sin(theta) d theta: retroreflection is the identity; specular reflection J commutes with laws that are mirror-symmetric;
-J J = 1, as for other involutions; HG(g) HG(h) = HG(g h) and J HG(g) = HG(-g); after the Lambertian law nothing before
-it matters, and nothing after it either; rectangular teeth of one shape several times are known in closed form.
+A word is a chain of laws in the order of application; the empty word is the identity. The rules hold for operators that
+preserve sin(theta) d theta. Retroreflection is the identity. Specular reflection J commutes with mirror-symmetric laws.
+J and other involutions have the square 1. HG(g) HG(h) = HG(g h) and J HG(g) = HG(-g). A chain that contains the
+Lambertian law is the Lambertian law. Powers of the law of rectangular teeth have a closed form.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from .repeated_teeth import MOST_TIMES, RepeatedTeethLaw
 Word = tuple[Law, ...]
 Sum = dict[Word, float]
 
-# Sums of compositions are multiplied out as long as no more words than this come of it.
+# Compositions of sums are multiplied out if the result has at most this many words.
 MOST_WORDS = 24
 
 
 def words_of(law: Law) -> Sum | None:
-    """The law as a sum of words with their weights, in the paper's frame; None if there would be too many words.
+    """The law as a weighted sum of words, in the paper's frame; None if there are more than `MOST_WORDS` words.
 
     Raises an InputError if a sum in the law has negative weights or weights that do not sum to 1.
 
@@ -44,7 +44,7 @@ def words_of(law: Law) -> Sum | None:
 
 
 def law_of(word: Word) -> Law:
-    """The word as one law; of a law before a flip it is that law in the other frame, which has more methods."""
+    """The word as one law; a law followed by J becomes a `SpecularFrame`, which has more methods."""
     if not word:
         return retroreflection()
     if len(word) == 1:
@@ -55,7 +55,7 @@ def law_of(word: Word) -> Law:
 
 
 def _leaf(law: Law) -> Sum | None:
-    # a polygonal wall's law as a table of isometries
+    # a wall's law in closed form, or as a table of isometries
     return {reduced((law.exact_law or law,)): 1.0}
 
 
@@ -86,12 +86,12 @@ def _chain(parts: Sequence[Sum | None]) -> Sum | None:
 
 
 def reduced(word: Word) -> Word:
-    """The shortest word for the same operator that the rules above lead to."""
+    """The word for the same operator after applying the rules above."""
     return _joined(_mirrored_angle(_forgotten(word)))
 
 
 def _forgotten(word: Word) -> Word:
-    """Without identities, and without what the Lambertian law makes no difference to."""
+    """Remove identities, and all laws that have no effect beside a Lambertian law."""
     word = tuple(law for law in word if law != retroreflection())
     diffuse = [k for k, law in enumerate(word) if _is_lambertian(law)]
     if not diffuse:
@@ -102,7 +102,7 @@ def _forgotten(word: Word) -> Word:
 
 
 def _mirrored_angle(word: Word) -> Word:
-    """With flips moved through mirror-symmetric laws: one at most in each run of these, in a scattering if there is."""
+    """Move J through mirror-symmetric laws: each run of these has at most one J, absorbed by an HG law if possible."""
     found: list[Law] = []
     run: list[Law] = []
     for law in (*word, None):
@@ -124,7 +124,7 @@ def _mirrored_angle(word: Word) -> Word:
 
 
 def _joined(word: Word) -> Word:
-    """With neighbouring scatterings, or teeth, as one, and without involutions that undo each other."""
+    """Merge neighbouring HG laws and neighbouring rectangular teeth, and cancel pairs of equal involutions."""
     for index, (first, second) in enumerate(pairwise(word)):
         if isinstance(first, InvolutionLaw) and first == second:
             return reduced(word[:index] + word[index + 2 :])
@@ -138,7 +138,7 @@ def _joined(word: Word) -> Word:
 
 
 def _repeated(first: Law, second: Law) -> Law | None:
-    """Rectangular teeth of the same shape one after the other."""
+    """The product of two laws of rectangular teeth of the same shape; None for other laws."""
     teeth = [law for law in (first, second) if isinstance(law, (RectangularTeethLaw, RepeatedTeethLaw))]
     times = sum(law.times if isinstance(law, RepeatedTeethLaw) else 1 for law in teeth)
     shapes = {law.height_to_width for law in teeth}
