@@ -1,4 +1,4 @@
-"""Distances between laws: Wasserstein, conditional or joint, and the paper's pseudometric."""
+"""Distances between laws: conditional or joint Wasserstein distances, and the paper's pseudometric."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ class Distance(Estimate):
     Attributes
     ----------
     noise_floor : float or None
-        For empirical matrices: the mean distance that samples of this size show if both laws are the same. A distance
-        near it says nothing; `difference_test` decides. For joint distances it is that of the rows, which is not
-        smaller. None where nothing was counted.
+        For empirical matrices: the mean distance between samples of this size from one law. A distance near the noise
+        floor is not significant; use `difference_test` to decide. For joint distances the noise floor of kind
+        ``"rows"`` is given, which is not smaller. None if neither matrix has counts.
     """
 
     noise_floor: float | None = None
@@ -51,17 +51,17 @@ def distance(
     Parameters
     ----------
     first, second : Law or KernelMatrix
-        Of a law and a matrix, the law is discretised on the bins of the matrix.
+        If one is a law and the other a matrix, the law is discretised on the bins of the matrix.
     order : float
-        p of the Wasserstein distance W_p, a finite number of at least 1. Angles are measured in radians.
+        p of the Wasserstein distance W_p, a finite number of at least 1. Angles are in radians.
     kind : {"rows", "sup", "joint", "pseudometric"}
-        ``"rows"``: W_p(P(theta, .), Q(theta, .)), averaged over sin(theta)/2 d theta as its p-th power.
-        ``"sup"``: its supremum over theta.
-        ``"joint"``: W_p between the measures sin(theta)/2 d theta P(theta, d theta') on the square; not larger than
-        ``"rows"``. ``"pseudometric"``: the paper's, see the notes; p plays no part in it.
+        ``"rows"``: the p-mean of W_p(P(theta, .), Q(theta, .)) over sin(theta)/2 d theta.
+        ``"sup"``: the supremum of W_p(P(theta, .), Q(theta, .)) over theta.
+        ``"joint"``: W_p between the measures sin(theta)/2 d theta P(theta, d theta') on the square, which is at most
+        the value of ``"rows"``. ``"pseudometric"``: the paper's pseudometric, see the notes; it does not depend on p.
     tolerance : float
-        Wanted error between laws, for ``"rows"``, ``"sup"`` and ``"pseudometric"``; where it is not reached, ``error``
-        says so.
+        Wanted error between laws, for ``"rows"``, ``"sup"`` and ``"pseudometric"``. If it is not reached, ``error`` is
+        larger.
 
     Returns
     -------
@@ -75,22 +75,23 @@ def distance(
 
     Notes
     -----
-    *Laws.* Rows are exact where they consist of atoms; densities are resolved on cells; both these and the nodes in
-    the incoming angle are refined until two levels agree. The difference of the levels is the error, an estimate.
+    *Laws.* Conditional distributions that consist of atoms are exact; densities are resolved on cells. The cells and
+    the nodes in the incoming angle are refined until two levels agree. The error is estimated from the difference of
+    the levels.
 
-    *Matrices* are kernels between the middle angles of their cells. By the triangle inequality the distance is wrong by
-    no more than both matrices are; how far empirical ones are from their laws is resampled. The interval holds in about
-    95 % of cases for a sample against its own law, and in more for two samples or laws that differ, since noise in
-    rows that differ cancels, by an amount that the counts do not tell. The distance of matrices can be far below that
-    of the laws if these vary within cells: two involutions may have the same matrix.
+    *Matrices* are treated as kernels between the middle angles of their cells. By the triangle inequality the error is
+    at most the sum of the errors of both matrices; for empirical matrices these are found by resampling. The interval
+    has about 95 % coverage for a sample against its own law. Its coverage is higher for two samples or for different
+    laws, because noise partly cancels. The distance of matrices can be far below the distance of their laws if these
+    vary within cells: two involutions may have the same matrix.
 
-    *Joint* distances of matrices are exact up to 4 million pairs of occupied cells (160 MB); beyond, cells are merged,
-    and the error says what that may have done. At orders of a few dozen and more, p-th powers of all but the longest
-    ways are lost in rounding, and the result is the middle of a bracket. Laws are compared on 128 bins.
+    *Joint* distances of matrices are exact up to 4 million pairs of occupied cells (160 MB). For more pairs, cells are
+    merged, and the error covers the effect. At orders above a few dozen, rounding removes the p-th powers of all but
+    the longest distances, and the result is the middle of a bracket. Laws are compared on 128 bins.
 
-    *The pseudometric* is the sum over k, l >= 0 of 2^(-k-l-2) times the difference of the means of
-    cos(k theta) cos(l theta') under the flux measures, with the rest of the sum in the error; it metrises their weak
-    convergence. Source: Rudzis 2022, section 6.2.3, corrected: f(y, x) G(y, dx) nu(dy).
+    *The pseudometric* is the sum over k, l >= 0 of 2^(-k-l-2) times the absolute difference of the means of
+    cos(k theta) cos(l theta') under the flux measures, whose weak convergence it metrises. The error includes the
+    remainder of the sum. Source: Rudzis 2022, section 6.2.3, corrected: f(y, x) G(y, dx) nu(dy).
 
     Examples
     --------

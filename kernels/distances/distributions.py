@@ -16,14 +16,14 @@ from .transport import Distributions
 
 
 def outgoing_distributions(law: Law, theta: Floats, edges: Floats) -> Distributions:
-    """P(theta_k, .) for every theta_k: exact for laws of isometries, else linear between ``edges``, from 0 to pi."""
+    """P(theta_k, .) for every theta_k: exact for atoms, else linear between ``edges``, which go from 0 to pi."""
     return Distributions.of_parts(edges, *law.distribution(theta, edges))
 
 
 def on_cells(law: Law) -> Law:
-    """The same law, whose products take the distribution of their later factors from a matrix on the cells.
+    """The same law, with products that take the distribution of their later factors from a matrix on the cells.
 
-    By `apply` it would be an integral over an integral, and a law does not know how matrices are made.
+    The default, `apply`, would nest one integral in another.
     """
     if isinstance(law, Combination):
         return Combination(tuple((weight, on_cells(term)) for weight, term in law.terms))
@@ -35,9 +35,9 @@ def on_cells(law: Law) -> Law:
 
 
 def cells_error(law: Law, order: float, sup: bool) -> float:
-    """How far a distance may be off because the later factors of products are known by their matrices only.
+    """Error of a distance from the matrices that replace the later factors of products.
 
-    As in `asperity.kernels.distances.resampling.matrices_error`, from the Frobenius errors of the last matrices used.
+    The Frobenius errors of the last matrices used enter as in `resampling.matrices_error`.
     """
     if isinstance(law, Combination):
         return sum(weight * cells_error(term, order, sup) for weight, term in law.terms)
@@ -51,9 +51,9 @@ def cells_error(law: Law, order: float, sup: bool) -> float:
 
 @dataclass(frozen=True, repr=False)
 class _OnCells(Composition):
-    """Its first factor exactly; of the others the matrix of their product on the cells between the edges."""
+    """A product whose later factors are replaced by the matrix of their product on the cells between the edges."""
 
-    # the matrix that was used last, for its error
+    # the last matrix used, for its error
     last: KernelMatrix | None = field(default=None, compare=False, repr=False)
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:

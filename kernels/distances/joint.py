@@ -1,4 +1,4 @@
-"""Distances between flux measures on the square of incoming and outgoing angles: optimal transport in the plane."""
+"""Distances between flux measures on the square of incoming and outgoing angles, by optimal transport."""
 
 from __future__ import annotations
 
@@ -19,24 +19,23 @@ from .resampling import cell_middles, matrices_error, stochastic_rows
 from .rowwise import matrix_distance
 from .transport import Distributions, power_mean, wasserstein
 
-# Pairs of occupied cells up to which the transport problem is solved exactly; it takes some 40 bytes a pair, 160 MB,
-# and some seconds.
+# Limit on the pairs of occupied cells for an exact solution, at about 40 bytes per pair, 160 MB, and a few seconds.
 MOST_PAIRS = 2**22
 MOST_PIVOTS = 10**8
 # Bins on which laws are compared, and the tolerance of their matrices.
 LAW_BINS, LAW_TOLERANCE = 128, 1e-7
-# The solver stops where reduced costs are those of rounding, 10 eps of the largest cost; as many again for its sums.
+# The solver stops at reduced costs of 10 eps times the largest cost; the rest is for the rounding of its sums.
 SOLVER_ROUNDING = 64.0 * EPS
-# What that may do to a distance, before the bounds of a bracket are worth their while.
+# If rounding changes the distance by more than this, a bracket is computed.
 SMALL_DOUBT = 1e-6
 # Directions of the lower bound by projection.
 DIRECTIONS = 32
-# Masses below this fraction of the whole are rounding.
+# Masses below this fraction of the total count as 0.
 NO_MASS = 1e-15
 
 
 def joint_law_distance(first: Law, second: Law, order: float) -> Estimate:
-    """Between laws, on bins; the error from two levels."""
+    """W_p between the flux measures of two laws, from their matrices on bins; the error is from two levels."""
     basis = Bins(LAW_BINS)
     pair = [discretise(law, basis, tolerance=LAW_TOLERANCE) for law in (first, second)]
     return joint_matrix_distance(pair[0], pair[1], order, of_laws=True)
@@ -45,11 +44,10 @@ def joint_law_distance(first: Law, second: Law, order: float) -> Estimate:
 def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, of_laws: bool = False) -> Estimate:
     r"""W_p between the flux measures of two matrices, as point masses in the middle of the cells.
 
-    Exact where the number of pairs of occupied cells is within ``MOST_PAIRS``. Beyond, neighbouring cells are merged
-    until it is. Merging moves masses by known distances, so the result is a bracket; it is cut further by W_p of the
-    rows, which is not smaller, and by W_p of projections to lines, which is not larger. The error is the difference
-    from the next coarser level where that is less than the bracket. At high orders the p-th powers of all but the
-    longest ways are lost in rounding, and the bracket is all that is known.
+    The result is exact up to ``MOST_PAIRS`` pairs of occupied cells. For more pairs, neighbouring cells are merged.
+    Merging moves masses by known distances, which gives a bracket. Further bounds are the distance of kind ``"rows"``
+    (from above) and W_p of projections to lines (from below). The error is the difference from the next coarser level
+    if it is smaller than the bracket. Where rounding spoils p-th powers, the result is the middle of the bracket.
     """
     own = matrices_error(first, second, order, False)
     flux, flux2 = (matrix.weights[:, None] * stochastic_rows(matrix) for matrix in (first, second))
@@ -78,7 +76,7 @@ def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: floa
 
 
 def _levels(basis: Basis, one: Floats, other: Floats, order: float) -> Iterator[tuple[Basis, Floats, Floats, float]]:
-    """Fluxes on coarser and coarser cells, and how far, in W_p, both masses together were moved."""
+    """Fluxes on successively coarser cells, and the total W_p distance by which merging has moved both of them."""
     start = cell_middles(basis.edges)
     parent = np.arange(basis.size)
     fluxes = [one, other]
@@ -98,7 +96,7 @@ def _levels(basis: Basis, one: Floats, other: Floats, order: float) -> Iterator[
 
 
 def _masses(one: Floats, other: Floats, order: float) -> tuple[Floats, Floats]:
-    """What has to be carried: for p = 1, where common mass may stay where it is, only the differences."""
+    """The masses to transport: for p = 1 only the differences, because common mass may stay."""
     if order == 1.0:
         one, other = np.maximum(one - other, 0.0), np.maximum(other - one, 0.0)
     return np.where(one > NO_MASS, one, 0.0), np.where(other > NO_MASS, other, 0.0)
@@ -110,7 +108,7 @@ def _pairs(one: Floats, other: Floats, order: float) -> int:
 
 
 def _solved(basis: Basis, one: Floats, other: Floats, order: float) -> tuple[float, float]:
-    """W_p between fluxes on the cells, and what the rounding of its p-th power does to it."""
+    """W_p between fluxes on the cells, and its error from the rounding of the p-th power."""
     import ot
     from scipy.spatial.distance import cdist
 
@@ -138,7 +136,7 @@ def _solved(basis: Basis, one: Floats, other: Floats, order: float) -> tuple[flo
 
 
 def _largest_projection(basis: Basis, one: Floats, other: Floats, order: float) -> float:
-    """The largest W_p of the images on lines through the origin: no larger than W_p in the plane."""
+    """The largest W_p of the projections to lines through the origin, a lower bound of W_p in the plane."""
     points = cell_middles(basis.edges)
     largest = 0.0
     for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS:
@@ -149,6 +147,6 @@ def _largest_projection(basis: Basis, one: Floats, other: Floats, order: float) 
 
 
 def _within_cells(basis: Basis, flux: Floats, order: float) -> float:
-    """How far, in W_p, a flux measure is at most from the point masses in the middle of its cells."""
+    """A bound of W_p between a flux measure and the point masses in the middle of its cells."""
     half = 0.5 * np.diff(basis.edges)
     return float(power_mean(np.hypot(half[:, None], half).ravel(), flux.ravel(), order))

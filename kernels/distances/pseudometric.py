@@ -1,4 +1,4 @@
-"""The paper's pseudometric of weak convergence, with an explicit family of test functions."""
+"""The paper's pseudometric of weak convergence, with products of cosines as test functions."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ LARGEST_ORDER = 58
 
 
 def moment_distance(first: Law | KernelMatrix, second: Law | KernelMatrix, tolerance: float) -> Estimate:
-    r"""sum over k, l >= 0 of 2^(-k - l - 2) times the difference of the means of cos(k theta) cos(l theta').
+    r"""Sum over k, l >= 0 of 2^(-k - l - 2) times the absolute difference of the means of cos(k theta) cos(l theta').
 
-    The means are those of the flux measure, int int f(theta, theta') P(theta, d theta') nu(d theta) with nu =
-    sin(theta)/2 d theta. The products of cosines span a dense set of the continuous functions on the square, so that
-    distances that tend to 0 mean weak convergence of the flux measures.
+    The means are taken under the flux measure, int int f(theta, theta') P(theta, d theta') nu(d theta) with
+    nu = sin(theta)/2 d theta. The products of cosines span a dense subspace of the continuous functions on the square,
+    so the distance tends to 0 exactly if the flux measures converge weakly.
 
-    The sum is taken over k, l <= K. The rest is at most 2 (1 - (1 - 2^(-K - 1))^2) < 2^(1 - K), since a difference
-    of means is at most 2. In u = cos(theta) the functions are Chebyshev's polynomials: K + 1 Legendre polynomials
-    give their means exactly, and an error E of the matrix changes none of them by more than E.
+    The sum is taken over k, l <= K. The remainder is at most 2 (1 - (1 - 2^(-K - 1))^2) < 2^(1 - K), because a
+    difference of means is at most 2. In u = cos(theta) the functions are Chebyshev polynomials: K + 1 Legendre
+    polynomials give their means exactly, and an error E of the matrix changes each mean by at most E.
 
-    Source: Rudzis 2022, section 6.2.3, with the order of the slots of f corrected: f(y, x) G(y, dx) nu(dy).
+    Source: Rudzis 2022, section 6.2.3, with the order of the arguments of f corrected: f(y, x) G(y, dx) nu(dy).
     """
     last = min(max(ceil(log2(2.0 / tolerance)), 1), LARGEST_ORDER)
     matrices = [
@@ -54,7 +54,7 @@ def flux_means(matrix: KernelMatrix, last: int) -> Floats:
 
 
 def _cosines(basis: Basis, last: int) -> Floats:
-    """Coefficients of cos(k theta) in the basis, one row for each k."""
+    """Coefficients of cos(k theta) in the basis, one row per k."""
     order = basis.nodes_per_interval + last
     angle, weight = basis.measure.quadrature(basis.edges, order)
     return np.asarray((weight * np.cos(np.arange(last + 1)[:, None] * angle)) @ basis.evaluate(angle))

@@ -1,4 +1,4 @@
-"""Resampled counts of empirical kernels: the distances that chance alone makes."""
+"""Distances between resampled counts of empirical kernels, for noise floors and errors."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .transport import grid_wasserstein, power_mean
 
 # From two arrays of probabilities, shape (..., n, n), to their distances, shape (...).
 RowsDistance = Callable[[Floats, Floats], Floats]
-# Resamples whose mean is the noise floor, good to a tenth or so, and whose spread is in the error.
+# Resamples for the noise floor, to about 10 %, and for the errors.
 RESAMPLES = 32
-# How many of their standard deviations above the mean the upper limit of 95 % is: more than the 1.65 of normal ones,
-# as the spread is that of 32; the largest of many rows has a longer tail.
+# Upper limit of 95 % in standard deviations above the mean. It is larger than the normal 1.65 because the deviation is
+# estimated from 32 resamples. The maximum over many incoming angles has a longer tail.
 DEVIATIONS, DEVIATIONS_OF_SUPREMUM = 1.96, 2.5
 SEED = 0
-# Counts held at a time.
+# Counts in memory at a time.
 CHUNK = 2**22
 
 
@@ -40,7 +40,7 @@ def cell_middles(edges: Floats) -> Floats:
 
 
 def distance_of_rows(matrix: KernelMatrix, order: float, sup: bool) -> RowsDistance:
-    """The row-wise W_p, averaged or at most, of kernels on the cells of a matrix."""
+    """A function for the mean or the maximum over rows of W_p, for kernels on the cells of a matrix."""
     points, weights = cell_middles(matrix.basis.edges), matrix.weights
 
     def between(one: Floats, other: Floats) -> Floats:
@@ -52,20 +52,20 @@ def distance_of_rows(matrix: KernelMatrix, order: float, sup: bool) -> RowsDista
 
 
 def check_comparable(first: KernelMatrix, second: KernelMatrix) -> None:
-    """Raise an InputError unless both are on the same cells and in the same convention."""
+    """Raise an InputError unless both matrices are on the same cells and in the same convention."""
     for matrix in (first, second):
         stochastic_rows(matrix)
     check_same_basis(first, second)
 
 
 def rows_of_counts(counts: Counts, pooled: Floats) -> Floats:
-    """Counts of pairs, shape (..., n, n), as probabilities; rows without a pair are those of the pooled kernel."""
+    """Counts of pairs, shape (..., n, n), as probabilities; rows without pairs are taken from the pooled kernel."""
     total = counts.sum(axis=-1, keepdims=True)
     return np.asarray(np.where(total > 0, counts / np.maximum(total, 1), pooled))
 
 
 def pooled_rows(first: KernelMatrix, second: KernelMatrix) -> Floats:
-    """The kernel that both have if they are equal: that of an exact one, else of all counts together."""
+    """The common kernel if both laws are equal: the kernel of an exact matrix, else of the pooled counts."""
     for matrix in (first, second):
         if matrix.counts is None:
             return stochastic_rows(matrix)
@@ -74,7 +74,7 @@ def pooled_rows(first: KernelMatrix, second: KernelMatrix) -> Floats:
 
 
 def resampled(counts: Counts, rows: Floats, number: int, rng: np.random.Generator) -> Iterator[Counts]:
-    """As many pairs from each cell as were counted, sent on by ``rows``, again and again; chunks of (., n, n)."""
+    """``number`` resamples of the counts by the kernel ``rows``, with the same row sums, in chunks of (., n, n)."""
     total = counts.sum(axis=1)
     size = len(total)
     chunk = max(1, CHUNK // size**2)
@@ -85,7 +85,7 @@ def resampled(counts: Counts, rows: Floats, number: int, rng: np.random.Generato
 
 
 def noise_floor(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> float | None:
-    """The mean distance of samples of these sizes from one and the same law; None where nothing was counted."""
+    """The mean distance of samples of these sizes from one law; None if neither matrix has counts."""
     if first.counts is None and second.counts is None:
         return None
     common, rng = pooled_rows(first, second), np.random.default_rng(SEED)
@@ -100,7 +100,7 @@ def null_distances(
     number: int,
     rng: np.random.Generator,
 ) -> Floats:
-    """Distances of resamples of both from a common kernel; a matrix without counts is that kernel itself."""
+    """Distances between resamples of both matrices from a common kernel, which replaces a matrix without counts."""
     between = distance_of_rows(first, *measured)
     found = []
     draws = [_draws(matrix, common, number, rng) for matrix in (first, second)]
@@ -120,12 +120,11 @@ def _draws(matrix: KernelMatrix, common: Floats, number: int, rng: np.random.Gen
 
 
 def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> float:
-    """How far the distance of two matrices may be from that of their laws: as far as both matrices are from theirs.
+    """Error of the distance of two matrices: the sum of the distances of both matrices from their laws.
 
-    Where pairs were counted, the distance of resamples from the sample tells how far: its mean, and its deviation by a
-    quantile, the deviations of two samples being independent. Else it is what the Frobenius error E of ``symmetric``
-    allows: W_1 <= pi/2 sum_j |dP_ij|, whose mean over i is at most pi/2 E by Cauchy and Schwarz, and whose largest
-    value is at most pi/2 E / sqrt(w_i); and W_p^p <= pi^(p - 1) W_1.
+    For a matrix with counts it is the mean distance of resamples from the sample, plus a multiple of the standard
+    deviation. Otherwise the Frobenius error E of ``symmetric`` gives a bound: W_1 <= pi/2 sum_j |dP_ij|, with a mean
+    over i of at most pi/2 E by Cauchy and Schwarz and a maximum of pi/2 E / sqrt(w_i); W_p^p <= pi^(p - 1) W_1.
     """
     known, mean, variance = 0.0, 0.0, 0.0
     for matrix in (first, second):

@@ -1,4 +1,4 @@
-"""Distances between laws and between kernel matrices, incoming angle by incoming angle."""
+"""Mean or supremum over the incoming angle of the Wasserstein distance of conditional distributions."""
 
 from __future__ import annotations
 
@@ -15,32 +15,31 @@ from .distributions import cells_error, on_cells, outgoing_distributions
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean, wasserstein
 
-# Gauss nodes on a panel in the incoming angle, panels without breakpoints, breakpoints and cells of the outgoing angle
-# on the coarsest level; every level doubles all of them.
+# Gauss nodes per panel of the incoming angle; panels (breakpoints not counted), breakpoints, and cells of the outgoing
+# angle on the coarsest level. Every level doubles panels, breakpoints and cells.
 NODES, PANELS, BREAKPOINTS, CELLS = 4, 12, 24, 64
-# Rows times cells of a level: some seconds. Rows without cells count as these many atoms.
+# Limit on the angles times cells of a level, a few seconds of work; FEW_ATOMS is added to the cells.
 MOST_CORNERS, FEW_ATOMS = 2**22, 32
-# Any angle; whether rows have densities does not depend on it.
+# Incoming angle at which laws are tested for densities; the result does not depend on it.
 PROBE = 1.0
-# Corners held at a time, counting every row with as many atoms as those of walls of many pieces have.
+# Corners in memory at a time. Each angle counts with at least MOST_ATOMS, the atoms of walls with many pieces.
 CORNERS_AT_ONCE, MOST_ATOMS = 2**21, ENTRY_POINTS
 FEWEST_LEVELS = 3
-# A level halves the error at least where the distance jumps as a function of the incoming angle, at positions unknown.
-# The difference of two levels is then the error of the finer one; chance may make it smaller, the one before it not.
+# If the distance jumps at unknown incoming angles, a level at least halves the error, and the difference of two levels
+# is the error of the finer one. This difference may be small by chance; a fraction of the one before guards against it.
 MEMORY = 0.25
-# A supremum at grazing, behind infinitely many breakpoints, is approached with order 1 exactly.
+# A supremum at grazing, where infinitely many breakpoints accumulate, converges with order 1.
 SUPREMUM_FACTOR = 2.0
-# The supremum is approached from inside the panels, to this fraction of their width.
+# Distance of the outermost nodes of a panel from its ends, as a fraction of its width, for the supremum.
 INSET = 1e-9
 # Rounding of some hundred sums of angles and probabilities.
 ROUNDING = 1e-13
 
 
 def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: float) -> Estimate:
-    """The mean or the supremum over incoming angles of W_p, by Gauss rules that are refined until they settle.
+    """The mean or the supremum over incoming angles of W_p, by Gauss rules refined until two levels agree.
 
-    The error is the difference of two levels, which differ in the nodes, in the breakpoints that are known to them, and
-    in the cells on which densities are resolved.
+    The error is estimated from the differences of levels, which differ in nodes, breakpoints and cells.
     """
     first, second = on_cells(first), on_cells(second)
     found: list[float] = []
@@ -67,7 +66,7 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
 
 
 def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> Estimate:
-    """The same between matrices on the same cells: rows are point masses in the middle of the cells."""
+    """The mean or the supremum of W_p between matrices on the same cells, with point masses in their middles."""
     between = distance_of_rows(first, order, sup)
     value = float(between(stochastic_rows(first), stochastic_rows(second)))
     error = matrices_error(first, second, order, sup) + ROUNDING
@@ -76,7 +75,7 @@ def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup
 
 
 def _is_atomic(law: Law) -> bool:
-    """Whether rows consist of atoms, so that no cells are needed to resolve them."""
+    """Whether the conditional distributions consist of atoms, so that no cells are needed."""
     return not np.any(law.distribution(np.array([PROBE]), np.array([0.0, np.pi])).below)
 
 

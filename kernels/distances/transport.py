@@ -11,18 +11,18 @@ from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.intervals import cell_among
 
-# Ends of a piece that agree to this fraction, over the order to the power 4/5, are integrated by two terms about the
-# middle: the divided difference below would lose more digits than the third term, 1/1920 of the fourth power, has.
+# If the ends of a piece agree to this fraction, divided by p^(4/5), two terms of the series about the middle are used.
+# The divided difference would then lose more digits than the third term, 1/1920 of the fourth power, contributes.
 EQUAL_ENDS = (1920.0 * EPS) ** 0.2
-# A step of a cumulative distribution smaller than this is none.
+# Smallest step of a cumulative distribution.
 SMALLEST_STEP = 1e-300
-# Numbers at a time: they stay in the cache, which makes it three times faster.
+# Numbers per block: a block fits in the cache, which is three times faster.
 CHUNK = 2**15
 
 
 @dataclass(frozen=True)
 class Distributions:
-    """Cumulative distribution functions as polygons, one a row: jumps are vertical sides, densities slanted ones.
+    """Cumulative distribution functions as polygons, one per row; jumps are vertical sides, densities slanted ones.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Distributions:
         fraction = (position - edges[cell]) / (edges[cell + 1] - edges[cell])
         low = np.take_along_axis(cumulative, cell, axis=1)
         at_atom = low + fraction * (np.take_along_axis(cumulative, cell + 1, axis=1) - low)
-        # every atom is two corners with the same position: before the jump and after it
+        # every atom has two corners at the same position, before and after the jump
         corner = np.concatenate((np.broadcast_to(edges, (rows, count)), position, position), axis=1)
         base = np.concatenate((cumulative, at_atom, at_atom), axis=1)
         jump = np.concatenate((np.zeros((rows, count + position.shape[1])), probability), axis=1)
@@ -66,7 +66,7 @@ class Distributions:
     def quantile(self, fraction: Floats) -> Floats:
         """The inverse function at ``fraction``, shape (rows, any)."""
         rows, corners = self.level.shape
-        # one search in all rows at once: row i occupies the values from 2 i to 2 i + 1
+        # one search in all rows at once: row i is shifted to the values from 2 i to 2 i + 1
         shift = 2.0 * np.arange(rows)[:, None]
         index = np.searchsorted((self.level + shift).ravel(), (fraction + shift).ravel(), side="left").reshape(
             fraction.shape
@@ -79,11 +79,11 @@ class Distributions:
 
 
 def wasserstein(first: Distributions, second: Distributions, order: float = 1.0) -> Floats:
-    r"""W_p between corresponding rows, exactly, shape (rows,).
+    r"""The exact W_p between corresponding distributions, shape (rows,).
 
-    W_p^p is the integral over t in (0, 1) of the p-th power of the difference of the two quantile functions. Between
-    two neighbouring levels of either function the difference is linear in t, and its power is integrated in closed
-    form.
+    W_p^p is the integral over t in (0, 1) of the p-th power of the absolute difference of the two quantile functions.
+    Between neighbouring levels of the two functions this difference is linear in t, and its power is integrated in
+    closed form.
 
     Examples
     --------
@@ -97,9 +97,9 @@ def wasserstein(first: Distributions, second: Distributions, order: float = 1.0)
     quarter, three = levels[:, :-1] + 0.25 * width, levels[:, :-1] + 0.75 * width
     early = first.quantile(quarter) - second.quantile(quarter)
     late = first.quantile(three) - second.quantile(three)
-    # steps of no width have no meaning at all
+    # steps of zero width have arbitrary quantiles
     start, end = (np.where(width > 0.0, side, 0.0) for side in (1.5 * early - 0.5 * late, 1.5 * late - 0.5 * early))
-    # powers of the fraction of the largest: those of angles leave the range of numbers at high orders
+    # divided by the largest, because powers of angles underflow or overflow at high orders
     largest = np.maximum(np.abs(start), np.abs(end)).max(axis=1, initial=0.0)
     unit = np.where(largest > 0.0, largest, 1.0)[:, None]
     power = np.sum(width * _mean_power(start / unit, end / unit, order), axis=1)
@@ -107,7 +107,7 @@ def wasserstein(first: Distributions, second: Distributions, order: float = 1.0)
 
 
 def _mean_power(start: Floats, end: Floats, order: float) -> Floats:
-    """The mean of the p-th power of the modulus of a linear function between two values."""
+    """The mean of |f|^p for a linear function f between two values."""
     rise, middle = end - start, 0.5 * (start + end)
     flat = np.abs(rise) <= EQUAL_ENDS / order**0.8 * np.maximum(np.abs(start), np.abs(end))
     bend = order * rise / np.where(flat & (middle != 0.0), middle, np.inf)
@@ -117,7 +117,7 @@ def _mean_power(start: Floats, end: Floats, order: float) -> Floats:
 
 
 def power_mean(values: Floats, weights: Floats, order: float) -> Floats:
-    """(sum_j w_j v_j^p)^(1/p) over the last axis, for values that are not negative and any order.
+    """(sum_j w_j v_j^p)^(1/p) over the last axis, for nonnegative values and any order p.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def power_mean(values: Floats, weights: Floats, order: float) -> Floats:
 
 
 def wasserstein_order(order: float) -> float:
-    """The order p of a Wasserstein distance, checked: a finite number of at least 1."""
+    """The checked order p of a Wasserstein distance, a finite number of at least 1."""
     power = finite_number("order", order)
     if power < 1.0:
         raise InputError(f"order: expected a number of at least 1, got {order!r}")
@@ -138,9 +138,9 @@ def wasserstein_order(order: float) -> float:
 
 
 def grid_wasserstein(first: Floats, second: Floats, points: Floats, order: float = 1.0) -> Floats:
-    """W_p between corresponding rows of probabilities of the same increasing points, shape ``first.shape[:-1]``.
+    """W_p between corresponding probability vectors on the same increasing points, shape ``first.shape[:-1]``.
 
-    For p = 1 it is the integral of the difference of the distribution functions: one sum, no sorting.
+    For p = 1 it is the integral of the absolute difference of the distribution functions, without sorting.
     """
     shape = first.shape[:-1]
     flat = [np.reshape(array, (-1, points.size)) for array in (first, second)]

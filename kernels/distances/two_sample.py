@@ -31,10 +31,9 @@ class DifferenceTest:
     statistic : float
         The distance of the two empirical kernels.
     p_value : float
-        The probability, if both have the same law, of a distance at least as large; never less than one over the
-        number of permutations plus one.
+        The probability of a distance at least as large if both laws are the same; at least 1 / (1 + permutations).
     null : ndarray, shape (permutations,)
-        The distances after the permutations. Their mean is the noise floor.
+        The distances after the permutations; their mean is the noise floor.
     """
 
     statistic: float
@@ -43,11 +42,11 @@ class DifferenceTest:
 
     @property
     def noise_floor(self) -> float:
-        """The mean distance if both have the same law."""
+        """The mean distance if both laws are the same."""
         return float(np.mean(self.null))
 
     def differs(self, level: float = 0.05) -> bool:
-        """Whether the laws differ at this level; false alarms come with at most this probability."""
+        """Whether the laws differ at this level, the largest probability of a false alarm."""
         return self.p_value <= number_between("level", level, 0.0, 1.0)
 
 
@@ -59,19 +58,19 @@ def difference_test(
     permutations: int = 999,
     rng: np.random.Generator | None = None,
 ) -> DifferenceTest:
-    r"""Test whether two laws are the same, from empirical matrices of them or from one and an exact matrix.
+    r"""Test whether two laws are the same, from two empirical matrices or from an empirical and an exact matrix.
 
     Parameters
     ----------
     first, second : KernelMatrix
-        On the same bins; at least one with counts of independent pairs (from `estimate`, or from `discretise` by
-        ``"monte-carlo"``; rays of ``"qmc"`` are too even, which makes the test cautious).
+        Matrices on the same bins. At least one has counts of independent pairs, from `estimate` or from `discretise`
+        by ``"monte-carlo"``. Counts by ``"qmc"`` are more even than independent pairs: the test is then conservative.
     order, kind
-        Of the distance, as in `distance`; kind is ``"rows"`` or ``"sup"``.
+        As in `distance`; kind is ``"rows"`` or ``"sup"``.
     permutations : int
-        At least 19.
+        Number of permutations, at least 19.
     rng : numpy.random.Generator, optional
-        Source of the permutations; by default a fixed one.
+        Source of the permutations; by default a generator with a fixed seed.
 
     Returns
     -------
@@ -80,16 +79,15 @@ def difference_test(
     Raises
     ------
     InputError
-        If the bins differ, the order is not a number of at least 1, or nothing was counted.
+        If the bins differ, the order is not a number of at least 1, or neither matrix has counts.
 
     Notes
     -----
-    Two samples: given the incoming angles, pairs from the same cell are exchangeable if the laws are equal, so the
-    pairs of each cell are dealt out anew (a multivariate hypergeometric draw) and the distance is compared with those
-    that result. The p-value (1 + number of distances not smaller) / (1 + permutations) is then valid for every number
-    of pairs, not only for many. One sample: its pairs are drawn anew from the exact matrix, cell by cell; the test is
-    valid if the mean over a cell is right for its incoming angles, which it is when they follow the invariant measure
-    or the law hardly varies within a cell.
+    Two samples: if the laws are equal, pairs with incoming angles in the same cell are exchangeable. The pairs of each
+    cell are redistributed between the samples (a multivariate hypergeometric draw). The p-value
+    (1 + number of distances not smaller) / (1 + permutations) is valid for every number of pairs. One sample: its pairs
+    are drawn anew from the exact matrix, cell by cell. The test is valid if the incoming angles follow the invariant
+    measure within each cell, or if the law hardly varies within a cell.
 
     Examples
     --------
@@ -118,7 +116,7 @@ def difference_test(
         pair = [rows_of_counts(counts, common) for counts in (first.counts, second.counts)]
         null = _permuted(first, second.counts, measured, number, source)
     statistic = float(distance_of_rows(first, *measured)(*pair))
-    # distances of equal tables may differ in the last digits, which must not count as smaller
+    # distances of equal tables may differ by rounding and count as equal
     not_smaller = int(np.count_nonzero(null >= statistic * (1.0 - 1e-12)))
     return DifferenceTest(statistic, (1 + not_smaller) / (1 + number), null)
 
@@ -126,7 +124,7 @@ def difference_test(
 def _permuted(
     first: KernelMatrix, other: Counts, measured: tuple[float, bool], number: int, rng: np.random.Generator
 ) -> Floats:
-    """Distances after the pairs of each incoming cell were dealt out anew."""
+    """Distances after redistributing the pairs of each incoming cell between the two samples."""
     assert first.counts is not None  # the caller looked
     pooled = first.counts + other
     common = rows_of_counts(pooled, stochastic_rows(first))

@@ -1,4 +1,4 @@
-"""The convergence of the laws of a sequence of walls, and the cost of each step."""
+"""Distances of the laws of a sequence of walls to their limit, and the run time of each step."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ConvergenceStep:
-    """One member of a sequence.
+    """Distance and run time for one member of a sequence.
 
     Attributes
     ----------
     name : str
     distance : Distance
-        To the limit, or to the next member.
+        Distance to the limit, or to the next member.
     seconds : float
-        What it took, the law included.
+        Run time in seconds, including the computation of the law.
     """
 
     name: str
@@ -40,13 +40,13 @@ class ConvergenceStep:
 
 @dataclass(frozen=True)
 class Convergence:
-    """The outcome of `study_convergence`; it prints as a table.
+    """The distances found by `study_convergence`; printed as a table.
 
     Attributes
     ----------
     steps : tuple of ConvergenceStep
     target : str
-        What the distances are to.
+        The law that distances refer to, in words.
     """
 
     steps: tuple[ConvergenceStep, ...]
@@ -54,12 +54,12 @@ class Convergence:
 
     @property
     def distances(self) -> Floats:
-        """The values alone."""
+        """The values of the distances."""
         return np.array([float(step.distance) for step in self.steps])
 
     @property
     def ratios(self) -> Floats:
-        """Every distance over the one before; nan where that was 0."""
+        """Every distance divided by the one before; nan if the one before is 0."""
         values = self.distances
         return np.asarray(
             np.divide(values[1:], values[:-1], out=np.full(values.size - 1, np.nan), where=values[:-1] > 0.0)
@@ -84,20 +84,20 @@ def study_convergence(
     kind: Kind = "rows",
     tolerance: float = 1e-3,
 ) -> Convergence:
-    """The distance of each member of a sequence to its limit, or to the next member, against run time.
+    """The distance of each member of a sequence to its limit, or to the next member, with run times.
 
-    Weak convergence of the laws of walls is what the limit theorems are about; distances of kind ``"joint"`` and
-    ``"pseudometric"`` measure it, ``"rows"`` and ``"sup"`` are stronger: they ask that the law converge for fixed
-    incoming angles. A deep rectangular hollow with depth tending to infinity converges in the former only.
+    The limit theorems state weak convergence of the laws of walls. Distances of kind ``"joint"`` and ``"pseudometric"``
+    measure weak convergence. ``"rows"`` and ``"sup"`` are stronger: they measure convergence of the law at fixed
+    incoming angles. For example, rectangular hollows with depth tending to infinity converge weakly only.
 
     Parameters
     ----------
     members : sequence of Wall, Law or KernelMatrix
-        Koch curves by generation, mushrooms with thinner and thinner stems, a profile at growing resolution.
+        For example Koch curves by generation, mushrooms with thinner stems, a profile at growing resolution.
     limit : Wall, Law or KernelMatrix, optional
-        By default every member is compared with the next one, and the last with none.
+        The limit; by default every member but the last is compared with the next one.
     names : sequence of str, optional
-        By default their reprs.
+        Names of the members; by default their reprs.
     order, kind, tolerance
         As in `distance`.
 
@@ -108,7 +108,7 @@ def study_convergence(
     Raises
     ------
     InputError
-        If there are too few members, or the names do not fit.
+        If there are fewer than one member (two without a limit), or the number of names differs.
 
     Examples
     --------
