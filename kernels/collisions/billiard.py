@@ -1,4 +1,4 @@
-"""A disk between rough walls: flights and collisions by any collision law, deterministic or random."""
+"""The motion of disks between rough walls, with any collision law, deterministic or random."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 
 class Reflector(Protocol):
-    """What a wall of the container needs: `CollisionLaw` has it, and so has `SatelliteLaw`."""
+    """Protocol for the collision law of one wall of a container, met by `CollisionLaw` and `SatelliteLaw`."""
 
     @property
     def disk(self) -> Disk: ...
 
     def sample(self, velocity: ArrayLike, rng: np.random.Generator) -> Floats:
-        """Outgoing (v1, v2, omega) for incoming ones with v2 < 0, the wall being below the disk."""
+        """Outgoing (v1, v2, omega) for incoming ones with v2 < 0; the wall is below the disk."""
         ...
 
 
@@ -31,7 +31,7 @@ class Reflector(Protocol):
 class BilliardRecord:
     """States of n disks after each of their collisions; the first entry of every array is the initial state.
 
-    A disk that meets no wall any more has fewer ``collisions`` than were asked for, and its last state is repeated.
+    A disk that meets no further wall has fewer ``collisions`` than ``steps``; its last state is repeated.
 
     Attributes
     ----------
@@ -39,11 +39,11 @@ class BilliardRecord:
     time : array, shape (steps + 1, n)
     position : array, shape (steps + 1, n, 2)
     angle : array, shape (steps + 1, n)
-        By how much the disk has turned, not reduced.
+        Angle of rotation since the start, radians, not reduced modulo 2 pi.
     velocity : array, shape (steps + 1, n, 3)
         (v1, v2, omega) after the collision.
     wall : array of int, shape (steps + 1, n)
-        Number of the wall, -1 at the start.
+        Index of the wall, -1 at the start.
     collisions : array of int, shape (n,)
     """
 
@@ -68,7 +68,7 @@ class BilliardRecord:
         return np.asarray(self.disk.mass * orbital + self.disk.inertia * v[..., 2])
 
     def extent(self, direction: ArrayLike = (1.0, 0.0)) -> Floats:
-        """Full width, shape (n,), of the positions of collision along a direction; the start does not count."""
+        """Range, shape (n,), of the collision positions along a direction, without the start."""
         along = self.position[1:] @ finite_array("direction", direction)
         return np.asarray(np.ptp(along, axis=0))
 
@@ -81,22 +81,22 @@ def play(
     collisions: int,
     rng: np.random.Generator,
 ) -> BilliardRecord:
-    """Let disks fly in a container and collide with its walls.
+    """Simulate disks that move in a container and collide with its walls.
 
     Parameters
     ----------
     container : Container
         The region of the centres.
-    laws : Reflector or sequence of them
-        One law for all walls or one for each, of the same disk: ``CollisionLaw(retroreflection(), disk)`` is a no-slip
-        wall, ``CollisionLaw.from_wall(wall, disk)`` a rough one. Each is used in the coordinates in which its wall is
-        below the disk.
+    laws : Reflector or sequence of Reflector
+        One law for all walls or one per wall, all for the same disk: ``CollisionLaw(retroreflection(), disk)`` for a
+        no-slip wall, ``CollisionLaw.from_wall(wall, disk)`` for a rough wall. Each law is applied in coordinates in
+        which its wall is below the disk.
     position : array_like, shape (n, 2)
-        Centres, inside.
+        Initial centres, inside the container.
     velocity : array_like, shape (n, 3)
-        (v1, v2, omega).
+        Initial (v1, v2, omega).
     collisions : int
-        How many to follow.
+        Number of collisions per disk.
     rng : numpy.random.Generator
 
     Returns
@@ -110,7 +110,7 @@ def play(
 
     Examples
     --------
-    A disk without spin on a no-slip floor and ceiling does not get on as a smooth disk does:
+    Between a no-slip floor and ceiling, a disk without initial spin moves back and forth:
 
     >>> import numpy as np
     >>> from asperity import geometry as geo, kernels as ker
@@ -160,12 +160,12 @@ def play(
 def _next_wall(
     container: Container, located: Floats, moving: Floats, last: NDArray[np.int64]
 ) -> tuple[Floats, NDArray[np.int64]]:
-    """Time to the next wall and its number, -1 where there is none."""
+    """Time to the next wall and its index, -1 if there is none."""
     approach = moving[:, :2] @ container.normals.T
     distance = np.maximum(container.distances(located), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         times = np.where(approach < 0.0, distance / -approach, np.inf)
-    # a disk that has just left a straight wall does not meet it next
+    # a disk that leaves a straight wall cannot meet the same wall next
     rows = np.flatnonzero(last >= 0)
     times[rows, last[rows]] = np.inf
     wall = np.argmin(times, axis=1)
@@ -174,7 +174,7 @@ def _next_wall(
 
 
 def _collide(container: Container, k: int, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
-    """Velocities after a collision with wall k, by its law in the coordinates in which it is below."""
+    """Velocities after a collision with wall k, by its law in coordinates in which the wall is below."""
     normal, tangent = container.normals[k], container.tangents[k]
     local = np.stack([moving[:, :2] @ tangent, moving[:, :2] @ normal, moving[:, 2]], axis=1)
     out = law.sample(local, rng)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from ..matrices.defects import SymmetryDefect
     from .operator import CollisionOperator
 
-# Pairs of angles count as a grid if the grid of their distinct values has at most this many times as many points.
+# Pairs of angles are evaluated as a grid if the grid of their distinct values has at most this many points per pair.
 GRID_EXCESS = 4
 DEFECT_SIZES = (32, 8)
 
@@ -32,18 +32,18 @@ VelocityFunction = Callable[[Floats, Floats], Floats]
 
 @dataclass(frozen=True)
 class CollisionLaw:
-    r"""K: the collision law of a rough disk with a rough wall, in the limit of small roughness.
+    r"""The collision law K of a rough disk with a rough wall, in the limit of small roughness.
 
-    K keeps the position, maps theta by P~, and psi to pi - psi. It takes minus the incoming velocity,
-    w = cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi, to the outgoing one. It conserves the kinetic
-    energy and the rolling momentum -m v1 + J omega, and is symmetric with respect to
-    Lambda^2 = sin(theta) sin(psi)^2 d theta d psi. Because the input is *minus* the incoming velocity, K composed with
-    itself is not the law of the next collision.
+    K maps *minus* the incoming velocity, w = cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi, to the
+    outgoing velocity. It maps theta by P~ and psi to pi - psi, and leaves the position unchanged. It conserves the
+    kinetic energy and the rolling momentum -m v1 + J omega, and is symmetric with respect to
+    Lambda^2 = sin(theta) sin(psi)^2 d theta d psi. Because of the minus sign, K composed with itself is not the law of
+    the next collision.
 
     Parameters
     ----------
     law : Law
-        P~, which is already the law of the *foreshortened* wall; `from_wall` foreshortens.
+        P~, the law of the *foreshortened* wall; `from_wall` foreshortens.
     disk : Disk
 
     Source: Rudzis 2022, Theorem 1.2 and eq. 1.27', 1.28' (sign of chi corrected).
@@ -108,7 +108,7 @@ class CollisionLaw:
         generator(rng)
         frame = np.asarray(self.disk.frame)
         along, up, roll = (self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame)
-        # angle and size of minus the incoming velocity in the plane of chi_perp and e2^; the fraction along chi stays
+        # angle and length of minus the incoming velocity in the plane of chi_perp and e2^; K leaves ``roll`` unchanged
         theta = np.arctan2(-up, -along)
         outgoing = self.law.sample(theta, rng)
         size = np.hypot(along, up)
@@ -116,7 +116,7 @@ class CollisionLaw:
         return np.asarray(sum(part[..., None] * direction for part, direction in zip(parts, frame, strict=True)))
 
     def apply(self, function: VelocityFunction, theta: ArrayLike, psi: ArrayLike) -> Floats:
-        """The operator: E[f(Theta', pi - psi) | theta, psi] for a vectorised f(theta, psi) that broadcasts.
+        """The expectation E[f(Theta', pi - psi) | theta, psi] for a vectorised function f(theta, psi) that broadcasts.
 
         ``theta`` and ``psi`` in (0, pi) are the angles of minus the incoming velocity; they broadcast.
         """
@@ -125,7 +125,7 @@ class CollisionLaw:
         psi_values, psi_index = np.unique(psi_all, return_inverse=True)
         rolled = np.pi - psi_values
         if theta_values.size * psi_values.size <= GRID_EXCESS * theta_all.size:
-            # a grid, or nearly: one call, with psi as a further axis of the function's values
+            # one call for the grid, with psi as an additional axis of the function's values
             grid = self.law.apply(lambda outgoing: function(outgoing[..., None], rolled), theta_values)
             return np.asarray(grid[theta_index, psi_index].reshape(theta_all.shape))
         value = np.empty(theta_all.shape)
@@ -135,18 +135,18 @@ class CollisionLaw:
         return value
 
     def branches(self, theta: ArrayLike) -> list[tuple[Floats, Floats]]:
-        """The law in the original coordinates, as a random choice among 3x3 matrices, for laws made of isometries.
+        """Probabilities and 3x3 velocity matrices of the branches of a law made of isometries.
 
         Parameters
         ----------
         theta : array_like
-            Angle of minus the incoming velocity, (0, pi).
+            Angle of minus the incoming velocity, in (0, pi), radians.
 
         Returns
         -------
         list of (probability, matrix)
-            Probability of shape ``theta.shape``, matrix of shape ``theta.shape + (3, 3)``; each matrix takes the
-            incoming (v1, v2, omega) to the outgoing one. Branches that have probability 0 everywhere are left out.
+            Probability of shape ``theta.shape``, matrix of shape ``theta.shape + (3, 3)``. Each matrix maps the
+            incoming (v1, v2, omega) to the outgoing one. Branches with probability 0 everywhere are omitted.
 
         Raises
         ------
@@ -162,10 +162,10 @@ class CollisionLaw:
         ]
 
     def operator(self, theta_basis: Basis, psi_basis: Basis, **discretisation: object) -> CollisionOperator:
-        """The matrix of K on products of two bases, as a lazy linear operator; it never forms the product.
+        """The matrix of K on a product of two bases, as a linear operator that never forms the product.
 
-        ``theta_basis`` is for sin(theta), ``psi_basis`` for sin(psi)^2 (``weight="sin2"``); further keywords go to
-        `discretise`.
+        ``theta_basis`` is for the weight sin(theta), ``psi_basis`` for sin(psi)^2 (``weight="sin2"``). Further keywords
+        are passed to `discretise`.
         """
         from ..discretisation.discretisation import discretise
         from .operator import CollisionOperator
@@ -175,9 +175,9 @@ class CollisionLaw:
     def symmetry_defect(
         self, theta_basis: Basis | None = None, psi_basis: Basis | None = None, **discretisation: object
     ) -> SymmetryDefect:
-        """How far K is from symmetric with respect to Lambda^2, measured on two bases.
+        """The asymmetry of K with respect to Lambda^2, measured on two bases.
 
-        By default polynomials of degree below 32 in cos theta and below 8 in cos psi.
+        The default bases are polynomials of degree below 32 in cos theta and below 8 in cos psi.
         """
         theta_basis = Legendre(DEFECT_SIZES[0]) if theta_basis is None else theta_basis
         psi_basis = Legendre(DEFECT_SIZES[1], weight="sin2") if psi_basis is None else psi_basis

@@ -1,4 +1,4 @@
-"""A picture of the outgoing angles of the true disk beside those of its limit law."""
+"""A plot of the outgoing angles of the true disk and of its limit law."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ...geometry import Disk, Wall
 
 COLOURS = ("#E69F00", "#0072B2", "#D55E00", "#009E73")
-# Points drawn of each sample: more would only darken the picture and swell its file.
+# Points drawn per sample.
 DRAWN = 1500
 
 
@@ -37,9 +37,9 @@ def draw_limit(
     ----------
     disk : Disk
     wall : Wall
-        Of segments and arcs.
+        A wall of segments and arcs.
     scales : array_like
-        eps, at most four.
+        Values of eps, at most four.
     angles : (float, float)
         Incoming (theta, psi), radians.
     rng : numpy.random.Generator
@@ -50,13 +50,13 @@ def draw_limit(
     Returns
     -------
     matplotlib Axes
-        Dots are the two angles; the dotted line is psi' = pi - psi. Lines, on the right axis, are the distribution
+        Dots show the two angles; the dotted line is psi' = pi - psi. Lines, on the right axis, are the distribution
         functions of theta'.
 
     Raises
     ------
     InputError
-        If there are more scales than colours that stay apart, or a number is unsuitable.
+        If there are more than four scales, or a number is out of range.
 
     Examples
     --------
@@ -92,6 +92,6 @@ def draw_limit(
     ax.set_xlabel("theta' (radians)")
     ax.set_ylabel("psi' (radians; dots)")
     right.set_ylabel("distribution function of theta' (lines)")
-    # distribution functions leave this corner free; the frame keeps words off dots
+    # distribution functions do not reach this corner; the frame separates the text from the dots
     right.legend(loc="lower right", fontsize="small", framealpha=0.9)
     return ax

@@ -1,4 +1,4 @@
-"""The collision law K on a product of bases in theta and psi, as a scipy LinearOperator that stays factored."""
+"""The collision law K on a product of bases in theta and psi, as a factored scipy LinearOperator."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 
 class CollisionOperator(LinearOperator):
-    """K = P~ (x) J_psi, symmetric with respect to Lambda^2 where P~ is symmetric.
+    """The operator K = P~ (x) J_psi, symmetric with respect to Lambda^2 if P~ is symmetric.
 
-    A vector holds coefficients in the orthonormal product basis e_i(theta) f_j(psi), the index of psi running fastest.
+    Vectors hold coefficients in the orthonormal product basis e_i(theta) f_j(psi); the index of psi runs fastest.
 
     Parameters
     ----------
@@ -51,9 +51,9 @@ class CollisionOperator(LinearOperator):
         return np.asarray(self.theta_matrix.symmetric.T @ self._split(vector) @ self.flip).ravel()
 
     def dense(self) -> Floats:
-        """The full matrix, shape (n, n) with n the product of the two sizes."""
+        """The full matrix, shape (n, n), where n is the product of the two sizes."""
         return np.asarray(np.kron(self.theta_matrix.symmetric, self.flip), dtype=np.float64)
 
     def symmetry_defect(self) -> SymmetryDefect:
-        """How far K is from symmetric with respect to Lambda^2: that of P~, because J_psi is exactly symmetric."""
+        """The asymmetry of K with respect to Lambda^2, equal to that of P~ because J_psi is exactly symmetric."""
         return self.theta_matrix.symmetry_defect()

@@ -1,4 +1,4 @@
-"""The true disk's collision as a random law of velocities: its position and angle are uniform."""
+"""The collision law of the true disk with random position and angle."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from ...core.errors import AccuracyError
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
 
-# Contacts that double precision does not settle are drawn again; they have probability zero but for rounding.
+# Draws of a position at most. Contacts that double precision cannot resolve are drawn again.
 MOST_DRAWS = 20
 
 
 @dataclass(frozen=True)
 class SatelliteLaw:
-    """K^{Sigma, eps} with x1 uniform over a cell and alpha over one spacing: what a collision looks like from afar.
+    """The collision law K^{Sigma, eps} of the true disk, with x1 uniform in a cell and alpha in one spacing.
 
     Parameters
     ----------
     wall : Wall
-        Of segments and arcs; not foreshortened, since the disk does that itself.
+        A wall of segments and arcs, not foreshortened.
     disk : Disk
     scale : float
         eps.
     spacing : float, optional
-        rho; by default that of `geometry.collide`.
+        rho; by default as in `geometry.collide`.
 
     Raises
     ------
     InputError
-        As `geometry.collide`.
+        As in `geometry.collide`.
 
     Examples
     --------
@@ -62,7 +62,7 @@ class SatelliteLaw:
         Raises
         ------
         AccuracyError
-            If some disk does not come back, whatever its position.
+            If a disk does not come back from the wall in 20 draws of its position.
         """
         from ...geometry import collide
 

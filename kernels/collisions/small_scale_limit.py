@@ -1,4 +1,4 @@
-"""The convergence of the true disk to its limit law: the distance of K^{Sigma, eps} from K as a function of eps."""
+"""The distance of the collision law of the true disk, K^{Sigma, eps}, from its limit K as a function of eps."""
 
 from __future__ import annotations
 
@@ -19,47 +19,45 @@ from ...core.rounding import EPS
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
 
-# A slope needs two points, and its error three.
+# A slope with an error needs three points.
 FEWEST_SCALES = 3
 COLUMNS = ("distance", "floor", "psi_defect", "two_satellites", "strays", "drift", "shift")
 
 
 @dataclass(frozen=True)
 class LimitStudy:
-    """Measured figures of one wall and one disk at several scales; each column has one entry a scale.
+    """Measured distances between the true disk and its limit law; each array has one entry per scale.
 
     Attributes
     ----------
     scales, spacings : array
         eps and rho.
     gap_fraction : array
-        2 delta_0/rho, the fraction of angles alpha at which two satellites can be below the tops (section 4.1): what
-        the paper's good set Z leaves out.
+        2 delta_0/rho, the fraction of angles alpha at which two satellites can be below the tops (section 4.1). The
+        paper's good set Z excludes these angles.
     distance : array
-        Wasserstein distance of the law of (theta', psi') from that of K, with the metric of the sum of both angles'
-        differences, averaged over incoming theta. As K's psi' is one number, this is the distance in theta' plus
-        E of the difference of psi' from pi - psi.
+        Wasserstein distance of the law of (theta', psi') from its limit under K, averaged over the incoming theta, for
+        the sum metric of both angles. It equals the distance in theta' plus ``psi_defect``.
     floor : array
-        What the same samples give for the distance in theta' of the cylinder law, which has no error: the part of
-        ``distance`` that is due to sampling is about that.
+        Distance in theta' of the cylinder law for the same samples, a measure of the sampling error of ``distance``.
     psi_defect : array
-        E of the absolute difference of psi' from pi - psi.
+        Mean of |psi' - (pi - psi)|.
     two_satellites : array
-        Share of collisions in which two satellites touch the wall.
-    strays : array
-        Share of collisions in which the modified law K~, the true collision in the coordinates of the cylinder, differs
-        from the cylinder's law by more than 0.1 in a unit velocity.
+        Fraction of collisions in which two satellites touch the wall.
+    outliers : array
+        Fraction of collisions in which the modified law K~ (the true collision in the coordinates of the cylinder)
+        differs from the cylinder law by more than 0.1 in a unit velocity.
     drift : array
-        E of the larger of the displacements of x1 and alpha between both times at height 0.
+        Mean of the larger displacement of x1 and alpha between the two times at height 0.
     shift : array
-        E[u u']/E[u^2] with u = -cos theta, less the same figure of the limit at the same incoming angles. The true
-        disk's correlation is <u, P~ u>/<u, u> plus this.
+        E[u u']/E[u^2] with u = -cos theta, minus the same ratio for the limit at the same incoming angles. The true
+        disk's correlation is <u, P~ u>/<u, u> plus ``shift``.
     errors : dict of arrays
         Standard errors of the seven columns above, from independent repetitions.
     seconds : array
         Processor time of the collisions.
     collisions : int
-        Their number at each scale.
+        Number of collisions at each scale.
     """
 
     scales: Floats
@@ -77,10 +75,10 @@ class LimitStudy:
     collisions: int
 
     def order(self, column: str, against: str = "scales") -> Estimate:
-        """The exponent p of column ~ against^p, fitted by least squares with weights.
+        """The exponent p of column ~ against^p, by weighted least squares.
 
-        The error is the half width of an interval of 95 %: where the points scatter about the line by more than their
-        sampling errors by that scatter, with Student's quantile, else by the sampling errors.
+        The error is the half width of a 95 % interval. It comes from the sampling errors, or, if the points scatter
+        about the line by more, from this scatter with Student's quantile.
 
         Parameters
         ----------
@@ -109,7 +107,7 @@ class LimitStudy:
         design = np.stack([x, np.ones_like(x)], axis=1) / spread[:, None]
         inverse = np.linalg.inv(design.T @ design)
         slope, offset = inverse @ design.T @ (y / spread)
-        # where the points scatter about the line by more than their sampling errors, the scatter counts
+        # scatter about the line, in units of the sampling errors
         excess = np.sum(((y - slope * x - offset) / spread) ** 2) / (len(x) - 2)
         standard_error = math.sqrt(float(inverse[0, 0]))
         by_scatter = student_95(len(x) - 1) * math.sqrt(float(excess)) if excess > 1.0 else 0.0
@@ -129,27 +127,27 @@ def limit_study(
     samples: tuple[int, int, int] = (16, 32, 32),
     repetitions: int = 4,
 ) -> LimitStudy:
-    """Collide true disks of random position and angle at each scale, and compare them with the limit law K.
+    """Collide true disks of random position and angle at several scales, and compare them with the limit law K.
 
     Parameters
     ----------
     disk : Disk
     wall : Wall
-        Of segments and arcs.
+        A wall of segments and arcs.
     scales : array_like, shape (n,)
-        eps, each greater than 0.
+        Values of eps > 0.
     rng : numpy.random.Generator
     psi : float
         Incoming psi in (0, pi), radians.
     spacing : callable, optional
-        rho as a function of eps; by default that of `geometry.collide`.
+        rho as a function of eps; by default as in `geometry.collide`.
     limit : Wall, optional
-        The wall whose foreshortened law the samples are compared with; by default ``wall``.
+        The wall whose foreshortened law is the limit; by default ``wall``.
     samples : (int, int, int)
-        Numbers of incoming angles theta, of disk angles alpha for each, and of positions x1 for each of these. All are
-        stratified: theta for sin(theta), alpha in one spacing, x1 in one cell.
+        Numbers of incoming angles theta, of disk angles alpha per theta, and of positions x1 per alpha. All are
+        stratified: theta with respect to sin(theta), alpha in one spacing, x1 in one cell.
     repetitions : int
-        Independent repetitions, at least 2, from which the standard errors come.
+        Independent repetitions for the standard errors, at least 2.
 
     Returns
     -------
@@ -158,7 +156,7 @@ def limit_study(
     Raises
     ------
     InputError
-        As `geometry.collide`, and for numbers out of range.
+        As in `geometry.collide`, and if a number is out of range.
 
     Source: Rudzis 2022, Theorem 5.1.
 
@@ -208,7 +206,7 @@ def _measured(
     samples: tuple[int, int, int],
     rng: np.random.Generator,
 ) -> tuple[list[float], float]:
-    """One repetition: the columns in the order of COLUMNS, and processor seconds."""
+    """The columns of one repetition in the order of COLUMNS, and the processor seconds."""
     from ...geometry import collide, collide_cylinder, collide_modified, trace
 
     scale, spacing = size
@@ -224,11 +222,11 @@ def _measured(
     spent = time.process_time() - begin
     outgoing, rolled = disk.to_angles(true.velocity)
     straight, _ = disk.to_angles(collide_cylinder(disk, target.unforeshorten(disk), scale, position, velocity).velocity)
-    # the same random numbers as straightened states
+    # the same samples in the coordinates of the cylinder
     modified = collide_modified(disk, wall, scale, position, velocity, spacing)
     cylinder = collide_cylinder(disk, wall, scale, position, velocity)
     per_angle = turns * starts
-    # the midpoints of equal parts of the cell: quantiles of the limit to the order of 1/per_angle
+    # midpoints of equal parts of the cell give quantiles of the limit, with an error of order 1/per_angle
     entry = target.period * (np.arange(per_angle) + 0.5) / per_angle
     limit = np.sort(trace(target, entry, theta[:, None]).theta, axis=1)
     shape = (angles, per_angle)
@@ -236,7 +234,7 @@ def _measured(
     away = float(np.mean(np.abs(np.sort(outgoing.reshape(shape), axis=1) - limit)))
     moved = np.abs(true.position - position).max(axis=1)
     differ = np.abs(modified.velocity - cylinder.velocity).max(axis=1) > 0.1
-    # E[u^2] = 1/3 for the measure sin(theta) d theta
+    # E[u^2] = 1/3 under sin(theta)/2 d theta
     shift = 3.0 * float(np.mean(u[:, None] * (np.cos(limit) - np.cos(outgoing.reshape(shape)))))
     columns = [
         away + psi_defect,
@@ -251,5 +249,5 @@ def _measured(
 
 
 def _strata(n: int, rng: np.random.Generator, shape: tuple[int, ...] = ()) -> Floats:
-    """``shape`` times n random numbers, one in each n-th of (0, 1)."""
+    """Stratified random numbers, shape ``shape + (n,)``: one in each of n equal parts of (0, 1)."""
     return np.asarray((np.arange(n) + rng.random((*shape, n))) / n)

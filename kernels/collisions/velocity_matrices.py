@@ -1,4 +1,4 @@
-"""Collision laws that are linear in the velocity (v1, v2, omega): smooth, no-slip, and any isometry in the angle."""
+"""Matrices of collision laws that are linear in the velocity (v1, v2, omega): smooth, no-slip, any isometry."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 
 
 def smooth_matrix(disk: Disk) -> Floats:
-    """A_smooth: the 3x3 matrix that reverses v2 and leaves v1 and omega.
+    """The 3x3 matrix A_smooth of a smooth collision, which reverses v2 and leaves v1 and omega unchanged.
 
-    It is K of specular reflection. Source: Rudzis 2022, eq. 2.25.
+    It is the law K of specular reflection. Source: Rudzis 2022, eq. 2.25.
 
     Examples
     --------
@@ -29,9 +29,9 @@ def smooth_matrix(disk: Disk) -> Floats:
 
 
 def no_slip_matrix(disk: Disk) -> Floats:
-    """A_no-slip = 2 chi chi^T - I in the kinetic-energy metric: reverses v2 and the slip v1 + omega.
+    """The 3x3 matrix A_no-slip = 2 chi chi^T - I (kinetic-energy metric), which reverses v2 and the slip v1 + omega.
 
-    It is K of retroreflection. Source: Rudzis 2022, eq. 2.25.
+    It is the law K of retroreflection. Source: Rudzis 2022, eq. 2.25.
 
     Examples
     --------
@@ -45,8 +45,8 @@ def no_slip_matrix(disk: Disk) -> Floats:
 def isometry_matrix(disk: Disk, sign: ArrayLike, offset: ArrayLike) -> Floats:
     """The velocity matrix of theta' = sign theta + offset, psi' = pi - psi; shape ``sign.shape + (3, 3)``.
 
-    It takes the true incoming velocity (v2 < 0) to the outgoing one, preserves the kinetic energy and the rolling
-    momentum -m v1 + J omega, and is what Rudzis 2022, section 2.3.2 leaves out for triangular teeth.
+    It maps the true incoming velocity (v2 < 0) to the outgoing one and preserves the kinetic energy and the rolling
+    momentum -m v1 + J omega. Rudzis 2022, section 2.3.2, omits it for triangular teeth.
     """
     sign, offset = np.broadcast_arrays(np.asarray(sign, dtype=np.float64), np.asarray(offset, dtype=np.float64))
     inner = np.zeros((*sign.shape, 3, 3))
