@@ -1,4 +1,4 @@
-"""Means of a function of the incoming and the outgoing angle, such as the resistance of a rough surface."""
+"""The mean of a function of the incoming and the outgoing angle, such as the resistance of a rough surface."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ from ..sampling.counts import half_width
 
 CostFunction = Callable[[Floats, Floats], Floats]
 
-# A smooth cost is replaced by polynomials of this degree on panels of this width: cos and sin to 1e-14.
+# The cost is replaced by polynomials of this degree on panels of this width; cos and sin have an error of 1e-14.
 DEGREE, WIDTH = 10, np.pi / 4.0
-# Panels are halved so often at most, until the cost is represented to the tolerance.
+# Largest number of halvings of the panels, until the cost is represented to the tolerance.
 MOST_HALVINGS = 3
-# The matrix may spend this fraction of the tolerance.
+# Fraction of the tolerance for the error of the matrix.
 MATRIX_FRACTION = 0.5
-# Angles a panel, at Gauss nodes of another rule, at which the polynomials are compared with the cost.
+# Angles per panel, at Gauss nodes of another rule, at which the polynomials are compared with the cost.
 PROBES = 17
 
 
 def air_resistance(theta: Floats, outgoing: Floats) -> Floats:
-    """(3/4)(1 + cos(theta' - theta)): Plakhov's cost, whose mean is 1 for a smooth surface.
+    """Plakhov's cost (3/4)(1 + cos(theta' - theta)), whose mean is 1 for a smooth surface.
 
     Examples
     --------
-    Retroreflection costs most.
+    Retroreflection has the largest cost.
 
     >>> float(air_resistance(np.array(1.25), np.array(1.25)))
     1.5
@@ -56,31 +56,31 @@ def resistance(
     incoming: AngleFunction | None = None,
     breakpoints: ArrayLike = (),
 ) -> Estimate:
-    r"""E[c(theta, theta')]: the mean resistance of a surface with the given law.
+    r"""The mean resistance E[c(theta, theta')] of a surface with the given law.
 
-    By default R = (3/4) E[1 + cos(theta' - theta)] with theta distributed as sin(theta)/2 d theta: the resistance of a
-    rough convex body that tumbles in a thin medium, as a fraction of that of the smooth body.
+    The default is R = (3/4) E[1 + cos(theta' - theta)] with theta distributed as sin(theta)/2 d theta: the resistance
+    of a tumbling rough convex body in a thin medium, relative to the smooth body.
 
     Parameters
     ----------
     law : Law
-        In the paper's convention.
+        A law in the paper's convention.
     tolerance : float
-        Wanted error. Of a wall of few pieces that has to be traced it takes at most some forty million flights of
-        rays, 5 to 15 seconds; ``error`` says what these have reached.
+        Wanted error. For a traced wall with few pieces the work is limited to some forty million ray segments, 5 to 15
+        seconds; ``error`` is the error reached.
     cost : callable
         ``cost(theta, theta_out)`` of two arrays that broadcast, radians; smooth between the breakpoints.
     incoming : callable, optional
-        Density of the incoming angles with respect to sin(theta)/2 d theta, vectorised; by default 1. It need not
-        have the integral 1.
+        Vectorised density of the incoming angles with respect to sin(theta)/2 d theta, by default 1. Its integral may
+        differ from 1.
     breakpoints : array_like, optional
         Angles in (0, pi) at which the cost or the density is not smooth.
 
     Returns
     -------
     Estimate
-        Its error has two parts: that of the law's matrix on `Panels`, and the distance of cost times density from
-        piecewise polynomials; the latter is measured at points between their nodes.
+        The error is the sum of the error of the law's matrix on `Panels` and of the distance of cost times density from
+        piecewise polynomials, measured between their nodes.
 
     Raises
     ------
@@ -89,8 +89,8 @@ def resistance(
 
     Notes
     -----
-    Where c(theta, theta') rho(theta) = sum_ij c_ij e_i(theta) e_j(theta') in an orthonormal basis, the mean is
-    sum_ij c_ij S_ij, S the matrix of the law. So every law has a resistance, by its best method and with its error.
+    If c(theta, theta') rho(theta) = sum_ij c_ij e_i(theta) e_j(theta') in an orthonormal basis, the mean is
+    sum_ij c_ij S_ij with the matrix S of the law.
 
     Source: A. Plakhov, "Billiards and two-dimensional problems of optimal resistance", Arch. Ration. Mech. Anal. 194
     (2009); Rudzis 2022, section 1.2.7.
@@ -114,7 +114,7 @@ def resistance(
         return value if incoming is None else value * finite_array("incoming", incoming(theta))
 
     if cost is air_resistance and incoming is None and not has_chain(law):
-        # three functions do, where a product of laws needs a basis that can be refined
+        # three functions suffice; a product of laws needs a basis that can be refined
         basis: Basis = Directions()
         coefficients, missed = _projected(weighted, basis)
     else:
@@ -128,7 +128,7 @@ def resistance(
 
 
 def _error(matrix: KernelMatrix, coefficients: Floats) -> float:
-    """The error of sum_ij c_ij S_ij: that of S by Cauchy and Schwarz, but what comes of rays by their own spread."""
+    """The error of sum_ij c_ij S_ij: from replicates for sampled rays, else from that of S by Cauchy and Schwarz."""
     size, parts = float(np.linalg.norm(coefficients)), len(matrix.replicates)
     if parts < 2:
         return size * float(matrix.error)
@@ -138,7 +138,7 @@ def _error(matrix: KernelMatrix, coefficients: Floats) -> float:
 
 
 def _represented(function: CostFunction, breakpoints: Floats, tolerance: float) -> tuple[Panels, Floats, float]:
-    """Panels, the coefficients of a function of two angles, and how far it is from its polynomials, in L^1 or sup."""
+    """Panels, the coefficients of a function of two angles on them, and the largest error of its polynomials."""
     inside = breakpoints[(breakpoints > 0.0) & (breakpoints < np.pi)]
     pieces = round(np.pi / WIDTH)
     for halving in range(MOST_HALVINGS + 1):

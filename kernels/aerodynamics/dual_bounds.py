@@ -1,4 +1,4 @@
-"""Bounds for the least mean of a cost over all symmetric laws, valid for the continuum and not only for a grid."""
+"""Bounds for the least mean of a cost over all symmetric laws of the continuum, not only of a grid."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from ..bases.measure import SINE, gauss_on_intervals
 
 CostFunction = Callable[[Floats, Floats], Floats]
 
-# Gauss nodes on a cell for means of an angle: rounding for the narrow cells of a grid.
+# Gauss nodes per cell for means of an angle; on the narrow cells of a grid the error is rounding.
 NODES = 8
-# Entries of a table held at a time.
+# Entries of a table in memory at a time.
 CHUNK = 2**22
 MOST_PIVOTS = 10**9
 
@@ -24,9 +24,9 @@ def dual_bound(potential: Floats, cost: CostFunction, curvature: float) -> float
     r"""A lower bound of E c(theta, theta') over all symmetric laws, from any potential on equally spaced angles.
 
     phi is the potential, linear between the nodes 0, h, ..., pi, and psi(y) = inf over x of c(x, y) - phi(x). Then
-    E c >= E phi + E psi for every coupling of sin(theta)/2 d theta with itself. For c with second derivatives at most
-    L in either variable, c(., y) - phi is above its least value at the nodes less L h^2/8; and psi, an infimum
-    of functions with second derivatives at most L, is above its chords less L h^2/8.
+    E c >= E phi + E psi for every coupling of sin(theta)/2 d theta with itself. Let L bound the second derivatives of c
+    in either variable. Then c(., y) - phi is at least its minimum at the nodes minus L h^2/8. Also psi, an infimum of
+    functions with second derivatives at most L, is at least its chords minus L h^2/8.
     """
     count = potential.size
     nodes = np.linspace(0.0, np.pi, count)
@@ -55,8 +55,8 @@ def hat_masses(nodes: Floats) -> Floats:
 def transport_plan(cost: CostFunction, cells: Bins, curvature: float) -> tuple[Floats, Floats, float]:
     """The optimal symmetric flux between cells, its potential at the edges, and an upper bound for the continuum.
 
-    Masses stand at the mean angles of the cells. Spread out uniformly and independently within its two cells, each
-    mass of the plan costs at most L/2 times the two variances more; that is a symmetric law of the continuum.
+    The masses are placed at the mean angles of the cells. Spreading each mass of the plan independently within its two
+    cells gives a symmetric law of the continuum and raises the cost by at most L/2 times the sum of the two variances.
     """
     import ot
 
@@ -71,5 +71,5 @@ def transport_plan(cost: CostFunction, cells: Bins, curvature: float) -> tuple[F
         raise AccuracyError(f"optimal transport: {log['warning']}", float("nan"))
     flux = 0.5 * (plan + plan.T)
     upper = float(np.sum(flux * table)) + curvature * float(weights @ variance)
-    # the duals of a symmetric problem may be averaged; between and beyond the means any continuation is allowed
+    # the duals of a symmetric problem may be averaged; any interpolation between the means is allowed
     return flux, np.interp(edges, mean, 0.5 * (log["u"] + log["v"])), upper

@@ -20,9 +20,9 @@ from ..matrices.matrix import KernelMatrix, frobenius_error
 from .drag import air_resistance
 from .dual_bounds import CostFunction, dual_bound, transport_plan
 
-# 3/4 of the second derivatives of the cosine, at most.
+# Bound of the second derivatives of the air resistance.
 AIR_CURVATURE = 0.75
-# Transport on a grid of n cells takes n^2 numbers of several arrays, and n^2 to n^3 steps: some seconds here.
+# Transport between n cells takes several arrays of n^2 numbers and n^2 to n^3 steps: a few seconds at this limit.
 MOST_CELLS = 2048
 # Rounding of sums of thousands of cosines.
 ROUNDING = 1e-14
@@ -35,11 +35,11 @@ class ExtremalResistance:
     Attributes
     ----------
     lower, upper : float
-        Bounds of the extremum over all symmetric laws, not only those of a grid, to rounding.
+        Bounds of the extremum over all symmetric laws of the continuum, to rounding.
     plan : KernelMatrix
-        The optimal law, or one within the bounds, on bins.
+        The optimal law, or a law within the bounds, on bins.
     law : Law
-        The law of the plan: in closed form for the resistance, else piecewise uniform.
+        The law of the plan, in closed form for the air resistance, else piecewise uniform.
     """
 
     lower: float
@@ -49,7 +49,7 @@ class ExtremalResistance:
 
     @property
     def value(self) -> Estimate:
-        """The middle between the bounds."""
+        """The midpoint of the bounds, with half of their distance as error."""
         half = 0.5 * (self.upper - self.lower)
         return Estimate(self.lower + half, half, "bound", "primal and dual of optimal transport")
 
@@ -72,13 +72,13 @@ def extremal_resistance(
     Parameters
     ----------
     n : int
-        Cells of the grid on which bounds are computed, at least 8; the gap between the bounds falls like n^-2. For a
-        cost of one's own at most 2048, and that takes some seconds.
+        Cells of the grid on which bounds are computed, at least 8; the gap between the bounds decreases like n^-2. With
+        ``cost`` at most 2048, which takes a few seconds.
     which : {"min", "max"}
     cost : callable, optional
-        Symmetric ``cost(theta, theta_out)`` of two arrays that broadcast; by default that of `resistance`.
+        Symmetric ``cost(theta, theta_out)`` of two arrays that broadcast; by default `air_resistance`.
     curvature : float
-        With a cost of one's own: a bound for the moduli of its second derivatives in either variable.
+        Required with ``cost``: a bound of the moduli of its second derivatives in either variable.
 
     Returns
     -------
@@ -91,11 +91,11 @@ def extremal_resistance(
 
     Notes
     -----
-    The problem is optimal transport of sin(theta)/2 d theta to itself; symmetry costs nothing, since a plan may be
-    averaged with its transpose. The bounds come from weak duality: a law is an upper bound of a minimum, a pair of
-    potentials a lower one. For the resistance both are known in closed form (`LeastResistanceLaw`, retroreflection)
-    and only the inequality between potential and cost is checked on the grid, with what may happen between its
-    points. For other costs both come from the network simplex method of POT.
+    The problem is optimal transport of sin(theta)/2 d theta to itself. Symmetry is no restriction, since a plan may be
+    averaged with its transpose. The bounds come from weak duality: a law gives an upper bound of a minimum, a pair of
+    potentials a lower bound. For the air resistance both have closed forms (`LeastResistanceLaw`, retroreflection), and
+    the grid serves to verify the inequality between potential and cost, also between its points. For other costs both
+    come from the network simplex method of POT.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def extremal_resistance(
         # cos <= 1, and retroreflection attains it
         return ExtremalResistance(1.5, 1.5, discretise(retroreflection(), Bins(n)), retroreflection())
     law = LeastResistanceLaw()
-    # the potential of 1 + cos is that of cos and half of the 1 for each of the two angles
+    # the potential of 1 + cos is the potential of cos plus 1/2 for each of the two angles
     potential = 0.75 * (0.5 + law.potential(np.linspace(0.0, np.pi, n + 1)))
     lower = dual_bound(potential, air_resistance, AIR_CURVATURE) - ROUNDING
     return ExtremalResistance(lower, 0.75 * (1.0 + law.mean_cosine) + ROUNDING, discretise(law, Bins(n)), law)

@@ -1,4 +1,4 @@
-"""A convex body that reflects by the law of a rough wall: its scattering law and its resistance."""
+"""The scattering law and the resistance of a convex body with a rough boundary."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..laws.law import Law
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score
 from .drag import resistance
 
-# Boundary elements of a smooth body: means over all directions converge geometrically, those of one direction, where
-# half of the boundary is in the shade, like their number to the power -2.
+# Boundary elements of a smooth body. Means over all directions converge geometrically in their number n. The force for
+# one direction, with half of the boundary in the shade, converges like n^-2.
 ELEMENTS = 720
-# Directions told apart by the test of symmetry.
+# Bins of directions in the test of symmetry.
 DIRECTION_BINS = 24
 # The measure sin(theta) d theta has the mass 2.
 SINE_MASS = 2.0
@@ -29,12 +29,12 @@ DirectionCost = Callable[[Floats, Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class RoughBody:
-    r"""A convex body in the plane with a rough boundary: elements of its boundary, and the law by which they reflect.
+    r"""A convex body in the plane with a rough boundary, given by boundary elements and their reflection law.
 
     A particle with velocity -u that meets an element with outer normal n leaves with velocity u'. The scattering law
     is the measure nu(du du' dn) on triples of directions: the length of the boundary with this normal, times
-    (u . n)_+ du, times the law P~ of u' given u in the frame of the element. It is symmetric in u and u', as the law
-    of every wall is.
+    (u . n)_+ du, times the law P~ of u' given u in the frame of the element. It is symmetric in u and u' if P~ is
+    reversible, as for every wall.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class RoughBody:
     lengths : array_like, shape (elements,)
         Lengths of the elements.
     law : Law
-        In the paper's convention; of a wall much finer than the body.
+        P~, in the paper's convention, for example of a wall much finer than the body.
 
     Raises
     ------
@@ -87,12 +87,12 @@ class RoughBody:
 
     @classmethod
     def disk(cls, law: Law, radius: float = 1.0) -> RoughBody:
-        """A disk."""
+        """A disk of the given radius."""
         return cls.ellipse(law, radius, radius)
 
     @classmethod
     def ellipse(cls, law: Law, a: float, b: float) -> RoughBody:
-        """An ellipse with the semi-axes a, along x1, and b."""
+        """An ellipse with the semi-axes a (along x1) and b."""
         a, b = positive_number("a", a), positive_number("b", b)
         normals = 2.0 * np.pi * (np.arange(ELEMENTS) + 0.5) / ELEMENTS
         radii = (a * b) ** 2 / np.hypot(a * np.cos(normals), b * np.sin(normals)) ** 3
@@ -100,7 +100,7 @@ class RoughBody:
 
     @classmethod
     def polygon(cls, law: Law, vertices: ArrayLike) -> RoughBody:
-        """A convex polygon, its vertices against the clock, shape (n, 2)."""
+        """A convex polygon with counterclockwise vertices, shape (n, 2)."""
         points = finite_array("vertices", vertices)
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 3:
             raise InputError(f"vertices: expected at least three points, got shape {points.shape}")
@@ -118,8 +118,7 @@ class RoughBody:
     def resistance(self, tolerance: float = 1e-8, *, cost: DirectionCost | None = None) -> Estimate:
         r"""The integral of c(u, u') against nu; ``cost(u, v)`` of two directions in radians, by default 1 + u . u'.
 
-        With the default it is 8/3 times the perimeter times the resistance of the law, whatever the shape: only the
-        law matters to a body that tumbles.
+        The default gives 8/3 times the perimeter times the resistance of the law, for a body of any shape.
         """
         if cost is None:
             found = resistance(self.law, tolerance)
@@ -138,16 +137,16 @@ class RoughBody:
         return _scaled(found, SINE_MASS * self.perimeter)
 
     def force(self, direction: float) -> Floats:
-        """The force of a stream of particles with velocity -u on the body, as components along -u and across it.
+        """The force on the body of a stream of particles with velocity -u, as components along and across -u.
 
-        In units of the stream's momentum flux; u has the angle ``direction``. The force across is positive to the
-        left of the stream. It is the sum over the boundary elements, for a smooth body of 720 of them.
+        The unit is the stream's momentum flux; u has the angle ``direction``, radians. The component across is positive
+        to the left of the stream. The force is a sum over the boundary elements; a smooth body has 720 of them.
         """
         theta = finite_number("direction", direction) - self.normals + 0.5 * np.pi
         theta = np.mod(theta, 2.0 * np.pi)
         lit = (theta > 0.0) & (theta < np.pi)
         incoming = theta[lit]
-        # momentum given to the body by a particle: -u - u', with -u along the stream
+        # a particle transfers the momentum -u - u' to the body; the stream has the direction -u
         along = 1.0 + self.law.apply(lambda out: np.cos(out), incoming) * np.cos(incoming)
         along += self.law.apply(lambda out: np.sin(out), incoming) * np.sin(incoming)
         across = self.law.apply(lambda out: np.sin(out), incoming) * np.cos(incoming)
@@ -156,7 +155,7 @@ class RoughBody:
         return np.array([flux @ along, flux @ across])
 
     def sample(self, n: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-        """Directions u, u' and n of ``n`` independent triples drawn from nu, divided by its mass, in [0, 2 pi)."""
+        """Directions u, u' and normals in [0, 2 pi) of ``n`` independent triples drawn from the normalised nu."""
         whole_number("n", n, 1)
         source = generator(rng)
         normal = self.normals[source.choice(self.normals.size, size=n, p=self.lengths / self.perimeter)]
@@ -167,7 +166,7 @@ class RoughBody:
         return u, v, np.mod(normal, 2.0 * np.pi)
 
     def symmetry_defect(self, n: int, rng: np.random.Generator) -> SymmetryDefect:
-        """How far nu is from symmetric in u and u', from ``n`` samples, with the z-score of the difference."""
+        """The asymmetry of nu in u and u' from ``n`` samples, with the z-score of the difference."""
         u, v, _ = self.sample(n, rng)
         scale = DIRECTION_BINS / (2.0 * np.pi)
         row, column = (np.minimum((angle * scale).astype(np.int64), DIRECTION_BINS - 1) for angle in (u, v))

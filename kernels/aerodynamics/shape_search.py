@@ -1,4 +1,4 @@
-"""The wall of a family with the least or the greatest resistance."""
+"""The member of a family of walls with the least or the greatest resistance."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ class BestHollow:
     Attributes
     ----------
     parameters : ndarray, shape (parameters,)
-        Those of the best member found.
+        Parameters of the best member found.
     member : Wall or Law
-        That member.
+        The best member found.
     resistance : Estimate
-        Its resistance; the error says nothing about better members that the grid missed.
+        Its resistance. The error does not cover better members missed by the grid.
     tried : ndarray, shape (members, parameters + 1)
-        All parameters tried, in order, with the resistance of each.
+        All parameters tried, in order, each with its resistance.
     """
 
     parameters: Floats
@@ -45,20 +45,20 @@ def best_hollow(
     tolerance: float = 1e-6,
     grid: int = GRID,
 ) -> BestHollow:
-    """The member of a family of walls, or laws, with the least or greatest resistance.
+    """Find the member of a family of walls or laws with the least or greatest resistance.
 
     Parameters
     ----------
     family : callable
-        ``family(*parameters)`` returns a wall or a law: ``geo.triangular_teeth``, ``ker.CircularArcLaw``.
+        ``family(*parameters)`` returns a wall or a law, for example ``geo.triangular_teeth`` or ``ker.CircularArcLaw``.
     bounds : sequence of (float, float)
-        Smallest and largest value of each parameter; the ends themselves are not tried on the grid.
+        Smallest and largest value of each parameter; the grid excludes these values.
     which : {"min", "max"}
     tolerance : float
-        Wanted error of the extremal resistance. At an extremum inside the bounds the parameters are good to about its
-        square root only.
+        Wanted error of the extremal resistance. The error of the parameters at an interior extremum is about its square
+        root.
     grid : int
-        Members in each parameter among which the search starts. Resistances need not have a single extremum.
+        Number of values of each parameter on the starting grid; resistances may have several extrema.
 
     Returns
     -------
@@ -71,11 +71,11 @@ def best_hollow(
 
     See Also
     --------
-    design_wall : The same search for other wishes, and within limits.
+    design_wall : The same search for other quantities, also with constraints.
 
     Examples
     --------
-    The best isosceles triangles are a little sharper than right-angled ones, which have sqrt(2).
+    The best isosceles triangles are slightly sharper than right-angled ones, whose resistance is sqrt(2).
 
     >>> from asperity import kernels as ker
     >>> best = best_hollow(ker.TriangularTeethLaw, [(0.2, 3.0)])
