@@ -1,7 +1,6 @@
-"""Spectra and gaps of reflection laws, and what follows from them, with errors that can be quoted.
+"""Spectra and spectral gaps of reflection laws, and their consequences, with errors.
 
-Names are imported when they are first used, so that ``import asperity`` stays quick; the stub beside this file says
-where each one is at home.
+Names are imported on first use, so ``import asperity`` is quick. The stub beside this file lists their modules.
 """
 
 import lazy_loader

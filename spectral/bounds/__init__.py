@@ -1,1 +1,1 @@
-"""Intervals that hold eigenvalues of a law itself, and the trial functions, residuals and norms behind them."""
+"""Intervals that contain eigenvalues of a law, and the trial functions, residuals and norms behind them."""

@@ -1,4 +1,4 @@
-"""Laws that are not self-adjoint in their convention: the reason, and their norm on functions of mean 0."""
+"""The reason why a law is not self-adjoint in its convention, and its norm on functions of mean 0."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from ...kernels import Law
 from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.laws.structure import lists_branches
 
-# Angles at which the law is compared with its mirror image, and the difference of two means of cos(theta') that is
-# beyond the errors of exact rows.
+# Angles at which the law is compared with its mirror image, and the difference of two means of cos(theta') that exceeds
+# their errors.
 COMPARED, DIFFERENT = np.array([0.4, 0.8, 1.2]), 1e-6
 
 
 def self_adjoint_elsewhere(law: Law) -> Law | None:
-    """The law in the other convention where it is self-adjoint there and not known to be so in its own; else None.
+    """The law in the other convention, if it is self-adjoint there and not known to be so in its own; else None.
 
     Examples
     --------
@@ -31,11 +31,12 @@ def self_adjoint_elsewhere(law: Law) -> Law | None:
 
 
 def refuse_unless_self_adjoint(law: Law) -> None:
-    """Raise an AccuracyError, with what is true, where a law is known not to be reversible or only in the other frame.
+    """Raise an AccuracyError if a law is not reversible or is reversible in the other frame only.
 
     Raises
     ------
     AccuracyError
+        The message states the bounds that hold nevertheless.
     """
     other = self_adjoint_elsewhere(law)
     if other is not None:
@@ -53,12 +54,12 @@ def refuse_unless_self_adjoint(law: Law) -> None:
 
 
 def why_not_self_adjoint(other: Law) -> str:
-    """Why P J is not self-adjoint for a self-adjoint P, or that it is not known to be."""
+    """The reason, in words, why P J is not (or not known to be) self-adjoint for a self-adjoint P."""
     if lists_branches(other) or other.expectations(ONE_PANEL).has_errors:
         try:
             here, there = (other.apply(np.cos, angle) for angle in (COMPARED, np.pi - COMPARED))
         except InputError:
-            # too many branches for a glance
+            # too many branches
             return _unknown(other)
         worst = int(np.argmax(np.abs(here + there)))
         if abs(here[worst] + there[worst]) > DIFFERENT:
@@ -71,7 +72,7 @@ def why_not_self_adjoint(other: Law) -> str:
 
 
 def what_is_true() -> str:
-    """The contraction of functions of mean 0 by P J."""
+    """The statement, in words, on the norm of P J on functions of mean 0."""
     return (
         "J is unitary and keeps the constants, so on functions f of mean 0 the norm of P J is the slem of P: "
         "||P J f|| <= slem ||f||, the best constant for one step, and the spectrum off the constants lies in the disk "

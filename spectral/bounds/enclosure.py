@@ -1,4 +1,4 @@
-"""Intervals that hold eigenvalues of a law itself, each with the reason for its claim."""
+"""Intervals that contain eigenvalues of a law (not of a matrix), each with its justification."""
 
 from __future__ import annotations
 
@@ -29,42 +29,42 @@ from .trial_space import adapted_trial_space
 
 Label = Literal["indexed", "contains-spectrum"]
 
-# Trial functions beyond those asked for: the first ones of them show what comes next.
+# Size of the Legendre basis: at least LEAST_DEGREE and 2 k + MORE_DEGREES. EXTRA more functions show the next values.
 LEAST_DEGREE, MORE_DEGREES, EXTRA = 32, 12, 2
 MATRIX_TOLERANCE = 1e-8
-# The squared residuals of adapted trial functions, and the errors of their quotients, may take this fraction of an
-# enclosure each. Rows that may be spent on the quotients: where they are traced, and where they have a closed form.
+# Fraction of the width of an enclosure for squared residuals, and for errors of quotients, of adapted trial functions;
+# limits on the incoming angles for the quotients, for traced laws and for closed forms.
 TRIAL_FRACTION, MOST_TRACED_ANGLES, MOST_EXACT_ANGLES = 0.3, 4_000, 40_000
-# Rounding of a Rayleigh quotient: sums of some hundred products each, in pairs.
+# Rounding of a Rayleigh quotient, a pairwise sum of some hundred products.
 QUOTIENT_ROUNDING = 4.0 * EPS
-# Laws whose images of polynomials are found to rounding.
+# Laws whose images of polynomials are computed to rounding.
 ROUNDED = (HenyeyGreensteinLaw, LambertianLaw)
 
 
 @dataclass(frozen=True)
 class Enclosure:
-    """An interval with spectrum of a law in it.
+    """An interval that contains a point of the spectrum of a law.
 
     Attributes
     ----------
     value : float
-        The Rayleigh quotient of the trial function.
+        The Rayleigh quotient rho of the trial function v.
     low, high : float
-        The interval.
+        The ends of the interval.
     label : {"indexed", "contains-spectrum"}
-        ``"indexed"``: as many eigenvalues of the law as there are enclosures whose moduli overlap this one's lie in
-        their union, and it is known how many are larger: ``index`` counts the eigenvalues by modulus, the constants' is
-        0. Which of those that overlap is larger is not known; ``reason`` says so.
-        ``"contains-spectrum"``: some point of the spectrum is in the interval, nothing more.
+        ``"indexed"``: the interval contains the eigenvalue number ``index``. If the moduli of m enclosures overlap,
+        their union contains m eigenvalues, in unknown order; ``reason`` lists the others.
+        ``"contains-spectrum"``: the interval contains a point of the spectrum, with unknown index.
     index : int or None
+        Number of the eigenvalue by decreasing modulus; the constants have index 0.
     residual : float
         ||P v - rho v||.
     kind : {"bound", "estimate"}
-        ``"bound"``: to rounding; ``"estimate"`` where a quadrature or the separation is estimated.
+        ``"bound"`` holds to rounding; ``"estimate"`` if a quadrature or the separation is estimated.
     reason : str
-        What the label rests on, or why the eigenvalue could not be indexed.
+        The justification of the label, or the reason for an unknown index.
     parity : {"even", "odd", "none"}
-        Of the trial function under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric.
+        Parity of the trial function under theta -> pi - theta; "none" if the law is not known to be mirror-symmetric.
     """
 
     value: float
@@ -79,7 +79,7 @@ class Enclosure:
 
     @property
     def width(self) -> float:
-        """``high - low``."""
+        """The width ``high - low`` of the interval."""
         return self.high - self.low
 
     def __contains__(self, number: float) -> bool:
@@ -93,13 +93,13 @@ class Enclosure:
 
 @dataclass(frozen=True)
 class Enclosures:
-    """Enclosures in the order of their values, descending; iterate over it or index it.
+    """Enclosures, with the one of the constants first and the others by decreasing value; a sequence.
 
     Attributes
     ----------
     items : tuple of Enclosure
     separation : Separation
-        What the indices rest on.
+        Bound of the rest of the spectrum, which justifies the indices.
     convention : {"paper", "specular"}
     method : str
     """
@@ -125,20 +125,20 @@ class Enclosures:
 def enclosures(
     law: Law | CollisionLaw, k: int = 4, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
 ) -> Enclosures:
-    r"""Enclose the k eigenvalues of largest modulus of a reversible law: of the operator, not of a matrix.
+    r"""Enclose the k eigenvalues of largest modulus of a reversible law (the operator, not a matrix).
 
     Parameters
     ----------
     law : Law or CollisionLaw
-        Reversible, in the convention that it carries; of a collision law its P~.
+        A reversible law, in its own convention; for a collision law its P~.
     k : int
-        Number of eigenvalues, the constants' included.
+        Number of eigenvalues, including the eigenvalue 1 of the constants.
     basis : Basis, optional
-        Where the trial functions are sought. By default panels that adapt to the law, for walls, arcs, Lambertian
-        reflection and sums of these; Legendre polynomials for other laws.
+        Basis of the trial functions. The default is panels that adapt to the law for walls, arcs, Lambertian reflection
+        and sums of these, and Legendre polynomials for other laws.
     tolerance : float
-        Wanted half width of the enclosures, where the panels adapt; else the wanted Frobenius error of the matrix that
-        gives the trial functions. It makes them better, not truer.
+        Wanted half width of the enclosures on adaptive panels, otherwise the wanted Frobenius error of the matrix that
+        yields the trial functions. It affects the width of the enclosures, not their validity.
 
     Returns
     -------
@@ -147,19 +147,19 @@ def enclosures(
     Raises
     ------
     InputError
-        If the errors of the means that `apply` gives are not known: of compositions with laws whose means are integrals
-        by quadrature, of walls of more than 64 pieces, of a user's law that does not promise to be exact
-        (``exact_apply``). Or if a scattering in a composition is too near to a mirror.
+        If the errors of conditional expectations are unknown: for compositions with laws whose expectations are
+        computed by quadrature, walls with more than 64 pieces, and user-defined laws without ``exact_apply``. Also if
+        the phase function of a scattering in a composition is too concentrated.
     AccuracyError
-        If the law is not symmetric within its error. Of a law that is self-adjoint in the other convention only, the
-        message says what is true in this one.
+        If the law is not symmetric within its error. If the law is self-adjoint in the other convention only, the
+        message states the norm bound that holds in this one.
 
     Notes
     -----
-    For a unit vector v with quotient rho and residual r, [rho - r, rho + r] meets the spectrum. If all of the spectrum
-    but m listed points has a modulus of at most s, and the m intervals widened by the joint residual stay beyond s,
-    then they hold m eigenvalues in order of their trial functions (Kahan), and the Kato-Temple bound
-    r^2/(distance to the rest of the spectrum) replaces r. The quadratures' own errors are in r and in rho.
+    For a unit vector v with quotient rho and residual r, [rho - r, rho + r] meets the spectrum. Suppose all of the
+    spectrum except m points has modulus at most s, and the m intervals, widened by the joint residual, stay beyond s.
+    Then they contain m eigenvalues in the order of their trial functions (Kahan), and the Kato-Temple bound
+    r^2/(distance to the rest of the spectrum) replaces r. The errors of the quadratures are included in r and rho.
 
     Source: B. N. Parlett, *The Symmetric Eigenvalue Problem* (1980), sections 10.5 and 11.5; T. Kato, J. Phys. Soc.
     Japan 4 (1949) 334.
@@ -183,7 +183,7 @@ def enclosures(
     if words is not None:
         only = next(iter(words)) if len(words) == 1 else ()
         if len(only) == 1 and isinstance(only[0], DensityLaw):
-            # a product of scatterings is one scattering
+            # a product of HG laws is one HG law
             return replace(enclosures(only[0], k, basis, tolerance), convention=law.frame)
         if basis is None:
             return _of_scattered(scattered_spectrum(law, words, k, tolerance), law.frame)
@@ -195,7 +195,7 @@ def enclosures(
 
 @dataclass(frozen=True)
 class EnclosedTrialSpace:
-    """Enclosures with their trial functions, coefficients in ``basis``, shape (n, k)."""
+    """Enclosures with their trial functions; ``vectors``, shape (n, k), holds coefficients in ``basis``."""
 
     enclosures: Enclosures
     basis: Basis
@@ -208,19 +208,19 @@ class EnclosedTrialSpace:
 
     @property
     def indexed(self) -> bool:
-        """Whether all are."""
+        """Whether all enclosures are indexed."""
         return all(item.label == "indexed" for item in self.enclosures)
 
 
 def enclosed_trial_space(
     law: Law, k: int, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
 ) -> EnclosedTrialSpace:
-    """`enclosures` of a law that is self-adjoint, with the trial functions."""
+    """The result of `enclosures` for a self-adjoint law, with the trial functions."""
     known = law.expectations(ONE_PANEL) if basis is None else None
     if known is not None and known.has_errors:
         space = adapted_trial_space(law, k, TRIAL_FRACTION * tolerance)
         basis, values, vectors, names = space.basis, space.values, space.vectors, space.parities
-        # rows are what costs: the functions that come next are looked at in the same ones
+        # conditional expectations dominate the cost, so the following functions use the same incoming angles
         both = residuals(
             law, basis, np.column_stack([vectors, space.following]), np.append(values, space.following_values),
             MOST_TRACED_ANGLES if known.is_traced else MOST_EXACT_ANGLES,
@@ -236,14 +236,14 @@ def enclosed_trial_space(
     order = np.argsort(-np.abs(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value)
     method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.angles_used} rows"
-    # images by quadratures that follow them to rounding, or by sums; else the difference of two rules is an estimate
+    # exact if images are computed to rounding or by sums; otherwise the difference of two rules estimates their errors
     exact = isinstance(law, ROUNDED if isinstance(basis, Legendre) else MatrixLaw)
     items = [_enclosed(found, apart, order, position, names, exact) for position in range(len(values))]
     return EnclosedTrialSpace(Enclosures(_with_ties(items), apart[1], law.frame, method), basis, vectors)
 
 
 def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
-    """With a word in the reason where the moduli of indexed enclosures overlap: their order is not known."""
+    """Add to the reason of an indexed enclosure the indices whose moduli overlap, because their order is unknown."""
     listed = []
     for item in items:
         others = [other for other in items if other is not item and other.index is not None]
@@ -254,15 +254,15 @@ def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
 
 
 def _moduli_overlap(one: Enclosure, other: Enclosure) -> bool:
-    # of an interval [a, b] the moduli run from max(a, -b, 0) to max(-a, b)
+    # the moduli in [a, b] range from max(a, -b, 0) to max(-a, b)
     least = max(max(item.low, -item.high, 0.0) for item in (one, other))
     return least <= min(max(-item.low, item.high) for item in (one, other))
 
 
 def as_power(law: Law) -> tuple[Law, int] | None:
-    """The law and the exponent of a power, also of one written as a product; None where powers tell nothing.
+    """Base and exponent of a power of a law, also if written as a product, or None.
 
-    A first power is one, so that ``law ** 1`` has all that is known of the law.
+    ``law ** 1`` counts as a power. None is returned for other laws, irreversible bases and laws made of isometries.
 
     Examples
     --------
@@ -281,13 +281,13 @@ def as_power(law: Law) -> tuple[Law, int] | None:
 
 
 def _raised(found: Enclosures, exponent: int) -> Enclosures:
-    """Enclosures of the eigenvalues of a power, in order of their values."""
+    """Enclosures of the eigenvalues of a power, by decreasing value."""
     items = []
     for item in found:
         ends = [item.low**exponent, item.high**exponent]
         if exponent % 2 == 0 and item.low < 0.0 < item.high:
             ends.append(0.0)
-        # lambda^n - rho^n is lambda - rho times a sum of products, in which lambda may be any of the spectrum
+        # lambda^n - rho^n is lambda - rho times a sum of products, for any lambda in the spectrum
         slope = sum(min(abs(item.value), 1.0) ** degree for degree in range(exponent))
         items.append(
             replace(
@@ -305,7 +305,7 @@ def _raised(found: Enclosures, exponent: int) -> Enclosures:
 
 
 def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:
-    """Enclosures from eigenvalues of a matrix that the law is near to."""
+    """Enclosures from the eigenvalues of a matrix close to the law in norm."""
     reason = f"the law is a matrix in {found.degrees} Legendre polynomials within {found.distance:.2g}"
     if found.essential > 0.0:
         reason += f", beyond them the essential spectrum of modulus {found.essential:.6g}"
@@ -327,7 +327,7 @@ def _of_scattered(found: ScatteredSpectrum, convention: str) -> Enclosures:
 def _first_that_separates(
     law: Law, found: Residuals, order: NDArray[np.intp], next_value: float
 ) -> tuple[int, Separation]:
-    """The largest number of leading values that the rest of the spectrum stays away from, and why it does."""
+    """The largest number of leading values separated from the rest of the spectrum, and the bound of this rest."""
     modulus = np.abs(found.quotients[order])
     following = np.append((modulus + found.norms[order])[1:], next_value)
     refused: Separation | None = None
@@ -335,7 +335,7 @@ def _first_that_separates(
         listed = found.quotients[order[:number]]
         joint = float(np.linalg.norm(found.norms[order[:number]]))
         if modulus[number - 1] - joint <= following[number - 1] and number > 1:
-            # the next trial function itself is not apart: a multiple value, or one that is not resolved
+            # the next trial function overlaps: a multiple or unresolved eigenvalue
             continue
         apart = rest_of_spectrum(law, listed, joint, float(following[number - 1]))
         if modulus[number - 1] - joint > apart.radius:
@@ -345,7 +345,7 @@ def _first_that_separates(
 
 
 def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Floats, tuple[Parity, ...], float]:
-    """Pairs of largest modulus, descending, constants first, with their parities; what comes next with its residual."""
+    """Eigenpairs of largest modulus, constants first, then descending; their parities; modulus reached by the next."""
     symmetric = _galerkin(law, basis, tolerance)
     constant = np.asarray(basis.constant)
     found, names = extremal_by_parity(symmetric, parity_basis(basis, law), constant, len(symmetric), "largest")
@@ -363,13 +363,13 @@ def _trial(law: Law, basis: Basis, k: int, tolerance: float) -> tuple[Floats, Fl
 
 
 def _reach(after: Residuals) -> float:
-    """Up to what modulus the intervals of these functions reach."""
+    """The largest modulus in the intervals of these functions."""
     return float(np.max(np.abs(after.quotients) + after.norms))
 
 
 def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
     if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
-        # a density may have a peak that no product rule sees; its rows have panels of their own
+        # a product rule may miss a peak of the density; the conditional distributions have adapted panels
         angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval)
         image, _ = image_rule(law, basis, np.eye(basis.size))(angle, tolerance)
         symmetric = basis.evaluate(angle).T @ (weight[:, None] * image)
@@ -394,7 +394,7 @@ def _enclosed(
     if rank == 0 and position == 0 and number:
         return Enclosure(1.0, 1.0, 1.0, "indexed", 0, norm, apart.kind, f"P 1 = 1; {apart.reason}", own)
     if rank < number:
-        # the law maps even functions to even ones and odd ones to odd ones: neighbours are those of the same parity
+        # the law preserves parity, so only enclosures of the same parity are neighbours
         alike = np.array([other for other in order[:number] if names[other] == own], dtype=np.intp)
         low, high = _temple(found, apart.radius, alike, position)
         kind: ErrorKind = "bound" if exact and apart.kind == "bound" else "estimate"
@@ -409,7 +409,7 @@ def _enclosed(
 
 
 def _temple(found: Residuals, rest: float, listed: NDArray[np.intp], position: int) -> tuple[float, float]:
-    """Kato-Temple on both sides, with the distances to the neighbouring enclosures or to the rest."""
+    """The Kato-Temple interval, from the distances to neighbouring enclosures or to the rest of the spectrum."""
     doubt = found.quotient_errors + QUOTIENT_ROUNDING
     radius = found.norms + doubt
     value, norm = found.quotients[position], found.norms[position]

@@ -1,4 +1,4 @@
-"""Residuals of trial functions under the law itself, not under its matrix."""
+"""Residuals of trial functions under the law (not under its matrix)."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from ...kernels.laws.structure import Rules, fold, holds_of_all
 from ...kernels.walls.circular_arc import MOST_HITS
 from ...kernels.walls.words import law_of, words_of
 
-# Squared residuals are wanted to this fraction of themselves, in at most MOST_ROWS rows of the law.
+# Wanted relative error of squared residuals, limit on the incoming angles, and least width of a panel.
 FRACTION, MOST_ANGLES, NARROWEST = 0.1, 900, 1e-9
-# Rows held at a time for few functions, and how many functions are few.
+# Angles per block for up to FEW_FUNCTIONS functions.
 CHUNK_ANGLES, FEW_FUNCTIONS = 256, 16
-# Halves of (0, pi) overlap by no more.
+# A panel must begin below pi/2 by more than this to belong to the left half.
 HALF_ROUNDING = 1e-12
-# Errors of rows of which nothing is asked.
+# Default error of conditional expectations.
 MEAN_TOLERANCE = 1e-8
-# A Gauss rule with n nodes on a panel of width h follows cos(l theta) to rounding for l h up to about this times n.
+# A Gauss rule with n nodes on a panel of width h resolves cos(l theta) to rounding for l h up to about this times n.
 NODES_PER_DEGREE = 1.2
-# Nodes beyond those that the basis asks for, of the two rules that are compared.
+# Additional nodes of the two rules that are compared.
 MORE_NODES = (0, 8)
-# Into how many parts the panels are cut for these two rules, and for the third where the two differ by more than this.
+# Parts of each panel for these two rules and for a third one, used if the two differ by more than SETTLED.
 PARTS, SETTLED = (1, 1, 4), 1e-12
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """What quadrature over the incoming angle finds of orthonormal trial functions v_i and a self-adjoint law P.
+    """Rayleigh quotients and residuals of orthonormal trial functions v_i for a self-adjoint law P.
 
     Attributes
     ----------
@@ -52,9 +52,9 @@ class Residuals:
     quotient_errors : array of shape (k,)
         Estimated errors of the quotients.
     norms : array of shape (k,)
-        ||P v_i - rho_i v_i||, the quadrature's own error included.
-    rows : int
-        Angles at which the law was applied.
+        ||P v_i - rho_i v_i||, with the error of the quadrature added.
+    angles_used : int
+        Number of incoming angles at which the law was applied.
     """
 
     quotients: Floats
@@ -63,7 +63,7 @@ class Residuals:
     angles_used: int
 
     def split(self, number: int) -> tuple[Residuals, Residuals]:
-        """Those of the first functions, and of the others."""
+        """The results for the first ``number`` functions, and for the others."""
         both = (
             (self.quotients[part], self.quotient_errors[part], self.norms[part])
             for part in (slice(None, number), slice(number, None))
@@ -85,11 +85,11 @@ def residuals(
 ) -> Residuals:
     """Rayleigh quotients and residuals of the functions with the coefficients ``vectors``, shape (n, k).
 
-    ``values``, shape (k,), are the eigenvalues that they are thought to have. ||P v - rho v||^2 is integrated as it
-    stands: as <P v, P v> - rho^2 it would lose half of its digits. Panels in the incoming angle are halved where Gauss
-    and Kronrod differ most for the ``leading`` functions, by default all; their difference counts as error.
-    ``mirrored`` says that each function is even or odd, and the law mirror-symmetric; an error of a quotient below
-    ``quotient_error`` is good enough.
+    ``values``, shape (k,), are approximate eigenvalues. ||P v - rho v||^2 is integrated directly; the difference
+    <P v, P v> - rho^2 would lose half of the digits. Panels in the incoming angle are halved where the Gauss and
+    Kronrod rules differ most for the ``leading`` functions (by default all); their difference counts as error.
+    ``mirrored``: each function is even or odd, and the law is mirror-symmetric. Quotients are refined until their error
+    is below ``quotient_error``.
     """
     if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.outgoing_breakpoints.size:
         return _smooth_residuals(law, basis, vectors, values)
@@ -99,7 +99,7 @@ def residuals(
         inside = low < 0.5 * np.pi - HALF_ROUNDING
         low, high = low[inside], np.minimum(high[inside], 0.5 * np.pi)
     ends = np.zeros((2, 0))
-    # integrals, the differences of the two rules, and what the errors of the rows do
+    # integrals, differences of the two rules, and effects of the errors of conditional expectations
     total, error, doubt = (np.zeros((0, 2, len(values))) for _ in range(3))
     angles_used = 0
     while low.size:
@@ -108,7 +108,7 @@ def residuals(
         ends = np.concatenate([ends, [low, high]], axis=1)
         total, error, doubt = (np.concatenate(both) for both in zip((total, error, doubt), fresh, strict=True))
         square = total[:, 1].sum(axis=0)
-        # a Kato-Temple bound adds about the square to the quotient: the quotient's own error should be less
+        # a Kato-Temple bound adds about the square to the quotient, so the error of the quotient should be smaller
         wanted = np.stack(
             [
                 np.maximum(FRACTION * square + 4.0 * EPS, quotient_error),
@@ -133,7 +133,7 @@ def residuals(
 
 
 def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -> Residuals:
-    """The same for polynomials and a density, whose images are smooth: two Gauss rules that follow them."""
+    """Residuals of polynomials under a smooth density, by two Gauss rules that resolve the smooth images."""
     found, angles_used, rule = [], 0, image_rule(law, basis, vectors)
     for more in MORE_NODES:
         angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval + more)
@@ -144,13 +144,13 @@ def _smooth_residuals(law: Law, basis: Basis, vectors: Floats, values: Floats) -
         found.append((weight @ (here * rest), weight @ (rest * rest)))
     (first, first_square), (second, second_square) = found
     norms = np.sqrt(np.maximum(first_square, second_square) + np.abs(first_square - second_square))
-    # an error e of the images adds at most ||e|| to either, for the trial functions are unit vectors
+    # an error e of the images adds at most ||e|| to quotients and norms, because the trial functions are unit vectors
     doubt = float(np.sqrt(weight @ errors**2))
     return Residuals(values + second, np.abs(second - first) + doubt, norms + doubt, angles_used)
 
 
 def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
-    """Between the edges of the basis and beside grazing; of densities also where their images of jumps vary."""
+    """Panels between the edges of the basis and near grazing; for densities also between their breakpoints."""
     edges = [basis.edges, GRAZING_EDGES, np.pi - GRAZING_EDGES]
     for part in {part for word in words_of(law) or () for part in word}:
         if isinstance(part, DensityLaw) and not isinstance(part, LambertianLaw):
@@ -162,7 +162,7 @@ def _first_panels(law: Law, basis: Basis) -> tuple[Floats, Floats]:
 
 
 class _TrialFunctions:
-    """Trial functions and what the law makes of them."""
+    """Trial functions v and their images P v."""
 
     def __init__(self, law: Law, basis: Basis, vectors: Floats, mean_tolerance: float) -> None:
         self.basis, self.vectors = basis, vectors
@@ -170,7 +170,7 @@ class _TrialFunctions:
         self.rule = image_rule(law, basis, vectors)
 
     def __call__(self, theta: Floats) -> Floats:
-        """Their values, shape (angles, k)."""
+        """The values of v, shape (angles, k)."""
         return expansion(self.basis, self.vectors, theta)
 
     def images(self, theta: Floats) -> tuple[Floats, Floats]:
@@ -184,10 +184,9 @@ class _TrialFunctions:
 def _integrals(
     function: _TrialFunctions, values: Floats, low: Floats, high: Floats, copies: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Integrals of v (P v - rho v) and of its square over each panel, with the differences of the two rules and what
-    the errors of the rows do.
+    """Integrals of v (P v - rho v) and (P v - rho v)^2 over each panel, differences of two rules, and error effects.
 
-    An error e of a row adds e v to the first and 2 e (P v - rho v) + e^2 to the second.
+    An error e of P v adds e v to the first integrand and 2 e (P v - rho v) + e^2 to the second.
     """
     half = 0.5 * (high - low)
     angle = (0.5 * (low + high))[:, None] + half[:, None] * NODES
@@ -207,13 +206,13 @@ def _integrals(
 
 
 def image_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
-    """What gives P v for the functions with the coefficients ``vectors``, and an error of the worst at each angle.
+    """A function for P v of the functions with the coefficients ``vectors``, and the largest error at each angle.
 
     Raises
     ------
     InputError
-        If nothing is known of the errors: `apply` of a law of unknown kind, which does not promise to be exact, of
-        walls of very many pieces, and of compositions with laws that are not exact.
+        If the errors are unknown: for user-defined laws without ``exact_apply``, walls with more than 64 pieces, and
+        compositions with laws that are not exact.
     """
     words = words_of(law)
     if words is None:
@@ -256,7 +255,7 @@ def _refusal(law: Law, reason: str) -> InputError:
 
 
 def _exact_rule(law: Law, basis: Basis, vectors: Floats) -> Means:
-    """By `apply`; rays of a polygon whose way was not found, a fraction s, change P v by 2 s^(1/2) max|v| at most."""
+    """Images by `apply`; a fraction s of unresolved rays of a polygon changes P v by at most 2 s^(1/2) max|v|."""
     unknown = fold(law, Rules(_unresolved, lambda terms: sum(w * s for w, s in terms), sum, lambda fraction: fraction))
     doubt = 2.0 * math.sqrt(unknown) * height_of(basis, vectors) if unknown else 0.0
 
@@ -271,12 +270,12 @@ def _unresolved(law: Law) -> float:
 
 
 def _of_rules(means: Callable[..., Floats], functions: int) -> Means:
-    """Means by two Gauss rules, and by a far finer one where these differ: the error is what both are from that."""
+    """Means by two Gauss rules; where these differ, by a much finer rule, and the error is its distance from both."""
 
     def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))
         error = _largest(second - first)
-        # two rules that hardly differ may both miss a kink: one whose error is much less tells
+        # two similar rules may both miss a breakpoint: a much finer rule detects it
         unsettled = np.flatnonzero(error > SETTLED)
         if unsettled.size:
             finest = _in_chunks(partial(means, level=2), theta[unsettled], functions)
@@ -297,10 +296,10 @@ def _in_chunks(means: Callable[[Floats], Floats], theta: Floats, functions: int)
 
 
 def _means_of_density(law: DensityLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
-    """Rows of a density are cut at the edges of the basis, and as fine as its functions need."""
+    """Means of a density, by Gauss rules on panels that resolve the density and the functions of the basis."""
     edges = law.panels(theta)
     if isinstance(basis, Legendre):
-        # a panel's Gauss rule follows polynomials in cos(theta) of a degree below its nodes over its width
+        # a panel's Gauss rule resolves polynomials in cos(theta) of degree below its number of nodes over its width
         edges = split_panels(edges, 1 + int(np.pi * basis.size / (NODES_PER_DEGREE * GAUSS_NODES)))
     else:
         inner = np.broadcast_to(basis.edges, (theta.size, basis.edges.size))
@@ -315,7 +314,7 @@ def _means_of_density(law: DensityLaw, basis: Basis, vectors: Floats, theta: Flo
 
 
 def _means_of_arc(law: CircularArcLaw, basis: Basis, vectors: Floats, theta: Floats, level: int) -> Floats:
-    """A piece of a row may be as long as (0, pi); finer rules also follow more hits."""
+    """Means of circular arcs, whose pieces may be as long as (0, pi); finer rules also follow more hits."""
     nodes = GAUSS_NODES + int(np.ceil(0.5 * np.pi * basis.size / NODES_PER_DEGREE)) + MORE_NODES[level % 2]
     hits = (level + 1) * MOST_HITS
     return law.means(lambda angle: expansion(basis, vectors, angle), theta, nodes, hits)

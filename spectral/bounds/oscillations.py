@@ -1,4 +1,4 @@
-"""Rayleigh quotients of fast oscillations, which show spectrum near 1 that slow trial functions miss."""
+"""Rayleigh quotients of fast oscillations, which detect spectrum near 1 missed by slow trial functions."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from ...core.errors import AccuracyError
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 
-# Rays, and parts of them for the spread.
+# Rays, and batches of them for the standard error.
 RAYS, PARTS = 2**12, 8
-# Frequencies at a time.
+# Frequencies per block.
 AT_ONCE = 32
-# Frequencies, in units of 1 over the root mean square by which the law moves angles.
+# Frequencies times the root mean square of theta' - theta (or of its mirror image).
 FREQUENCIES = np.arange(0.5, 64.0, 0.1)
-# The least of so many quotients is 3 standard errors below its mean by chance.
+# Margin in standard errors; by chance alone the least of the quotients is 3 standard errors below its mean.
 SIGMAS = 6.0
-# Trial functions of enclosures are slower than this frequency t: of a faster oscillation less than this fraction, which
-# falls off like t^-4, is in them.
+# Trial functions of enclosures are slower than the frequency FASTEST_SLOW. The fraction of a faster oscillation in
+# their span, which decreases like t^-4, is below SLOW_FRACTION.
 FASTEST_SLOW, SLOW_FRACTION = 40.0, 0.01
-# What the law moves angles by, at least.
+# Lower limit of the root mean square of theta' - theta.
 LEAST_MOVE = 1e-6
 
 
 @lru_cache(maxsize=8)
 def fast_top(law: Law) -> tuple[float, str] | None:
-    """A value that the spectrum beyond slow functions reaches, with what shows it; None where that cannot be told.
+    """A value reached by the spectrum beyond slow functions, with its evidence in words; None if rays do not escape.
 
-    It is the largest mean of f P f / f^2, f = cos(t theta + phase), that rays show, less what chance may do and what of
-    f is in the slow functions.
+    It is the largest sampled Rayleigh quotient of f = cos(t theta + phase), minus margins for the sampling error and
+    for the part of f in the span of slow functions.
     """
     try:
         frequency, quotient, spread = least_quotient(law, FASTEST_SLOW)
@@ -43,7 +43,7 @@ def fast_top(law: Law) -> tuple[float, str] | None:
 
 
 def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
-    """The frequency of the least quotient, this quotient, and its standard error; of frequencies beyond the least."""
+    """Frequency, value and standard error of the least quotient of 1 - P, for frequencies of at least ``least``."""
     rng = np.random.default_rng(0)
     theta = SINE.quantile((np.arange(RAYS) + rng.random(RAYS)) / RAYS)
     out = law.sample(theta, rng)
@@ -62,14 +62,14 @@ def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
         if values[worst, 0] < best[1]:
             real, imaginary = np.linalg.solve(lower[worst].T, vectors[worst, :, 0])
             change = (there - here)[worst]
-            # neighbouring angles in every part
+            # batches of interleaved angles
             parts = (0.5 * (real * change.real + imaginary * change.imag) ** 2).reshape(-1, PARTS).mean(axis=0)
             best = (float(t[worst]), float(values[worst, 0]), float(parts.std(ddof=1) / np.sqrt(PARTS)))
     return best
 
 
 def _squares(values: NDArray[np.complex128]) -> Floats:
-    """The mean products of real and imaginary parts, shape (frequencies, 2, 2)."""
+    """Mean products of real and imaginary parts, shape (frequencies, 2, 2)."""
     square, product = (np.abs(values) ** 2).mean(axis=1), (values**2).mean(axis=1)
     rows = [[square + product.real, product.imag], [product.imag, square - product.real]]
     return np.asarray(0.5 * np.moveaxis(np.array(rows), -1, 0))

@@ -1,9 +1,9 @@
-"""Enclosures of the whole spectrum of sums of words that begin and end with a Henyey-Greenstein scattering.
+"""Enclosures of the spectrum of sums of words that begin and end with a Henyey-Greenstein scattering.
 
-The scattering HG(g) leaves of polynomials of degree n and more at most the fraction |g|^n, so that such a word is its
-matrix in the first n Legendre polynomials but for an operator of norm 2 |g|^n and the matrix' own error. What else the
-sum may have, identity, specular and Lambertian reflection, is diagonal in these polynomials. By Weyl's theorem the
-eigenvalues off the essential spectrum are then those of the matrix within that distance, in order.
+HG(g) has the norm |g|^n on Legendre polynomials of degree n and more. Therefore such a word differs from its matrix in
+the first n polynomials by an operator of norm at most 2 |g|^n, plus the error of the matrix. The other words (identity,
+specular and Lambertian reflection) are diagonal in these polynomials. By Weyl's theorem the eigenvalues off the
+essential spectrum lie within this distance of the matrix eigenvalues, in order.
 """
 
 from __future__ import annotations
@@ -26,30 +26,31 @@ from ...kernels.walls.words import Sum, Word, words_of
 from ..eigenvalues.parity import Parity
 from ..eigenvalues.spectra import check_reversible
 
-# The largest matrices, where they are diagonal and where not, and the fraction of the tolerance that the tail may have.
+# Largest size of diagonal and of other matrices, and the fraction of the tolerance for the tail.
 MOST_DIAGONAL, MOST_FUNCTIONS, TAIL_FRACTION = 2048, 512, 0.1
-# Rounding of sums and powers of numbers below 1; of eigenvalues of a matrix with n rows n^(1/2) times as much.
+# Rounding of sums and powers of numbers below 1; it is n^(1/2) times larger for eigenvalues of an n x n matrix.
 ROUNDING = 8.0 * EPS
 
 
 @dataclass(frozen=True)
 class ScatteredSpectrum:
-    """The eigenvalues of largest modulus of a matrix that is the law but for an operator of small norm.
+    """The eigenvalues of largest modulus of a matrix that differs from the law by an operator of small norm.
 
     Attributes
     ----------
     values : array of shape (k,)
-        The constants' 1 first, the others in order of their moduli.
+        The 1 of the constants first, the others by decreasing modulus.
     parities : tuple of str
     certain : tuple of bool
-        Whether so many eigenvalues of the law as there are listed values near it are there, in this order.
+        Whether the index of the eigenvalue near this value is known.
     distance : float
-        A bound for the norm of what the matrix leaves out.
+        A bound of the norm of the difference.
     essential : float
         Largest modulus in the essential spectrum, exact.
     degrees : int
+        Number of Legendre polynomials.
     kind : {"bound", "estimate"}
-        ``"bound"`` where the matrix is diagonal.
+        ``"bound"`` if the matrix is diagonal.
     """
 
     values: Floats
@@ -62,7 +63,7 @@ class ScatteredSpectrum:
 
 
 def scattered_words(law: Law) -> Sum | None:
-    """The law as a sum of words with a scattering in them; None where this module has nothing to say."""
+    """The law as a sum of words with scatterings at their ends or diagonal; None for other laws."""
     if holds_of_all(law, lambda part: not isinstance(part, HenyeyGreensteinLaw)):
         return None
     words = words_of(law)
@@ -72,12 +73,12 @@ def scattered_words(law: Law) -> Sum | None:
 
 
 def scattered_spectrum(law: Law, words: Sum, k: int, tolerance: float) -> ScatteredSpectrum:
-    """The spectrum of a law that is self-adjoint, from its words.
+    """The spectrum of a self-adjoint law, from its words.
 
     Raises
     ------
     InputError
-        If a scattering is too near to a mirror for the polynomials that can be held.
+        If a scattering is so concentrated that more than 512 polynomials are needed.
     """
     diagonal = all(map(_is_diagonal, words))
     most = MOST_DIAGONAL if diagonal else MOST_FUNCTIONS
@@ -120,7 +121,7 @@ def _is_enclosed(word: Word) -> bool:
 
 
 def _factor(word: Word) -> float:
-    """The |g| of the end of a word that leaves more of high degrees; 0 where nothing or all is left."""
+    """The larger |g| of the two ends of a word; 0 if neither end is a scattering."""
     ends = [part for part in (*word[:1], *word[-1:]) if isinstance(part, HenyeyGreensteinLaw)]
     return max((abs(part.g) for part in ends), default=0.0)
 
@@ -130,7 +131,7 @@ def _tail(words: Sum, degrees: int) -> float:
 
 
 def _high_degree_value(word: Word, sign: float) -> float:
-    """What the word makes of polynomials of high degree that are even, or odd: only isometries keep them."""
+    """The eigenvalue of a word on even or odd polynomials of high degree, which is not 0 for isometries only."""
     if not word:
         return 1.0
     return sign if word == (specular(),) else 0.0
@@ -157,7 +158,7 @@ def _checked(matrix: KernelMatrix) -> tuple[Floats, float]:
 
 
 def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parity, ...]]:
-    """Those off the constants by modulus, descending, with their parities."""
+    """Eigenvalues without the constants, by decreasing modulus, with their parities."""
     inner = symmetric[1:, 1:]
     values: Floats
     names: list[Parity] = ["none"] * len(inner)
@@ -166,7 +167,7 @@ def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parit
         if mirrored:
             names = ["odd" if index % 2 == 0 else "even" for index in range(len(values))]
     elif mirrored:
-        # what the law has between polynomials of either parity is error
+        # matrix entries between the two parities are errors
         odd, even = (np.linalg.eigvalsh(inner[start::2, start::2]) for start in (0, 1))
         values = np.asarray(np.append(odd, even), dtype=np.float64)
         names[: len(odd)], names[len(odd) :] = ["odd"] * len(odd), ["even"] * len(even)
@@ -177,10 +178,10 @@ def _eigenvalues(symmetric: Floats, mirrored: bool) -> tuple[Floats, tuple[Parit
 
 
 def _is_certain(values: Floats, index: int, number: int, distance: float, essential: float) -> bool:
-    """Whether a value's position is known: all that may have its modulus are near to it, and are listed."""
+    """Whether the index of a value is known: all values that may have its modulus are listed and have its sign."""
     if abs(values[index]) - distance <= essential + distance:
         return False
-    # neighbours by modulus as far as no gap tells them apart
+    # the cluster of values whose moduli are not separated by gaps
     modulus = np.abs(values)
     apart = np.flatnonzero(modulus[:-1] - modulus[1:] > 2.0 * distance) + 1
     first = int(apart[apart <= index].max(initial=0))

@@ -1,4 +1,4 @@
-"""The distance of the rest of a spectrum from the enclosed eigenvalues."""
+"""A bound of the modulus of the spectrum beyond the enclosed eigenvalues."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from ...kernels.laws.structure import Rules, fold
 from ..essential.edge import essential_edge
 from .oscillations import fast_top
 
-# The power P^p of a law with eigenvalues g^l is chosen so that g^p is about this: the sum of the squares that are left
-# out, x^(2 m)/(1 - x^2), is then below the last square that is kept, x^(2 m - 2), and rounding is not yet.
+# For a law with eigenvalues g^l the power P^p is chosen with x = g^p near this value. Then the sum of the omitted
+# squares, x^(2 m)/(1 - x^2), is below the last listed square, x^(2 m - 2), and above rounding.
 POWER_TARGET = 0.6
-# Nodes of the quadrature of traces, and of the coarser one that tells its error.
+# Panels of the quadrature of traces; nodes per panel of the coarser rule, for the error, and of the finer rule.
 TRACE_PANELS, TRACE_NODES = 24, (12, 16)
 
 
 @dataclass(frozen=True)
 class Separation:
-    """All of the spectrum but m listed eigenvalues has a modulus of at most ``radius``.
+    """A bound ``radius`` of the modulus of the spectrum without m listed eigenvalues.
 
     Attributes
     ----------
     radius : float
-        ``inf`` where nothing is known.
+        ``inf`` if no bound is known.
     kind : {"bound", "estimate"}
     reason : str
     """
@@ -42,17 +42,17 @@ class Separation:
 
 
 def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) -> Separation:
-    """What bounds the spectrum beyond the listed eigenvalues.
+    """A bound of the spectrum beyond the listed eigenvalues.
 
     Parameters
     ----------
     law : Law
     values : array of shape (m,)
-        The listed eigenvalues, the constants' included.
+        The listed eigenvalues, including the 1 of the constants.
     width : float
-        Each of them has an eigenvalue of its own this near.
+        Distance within which each listed value has its own eigenvalue.
     next_value : float
-        Modulus, with its residual, of the next one in the basis, for laws of which nothing better is known.
+        Modulus plus residual of the next eigenvalue in the basis, for laws without a better bound.
     """
     if isinstance(law, MatrixLaw):
         return _of_matrix(law, len(values))
@@ -68,7 +68,7 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
     if edge.high >= next_value:
         reason = f"norm of the essential part, {edge.high:.6g}: " + "; ".join(edge.reasons)
         return Separation(edge.high, edge.kind, reason)
-    # the next value of slow functions is not that of the law where a law nearly keeps fast oscillations
+    # a law that nearly preserves fast oscillations may have spectrum above the next value of slow functions
     fast = fast_top(law)
     if fast is not None and fast[0] > next_value:
         return Separation(1.0, "estimate", f"fast oscillations show spectrum near 1, how much is not known: {fast[1]}")
@@ -77,7 +77,7 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
 
 
 def _of_matrix(law: MatrixLaw, listed: int) -> Separation:
-    """A law that is constant on bins has the eigenvalues of its matrix, and 0."""
+    """The bound for a law that is constant on bins, whose spectrum is that of its matrix, and 0."""
     root = np.sqrt(SINE.mass(law.edges[:-1], law.edges[1:]))
     symmetric = root[:, None] * law.array / root
     moduli = np.sort(np.abs(np.linalg.eigvalsh(0.5 * (symmetric + symmetric.T))))[::-1]
@@ -89,9 +89,9 @@ def _of_matrix(law: MatrixLaw, listed: int) -> Separation:
 
 
 def lambertian_fraction(law: Law) -> float:
-    r"""The a in P = a L + (1 - a) R with L Lambertian and R Markov: beyond the constants ||P|| <= 1 - a.
+    r"""The fraction a in P = a L + (1 - a) R with L Lambertian and R Markov; beyond the constants ||P|| <= 1 - a.
 
-    Of sums and products it is found from their parts: (1 - a)(1 - b) is what is left of a product.
+    It is computed from the parts of sums and products: a product has 1 - (1 - a)(1 - b).
 
     Examples
     --------
@@ -109,7 +109,7 @@ def lambertian_fraction(law: Law) -> float:
 
 
 def _hilbert_schmidt(law: Law, values: Floats, width: float) -> Separation | None:
-    """The sum of all lambda^(2 p), which is the trace of P^(2 p), less those that are listed."""
+    """The bound from the sum of all lambda^(2 p), the trace of P^(2 p), minus the listed terms."""
     if not isinstance(law, DensityLaw):
         return None
     power = 1
@@ -138,7 +138,7 @@ def _trace(law: DensityLaw, nodes: int) -> float:
 
 
 def _squared_norm(law: DensityLaw, nodes: int) -> float:
-    """The integral of p(theta, theta') p(theta', theta), which for a reversible law is that of the squared kernel."""
+    """The integral of p(theta, theta') p(theta', theta), for a reversible law the squared Hilbert-Schmidt norm."""
     edges = np.unique(np.concatenate((_edges(), law.outgoing_breakpoints)))
     theta, weight = gauss_rule(edges, nodes)
     density = law.density(theta[:, None], theta)

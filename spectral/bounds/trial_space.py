@@ -1,4 +1,4 @@
-"""Trial functions on panels that are divided where the residual is large."""
+"""Approximate eigenfunctions on panels that are divided where the residual is large."""
 
 from __future__ import annotations
 
@@ -17,42 +17,45 @@ from ...kernels.bases.panels import ONE_PANEL
 from ...kernels.expectations.angle_panels import KRONROD, NODES
 from ..eigenvalues.parity import Parity
 
-# Degree on each panel: Kronrod's rule is then still exact for products of two functions.
+# Degree on each panel, for which Kronrod's rule is exact for products of two functions.
 DEGREE = 6
-# Breakpoints that the law knows become edges at once, the widest panel of the first level is this.
+# Number of the law's breakpoints that are edges of the first level, and width of its widest panel.
 FIRST_BREAKPOINTS, WIDEST = 40, np.pi / 10
-# Nearest distance of two edges.
+# Least distance of two edges.
 NARROWEST = 1e-7
-# A level divides the worst panels, those that hold this fraction of the squared residuals.
+# Each level divides the worst panels, with this fraction of the squared residuals.
 FRACTION = 0.9
-# Levels at most; and panels beyond which none are divided, where rows are traced and where they are not.
+# Limit on the levels, and limit on the panels for traced laws (True) and for others.
 MOST_LEVELS, MOST_PANELS = 12, {True: 60, False: 200}
-# Trial functions that tell what comes next.
+# Trial functions beyond the wanted ones, to estimate the next eigenvalues.
 EXTRA = 2
-# Trial functions of one parity that are iterated together, beyond those asked for.
+# Additional functions of one parity in the iteration.
 GUARD = 12
 MOST_ITERATIONS, SETTLED = 60, 0.02
 PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
-# Rows are as exact as this fraction of the residual that is wanted.
+# Error of conditional expectations as a fraction of the wanted residual.
 MEAN_FRACTION = 0.03
 
 
 @dataclass(frozen=True)
 class TrialSpace:
-    """Approximate eigenfunctions of a law, the constants first, then descending.
+    """Approximate eigenfunctions of a law, constants first, then by decreasing eigenvalue.
 
     Attributes
     ----------
     basis : Panels
     values : array of shape (k,)
+        Approximate eigenvalues.
     vectors : array of shape (n, k)
         Coefficients in ``basis``, of unit norm.
-    following : array of shape (n, 2)
-        Those that come next by modulus, ``following_values`` their values.
+    following_values, following : arrays of shape (2,) and (n, 2)
+        Eigenvalues and coefficients of the next eigenfunctions by modulus.
     parities : tuple of {"even", "odd", "none"}
-        Of ``vectors``.
+        Parities of ``vectors``.
     mirrored : bool
         Whether every function is even or odd under theta -> pi - theta.
+    levels : tuple of (int, float)
+        For each level the size of the basis and the joint residual.
     """
 
     basis: Panels
@@ -66,14 +69,13 @@ class TrialSpace:
 
 
 def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = MOST_LEVELS) -> TrialSpace:
-    """Trial functions of the k eigenvalues of largest modulus, with Kato-Temple bounds of about the tolerance.
+    """Trial functions for the k eigenvalues of largest modulus, with Kato-Temple bounds of about the tolerance.
 
     Notes
     -----
-    On every level the functions P e_j are evaluated at Kronrod's nodes, and e_i is integrated against them: a matrix
-    that acts on smooth functions as exactly as P does, but is not symmetric, because single P e_j have kinks inside
-    panels. Its leading eigenvectors are found by iterating smooth functions. The same nodes show their residuals, and
-    panels with large ones are divided.
+    On every level the functions P e_j are evaluated at the Kronrod nodes, and their inner products with e_i form a
+    matrix. It is accurate for smooth functions but not symmetric, because single P e_j have breakpoints inside panels.
+    Subspace iteration from smooth functions gives its leading eigenvectors. Panels with large residuals are divided.
     """
     mirrored = bool(law.mirror_symmetric)
     edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[law.expectations(ONE_PANEL).is_traced]
@@ -100,9 +102,9 @@ def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = M
 
 
 class _Level:
-    """The law at the Kronrod nodes of panels; of a mirror-symmetric law on (0, pi/2) only.
+    """The law at the Kronrod nodes of panels, for a mirror-symmetric law on (0, pi/2) only.
 
-    Coefficients are those on the panels that are kept; the others have them by parity.
+    Coefficients refer to these panels; parity gives the coefficients on the others.
     """
 
     def __init__(self, law: Law, edges: Floats, mirrored: bool, mean_tolerance: float) -> None:
@@ -113,13 +115,13 @@ class _Level:
         angle = (0.5 * (edges[1:] + edges[:-1]))[:, None] + half[:, None] * NODES
         self.angle, self.weight = angle, half[:, None] * SINE.density(angle) * KRONROD * (2.0 if mirrored else 1.0)
         self._images, _ = law.expectations(self.panels)(angle.ravel(), mean_tolerance)
-        # values of each panel's own functions, shape (panels, nodes, degree + 1); of norm 1 on what is kept
+        # values of each panel's functions, shape (panels, nodes, degree + 1), normalised on (0, pi) or (0, pi/2)
         self.norm = np.sqrt(0.5) if mirrored else 1.0
         self.local = self.panels.local(angle)[1] * self.norm
         self._signs = (-1.0) ** np.arange(DEGREE + 1)
 
     def images(self, parity: int) -> Floats:
-        """The images of the functions of one parity, shape (rows, functions)."""
+        """The images of the functions of one parity, shape (angles, functions)."""
         return self._even if parity > 0 else self._odd
 
     @cached_property
@@ -139,23 +141,23 @@ class _Level:
         return np.asarray(self.norm * folded.reshape(self.angle.size, -1))
 
     def projected(self, values: Floats) -> Floats:
-        """Coefficients of functions known at the nodes, shape (rows, k)."""
+        """Coefficients of functions with given values at the nodes, shape (angles, k)."""
         shaped = values.reshape(*self.angle.shape, -1) * self.weight[..., None]
         return np.asarray(np.einsum("pqd,pqk->pdk", self.local, shaped).reshape(-1, values.shape[1]))
 
     def expanded(self, vectors: Floats) -> Floats:
-        """Values at the nodes, shape (rows, k)."""
+        """Values at the nodes, shape (angles, k)."""
         blocks = vectors.reshape(len(self.angle), DEGREE + 1, -1)
         return np.asarray(np.einsum("pqd,pdk->pqk", self.local, blocks).reshape(self.angle.size, -1))
 
     def leading(self, k: int, algebraic: float) -> tuple[Floats, Floats, NDArray[np.intp]]:
-        """Values of the largest moduli, constants first, with vectors and parities (0 where the law has none)."""
+        """Eigenvalues of largest modulus, constants first, with vectors and parities (0 without mirror symmetry)."""
         found = [self._leading_of(parity, k, algebraic) for parity in ((1, -1) if self.mirrored else (0,))]
         values = np.concatenate([part[0] for part in found])
         vectors = np.concatenate([part[1] for part in found], axis=1)
         parity = np.concatenate([np.full(len(part[0]), sign) for part, sign in zip(found, (1, -1), strict=False)])
         order = np.argsort(-np.abs(values), kind="stable")
-        # the constants are the first vector of the first part whatever rounding does to 1
+        # the constants are the first vector of the first part, regardless of rounding
         order = np.append(0, order[order != 0])[:k]
         return values[order], vectors[:, order], parity[order]
 
@@ -183,7 +185,7 @@ class _Level:
         return values[wanted], vectors[:, wanted]
 
     def squared_residuals(self, values: Floats, vectors: Floats, parity: NDArray[np.intp]) -> Floats:
-        """The part of every panel in the squared residuals, shape (panels, k)."""
+        """The contribution of every panel to the squared residuals, shape (panels, k)."""
         rest = np.empty((self.angle.size, len(values)))
         for sign in np.unique(parity):
             own = parity == sign
@@ -192,7 +194,7 @@ class _Level:
         return np.asarray(np.einsum("pq,pqk->pk", self.weight, squares))
 
     def extended(self, vectors: Floats, parity: NDArray[np.intp]) -> Floats:
-        """Coefficients in all panels."""
+        """Coefficients on all panels."""
         if not self.mirrored:
             return vectors
         blocks = self.norm * vectors.reshape(len(self.angle), DEGREE + 1, -1)
@@ -201,7 +203,7 @@ class _Level:
 
 
 def _ritz(projected: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues of largest modulus first and eigenvectors of a matrix that is nearly symmetric."""
+    """Eigenvalues, by decreasing modulus, and eigenvectors of a nearly symmetric matrix."""
     values, vectors = np.linalg.eig(projected)
     if np.iscomplexobj(values) and np.any(values.imag != 0.0):
         values, vectors = np.linalg.eigh(0.5 * (projected + projected.T))
@@ -211,13 +213,13 @@ def _ritz(projected: Floats) -> tuple[Floats, Floats]:
 
 
 def _room(values: Floats, k: int) -> float:
-    """How far the last value that is wanted stays from the next, at least a hundredth of itself."""
+    """Distance in modulus of the last wanted value from the next, at least a hundredth of this value."""
     modulus = np.abs(values)
     return float(max(modulus[k - 1] - modulus[k], 0.01 * modulus[k - 1])) if len(values) > k else 1.0
 
 
 def _first_edges(law: Law, mirrored: bool) -> Floats:
-    """Breakpoints that the law knows, and panels that are not too wide between them; from 0 to pi or pi/2."""
+    """Edges from 0 to pi or pi/2: known breakpoints of the law, and panels between them not wider than `WIDEST`."""
     end = 0.5 * np.pi if mirrored else np.pi
     points, left_out = law.breakpoints(FIRST_BREAKPOINTS)
     used = (points > NARROWEST) & (points < end - NARROWEST) & math.isfinite(left_out)
