@@ -1,4 +1,4 @@
-"""Direct simulation of a channel: exit times of particles that fly from wall to wall."""
+"""Exit times of particles from a channel with rough walls, by direct simulation."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .diffusion import Arrangement, check_arrangement
 
-# pi - theta for a theta below half a spacing of pi would be pi itself.
+# Smallest angle; below half of it, pi - theta would round to pi.
 SMALLEST = float(np.spacing(np.pi))
-# Flights after which a particle that has not left is a sign of a law that goes back and forth.
+# Limit on the crossings of a particle; a law that retroreflects for ever reaches it.
 MOST_CROSSINGS = 1_000_000
 
 
 @dataclass(frozen=True)
 class ExitTimes:
-    """Mean times to leave |x| < L, starting at x = 0 from a wall with the invariant distribution of angles.
+    """Times to leave |x| < L, for particles that start at x = 0 from a wall with the invariant distribution of angles.
 
     Attributes
     ----------
     lengths : array of shape (n,)
-        L, increasing.
+        Increasing values of L.
     times : array of shape (particles, n)
-        Of every particle the time at which it first reaches each L.
+        Time at which a particle first reaches |x| = L.
     radius, speed : float
-        Half the width of the channel and the speed.
+        Half the width of the channel, and the speed of the particles.
     """
 
     lengths: Floats
@@ -46,22 +46,21 @@ class ExitTimes:
 
     @property
     def scaled(self) -> Floats:
-        """L^2/(D_0 tau(L)), which grows like eta ln(L/r)."""
+        """The ratio L^2/(D_0 tau(L)), which grows like eta ln(L/r)."""
         return self.lengths**2 / (4.0 * self.radius * self.speed / np.pi * self.means)
 
     def eta(self) -> Estimate:
-        """The slope of L^2/(D_0 tau) in ln L: D over that of diffuse walls.
+        """The ratio eta of D to its value D_0 for diffuse walls, from the slope of L^2/(D_0 tau) in ln L.
 
-        The slope settles as L grows, so that the upper half of the lengths gives the value; the error is the
-        half width of its interval of 95 %, by the delta method over particles, plus its difference from that of the
-        lower half.
+        The value is the slope over the upper half of the lengths. The error is the half width of its 95 % interval, by
+        the delta method over particles, plus the difference from the slope over the lower half.
         """
         log = np.log(self.lengths)
         middle = len(log) // 2
         upper, lower = _slope_weights(log[middle:]), _slope_weights(log[: middle + 1])
         value = float(upper @ self.scaled[middle:])
         drift = abs(value - float(lower @ self.scaled[: middle + 1]))
-        # to first order scaled moves by -scaled/mean times the mean's error, for every L
+        # to first order an error e of the mean changes scaled by -scaled/mean e, for every L
         influence = (self.times / self.means)[:, middle:] @ (-self.scaled[middle:] * upper)
         spread = float(influence.std(ddof=1) / np.sqrt(len(self.times)))
         method = f"slope of L^2/(D_0 tau) in ln L, {len(self.times)} particles"
@@ -82,20 +81,21 @@ def exit_times(
     speed: float = 1.0,
     arrangement: Arrangement = "mirror",
 ) -> ExitTimes:
-    """Simulate a channel of two rough walls, flight by flight.
+    """Simulate exit times of particles from a channel between two rough walls.
 
     Parameters
     ----------
     law : Law
-        In either convention; it is converted to the paper's.
+        The law of the walls, in either convention.
     lengths : array_like
-        Increasing L at which exits are timed.
+        At least three increasing values of L at which exits are timed.
     particles : int
+        Number of particles, at least 2.
     rng : numpy.random.Generator
     radius, speed : float
-        Half the width of the channel, and the speed.
+        Half the width of the channel, and the speed of the particles.
     arrangement : {"mirror", "half-turn"}
-        How the upper wall is made from the lower one.
+        The upper wall is the mirror image of the lower one, or is rotated by pi.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def exit_times(
     Raises
     ------
     InputError
-        If the lengths do not increase, or a particle has not left after 10^6 flights.
+        If the lengths do not increase, or a particle has not left after 10^6 crossings.
 
     Examples
     --------
@@ -126,7 +126,7 @@ def exit_times(
     times = np.full((particles, levels.size), np.nan)
     inside = np.arange(particles)
     x, clock, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
-    # the angle at which a particle leaves a wall, in that wall's own frame, and the sign of its x axis in the channel's
+    # angle at which a particle leaves a wall, in the frame of this wall, and the sign of its x axis in the channel
     theta, sign = SINE.sample(particles, rng), 1.0
     for _ in range(MOST_CROSSINGS):
         shift = sign * width * np.cos(theta) / np.sin(theta)
@@ -134,7 +134,7 @@ def exit_times(
         target = x + shift
         crossing = np.flatnonzero(np.abs(target) >= levels[reached])
         while crossing.size:
-            # the flight is straight: the fraction of it up to |x| = L
+            # fraction of the ray segment up to |x| = L
             ahead = np.copysign(levels[reached[crossing]], target[crossing]) - x[crossing]
             moment = clock[crossing] + ahead / shift[crossing] * duration[crossing]
             times[inside[crossing], reached[crossing]] = moment

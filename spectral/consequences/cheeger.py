@@ -1,4 +1,4 @@
-"""Conductance of cuts: Cheeger's bounds for the gap."""
+"""Cheeger's bounds for the gap, from the conductance of a cut."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Conductance:
-    """The best cut that the second eigenfunction shows, and what it says of the gap.
+    """The best cut by a level of the second eigenfunction, and its bounds for the gap.
 
     Attributes
     ----------
     value : float
-        Flux from the set to its complement over the measure of the smaller of both.
+        Flux from the set to its complement over the smaller of the two measures.
     cells : array of shape (n,)
         1 for the bins of the set, 0 for the others.
     gap_above : float
-        The gap is at most this, flux / (measure times measure of the complement): of the matrix, and of the law behind
-        it, whose Rayleigh quotient of the same set is the same number. Of a sampled matrix only to its sampling error.
+        Upper bound of the gap, flux / (measure times measure of the complement). It holds for the matrix and for the
+        law, whose Rayleigh quotient of the set is the same. For a sampled matrix it has a sampling error.
     gap_below : float
-        value^2 / 2, which the gap of the matrix is at least. Of the law nothing follows.
+        Lower bound value^2 / 2 of the gap of the matrix. It does not hold for the law.
     error : float
-        Of ``gap_above``, from the Frobenius error of the matrix.
+        Error of ``gap_above``, from the Frobenius error of the matrix.
     """
 
     value: float
@@ -42,12 +42,12 @@ class Conductance:
 
 
 def conductance(matrix: KernelMatrix) -> Conductance:
-    """Cheeger's bounds for a reversible matrix in bins, by sweeping its second eigenfunction.
+    """Cheeger's bounds for a reversible matrix on bins, from the level sets of its second eigenfunction.
 
     Parameters
     ----------
     matrix : KernelMatrix
-        In `Bins`, reversible.
+        A reversible matrix on `Bins`.
 
     Raises
     ------
@@ -56,9 +56,8 @@ def conductance(matrix: KernelMatrix) -> Conductance:
 
     Notes
     -----
-    Among the sets where the second eigenfunction exceeds a level there is one with conductance at most
-    sqrt(2 gap): so gap >= value^2 / 2. Source: D. A. Levin and Y. Peres, *Markov Chains and Mixing Times* (2017),
-    theorem 13.10.
+    Some level set of the second eigenfunction has a conductance of at most sqrt(2 gap), so gap >= value^2 / 2.
+    Source: D. A. Levin and Y. Peres, *Markov Chains and Mixing Times* (2017), theorem 13.10.
 
     Examples
     --------
@@ -75,7 +74,7 @@ def conductance(matrix: KernelMatrix) -> Conductance:
     second = found.vectors[:, 1] / np.sqrt(weights)
     order = np.argsort(second, kind="stable")
     sorted_flux, mass = flux[np.ix_(order, order)], np.cumsum(weights[order])[:-1]
-    # the flux out of the first m cells: all that they send less what stays among them
+    # the flux out of the first m cells: their total flux minus the flux among them
     within = np.cumsum(np.cumsum(sorted_flux, axis=0), axis=1).diagonal()[:-1]
     out = np.maximum(np.cumsum(sorted_flux.sum(axis=1))[:-1] - within, 0.0)
     ratio = out / np.minimum(mass, 1.0 - mass)

@@ -1,4 +1,4 @@
-"""Knudsen diffusion in a channel whose walls reflect by a law."""
+"""The diffusivity of a rarefied gas in a channel with rough walls (Knudsen diffusion)."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from ..essential.exact import ideal_spectrum
 Arrangement = Literal["mirror", "half-turn"]
 ARRANGEMENTS: tuple[Arrangement, ...] = ("mirror", "half-turn")
 
-# Signs of the displacement of rays that leave near theta = 0 and near theta = pi.
+# Sign of the displacement of rays that leave near theta = 0 and near theta = pi.
 DIRECTION = np.array([1.0, -1.0])
-# A persistence this close to 1 is not told from it: the particle never turns round.
+# A persistence within this distance of 1 counts as 1: the particle never reverses its direction.
 BALLISTIC = 1e-12
 
 
@@ -28,17 +28,18 @@ BALLISTIC = 1e-12
 class Diffusivity(Estimate):
     r"""The diffusivity D of a rarefied gas in a channel with two parallel rough walls.
 
-    The mean time to leave |x| < L is asymptotically L^2 / (D ln(L/r)): the flights have no variance, and their tails
-    alone make the diffusivity.
+    The mean time to leave |x| < L is asymptotically L^2 / (D ln(L/r)). The displacements between collisions have
+    infinite variance, and the tails of their distribution determine D.
 
     Attributes
     ----------
     eta : float
-        D over that of diffuse walls, D_0 = 4 r s / pi.
+        D / D_0, where D_0 = 4 r s / pi is the diffusivity for diffuse walls.
     zeta : float
-        Persistence of grazing flights, lim E[cot(Theta) / cot(theta)] in Feres' convention; eta = (1 + zeta)/(1 - zeta)
-        for mirror-symmetric laws.
+        Persistence of grazing ray segments, lim E[cot(Theta) / cot(theta)] in Feres' convention.
+        eta = (1 + zeta)/(1 - zeta) for mirror-symmetric laws.
     eta_error, zeta_error : float
+        Errors of ``eta`` and ``zeta``.
     arrangement : {"mirror", "half-turn"}
     """
 
@@ -50,19 +51,19 @@ class Diffusivity(Estimate):
 
 
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
-    r"""D of a channel from the law's action on grazing flights.
+    r"""The diffusivity D of a channel, from the law's action on grazing rays.
 
     Parameters
     ----------
     law : Law
-        In either convention; it is converted to the paper's.
+        The law of the walls, in either convention.
     radius : float
         Half the width r of the channel.
     speed : float
         Speed s of the particles.
     arrangement : {"mirror", "half-turn"}
-        How the upper wall is made from the lower one: as its mirror image, or by turning it through pi. For
-        mirror-symmetric cells both are the same.
+        The upper wall is the mirror image of the lower one, or is rotated by pi. For mirror-symmetric cells both are
+        the same.
 
     Returns
     -------
@@ -71,21 +72,21 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     Raises
     ------
     InputError
-        If the law keeps the direction of grazing flights for ever, as specular reflection does: D is infinite.
+        If the law preserves the direction of grazing rays, like specular reflection: D is infinite.
 
     Notes
     -----
-    A flight at the angle theta moves by 2 r cot(theta); the distribution of these has tails of the order -3 under
-    sin(theta) d theta, so that the variance grows like ln L. What counts is how much of a long flight the next ones
-    keep: with M the matrix of `grazing_symbol` and c = (1, -1),
-    eta = c^T (2 (1 - F)^(-1) - 1) c / 2, F = M SWAP for mirror images, F = -M for half-turns.
+    A ray segment at the angle theta has the displacement 2 r cot(theta). Under sin(theta) d theta displacements have
+    a density with tails of order -3, so their variance grows like ln L. D depends on the correlation of successive long
+    displacements. With the matrix M of `grazing_symbol` and c = (1, -1), eta = c^T (2 (1 - F)^(-1) - 1) c / 2, where
+    F = M SWAP for mirror images and F = -M for half-turns.
 
     Source: T. Chumley, R. Feres and H.-K. Zhang, Multiscale Model. Simul. 11 (2013) 1179, for the mirror-symmetric
     case.
 
     Examples
     --------
-    For Maxwell's walls with a diffuse fraction a, eta = (2 - a)/a:
+    Maxwell's law with a diffuse fraction a has eta = (2 - a)/a:
 
     >>> from asperity import kernels as ker, spectral as spec
     >>> found = spec.diffusivity(ker.maxwell(0.5))
@@ -106,7 +107,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
             "expected a law that turns them round at times, as a mixture with lambertian() does"
         )
     eta = _eta(step)
-    # the derivative of (1 + zeta)/(1 - zeta), at the worst end of the interval of zeta
+    # from the derivative of (1 + zeta)/(1 - zeta) at the worst end of the interval of zeta
     eta_error = 2.0 * doubt / max(1.0 - zeta - doubt, BALLISTIC) ** 2
     exact = ideal_spectrum(law) is not None
     kind: ErrorKind = "bound" if exact else "estimate"
@@ -117,7 +118,7 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
 
 
 def _step(symbol: Floats, arrangement: Arrangement) -> Floats:
-    """From the direction of a long flight along the channel to that of the next, in the frame of the channel."""
+    """The matrix F from one long displacement to the next, in the frame of the channel."""
     return symbol[:, ::-1] if arrangement == "mirror" else -symbol
 
 
@@ -127,6 +128,6 @@ def _eta(step: Floats) -> float:
 
 
 def check_arrangement(arrangement: str) -> None:
-    """Raise an InputError unless it is one of the two arrangements."""
+    """Raise an InputError unless ``arrangement`` is one of the two arrangements."""
     if arrangement not in ARRANGEMENTS:
         raise InputError(f"arrangement: expected one of {', '.join(ARRANGEMENTS)}, got {arrangement!r}")

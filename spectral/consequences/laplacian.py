@@ -1,4 +1,4 @@
-"""Comparison with the billiard Laplacian, to which laws of shallow walls tend."""
+"""Comparison of a law with the billiard Laplacian, the limit of the laws of shallow walls."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from ...core.checks import Floats, frozen, whole_number
 from ...core.errors import InputError
 from ...kernels import Law, Legendre, discretise
 
-# Chords of a wall's pieces and twice as many, whose difference tells the error of the mean squared slope.
+# Chords per piece of a wall on the coarser of two levels.
 CHORDS = 4096
-# Towards a vertical tangent the steepest chord grows like the root of their number, elsewhere by one part in it.
+# Ratio of the steepest slopes of the two levels that indicates a vertical tangent. There the steepest slope grows like
+# the root of the number of chords.
 STEEPENING = 1.2
 
 
 @dataclass(frozen=True)
 class LaplacianComparison:
-    r"""The law in Feres' convention against 1 + 2 h d/dz (1 - z^2) d/dz, z = cos(theta).
+    r"""Comparison of a law in Feres' convention with 1 + 2 h d/dz (1 - z^2) d/dz, z = cos(theta).
 
     Attributes
     ----------
     flatness : float
-        h, from the law: (1 - <e_1, P_F e_1>)/4 with e_1 = sqrt(3) cos(theta).
+        h, computed as (1 - <e_1, P_F e_1>)/4 with e_1 = sqrt(3) cos(theta).
     degrees : array of int, shape (n,)
         1, ..., n.
     deficits : array of shape (n,)
-        1 - <e_l, P_F e_l> of the normalised Legendre polynomials.
+        1 - <e_l, P_F e_l> for the normalised Legendre polynomials e_l.
     ratios : array of shape (n,)
-        deficits / (2 h l (l + 1)): 1 where the Laplacian describes the law.
+        deficits / (2 h l (l + 1)), which is 1 if the Laplacian describes the law.
     leaks : array of shape (n,)
-        Norm of what P_F e_l has beyond e_l, over its deficit: small where Legendre polynomials are nearly
-        eigenfunctions.
+        Norm of the part of P_F e_l orthogonal to e_l, over the deficit; small if e_l is nearly an eigenfunction.
     error : float
-        Frobenius error of the matrix that was used.
+        Frobenius error of the matrix.
     """
 
     flatness: float
@@ -47,16 +47,16 @@ class LaplacianComparison:
 
 
 def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) -> LaplacianComparison:
-    """Moments of scattering and eigenvalues of a law, compared with those of the billiard Laplacian.
+    """Compare the diagonal of a law in Legendre polynomials with the eigenvalues of the billiard Laplacian.
 
     Parameters
     ----------
     law : Law
-        In either convention; it is compared in Feres'.
+        The law, in either convention; it is compared in Feres'.
     degrees : int
         Number of Legendre polynomials.
     tolerance : float
-        Wanted error of the matrix.
+        Wanted Frobenius error of the matrix.
 
     Notes
     -----
@@ -90,7 +90,7 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
 
 
 def mean_squared_slope(wall: Any) -> float:
-    """h of a wall: the mean over a period of the squared slope; ``inf`` where a piece is vertical or overhangs.
+    """The mean squared slope h of a wall over a period; ``inf`` if a piece is vertical or overhangs.
 
     Examples
     --------
@@ -100,14 +100,14 @@ def mean_squared_slope(wall: Any) -> float:
     """
     coarse, fine = (_slope_sum(wall, chords) for chords in (CHORDS, 2 * CHORDS))
     if not np.isfinite(fine[0]) or fine[1] > STEEPENING * coarse[1]:
-        # halving the chords makes the steepest one steeper: a vertical tangent, where the integral diverges
+        # a vertical tangent, where the integral diverges
         return float("inf")
     # chords have the error 1/chords^2
     return float((fine[0] + (fine[0] - coarse[0]) / 3.0) / wall.period)
 
 
 def _slope_sum(wall: Any, chords: int) -> tuple[float, float]:
-    """The integral of the squared slope of the chords of a wall's pieces, and the steepest of them."""
+    """The integral of the squared slope of the chords of a wall's pieces, and the largest slope."""
     total, steepest = 0.0, 0.0
     for piece in wall.pieces:
         points = np.array([piece.point(t) for t in np.linspace(0.0, 1.0, chords + 1)])

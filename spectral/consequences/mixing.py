@@ -20,9 +20,9 @@ from ..gap.gap import modulus_gap
 Distance = Literal["L2", "total variation", "chi-square"]
 DISTANCES: tuple[Distance, ...] = ("L2", "total variation", "chi-square")
 
-# Eigenvalues of a matrix among which the one of largest modulus is sought, and the error asked of a law's.
+# Number of eigenvalues computed for a matrix, and wanted error of the gap of a law.
 SOUGHT, TOLERANCE = 6, 1e-4
-# Panels and nodes of the norm of a density.
+# Panels and nodes for the norm of a density.
 PANELS, NODES = 48, 16
 
 
@@ -33,10 +33,10 @@ class MixingTime:
     Attributes
     ----------
     steps : int
-        Enough for every initial density whose distance to 1 in L^2 is ``initial``.
+        Sufficient number of steps for every initial density f with ||f - 1|| = ``initial``.
     earliest : int
-        For ``distance="L2"`` and ``"chi-square"`` fewer steps than this do not do for the worst such density; for
-        ``"total variation"`` 0, for nothing is claimed.
+        For ``distance="L2"`` and ``"chi-square"`` fewer steps are not sufficient for the worst such density. It is 0
+        for ``"total variation"``, which has no such bound.
     relaxation_time : Estimate
         -1/ln(slem), in steps.
     slem : Estimate
@@ -45,7 +45,7 @@ class MixingTime:
     initial : float
         ||f - 1|| in L^2 of the invariant probability measure.
     kind : {"bound", "estimate"}
-        Of ``steps``: that of ``slem``, whose upper end is used.
+        Kind of ``steps``, the same as for ``slem``, whose upper end is used.
     """
 
     steps: int
@@ -69,22 +69,22 @@ def mixing_time(
     start: float | None = None,
     initial: float = 1.0,
 ) -> MixingTime:
-    r"""Steps until the distribution is ``within`` of the invariant one, from a density in L^2.
+    r"""The number of steps until a distribution with a density in L^2 is close to the invariant distribution.
 
     Parameters
     ----------
     kernel : Law, KernelMatrix or Spectrum
-        Reversible.
+        A reversible kernel, or its spectrum.
     within : float
-        The distance that is allowed.
+        The allowed distance from the invariant distribution.
     distance : {"L2", "total variation", "chi-square"}
-        ||f_n - 1||, half of the L^1 norm of f_n - 1, or the square of the first.
+        ||f_n - 1||, half of the L^1 norm of f_n - 1, or ||f_n - 1||^2.
     density : callable, optional
         Initial density with respect to sin(theta)/2 d theta, a vectorised function of the angle.
     start : float, optional
-        An initial angle. Only for laws with a density: after one step, which is counted, the distribution has one.
+        Initial angle, for laws with a density only. The first step, which yields a density, is counted.
     initial : float
-        ||f - 1|| itself, where neither of these is given.
+        ||f - 1|| of the initial density, if neither ``density`` nor ``start`` is given.
 
     Returns
     -------
@@ -95,12 +95,12 @@ def mixing_time(
     AccuracyError
         If the law has no gap, or its slem is not known to be less than 1.
     InputError
-        If a start is given for a law without a density, or the density is no density.
+        If ``start`` is given for a law without a density, or ``density`` is negative or not normalised.
 
     Notes
     -----
-    f_n = P^n f, so ||f_n - 1|| <= slem^n ||f - 1||, and for the worst f this is attained in the limit; the total
-    variation distance is at most half of it, the chi-square distance its square.
+    With f_n = P^n f, ||f_n - 1|| <= slem^n ||f - 1||, and a sequence of densities f attains this bound in the limit.
+    The total variation distance is at most half of the bound, the chi-square distance at most its square.
 
     Examples
     --------
@@ -121,7 +121,7 @@ def mixing_time(
         steps_before, size = 1, _distance_after_a_step(kernel, start)
     gap = _modulus_gap(kernel)
     slem = slem_from_gap(gap)
-    # as gaps: 1 - slem of a slem near 1 would lose its digits
+    # in terms of the gap, because 1 - slem loses digits for a slem near 1
     least, most = gap.value - gap.error, min(gap.value + gap.error, 1.0)
     if least <= 0.0:
         raise AccuracyError(
@@ -134,13 +134,13 @@ def mixing_time(
 
 
 def slem_from_gap(gap: Estimate) -> Estimate:
-    """1 - gap, whose rounding is an error that the gap does not have."""
+    """The slem 1 - gap, with the rounding of this difference added to the error."""
     value = 1.0 - gap.value
     return Estimate(value, gap.error + (EPS if 1.0 - value != gap.value else 0.0), gap.kind, gap.method)
 
 
 def relaxation_time(gap: Estimate) -> Estimate:
-    """-1/ln(1 - gap), with an infinite error where the gap may be 0.
+    """The relaxation time -1/ln(1 - gap), with an infinite error if the gap may be 0.
 
     Examples
     --------
@@ -165,7 +165,7 @@ def _modulus_gap(kernel: Law | KernelMatrix | Spectrum) -> Estimate:
         return Estimate(1.0, np.inf, "estimate", method)
     largest = int(np.argmax(modulus))
     if listed.slem > modulus[largest]:
-        # the edge of a law's essential spectrum
+        # the slem is the edge of the essential spectrum of a law
         return Estimate(1.0 - listed.slem, listed.gap_error, "estimate", f"{listed.verdict}: {listed.method}")
     return Estimate(1.0 - float(modulus[largest]), float(width[largest]), "estimate", method)
 
