@@ -1,4 +1,4 @@
-"""Proof by factorisation that a symmetric matrix has no eigenvalue beyond those that are known."""
+"""Proof by factorisation that a symmetric matrix has no eigenvalues beyond the known ones."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.rounding import UNIT_ROUNDOFF
 
-# Roundings of an entry of the shifted matrix, beside one for each vector that is moved: its product with the sign, the
+# Roundings of an entry of the shifted matrix, without one for each deflated vector: its product with the sign, the
 # shift, and two products and sums of the deflation.
 ENTRY_ROUNDINGS = 6
-# Of gamma_{n+1} the one beyond n is the division by a pivot; where BLAS multiplies by its reciprocal it is one more,
-# and one is for the square root.
+# Roundings beyond n in gamma_{n+3}: the division by a pivot, one more if BLAS multiplies by its reciprocal, and the
+# square root.
 PIVOT_ROUNDINGS = 3
 
 
 @dataclass(frozen=True)
 class Deflated:
-    """The symmetric S, or for a unit vector c the matrix (I - c c^T) S (I - c c^T), which is not formed.
+    """A symmetric matrix S, or (I - c c^T) S (I - c c^T) for a unit vector c, without forming it.
 
-    It is S - c u^T - u c^T with u = S c - (c^T S c) c / 2. The eigenvalue at c is 0.
+    The latter is S - c u^T - u c^T with u = S c - (c^T S c) c / 2; it has the eigenvalue 0 at c.
     """
 
     array: Floats
@@ -31,7 +31,7 @@ class Deflated:
 
     @classmethod
     def of(cls, array: Floats, constant: Floats | None) -> Deflated:
-        """The matrix without the direction of ``constant``."""
+        """The matrix compressed to the complement of ``constant``."""
         if constant is None:
             return cls(array, None, None)
         image = array @ constant
@@ -40,7 +40,7 @@ class Deflated:
     def __matmul__(self, block: Floats) -> Floats:
         from scipy.linalg.blas import dsymv
 
-        # of a symmetric matrix the transpose is the same and, for BLAS, in the right order; one triangle is read
+        # the transpose of a symmetric matrix is the same matrix in the order of BLAS; one triangle is read
         found = dsymv(1.0, self.array.T, block) if block.ndim == 1 else self.array @ block
         if self.constant is None or self.image is None:
             return np.asarray(found)
@@ -55,15 +55,15 @@ class Deflated:
             return float(np.sqrt(square))
         along = float(self.constant @ self.image)
         rest = float(self.image @ self.image) - along**2
-        # S c = u + (c^T u) c, of which u - (c^T u) c is off c
+        # S c = u + (c^T u) c, with the part u - (c^T u) c orthogonal to c
         return float(np.sqrt(max(square - 2.0 * rest - 4.0 * along**2, 0.0)))
 
 
 def norm_beyond(matrix: Deflated, values: Floats) -> float:
-    """A bound for the moduli of all eigenvalues but the listed ones, which are Ritz values: by Frobenius norms.
+    """A bound, from Frobenius norms, of the moduli of all eigenvalues other than the listed Ritz values.
 
-    On orthonormal vectors V with V^T S V = diag(values) the squared norm of S is at least the sum of the squares of the
-    values plus that of the compression to the complement of V.
+    For orthonormal vectors V with V^T S V = diag(values), the squared norm of S is at least the sum of the squared
+    values plus the squared norm of the compression to the complement of V.
     """
     square = matrix.frobenius**2
     # sums of n^2 squares, in any order
@@ -72,18 +72,18 @@ def norm_beyond(matrix: Deflated, values: Floats) -> float:
 
 
 def margin_below(matrix: Deflated, sign: float, vectors: Floats, values: Floats, threshold: float) -> float | None:
-    r"""How far above ``threshold`` the eigenvalues of sign * matrix off the ``vectors`` may lie at most.
+    r"""A bound of the distance by which eigenvalues of sign * matrix off the ``vectors`` can exceed ``threshold``.
 
-    None where the proof fails: some of them are above, or nearer than rounding.
+    None if the proof fails, because an eigenvalue is above the threshold or closer to it than rounding.
 
     Notes
     -----
-    B = threshold - sign * matrix is made, with the vectors (approximate eigenvectors of the given values) and the
-    deflated direction moved far up, and factorised as B = R^T R. If that runs to completion then R^T R = B + E with
+    Let B be threshold - sign * matrix, in which the ``vectors`` (approximate eigenvectors of the given values) and the
+    deflated direction are moved to large eigenvalues. If the factorisation B = R^T R completes, R^T R = B + E with
     \|E\| <= gamma_{n+3} \| |R^T| |R| \| <= gamma_{n+3} \| |R| \|_1 \| |R| \|_inf in the spectral norm and
-    gamma_k = k u / (1 - k u), for every order of summation and pivots by their reciprocals. So x^T B x >= -margin for
-    all unit x, and for x orthogonal to the vectors x^T B x is threshold - sign * x^T S x: by the minimax principle
-    nothing else lies above.
+    gamma_k = k u / (1 - k u), for every order of summation and pivots by their reciprocals. Hence x^T B x >= -margin
+    for all unit x. For x orthogonal to the vectors, x^T B x is threshold - sign * x^T S x. By the minimax principle no
+    other eigenvalue exceeds threshold + margin.
 
     Source: N. J. Higham, *Accuracy and Stability of Numerical Algorithms* (2nd ed. 2002), Theorem 10.3.
     """
@@ -107,7 +107,7 @@ def margin_below(matrix: Deflated, sign: float, vectors: Floats, values: Floats,
     terms = (size + PIVOT_ROUNDINGS) * UNIT_ROUNDOFF
     norm: Any = get_lapack_funcs("lange", (factor,))
     one_norm, largest_row = norm("1", factor), norm("I", factor)
-    # | |S| | <= |S|_F; a rank one update has the norm of its vectors
+    # | |S| | <= |S|_F; the norm of a rank one update is the product of the norms of its vectors
     parts = float(np.linalg.norm(matrix.array)) + abs(threshold) + float(np.sum(moved**2))
     if matrix.image is not None:
         parts += 2.0 * float(np.linalg.norm(matrix.image))

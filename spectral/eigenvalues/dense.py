@@ -1,4 +1,4 @@
-"""Extremal eigenvalues of a dense symmetric matrix, with a proof that none is missed."""
+"""Extremal eigenvalues of a dense symmetric matrix, with a proof of completeness."""
 
 from __future__ import annotations
 
@@ -15,31 +15,30 @@ from .completeness import Deflated, margin_below, norm_beyond
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-# Two tiles of this many rows and columns stay in the cache.
+# Two tiles with this many rows and columns fit in the cache.
 TILE = 256
 Which = Literal["largest", "moduli"]
 _Pairs = tuple[Floats, Floats]
-# Below this size, and for more than this fraction of the spectrum, LAPACK's complete solver takes no longer.
+# LAPACK's complete solver is used below this size and above this fraction of the spectrum, where it takes no longer.
 SMALL, LARGEST_FRACTION = 512, 1.0 / 24.0
-# Relative accuracy that is asked of Lanczos; and the vectors and restarts that it may take: some hundred products,
-# still less than LAPACK takes.
+# Relative accuracy, least number of vectors and limit on restarts of Lanczos: some hundred products, less than LAPACK.
 LANCZOS_TOLERANCE, LEAST_SPACE, MOST_RESTARTS = 1e-13, 24, 16
-# Joint residual above which LAPACK's answer is worth its time; Lanczos loses digits where it starts anew in a cluster.
+# Joint residual above which LAPACK is used; Lanczos loses digits where it restarts in a cluster.
 LARGEST_RESIDUAL = 1e-11
-# Values beyond those asked for: of a compact operator the squares of a few leave less than that of the last one asked
-# for, and no factorisation is needed.
+# Additional values. For a compact operator the Frobenius norm of the rest may then be below the last wanted value, and
+# no factorisation is needed.
 GUARDS = 6
-# Further searches where the proof shows that values are missing, and for how many more each.
+# Number of searches, and additional values per search, if the proof shows that values are missing.
 SEARCHES, MORE_VALUES = 2, 8
-# What is between the last value and the threshold of the proof, in backward errors n u of a factorisation.
+# Distance from the last value to the threshold of the proof, in backward errors n u of a factorisation.
 CLEARANCE = 2.0
 
 
 def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
     """All eigenvalues (ascending) and eigenvectors of a symmetric matrix on the complement of a unit vector.
 
-    The complement is reached by a Householder reflection that takes the vector to the first axis; so neither the
-    multiplicity of the eigenvalue 1 nor noise in the rows can mix constants into the rest.
+    A Householder reflection maps the vector to the first axis. Therefore neither the multiplicity of the eigenvalue 1
+    nor noise in the entries can mix constants into the other eigenvectors.
     """
     from scipy.linalg import eigh
 
@@ -51,17 +50,17 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
 
 
 def compressed(array: Floats, embedding: csr_array[Any]) -> Floats:
-    """The symmetric half of E A E^T for a sparse E of shape (m, n): the form of A on the rows of E."""
+    """The symmetric part of E A E^T for a sparse E of shape (m, n): the form of A on the rows of E."""
     rows = embedding @ array
     found = np.empty((len(rows), len(rows)))
     for start in range(0, len(rows), TILE):
-        # a product with a transpose in one piece would read memory across the rows
+        # tile by tile, because a product with a transpose would read memory across the rows
         found[:, start : start + TILE] = embedding @ np.ascontiguousarray(rows[start : start + TILE].T)
     return symmetric_half(found)
 
 
 def symmetric_half(array: Floats) -> Floats:
-    """(A + A^T)/2, tile by tile, so that memory is read along the rows."""
+    """The symmetric part (A + A^T)/2, tile by tile, so that memory is read along the rows."""
     found = np.empty_like(array)
     for row in range(0, len(array), TILE):
         for column in range(0, row + 1, TILE):
@@ -72,7 +71,7 @@ def symmetric_half(array: Floats) -> Floats:
 
 
 def _householder(unit: Floats) -> Floats:
-    """The unit vector v for which I - 2 v v^T takes ``unit`` to plus or minus the first axis."""
+    """The unit vector v for which I - 2 v v^T maps ``unit`` to plus or minus the first axis."""
     v = np.array(unit, dtype=np.float64)
     v[0] += 1.0 if v[0] >= 0.0 else -1.0
     return np.asarray(v / np.linalg.norm(v))
@@ -84,7 +83,7 @@ def _reflect(v: Floats, array: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class ExtremalEigenvalues:
-    """The outermost eigenvalues of a symmetric matrix.
+    """The extremal eigenvalues of a symmetric matrix.
 
     Attributes
     ----------
@@ -93,13 +92,13 @@ class ExtremalEigenvalues:
     vectors : array of shape (n, m)
         Orthonormal.
     top : int
-        So many of them are the largest ones, counted from the upper end; the others are counted from the lower end.
+        The first ``top`` values are the largest eigenvalues; the others are the least ones.
     residuals : array of shape (m,)
         Norms of S v - lambda v.
     errors : array of shape (m,)
-        Bounds, to rounding: every value is this near the eigenvalue of its rank.
+        Bounds, to rounding, of the distance of every value from the eigenvalue of its rank.
     method : str
-        How they were found, and what proves that none is missing.
+        The method of computation, and the proof of completeness.
     """
 
     values: Floats
@@ -111,7 +110,7 @@ class ExtremalEigenvalues:
 
 
 def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "moduli") -> ExtremalEigenvalues:
-    r"""The k largest eigenvalues; or the k of largest modulus, and with them always the largest one.
+    r"""The k largest eigenvalues, or the k eigenvalues of largest modulus together with the largest one.
 
     Parameters
     ----------
@@ -125,12 +124,12 @@ def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "mod
 
     Notes
     -----
-    Lanczos finds values and vectors; with these moved away, a Cholesky factorisation of sigma - S, sigma just beyond
-    the last of them, shows that nothing else is beyond sigma, and one of sigma + S the same of the lower end. That
-    takes a tenth of the time of LAPACK's solver, which is asked where Lanczos does not converge. Let V hold the vectors
-    and R = S V - V diag(values): by Weyl the eigenvalues of S are within \|R\| of the values and of the spectrum of the
-    compression to the complement of V, and of this one it is proved to be within sigma plus the margin of rounding. So
-    clusters may be cut: a copy that is not listed is not larger than those that are.
+    Lanczos computes values and vectors, which are then deflated. A Cholesky factorisation of sigma - S, with sigma just
+    beyond the last value, proves that no other eigenvalue is above sigma; sigma + S proves the same for the lower end.
+    This takes a tenth of the time of LAPACK's solver, which is used if Lanczos does not converge. With the vectors V
+    and R = S V - V diag(values), the eigenvalues of S are by Weyl within \|R\| of the values and of the spectrum of the
+    compression to the complement of V, whose upper end is at most sigma plus a margin of rounding. A cluster may be
+    cut: its unlisted eigenvalues are not larger than the listed ones.
     """
     size = len(array)
     if size < SMALL or k > LARGEST_FRACTION * size:
@@ -144,7 +143,7 @@ def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "mod
 def end_values(array: Floats, constant: Floats | None, top: int, bottom: int) -> tuple[Floats, Floats]:
     """The ``top`` largest eigenvalues, descending, and the ``bottom`` least ones, ascending; fewer of a small matrix.
 
-    Without a proof: for the comparison of two grids, which is an estimate.
+    There is no proof of completeness; the values serve to compare two grids, an estimate.
     """
     if len(array) >= SMALL and max(top, bottom) <= LARGEST_FRACTION * len(array):
         matrix = Deflated.of(array, constant)
@@ -157,19 +156,19 @@ def end_values(array: Floats, constant: Floats | None, top: int, bottom: int) ->
 
 
 def wanted(values: Floats, k: int, which: Which) -> NDArray[np.intp]:
-    """Positions in descending values of the k wanted ones: of moduli the first is among them in any case."""
+    """Indices of the k wanted ones among descending values; for moduli they include the largest value."""
     if which == "largest" or not len(values):
         return np.arange(min(k, len(values)))
     return np.union1d([0], np.argsort(-np.abs(values), kind="stable")[:k])
 
 
 def counted_from_above(values: Floats, which: Which) -> int:
-    """How many of the wanted values, descending, have their rank from the upper end: of moduli the positive ones."""
+    """The number of wanted values, descending, with a rank from the upper end: for moduli the positive values."""
     return len(values) if which == "largest" else max(int(np.sum(values > 0.0)), min(1, len(values)))
 
 
 def _proved(matrix: Deflated, k: int, which: Which) -> ExtremalEigenvalues | str:
-    """By Lanczos and Cholesky; in words why not, where the one does not converge or the other does not bear it out."""
+    """Extremal eigenvalues by Lanczos, verified by a Cholesky factorisation; the reason in words if either fails."""
     end: Literal["LM", "LA"] = "LM" if which == "moduli" else "LA"
     none = _nothing(len(matrix.array))
     found = _more(matrix, none, k + GUARDS, end) or _more(matrix, none, k, end)
@@ -186,7 +185,7 @@ def _proved(matrix: Deflated, k: int, which: Which) -> ExtremalEigenvalues | str
 
 
 def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> ExtremalEigenvalues | str:
-    """The k wanted ones of those found; or why they are not good, or other eigenvalues may be beyond the last."""
+    """The k wanted pairs among those found, or the reason why they are inaccurate or may be incomplete."""
     values, vectors = found
     rounding = len(matrix.array) * EPS * max(1.0, float(np.abs(values).max()))
     residuals = np.linalg.norm(matrix @ vectors - vectors * values, axis=0)
@@ -200,7 +199,7 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
         last = float(chosen[-1])
         ends = {1.0: last}
     else:
-        # the largest value is wanted in any case, also where it is not among the k largest moduli
+        # the largest value is always wanted, even if it is not among the k largest moduli
         last = float(np.sort(np.abs(chosen))[-min(k, len(chosen))])
         ends = {1.0: min(last, float(chosen[0])), -1.0: last}
     others, reach = norm_beyond(matrix, values), {}
@@ -221,12 +220,12 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
 
 
 def _more(matrix: Deflated, known: _Pairs, number: int, end: Literal["LM", "LA", "SA"]) -> _Pairs | None:
-    """The known pairs and ``number`` more from one end of the rest, descending; None where Lanczos fails."""
+    """The known pairs and ``number`` more from one end of the rest, descending; None if Lanczos fails."""
     from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
     values, vectors = known
     size = len(matrix.array)
-    # known ones go where they are not looked for
+    # known eigenvalues are moved away from the wanted end
     target = {"LM": 0.0, "LA": -1.0, "SA": 1.0}[end] * (1.0 + np.abs(values).max(initial=0.0))
 
     def product(x: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Even and odd functions under theta -> pi - theta: the two parts of a mirror-symmetric law, and their eigenvalues."""
+"""Eigenvalues of the even and odd parts of a mirror-symmetric law under theta -> pi - theta."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 Parity = Literal["even", "odd", "none"]
 
-# Entries of the flip that are no rounding: it permutes the functions of a basis, up to signs.
+# Larger entries of the reflection matrix count as 1 in modulus: the reflection permutes the basis up to signs.
 ENTRY = 0.5
 
 
 def parity_basis(basis: Basis, law: Law | KernelMatrix) -> ParityBasis | None:
-    """Orthonormal even and odd functions of a mirror-symmetric law's basis: sparse, shapes (n, even) and (n, odd).
+    """Orthonormal even and odd functions in a basis, as sparse arrays of shapes (n, even) and (n, odd).
 
-    None where the law is not known to be mirror-symmetric, or where the flip does not keep the basis.
+    None if the law is not known to be mirror-symmetric, or the reflection does not preserve the basis.
 
     Examples
     --------
@@ -40,7 +40,7 @@ def parity_basis(basis: Basis, law: Law | KernelMatrix) -> ParityBasis | None:
         return None
     here = np.arange(basis.size)
     if isinstance(basis, Bins):
-        # a large matrix need not be made to see that bins change places
+        # the reflection reverses the bins; no large matrix is needed
         image, sign = here[::-1], np.ones(basis.size)
     else:
         flip = reflection_matrix(basis)
@@ -51,7 +51,7 @@ def parity_basis(basis: Basis, law: Law | KernelMatrix) -> ParityBasis | None:
     from scipy.sparse import csr_array
 
     def columns(alone: NDArray[np.bool_], factor: float) -> csr_array[Any]:
-        """The functions of one parity: each that is its own image, and the sums of each other one with its image."""
+        """The functions of one parity: those equal to their image, and sums of the others with their images."""
         single, first = here[alone], here[image > here]
         weight = np.full(len(first), np.sqrt(0.5))
         rows = np.concatenate([single, first, image[first]])
@@ -66,10 +66,10 @@ def parity_basis(basis: Basis, law: Law | KernelMatrix) -> ParityBasis | None:
 def extremal_by_parity(
     array: Floats, split: ParityBasis | None, constant: Floats | None, k: int, which: Which = "moduli"
 ) -> tuple[ExtremalEigenvalues, tuple[Parity, ...]]:
-    """`extremal` of the symmetric half of a matrix, with the parities of the eigenvectors.
+    """The result of `extremal` for the symmetric part of a matrix, with the parities of the eigenvectors.
 
-    Of a mirror-symmetric law, even and odd functions do not mix: two matrices of half the size take a quarter of the
-    work, and what a sampled matrix mixes is left out as the noise that it is. ``split`` is what `parity_basis` gives.
+    A mirror-symmetric law does not mix even and odd functions. Two matrices of half the size take a quarter of the
+    work; noise between the parities in a sampled matrix is omitted. ``split`` is the result of `parity_basis`.
     """
     if split is None:
         found = extremal(symmetric_half(array), constant, k, which)
@@ -87,7 +87,7 @@ def extremal_by_parity(
 def _merged(
     parts: list[tuple[ExtremalEigenvalues, csr_array[Any], Parity]], k: int, which: Which
 ) -> tuple[ExtremalEigenvalues, tuple[Parity, ...]]:
-    """The k wanted ones of both halves: each of these lists as many of its own."""
+    """The k wanted eigenvalues of the even and odd parts together, from the k wanted ones of each."""
     values = np.concatenate([part.values for part, _, _ in parts])
     vectors = np.concatenate([half @ part.vectors for part, half, _ in parts], axis=1)
     residuals = np.concatenate([part.residuals for part, _, _ in parts])

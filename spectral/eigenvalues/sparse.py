@@ -1,4 +1,4 @@
-"""The largest eigenvalues of large symmetric matrices, with a count that proves that none is missed."""
+"""The largest eigenvalues of large symmetric matrices, with a proof of completeness by a count."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import LinearOperator, SuperLU
 
-# Vectors carried beyond those asked for: the block converges as fast as the first value beyond it is far away.
+# Additional vectors of the block; it converges at the rate of the distance to the first value beyond the block.
 GUARD = 12
-# Of the shift beyond the largest eigenvalue that a matrix of norm 1 can have: a solve then loses half of the digits
-# only, and values within it of each other are told apart by Rayleigh and Ritz.
+# Relative distance of the shift from the bound of the largest eigenvalue. A solve then loses half of the digits only;
+# Rayleigh-Ritz separates values closer than this.
 SHIFT = 1e-9
 MOST_ITERATIONS, SETTLED = 300, 64.0
-# Fraction of the widest gap below the k-th value that another must have to be cut in.
+# Width of an acceptable gap below the k-th value, as a fraction of the widest.
 WIDE_GAP = 0.25
-# Gaps between neighbouring values must be this many rounding margins wide for a count between them to mean anything.
+# Least width of the gap of a reliable count, in margins of rounding.
 MARGINS = 4.0
 
 
@@ -44,17 +44,17 @@ class LeadingEigenvalues:
     residuals : array of shape (k,)
         ||S v - lambda v||.
     error : float
-        Bound, to rounding: every value is this near the eigenvalue of its rank.
+        Bound, to rounding, of the distance of every value from the eigenvalue of its rank.
     complete : bool
-        Whether the count proves that no larger eigenvalue is missing.
+        Whether it is proved that no larger eigenvalue is missing.
     counted : int
-        Eigenvalues above ``threshold``, by the signs of a factorisation; -1 where none was made. Of dense matrices the
-        number of those that are listed: no more are above ``threshold``, the last of them, plus ``margin``.
+        Number of eigenvalues above ``threshold``, by the signs of a factorisation; -1 without a factorisation. For
+        dense matrices the number of listed values: no others are above ``threshold``, the last value, plus ``margin``.
     threshold, margin : float
-        The matrix that was factorised differs from S - threshold by at most ``margin`` in norm.
+        The factorised matrix differs from S - threshold by at most ``margin`` in norm.
     method : str
     parity : tuple of {"even", "odd"}
-        Of the eigenvectors of a `KernelMatrix` of a mirror-symmetric law, which is solved in two halves; else empty.
+        Parities of the eigenvectors for a `KernelMatrix` of a mirror-symmetric law, otherwise empty.
     """
 
     values: Floats
@@ -72,17 +72,17 @@ class LeadingEigenvalues:
 def leading_eigenvalues(
     matrix: KernelMatrix | Floats | LinearOperator | Any, k: int, rng: np.random.Generator | None = None
 ) -> LeadingEigenvalues:
-    r"""The k largest eigenvalues of a symmetric matrix of norm about 1, proved to be the k largest.
+    r"""The k largest eigenvalues of a symmetric matrix of norm about 1, with a proof of completeness.
 
     Parameters
     ----------
     matrix : KernelMatrix, array, scipy sparse array or LinearOperator
-        Symmetric in an orthonormal basis: for a reversible stochastic P with the invariant weights w this is
+        A symmetric matrix in an orthonormal basis; for a reversible stochastic P with the invariant weights w it is
         W^(1/2) P W^(-1/2).
     k : int
-        How many; a cluster that k would cut is taken in whole, so that there may be a few more.
+        Number of eigenvalues. A cluster at the end is not cut, so there may be a few more.
     rng : numpy.random.Generator, optional
-        For the vectors to start from.
+        Source of the initial vectors.
 
     Returns
     -------
@@ -93,15 +93,15 @@ def leading_eigenvalues(
     InputError
         If the matrix is not square or not symmetric.
     AccuracyError
-        If the values do not converge, or the count disagrees with them: some would be missing or wrong.
+        If the values do not converge, or the count contradicts them.
 
     Notes
     -----
-    Sparse matrices: blocks of vectors are multiplied by (sigma - S)^(-1), sigma just above the spectrum, until they
-    settle, and an LDL^T factorisation without pivoting of S - tau, tau in a gap below the k-th value, has as many
-    positive pivots as S has eigenvalues above tau (Sylvester). The factors are multiplied out: the difference from
-    S - tau bounds how far the counted spectrum is moved. Dense matrices: see `asperity.spectral.eigenvalues.dense`.
-    For a LinearOperator nothing can be factorised: ``complete`` is False, and the residuals are all that is known.
+    Sparse matrices: a block of vectors is iterated with (sigma - S)^(-1), sigma just above the spectrum, until it
+    converges. An LDL^T factorisation without pivoting of S - tau, with tau in a gap below the k-th value, has as many
+    positive pivots as S has eigenvalues above tau (Sylvester). The difference of the product of the factors from
+    S - tau bounds the displacement of the counted spectrum. Dense matrices: see `asperity.spectral.eigenvalues.dense`.
+    A LinearOperator cannot be factorised: ``complete`` is False, and only the residuals are known.
 
     Examples
     --------
@@ -147,7 +147,7 @@ def _sparse(matrix: csc_array[Any], k: int, rng: np.random.Generator) -> Leading
     size = matrix.shape[0]
     if size <= 4 * (k + GUARD):
         return _dense(matrix.toarray(), k)
-    # no eigenvalue is above the largest sum of moduli in a row
+    # the largest sum of moduli in a row bounds the eigenvalues
     top = float(np.max(abs(matrix).sum(axis=1)))
     inverse = _factorised(matrix, top * (1.0 + SHIFT), -1.0).solve
     values, vectors, number, gap = _block_iteration(matrix, inverse, k, rng)
@@ -167,7 +167,7 @@ def _sparse(matrix: csc_array[Any], k: int, rng: np.random.Generator) -> Leading
             "some; ask for more with a larger k",
             abs(counted - number),
         )
-    # as many values as the count has, each with an eigenvalue of its own within the joint residual
+    # the number of values equals the count, so each has its own eigenvalue within the joint residual
     error = float(np.linalg.norm(residuals)) + 8.0 * EPS * top
     return LeadingEigenvalues(
         frozen(values[:number]), frozen(leading), frozen(residuals), error, True, counted, float(threshold), margin,
@@ -178,7 +178,7 @@ def _sparse(matrix: csc_array[Any], k: int, rng: np.random.Generator) -> Leading
 def _block_iteration(
     matrix: csc_array[Any], inverse: Callable[[Floats], Floats], k: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats, int, float]:
-    """Ritz values (descending) and vectors of a block, how many of them are wanted, and the gap below these."""
+    """Ritz values (descending) and vectors of a block, the number of wanted ones, and the gap below these."""
     size = matrix.shape[0]
     block = np.linalg.qr(rng.normal(size=(size, k + GUARD)))[0]
     worst = np.inf
@@ -186,7 +186,7 @@ def _block_iteration(
         block = np.linalg.qr(inverse(block))[0]
         values, turn = np.linalg.eigh(block.T @ (matrix @ block))
         values, block = values[::-1], block @ turn[:, ::-1]
-        # cut below k at the first gap that is about as wide as any, so that no cluster is cut
+        # cut at the first sufficiently wide gap below k, so that no cluster is cut
         drops = (values[k - 1 : -1] - values[k:])[: GUARD - 2]
         number = k + int(np.argmax(drops >= WIDE_GAP * drops.max()))
         leading = block[:, :number]
@@ -201,7 +201,7 @@ def _block_iteration(
 
 
 def _factorised(matrix: csc_array[Any], shift: float, sign: float) -> SuperLU:
-    """LU of sign * (matrix - shift) with symmetric permutations only, so that it is an LDL^T."""
+    """LU factors of sign * (matrix - shift) with symmetric permutations only, equivalent to LDL^T."""
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import splu
 
@@ -212,7 +212,7 @@ def _factorised(matrix: csc_array[Any], shift: float, sign: float) -> SuperLU:
 
 
 def _count_above(matrix: csc_array[Any], threshold: float) -> tuple[int, float]:
-    """Eigenvalues above the threshold and how far, in norm, the factorised matrix is from the one asked for."""
+    """The number of eigenvalues above the threshold, and the norm of the error of the factorisation."""
     from scipy.sparse import csc_array, eye_array
 
     factors = _factorised(matrix, threshold, 1.0)
@@ -223,7 +223,7 @@ def _count_above(matrix: csc_array[Any], threshold: float) -> tuple[int, float]:
     order = np.argsort(factors.perm_c)
     shifted = csc_array(matrix - threshold * eye_array(size))[order][:, order]
     difference = abs(factors.L @ factors.U - shifted)
-    # of a matrix that is symmetric but for rounding the norm is at most the root of both sums
+    # the spectral norm is at most the root of the product of both sums
     margin = float(np.sqrt(difference.sum(axis=0).max() * difference.sum(axis=1).max())) + size * EPS * EPS
     return int(np.sum(pivots > 0.0)), margin
 

@@ -1,4 +1,4 @@
-"""Spectra of kernel matrices, with the algebraic, the discretisation and the sampling error kept apart."""
+"""Spectra of kernel matrices, with separate algebraic, discretisation and sampling errors."""
 
 from __future__ import annotations
 
@@ -21,26 +21,25 @@ from .standard_errors import sampling_errors, sampling_quantile
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# With order 2, the lowest of the bases, the change by the last doubling is this fraction of the one before.
+# Ratio of the changes by two successive doublings of the basis, for order 2, the lowest order of the bases.
 EARLIER_FRACTION = 0.25
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
-# A sampled matrix whose antisymmetric part has a z-score above this is not called reversible: under reversibility
-# the score is standard normal, and 5 is exceeded once in 3.5 million matrices.
+# A sampled matrix is rejected as irreversible if its antisymmetric part has a z-score above this. Under reversibility
+# the score is standard normal and exceeds 5 once in 3.5 million matrices.
 REVERSIBLE_Z = 5.0
-# An unsampled matrix is called reversible below this relative antisymmetry, a thousand times the rounding errors of
-# its entries; otherwise its own reported error decides.
+# Relative antisymmetry allowed beyond the error of an unsampled matrix, a thousand times the rounding of its entries.
 REVERSIBLE_ROUNDING = 1e-12
-# Angles of a curve, and curves that can be told apart.
+# Angles per curve, and curves in a plot.
 ANGLES, SHOWN_FUNCTIONS = 400, 5
-# The label of eigenvalues in pictures.
+# Label of eigenvalues in plots.
 EIGENVALUE = "eigenvalue with its total error"
 
 
 def two_grid_changes(matrix: KernelMatrix, found: ExtremalEigenvalues) -> Floats:
-    """Change of every eigenvalue off the constants from the coarser basis, by its rank from its end of the spectrum.
+    """Change of every eigenvalue off the constants from the coarser basis, matched by rank from its spectral end.
 
-    A step of parity can leave an eigenvalue unchanged by accident; so a fraction of the change before counts too.
-    ``inf`` where the coarser basis has no such eigenvalue.
+    A refinement can leave an eigenvalue unchanged by chance, so a fraction of the previous change is a lower limit.
+    ``inf`` if the coarser basis has no such eigenvalue.
     """
     grids = _coarser_grids(matrix, found.top, len(found.values) - found.top, levels=2)
     changes = np.abs(np.diff([found.values, *grids], axis=0))
@@ -51,7 +50,7 @@ def two_grid_changes(matrix: KernelMatrix, found: ExtremalEigenvalues) -> Floats
 
 
 def _coarser_grids(matrix: KernelMatrix, top: int, bottom: int, levels: int) -> list[Floats]:
-    """The eigenvalues of these ranks on successively coarser bases; NaN where there is none."""
+    """The eigenvalues of these ranks on successively coarser bases; NaN if there is none."""
     from scipy.sparse import csr_array
 
     found: list[Floats] = []
@@ -78,16 +77,16 @@ class SpectrumErrors:
     Attributes
     ----------
     algebraic : array
-        Bound, to rounding: the value is this near the eigenvalue of its rank in the matrix (``Spectrum.completeness``),
-        and the norm of S v - lambda v is below it.
+        Bound, to rounding, of the distance from the eigenvalue of the same rank in the matrix
+        (``Spectrum.completeness``) and of the norm of S v - lambda v.
     discretisation : array
-        Change of the eigenvalue from the basis of half the size, or a quarter of the change before that, whichever
-        is larger (``inf`` where there is no coarser basis), plus the Frobenius error of a matrix that was not sampled.
+        Change of the eigenvalue from the basis of half the size, or a quarter of the previous change if that is larger
+        (``inf`` without a coarser basis), plus the Frobenius error of an unsampled matrix.
     sampling : array
-        Estimate: one standard error from the rays' randomness; 0 for matrices that were not sampled.
+        One standard error from the randomness of the rays, an estimate; 0 for unsampled matrices.
     quantile : float
-        Of how many standard errors an interval of 95 % has on each side: 1.96, or Student's quantile where the standard
-        error comes from the spread of a few parts of the rays.
+        Half width of a 95 % interval in standard errors: 1.96, or Student's quantile if the standard error comes from
+        a few replicates.
     """
 
     algebraic: Floats
@@ -96,7 +95,7 @@ class SpectrumErrors:
     quantile: float = NORMAL_95
 
     def total(self) -> Floats:
-        """Half width of an interval of about 95 %: bounds and two-grid differences in full, sampling by quantile."""
+        """Half width of an interval of about 95 %: algebraic + discretisation + quantile x sampling error."""
         return np.asarray(self.algebraic + self.discretisation + self.quantile * self.sampling)
 
 
@@ -107,34 +106,34 @@ class Spectrum:
     Attributes
     ----------
     values : array of shape (k,)
-        Eigenvalues; the constant function's is the first.
+        Eigenvalues; the first belongs to the constants.
     vectors : array of shape (n, k)
         Coefficients of the orthonormal eigenfunctions in ``basis``, constants first.
     residuals : array of shape (k,)
-        Norm of S v - lambda v; S is averaged with its mirror image where the eigenfunctions have parities.
+        Norm of S v - lambda v; S is averaged with its mirror image if the eigenfunctions have parities.
     gap, slem : float
-        1 - the largest spectral value off the constants; the largest modulus there. Of a law its essential spectrum
-        counts, whatever a matrix shows; of a matrix its eigenvalues are all there is.
+        1 minus the largest spectral value off the constants, and the largest modulus off the constants. They include
+        the essential spectrum of a law; for a matrix they come from its eigenvalues.
     gap_errors : SpectrumErrors
         The three errors of the gap, each of shape (1,).
     convention : str
-        ``"paper"`` (retroreflection is the identity) or ``"specular"`` (Feres: specular reflection is).
+        ``"paper"`` (retroreflection is the identity) or ``"specular"`` (Feres: specular reflection is the identity).
     errors : SpectrumErrors
     basis : Basis
     method : str
-        How the matrix was made.
+        The method that computed the matrix.
     matrix_error : float
         The part of the discretisation errors that comes from the entries of an unsampled matrix.
     parity : tuple of {"even", "odd", "none"}
-        Of every eigenfunction under theta -> pi - theta; "none" where the law is not known to be mirror-symmetric. In
-        the other convention the odd eigenvalues have the opposite sign.
+        Parities of the eigenfunctions under theta -> pi - theta; "none" if the law is not known to be mirror-symmetric.
+        In the other convention the odd eigenvalues have the opposite sign.
     completeness : str
-        What proves that no eigenvalue has a larger modulus off the constants and is not listed: of the matrix, or of
-        the law where the values are enclosed.
+        The proof that no eigenvalue of larger modulus off the constants is missing: for the matrix, or for the law if
+        the values are enclosed.
     verdict : {"isolated", "essential edge", "no gap", "undecided"}
-        Of the gap of a law, as in `SpectralGap`; of a matrix alone nothing can be decided.
+        Verdict on the gap of a law, as in `SpectralGap`; "undecided" for a matrix.
     evidence : tuple of str
-        What the verdict rests on.
+        The evidence for the verdict.
     """
 
     values: Floats
@@ -155,7 +154,7 @@ class Spectrum:
 
     @property
     def intervals(self) -> Floats:
-        """value -+ total error, shape (k, 2)."""
+        """The intervals value -+ total error, shape (k, 2)."""
         width = self.errors.total()
         return np.stack([self.values - width, self.values + width], axis=1)
 
@@ -165,7 +164,7 @@ class Spectrum:
         return float(self.gap_errors.total()[0])
 
     def estimates(self) -> tuple[Estimate, ...]:
-        """Every eigenvalue with its total error, to be quoted.
+        """Every eigenvalue with its total error.
 
         Examples
         --------
@@ -179,13 +178,13 @@ class Spectrum:
         return tuple(Estimate(float(value), float(error), "estimate", method) for value, error in pairs)
 
     def eigenfunction(self, index: int, theta: Any) -> Floats:
-        """Values of the eigenfunction of ``values[index]`` at the angles theta; mean square 1 under the measure."""
+        """Values at the angles theta of the eigenfunction of ``values[index]``, normalised to the mean square 1."""
         return np.asarray(self.basis.evaluate(theta) @ self.vectors[:, index])
 
     def implied_time_scales(self) -> tuple[Floats, Floats]:
-        """-1/ln|lambda| in steps, for all but the constants, and the intervals, shape (k - 1, 2), of the eigenvalues'.
+        """Time scales -1/ln|lambda| in steps, without the constants, and their intervals, shape (k - 1, 2).
 
-        Infinite at the end where the interval of an eigenvalue reaches modulus 1.
+        An interval is unbounded if the interval of the eigenvalue reaches modulus 1.
         """
         modulus, width = np.abs(self.values[1:]), self.errors.total()[1:]
         ends = np.stack([np.maximum(modulus - width, 0.0), np.minimum(modulus + width, 1.0)], axis=1)
@@ -194,7 +193,7 @@ class Spectrum:
         return scales, np.asarray(intervals)
 
     def plot_eigenfunctions(self, ax: Axes | None = None) -> Axes:
-        """Draw the eigenfunctions off the constants against the incoming angle."""
+        """Draw up to five eigenfunctions, without the constants, against the incoming angle."""
         theta = np.linspace(0.0, np.pi, ANGLES + 2)[1:-1]
         labels, functions = [], []
         for index in range(1, min(len(self.values), 1 + SHOWN_FUNCTIONS)):
@@ -228,7 +227,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
     image = 0.5 * (matrix.symmetric @ constant + constant @ matrix.symmetric)
     first = float(constant @ image)
     defect = float(np.linalg.norm(image - first * constant))
-    # the constants' own pair, then the others
+    # the pair of the constants, then the others
     values, vectors = np.append(first, rest.values), np.column_stack([constant, rest.vectors])
     residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
     changes = np.append(0.0, two_grid_changes(matrix, rest))
@@ -236,7 +235,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
     def errors_of(indices: NDArray[np.intp]) -> SpectrumErrors:
         return _errors(matrix, values[indices], vectors[:, indices], algebraic[indices], changes[indices])
 
-    # without a second function the gap is 1 by convention, and nothing is known of it
+    # without a second function the gap is 1 by convention, with unknown error
     unknown = frozen([np.inf])
     gap, slem, gap_errors = 1.0, 0.0, SpectrumErrors(unknown, unknown, unknown)
     if len(rest.values):
@@ -267,7 +266,7 @@ def _errors(
     rounding = matrix.basis.size * EPS
     return SpectrumErrors(
         algebraic=frozen(algebraic + rounding),
-        # an entry's error moves an eigenvalue by no more than the Frobenius norm; sampled ones have their own part
+        # errors of entries change an eigenvalue by at most their Frobenius norm; sampling errors are separate
         discretisation=frozen(changes + (0.0 if matrix.samples else float(matrix.error))),
         sampling=frozen(sampling_errors(matrix, vectors, values)),
         quantile=sampling_quantile(matrix),
@@ -275,9 +274,9 @@ def _errors(
 
 
 def check_reversible(matrix: KernelMatrix) -> None:
-    """Raise an AccuracyError where the matrix is not symmetric within its error.
+    """Raise an AccuracyError if the matrix is not symmetric within its error.
 
-    The matrix of a law that is reversible by theorem is taken so, unless it was sampled and the counts speak against.
+    The matrix of a law that is reversible by theorem is accepted, unless sampled counts contradict it.
     """
     if matrix.reversible and matrix.raw_defect is None:
         return
@@ -285,7 +284,7 @@ def check_reversible(matrix: KernelMatrix) -> None:
     if defect.z_score is not None:
         refused = defect.z_score > REVERSIBLE_Z
     else:
-        # an antisymmetric part of the size of the matrix's own error is no evidence
+        # an antisymmetric part of the size of the matrix error is no evidence
         scale = float(np.linalg.norm(matrix.symmetric)) or 1.0
         allowed = REVERSIBLE_ROUNDING + 2.0 * float(matrix.error) / scale
         refused = float(defect) > allowed

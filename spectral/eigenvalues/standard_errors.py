@@ -1,4 +1,4 @@
-"""Sampling errors of eigenvalues: standard errors by the delta method, intervals by the bootstrap."""
+"""Sampling errors of eigenvalues, by the delta method and by the bootstrap."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 
 def sampling_quantile(matrix: KernelMatrix) -> float:
-    """How many standard errors of `sampling_errors` an interval of 95 % has on each side."""
+    """Half width of a 95 % interval in standard errors of `sampling_errors`."""
     return student_95(len(matrix.replicates)) if len(matrix.replicates) > 1 else NORMAL_95
 
 
 def sampling_errors(matrix: KernelMatrix, vectors: Floats, values: Floats) -> Floats:
-    """One standard error of each eigenvalue, shape (k,); zeros for matrices that were not sampled.
+    """One standard error of each eigenvalue, shape (k,); zeros for unsampled matrices.
 
-    To first order an eigenvalue moves by v^T (S_hat - S) v. Where the matrix keeps the parts of its rays,
-    the spread of v^T S_r v over them is used; otherwise the multinomial variance of the counts in each row.
+    To first order an eigenvalue changes by v^T (S_hat - S) v. If the matrix has replicates, the spread of v^T S_r v
+    over them is used; otherwise the multinomial variance of the counts.
     """
     if len(matrix.replicates) > 1:
         each = np.array([_quadratic_forms(replicate, vectors) for replicate in matrix.replicates])
@@ -42,7 +42,7 @@ def _quadratic_forms(symmetric: Floats | csr_array[Any], vectors: Floats) -> Flo
 def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
     """Variance of the mean of phi(i) phi(j) over the counted pairs, phi = v / sqrt(w).
 
-    Where rows were normalised, i is fixed and each row an independent multinomial; else all pairs are one.
+    If rows were normalised, each row i is an independent multinomial sample; otherwise all pairs are one sample.
     """
     counts = np.asarray(matrix.counts, dtype=np.float64)
     weights = np.asarray(matrix.weights)
@@ -66,7 +66,7 @@ def bootstrap_intervals(
     Parameters
     ----------
     matrix : KernelMatrix
-        Sampled, in bins, with its raw counts; resampled as it was sampled, pair by pair.
+        A sampled matrix on bins with counts, which are resampled pair by pair.
     k : int
         Number of eigenvalues.
     rng : numpy.random.Generator
@@ -81,8 +81,8 @@ def bootstrap_intervals(
 
     Notes
     -----
-    An interval [2 x - q_high, 2 x - q_low] from the quantiles q of the resampled values; it needs no normality, which
-    makes it a check of the delta method. Where a bin has few pairs both are doubtful.
+    The interval is [2 x - q_high, 2 x - q_low] with the quantiles q of the resampled values. It does not assume
+    normality, so it checks the delta method. Both are unreliable if a bin has few pairs.
 
     Examples
     --------
@@ -116,6 +116,6 @@ def _leading_values(counts: Floats, weights: Floats, k: int, *, symmetrised: boo
         flux = weights[:, None] * counts / np.maximum(counts.sum(axis=2, keepdims=True), 1.0)
     root = np.sqrt(weights)
     flux = 0.5 * (flux + np.swapaxes(flux, 1, 2)) / (root[:, None] * root)
-    # the constants are moved out of the way, below everything else
+    # the constants are moved below all other eigenvalues
     shifted = flux - 3.0 * np.outer(root, root)
     return np.asarray(np.linalg.eigvalsh(shifted)[:, ::-1][:, :k])
