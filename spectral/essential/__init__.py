@@ -1,1 +1,1 @@
-"""The essential spectrum of a law: its edge, from grazing rays, ideal parts and straight pieces."""
+"""The edge of the essential spectrum of a law, from grazing rays, ideal parts and straight pieces."""

@@ -23,12 +23,12 @@ ROUNDING = 1e-15
 
 @dataclass(frozen=True)
 class EssentialEdge:
-    """An interval that holds the supremum of the essential spectrum.
+    """An interval that contains the supremum of the essential spectrum.
 
     Attributes
     ----------
     low, high : float
-        Between 0 and 1; equal where the structure of the law tells.
+        Ends of the interval, between 0 and 1; equal if the supremum follows from the structure of the law.
     kind : {"bound", "estimate"}
     reasons : tuple of str
     """
@@ -40,20 +40,20 @@ class EssentialEdge:
 
     @property
     def value(self) -> float:
-        """The middle of the interval."""
+        """The midpoint of the interval."""
         return 0.5 * (self.low + self.high)
 
     @property
     def error(self) -> float:
-        """Half its width."""
+        """Half of the width of the interval."""
         return 0.5 * (self.high - self.low)
 
 
 @dataclass(frozen=True)
 class _Part:
-    """What a law does to functions that oscillate fast, and to functions of grazing angles."""
+    """The action of a law on fast oscillations and on functions of grazing angles."""
 
-    # an interval for the top of what its isometries make, and <1, Q 1> of these
+    # an interval for the top of the spectrum of its isometries Q; ``fraction`` is <1, Q 1>
     modulus: tuple[float, float]
     grazing: Floats
     error: float
@@ -64,7 +64,7 @@ class _Part:
 
 
 def essential_edge(law: Law) -> EssentialEdge:
-    r"""How far the essential spectrum of a reversible law reaches towards 1.
+    r"""The supremum of the essential spectrum of a reversible law, as an interval.
 
     Parameters
     ----------
@@ -76,13 +76,12 @@ def essential_edge(law: Law) -> EssentialEdge:
 
     Notes
     -----
-    A law is taken apart into what is compact and two things that are not. *Isometries*, theta' = +-theta + c: for
-    suitable large n all n c are nearly multiples of 2 pi, so that cos(n theta) times a slow function goes to
-    cos(n theta) times another; the part of the law that consists of isometries, a sub-Markov operator Q, has all of
-    its spectrum in the essential spectrum: `straight_part`. *Grazing rays*: see
-    `grazing_limit`. Sums and products of laws have the sums and products of these symbols. That the remainder is
-    compact is a theorem for densities and matrices; for curved walls it presumes that outgoing angles depend on the
-    entry point by analytic pieces, so that the edge is an estimate.
+    A law is the sum of a compact part and of two parts that are not compact. *Isometries*, theta' = +-theta + c: for
+    suitable large n all n c are nearly multiples of 2 pi, so cos(n theta) times a slow function is mapped to
+    cos(n theta) times a slow function. Therefore the whole spectrum of the isometric part Q, a sub-Markov operator, is
+    essential; see `straight_part`. *Grazing rays*: see `grazing_limit`. Sums and products of laws have the sums and
+    products of these symbols. The remainder is compact by a theorem for densities and matrices. For curved walls this
+    assumes that the outgoing angle is a piecewise analytic function of the entry point, so the edge is an estimate.
 
     Examples
     --------
@@ -97,13 +96,13 @@ def essential_edge(law: Law) -> EssentialEdge:
     high = min(max(part.modulus[1], root + part.error, low), 1.0)
     notes = tuple(dict.fromkeys(part.notes))
     if part.certain and part.modulus[0] == part.modulus[1] >= root - ROUNDING - part.error:
-        # fast oscillations reach as far as anything can: the norm of the part that is not compact
+        # fast oscillations attain the norm of the part that is not compact
         low = high = min(part.modulus[0], 1.0)
     return EssentialEdge(low, high, "bound" if part.certain and low == high else "estimate", notes)
 
 
 def grazing_symbol(law: Law) -> GrazingLimit:
-    """`grazing_limit` of a law, from its parts: sums and products of laws have sums and products of these matrices."""
+    """The `grazing_limit` of a law, from sums and products of the limits of its parts."""
     part = _taken_apart(law)
     return GrazingLimit(part.grazing, part.error, part.entry_error)
 
@@ -117,7 +116,7 @@ def _leaf(law: Law) -> _Part:
         return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
     if made_of_isometries(law):
         limit = _ideal_limit(law) if isinstance(law, IsometryLaw) else grazing_limit(law)
-        # an isometric law cannot enlarge anything: what its grazing limit is matters in sums with other walls only
+        # an isometric law has the edge 1; its grazing limit matters in sums with other laws only
         note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
         return _Part((1.0, 1.0), limit.matrix, limit.error, limit.entry_error, True, (note,), 1.0)
     limit = grazing_limit(law)
@@ -154,7 +153,7 @@ def _ideal_limit(law: IsometryLaw) -> GrazingLimit:
 def _mixture(terms: Sequence[tuple[float, _Part]]) -> _Part:
     fraction = sum(w * part.fraction for w, part in terms)
     return _Part(
-        # positive operators: the sum reaches as far as any term, and as its fraction
+        # for positive operators the top of a sum is at least the top of each weighted term, and at least its fraction
         (max(fraction, *(w * part.modulus[0] for w, part in terms)), sum(w * part.modulus[1] for w, part in terms)),
         sum((w * part.grazing for w, part in terms), np.zeros((2, 2))),
         sum(w * part.error for w, part in terms),
@@ -176,14 +175,14 @@ def _chain(parts: Sequence[_Part]) -> _Part:
 
 def _product(first: _Part, second: _Part) -> _Part:
     fraction = first.fraction * second.fraction
-    # what keeps all rays changes no norm
+    # a factor whose top is 1 does not change the top
     low = {(True, True): 1.0, (True, False): second.modulus[0], (False, True): first.modulus[0]}.get(
         (first.modulus[0] == 1.0, second.modulus[0] == 1.0), fraction
     )
     return _Part(
         (low, first.modulus[1] * second.modulus[1]),
         first.grazing @ second.grazing,
-        # sums of rows are at most 1 but for the errors
+        # row sums are at most 1 plus the errors
         first.error + second.error + first.error * second.error,
         2.0 * (first.entry_error + second.entry_error + first.entry_error * second.entry_error),
         first.certain and second.certain,

@@ -1,4 +1,4 @@
-"""The spectrum of laws made of ideal ones (specular, retroreflection, Lambertian), exactly."""
+"""The exact spectrum of laws composed of ideal ones (specular reflection, retroreflection, Lambertian reflection)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from ...kernels.laws.structure import Rules, fold
 
 @dataclass(frozen=True)
 class IdealSpectrum:
-    """Off the constants such a law is ``even`` times the identity on even functions of cos(theta), ``odd`` on odd ones.
+    """The two eigenvalues, off the constants, of a law composed of ideal ones.
 
     Attributes
     ----------
     even, odd : float
+        The eigenvalues on even and on odd functions of cos(theta).
     rounding : float
-        Bound for the rounding of both.
+        Bound of the rounding of both.
     """
 
     even: float
@@ -30,12 +31,12 @@ class IdealSpectrum:
 
     @property
     def top(self) -> float:
-        """The larger of the two."""
+        """The larger eigenvalue."""
         return max(self.even, self.odd)
 
 
 def ideal_spectrum(law: Law) -> IdealSpectrum | None:
-    """The two eigenvalues off the constants of a law made of ideal ones in any way; None of other laws.
+    """The two eigenvalues off the constants of a law composed of ideal ones; None for other laws.
 
     Examples
     --------
@@ -80,9 +81,9 @@ def _in_other_frame(part: IdealSpectrum | None) -> IdealSpectrum | None:
 
 
 def without_identity(law: Law) -> tuple[float, Law]:
-    """1 - a and R of P = a 1 + (1 - a) R, where the structure of a law shows such an a > 0; else 1 and P itself.
+    """The weight 1 - a and the law R in P = a 1 + (1 - a) R, if P is a sum with an identity term; else 1 and P.
 
-    The identity is retroreflection in the paper's convention, specular reflection in the other.
+    The identity is retroreflection in the paper's convention and specular reflection in the other.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The limit of a law at grazing incidence, on which its essential spectrum depends."""
+"""The limit of a law at grazing incidence, which determines part of its essential spectrum."""
 
 from __future__ import annotations
 
@@ -19,24 +19,23 @@ if TYPE_CHECKING:
     from ...geometry import Wall
     from ...geometry.curves.curve import Curve
 
-# Grazing angles, down to where the outgoing angle, good to some 1e-15, still has seven digits; for the ends of hollows
-# that keep their direction only to a small depth, times the ratio of this depth to the opening.
+# Grazing angles in units of the scale of the wall. At the smallest one the outgoing angle, with an error of some 1e-15,
+# has seven digits.
 ANGLES = 10.0 ** -np.arange(3.0, 9.0)
-# A tangent is taken as vertical if its horizontal part is below this fraction: the angles of some ten operations.
+# A unit tangent with a smaller horizontal part counts as vertical: rounding of some ten operations.
 VERTICAL = 64.0 * EPS
-# The end of a hollow keeps its direction until its tangent has turned by this angle; halvings that find the position.
+# The end of a hollow counts as straight until its tangent has turned by this angle; halvings to find this point.
 TURN, HALVINGS = 0.1, 60
-# Adaptive quadrature in the entry point: first panels, error asked for, and rays that it may take.
+# Adaptive quadrature in the entry point: first panels, wanted error, limit on the rays, and least width of a panel.
 FIRST_PANELS, QUADRATURE_TOLERANCE, MOST_RAYS, NARROWEST = 8, 1e-9, 20_000, 1e-13
-# Shifted lattices where there are too many changes of itinerary: their spread is the error.
+# Shifted lattices for integrands with too many changes of itinerary; their spread is the error.
 LATTICES, LATTICE_POINTS = 8, 2048
-# Three powers of ten between which the sums of rows change by less than this are enough, where the scale is known.
+# If the row sums change by less than SETTLED between three powers of ten, and the scale is known, no more are needed.
 SETTLED, FEWEST_ANGLES = 2e-8, 3
-# No limit has an eigenvalue above the norm of a law, 1: what exceeds it by more than its error has not settled, and
-# then nothing is known.
+# No limit has an eigenvalue above 1, the norm of a law. If one exceeds 1 by more than its error, the limit is unknown.
 NORM, UNKNOWN = 1.0, 1.0
 SWAP = np.array([[0.0, 1.0], [1.0, 0.0]])
-# Walls whose limits are kept.
+# Number of walls in the cache.
 REMEMBERED = 32
 # Relative accuracy of an outgoing angle of the size of the incoming one.
 ANGLE_ROUNDING = 4e-15
@@ -44,17 +43,17 @@ ANGLE_ROUNDING = 4e-15
 
 @dataclass(frozen=True)
 class GrazingLimit:
-    """The matrix lim E[sin(theta) / sin(Theta'); Theta' at end j] for theta at end i; ends are 0 and pi.
+    """The matrix lim E[sin(theta) / sin(Theta'); Theta' at end j] for theta at end i, with the ends 0 and pi.
 
     Attributes
     ----------
     matrix : array of shape (2, 2)
     error : float
-        Estimated error of the sums of rows; 0 where the shape of the wall decides.
+        Estimated error of the row sums; 0 if the limit follows from the shape of the wall.
     entry_error : float
-        Estimated error of the entries: in deep hollows the ends share a row in a way that never settles.
+        Estimated error of the entries. In deep hollows the entries of a row may not converge although their sum does.
     resolved : bool
-        False where the angles have not come near a limit: its error is then the norm of a law, 1.
+        False if no limit was reached; the error is then 1, the norm of a law.
     """
 
     matrix: Floats
@@ -64,31 +63,31 @@ class GrazingLimit:
 
     @property
     def root(self) -> float:
-        """The largest eigenvalue: how far the essential spectrum reaches on account of grazing rays."""
+        """The largest modulus of an eigenvalue, the edge of the essential spectrum of grazing rays."""
         return float(np.max(np.abs(np.linalg.eigvals(self.matrix))))
 
 
 def grazing_limit(law: Law) -> GrazingLimit:
-    r"""The limit at grazing of the law's action on 1/sin(theta), end by end.
+    r"""The limit at grazing of the law's action on 1/sin(theta), for each of the ends 0 and pi.
 
     Notes
     -----
-    Where grazing rays come back at an angle proportional to their own, theta' = c theta with c of a fixed
-    distribution, the law acts on functions of ln(theta) as a convolution, and the symbol of this convolution on
-    L^2(theta d theta) is E[c^(-1 + i omega)], whose modulus is largest at omega = 0. An outgoing angle that does not
-    graze contributes nothing in the limit. For the semicircle the sum of a row is (3/8) ln 9.
+    If grazing rays leave at a proportional angle, theta' = c theta with a fixed distribution of c, the law acts on
+    functions of ln(theta) as a convolution. The symbol of this convolution on L^2(theta d theta) is
+    E[c^(-1 + i omega)], whose modulus is largest at omega = 0. Outgoing angles that are not grazing contribute nothing
+    in the limit. For the semicircle a row sum is (3/8) ln 9.
 
     *Walls.* A ray that enters a hollow at a small angle theta meets the side of the hollow within O(theta) of its end
-    on y = 0. If the side leaves this end at an angle a to the horizontal, 0 < a < pi/2, the ray goes up from there
-    at the angle pi - 2 a, and out: it does not graze. If a = 0, the side falls off like -c w^m with the distance w from
-    its end, m > 1; the ray meets it at a depth of order theta, where w is of order theta^(1/m) and the slope of order
-    theta^(1 - 1/m), so that sin(theta)/sin(theta') is of order theta^(1/m). Either way the limit is 0, and by Schur's
-    test with the weight 1/sin(theta) the norm of the law on functions of angles below theta tends to 0: such sides add
-    nothing to the essential spectrum. Only flat tops, vertical sides and overhanging ones do.
+    on y = 0. If the side leaves this end at an angle a to the horizontal, 0 < a < pi/2, the ray leaves at the angle
+    pi - 2 a, which is not grazing. If a = 0, the side has the depth c w^m at the distance w from its end, m > 1. The
+    ray meets it at a depth of order theta, where w is of order theta^(1/m) and the slope of order theta^(1 - 1/m), so
+    sin(theta)/sin(theta') is of order theta^(1/m). In both cases the limit is 0, and by Schur's test with the weight
+    1/sin(theta) the norm of the law on functions of angles below theta tends to 0. Such sides add nothing to the
+    essential spectrum; only flat tops and vertical or overhanging sides do.
 
-    *Other ends, other laws.* The angles run through powers of ten, from a thousandth of the angle under which the part
-    of the side that keeps its direction is seen from the opening; Aitken's extrapolation gives the limit, and how far
-    it moved the last value, with the errors of the quadratures, its error. A limit above the norm of a law is refused.
+    *Other ends, other laws.* The angles are powers of ten, from 1e-3 on, times the length of the straight part of the
+    side over the opening. The limit is found by Aitken's extrapolation. Its error is the change of the last value by
+    the extrapolation plus the errors of the quadratures. A limit above the norm of a law is rejected.
 
     Examples
     --------
@@ -109,7 +108,7 @@ def grazing_limit(law: Law) -> GrazingLimit:
 
 @dataclass(frozen=True)
 class Grazed:
-    """Where grazing rays are to be looked at: parts of the period, for theta near 0 and near pi, and how near."""
+    """Parts of the period whose grazing rays are traced, for theta near 0 and near pi, and the scale of the angles."""
 
     parts: tuple[tuple[tuple[float, float], ...], ...] = (((0.0, 1.0),), ((0.0, 1.0),))
     flat: float = 0.0
@@ -118,16 +117,16 @@ class Grazed:
 
 @lru_cache(maxsize=REMEMBERED)
 def _limit_of_wall(law: CircularArcLaw | WallLaw) -> GrazingLimit:
-    """The gaps in both conventions and the diffusivity ask for the same limit."""
+    """The limit of a wall, cached for the gaps in both conventions and the diffusivity."""
     if isinstance(law, CircularArcLaw):
         return _limit(law, Grazed(scale=1.0))
-    # the law of the cell is that of the wall, and its rays enter where its hollows are
+    # the cell has the same law, and its entry points refer to its hollows
     cell = law.wall.cell
     return _limit(law if cell is law.wall else WallLaw(cell), grazed(cell))
 
 
 def grazed(wall: Wall) -> Grazed:
-    """The hollows of a wall whose sides are vertical, or overhang, where grazing rays meet them."""
+    """The hollows of a wall whose sides are vertical or overhang where grazing rays meet them."""
     from ...geometry.cells.hollow import flat_tops, hollows_between
 
     highest = max((float(piece.box[3]) for loop in wall.islands for piece in loop), default=-np.inf)
@@ -138,22 +137,22 @@ def grazed(wall: Wall) -> Grazed:
     for hollow in hollows_between(flat_tops(wall.pieces, wall.vertices), wall.vertices):
         sides = (wall.pieces[hollow.first], wall.pieces[hollow.last - 1].reversed())
         for part, side, forward in zip(parts, sides, (1.0, -1.0), strict=True):
-            # a straight curve on y = 0 is a flat top in all but name
+            # a curve along y = 0 counts as a flat top
             if not (_is_plain(float(forward * _direction(side)[0])) and side.box[1] < 0.0):
                 part.append((hollow.left / wall.period, hollow.right / wall.period))
                 scales.append(_straight_depth(side) / hollow.width)
-    # islands below the openings are met by rays that are not grazing enough
+    # islands below the openings limit the scale
     scale = min(*scales, -highest / wall.period) if wall.islands else min(scales)
     return Grazed((tuple(parts[0]), tuple(parts[1])), wall.flat_top / wall.period, scale)
 
 
 def _is_plain(run: float) -> bool:
-    """Whether a side with this horizontal part of its unit tangent is neither vertical nor overhanging."""
+    """Whether a side whose unit tangent has this horizontal part is neither vertical nor overhanging."""
     return run > VERTICAL
 
 
 def _direction(side: Curve) -> Floats:
-    """The unit tangent at the start; of a Bezier curve that stands still there its limit."""
+    """The unit tangent at the start, or its limit for a Bezier curve with zero velocity there."""
     from ...geometry import Bezier
 
     points = np.array(side.control_points if isinstance(side, Bezier) else ())
@@ -162,7 +161,7 @@ def _direction(side: Curve) -> Floats:
 
 
 def _straight_depth(side: Curve) -> float:
-    """How far from its start a curve keeps its direction."""
+    """Distance from the start up to which a curve is nearly straight."""
     start = _direction(side)
 
     def has_turned(s: float) -> bool:
@@ -196,7 +195,7 @@ def _limit(law: Law, where: Grazed) -> GrazingLimit:
 def _extrapolated(limits: list[list[tuple[Floats, float]]]) -> GrazingLimit:
     values = np.array([[pair[end][0] for end in (0, 1)] for pair in limits])
     noise = np.array([max(pair[0][1], pair[1][1]) for pair in limits])
-    # of deep hollows only small angles are out of reach: the best-known angles decide
+    # in deep hollows the smallest angles may be inaccurate: only the most accurate values are used
     known = noise <= max(4.0 * float(noise.min()), 1e-6)
     values, noise = values[known], noise[known]
     matrix, sums = values[-1], values.sum(axis=2)
@@ -207,14 +206,14 @@ def _extrapolated(limits: list[list[tuple[Floats, float]]]) -> GrazingLimit:
     scale = np.divide(limit, sums[-1], out=np.ones(2), where=sums[-1] > 0.0)
     moved = np.abs(limit - sums[-1]) + np.minimum(np.abs(sums[-1] - sums[-2]), np.abs(limit - sums[-1]) + noise[-1])
     error = float(np.max(moved) + noise[-3:].max())
-    # what shrinks from one power of ten to the next is settled; what does not, as rays that alternate, is not
+    # entries whose change decreases from one power of ten to the next converge; alternating ones do not
     steps = np.abs(np.diff(values[-3:], axis=0)).max(axis=(1, 2))
     unsettled = float(steps[1]) if steps[1] < 0.5 * steps[0] else float(np.ptp(values, axis=0).max())
     return GrazingLimit(matrix * scale[:, None], error, max(error, unsettled))
 
 
 def _aitken(first: Floats, second: Floats, third: Floats, noise: float) -> Floats:
-    """The limit of a geometric approach; the last value where the steps are noise or do not shrink."""
+    """The limit of geometric convergence, or the last value if the steps are noise or do not decrease."""
     before, last = second - first, third - second
     shrinks = (np.abs(last) > noise) & (np.abs(last) < 0.9 * np.abs(before)) & (before * last > 0.0)
     step = np.divide(last * last, before - last, out=np.zeros_like(last), where=shrinks)
@@ -222,7 +221,7 @@ def _aitken(first: Floats, second: Floats, third: Floats, noise: float) -> Float
 
 
 def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float], ...]) -> tuple[Floats, float]:
-    """E[sin(theta)/sin(Theta'); x in parts] with Theta' nearer to 0 and to pi, and its error."""
+    """E[sin(theta)/sin(Theta'); x in parts] for Theta' below and above pi/2, and its error."""
     if not parts:
         return np.zeros(2), 0.0
     theta = angle if end == 0 else np.pi - angle
@@ -244,7 +243,7 @@ def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float]
 
 
 def _entry_integral(function: Callable[[Floats], Floats], first: float, last: float) -> tuple[Floats, float]:
-    """The integral over entry points in (first, last) of a function that is analytic between jumps, and its error."""
+    """The integral over entry points in (first, last) of a piecewise analytic function, and its error."""
     edges = np.linspace(first, last, FIRST_PANELS + 1)
     low, high = edges[:-1], edges[1:]
     total, settled, rays = np.zeros(2), 0.0, 0
@@ -270,7 +269,7 @@ def _entry_integral(function: Callable[[Floats], Floats], first: float, last: fl
 def _lattice_integral(
     function: Callable[[Floats], Floats], first: float, last: float, total: Floats, settled: float
 ) -> tuple[Floats, float]:
-    """Shifted lattices, if their spread is smaller than the error of what they replace."""
+    """The integral by shifted lattices, if their spread is less than the error of the given total."""
     shift = (np.arange(LATTICES) + 0.5) / LATTICES * np.sqrt(2.0) % 1.0
     points = (np.arange(LATTICE_POINTS) + shift[:, None]) / LATTICE_POINTS
     values = function(entry_inside(first + (last - first) * points.ravel()))

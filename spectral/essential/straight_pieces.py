@@ -1,4 +1,4 @@
-"""The part of a wall's law that comes from straight pieces alone, and the edge of its spectrum."""
+"""The part of a wall's law from rays that meet straight pieces only, and the edge of its spectrum."""
 
 from __future__ import annotations
 
@@ -16,33 +16,33 @@ from .grazing import REMEMBERED
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Entry points a short step apart leave by the same angle where all reflections are at straight pieces: rounding is
-# below this, and a curved piece turns the ray by the step over its radius, 1e-7 or more unless it is flat.
+# Two rays with entry points this step apart leave at the same angle, to rounding, if all reflections are at straight
+# pieces. A curved piece changes the angle by the step over its radius, 1e-7 or more unless the piece is flat.
 STEP, SAME_ANGLE = 1e-7, 1e-11
-# Outgoing angles of the same angle nearer than this are of one isometry, and so are nodes of one orbit.
+# Outgoing angles closer than this belong to one isometry, or are one node of an orbit.
 SAME_NODE = 1e-8
-# Entry points of a row at first, and on the last level, where the changes between them are halved so often.
+# Entry points per angle on the first levels and on the last ones, and bisections of changes on the last ones.
 POINTS, FINE_POINTS, HALVINGS = 256, 2048, 40
-# Orbits are followed from so many angles, through so many layers while they have no more nodes than this.
+# Number of initial angles, layers of an orbit, and limit on its nodes.
 ANGLES, LAYERS, MOST_NODES = 96, 6, 60
-# The largest values are looked at again, so often and the last of these times with all entry points, between so many
-# angles that are nearer by this factor.
+# Search near the largest values: peaks, levels, levels with all entry points, angles per peak, ratio of spacings.
 PEAKS, LEVELS, FINE_LEVELS, NEARBY_ANGLES, NEARER = 4, 5, 2, 9, 6.0
-# Of what the last level, or the last layers, added: what may still be missing.
+# Error as a multiple of the change by the last level plus the last layer.
 BEYOND = 2.0
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class StraightPart:
-    """Rays of a wall that meet straight pieces only, an operator Q between 0 and P.
+    """The operator Q of the rays of a wall that meet straight pieces only, 0 <= Q <= P.
 
     Attributes
     ----------
     fraction : float
-        <1, Q 1>: the probability of these rays.
+        <1, Q 1>, the probability of these rays.
     low, high : float
-        An interval that holds the top of Q's spectrum, which is all essential: estimated, unless they are equal.
+        An interval that contains the top of the spectrum of Q, all of which is essential. It is estimated, unless the
+        ends are equal.
     """
 
     fraction: float
@@ -52,15 +52,14 @@ class StraightPart:
 
 @lru_cache(maxsize=REMEMBERED)
 def straight_part(law: WallLaw) -> StraightPart:
-    r"""How far the spectrum of the straight part of a wall's law reaches.
+    r"""The operator Q of the rays that meet straight pieces only: its fraction and the top of its spectrum.
 
     Notes
     -----
-    Q f(theta) = sum of q_k(theta) f(+-theta + c_k) is symmetric and positive, and so is its restriction to the orbit of
-    one angle under the isometries: a matrix with the entries q_k(theta) (sin(theta)/sin(theta'))^(1/2). Functions near
-    the points of an orbit show that the top of Q is the supremum of the largest eigenvalues of these matrices, over
-    all orbits; those of orbits that are cut off are below it. The supremum is sought on a grid of angles and then near
-    its largest values.
+    Q f(theta) = sum of q_k(theta) f(+-theta + c_k) is symmetric and positive. So is its restriction to the orbit of one
+    angle under the isometries, a matrix with the entries q_k(theta) (sin(theta)/sin(theta'))^(1/2). The top of Q is the
+    supremum over all orbits of the largest eigenvalues of these matrices, as functions near the points of an orbit
+    show. Truncated orbits give lower values. The supremum is searched on a grid of angles and near its largest values.
 
     Examples
     --------
@@ -78,7 +77,7 @@ def straight_part(law: WallLaw) -> StraightPart:
     found = _largest_of_orbits(law, angle, POINTS)
     fraction = float(found.fractions @ np.sin(angle) / np.sin(angle).sum())
     if np.all(found.fractions <= flat + 2.0 / POINTS):
-        # what more there is would need a fraction of rays below what is seen
+        # more straight rays would be a smaller fraction than the entry points resolve
         return StraightPart(fraction, flat, min(flat + 2.0 / POINTS, 1.0))
     spacing, best = np.pi / ANGLES, found
     candidates, values = angle, found.roots
@@ -98,7 +97,7 @@ def straight_part(law: WallLaw) -> StraightPart:
 
 @dataclass(frozen=True)
 class _Orbits:
-    """For each starting angle: the largest eigenvalue of its orbit's matrix, the last layers' part, the fraction."""
+    """For each initial angle the largest eigenvalue of its orbit, its change by the last layer, and the fraction."""
 
     roots: Floats
     missing: Floats
@@ -139,7 +138,7 @@ def _near(node: int, orbit: list[int]) -> bool:
 
 
 def _root(orbit: list[int], conditionals: dict[int, tuple[Floats, Floats]], angles: dict[int, float]) -> float:
-    """The largest eigenvalue on the nodes of an orbit, all of whose rows are known."""
+    """The largest eigenvalue on the nodes of an orbit."""
     matrix = np.zeros((len(orbit), len(orbit)))
     for i, node in enumerate(orbit):
         for weight, out in zip(*conditionals[node], strict=True):
@@ -153,7 +152,7 @@ def _root(orbit: list[int], conditionals: dict[int, tuple[Floats, Floats]], angl
 def _conditionals(
     law: WallLaw, nodes: list[tuple[int, float]], points: int, halved: bool
 ) -> dict[int, tuple[Floats, Floats]]:
-    """Weights and outgoing angles of the straight rays of each node's angle."""
+    """Weights and outgoing angles of the straight rays for the angle of each node."""
     if not nodes:
         return {}
     theta = np.array([angle for _, angle in nodes])
@@ -177,7 +176,7 @@ def _conditionals(
 
 
 def _changes(law: WallLaw, theta: Floats, low: Floats, high: Floats, label: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """The first change of the label to the right of ``low``, nearer than rounding shows."""
+    """Intervals, bisected to rounding, that contain the first change of the label to the right of ``low``."""
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
         here = np.rint(np.nan_to_num(_straight(law, middle, theta), nan=-1.0) / SAME_NODE).astype(np.int64)
@@ -187,7 +186,7 @@ def _changes(law: WallLaw, theta: Floats, low: Floats, high: Floats, label: NDAr
 
 
 def _straight(law: WallLaw, x: Floats, theta: Floats) -> Floats:
-    """Outgoing angles of the rays that meet straight pieces only; nan of the others."""
+    """Outgoing angles of the rays that meet straight pieces only, and nan for other rays."""
     if not x.size:
         return np.empty(0)
     here, there = (law.reflect_with_status(entry, theta)[0] for entry in (x, np.minimum(x + STEP, 1.0 - 2.0**-53)))
