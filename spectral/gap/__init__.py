@@ -1,1 +1,1 @@
-"""The spectral gap and the spectrum of a law: the methods, the theorems and the verdict."""
+"""The spectral gap and the spectrum of a law: methods, theorems and verdict."""

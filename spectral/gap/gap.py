@@ -1,4 +1,4 @@
-"""The spectral gap of a law in either convention: a number with its error, a verdict and the evidence."""
+"""The spectral gap of a law in either convention, with its error, a verdict and the evidence."""
 
 from __future__ import annotations
 
@@ -25,24 +25,23 @@ from .shallow import shallow_gap
 from .theorems import gap_by_theorem
 from .verdict import SpectralGap, isolated, made_from
 
-# Eigenvalues that are enclosed in the search of the largest one off the constants; how many may be for walls, and how
-# exact the pilot run is that counts them.
+# Number of enclosed eigenvalues for densities; limit on this number for walls, and accuracy and levels of the pilot run
+# that determines it.
 ENCLOSED, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS = 3, 8, 1e-2, 2
-# Enclosures somewhat wider than the tolerance are sought once more, to this fraction of it; a gap whose error misses
-# the tolerance is handed over as it is where that is below the largest miss, a fraction of the gap.
+# Enclosures slightly wider than the tolerance are computed again with CLOSER times the tolerance. A gap whose error
+# exceeds the tolerance is accepted if its relative error is at most LARGEST_MISS.
 CLOSER, LARGEST_MISS = 0.25, 1e-3
-# From this tolerance on, small matrices by few rays may do for the gap of a traced wall: their sizes, with the errors
-# asked of them, and the rays allowed. What larger bases would change is at most this multiple of the last change where
-# these changes fall like a power of the size of .6 or more.
+# From the tolerance ROUGH on, small sampled matrices are tried for traced walls: sizes with wanted errors, and rays.
+# Larger bases change the gap by at most BEYOND_CHANGE times the last change, if changes decrease like size^-0.6.
 ROUGH, GLANCES, FEW_RAYS, BEYOND_CHANGE = 2e-3, ((24, 1.0), (48, 0.1)), 2**17, 2.0
-# Eigenvalues among which the one of largest modulus is sought.
+# Number of eigenvalues computed to find the least one.
 MODULI = 3
 
 
 def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap | None:
-    """A rough gap of a traced wall from small matrices by few rays: the rows of an enclosure take ten times as long.
+    """A rough gap of a traced wall, from small matrices sampled with few rays; enclosures take ten times as long.
 
-    None for other laws, for fine tolerances, and near the essential spectrum.
+    None for other laws, for tolerances below `ROUGH`, and near the essential spectrum.
     """
     if tolerance < ROUGH or not law.expectations(ONE_PANEL).is_traced:
         return None
@@ -57,7 +56,7 @@ def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essent
 
 
 def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap | None:
-    """The gap from an indexed enclosure; None where rows or the separation of the spectrum are not known so well."""
+    """The gap from an indexed enclosure, or None if the conditional expectations or the separation are inaccurate."""
     if isinstance(law, DensityLaw):
         found = (_gap_of_enclosures(law, number, tolerance) for number in (ENCLOSED, 2 * ENCLOSED))
         return next((gap for gap in found if gap is not None and gap.error <= tolerance), None)
@@ -68,7 +67,7 @@ def enclosed_gap(law: Law, tolerance: float, edge: EssentialEdge) -> SpectralGap
     gap = None if number is None else _gap_of_enclosures(law, number, tolerance)
     if number is not None and gap is not None and tolerance < gap.error <= tolerance / CLOSER:
         gap = _gap_of_enclosures(law, number, CLOSER * tolerance) or gap
-    # other bases than adapted panels would hardly do better
+    # other bases are hardly better than adapted panels
     return gap if gap is not None and gap.error <= max(tolerance, LARGEST_MISS * gap.value) else None
 
 
@@ -76,7 +75,7 @@ def _gap_of_enclosures(law: Law, number: int, tolerance: float) -> SpectralGap |
     found = enclosures(law, number, tolerance=tolerance)
     listed = [item for item in found if item.label == "indexed" and item.index]
     top = max(listed, key=lambda item: item.value, default=None)
-    # nothing that is not listed is larger
+    # no eigenvalue that is not listed may be larger
     if top is None or top.low <= max(found.separation.radius, 0.0) or top.high >= 1.0:
         return None
     gap, error = 1.0 - 0.5 * (top.low + top.high), 0.5 * top.width
@@ -84,9 +83,9 @@ def _gap_of_enclosures(law: Law, number: int, tolerance: float) -> SpectralGap |
 
 
 def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
-    """How many of the largest moduli reach down to the largest value off the constants, in a pilot run.
+    """The number of eigenvalues of largest modulus that include the largest one off the constants, by a pilot run.
 
-    None where that value is not beyond the essential spectrum.
+    None if the largest eigenvalue is not beyond the essential spectrum.
     """
     pilot = adapted_trial_space(law, MOST_ENCLOSED, PILOT_TOLERANCE, PILOT_LEVELS)
     values = pilot.values[np.argsort(-np.abs(pilot.values), kind="stable")]
@@ -102,12 +101,11 @@ def spectral_gap(
     Parameters
     ----------
     law : Law, CollisionLaw or KernelMatrix
-        In the convention that it carries; a matrix is taken as it is, of a collision law its P~.
+        A law in its own convention; for a collision law its P~. A matrix is not refined.
     tolerance : float
-        The basis grows, and the number of rays with it, until the reported error is below this or the largest basis
-        and number of rays are reached; the error says which.
+        Wanted error. If it is not reached with the largest basis and number of rays, ``error`` is larger.
     rng : numpy.random.Generator, optional
-        For laws that are traced; ``np.random.default_rng(0)`` by default, so that results repeat.
+        Source of rays for traced laws; by default ``np.random.default_rng(0)``.
 
     Returns
     -------
@@ -116,19 +114,19 @@ def spectral_gap(
     Raises
     ------
     AccuracyError
-        If the law is not reversible, or its sampled matrix speaks against it.
+        If the law is not reversible, or its sampled matrix is not symmetric within its error.
 
     Notes
     -----
-    A law P J in the convention in which it is not self-adjoint, as that of a wall without mirror symmetry in the
-    specular frame, need not have a real spectrum. There the value is 1 - the contraction factor of functions of mean
-    0, ||P J|| = slem of P, since J is unitary; method and evidence say so.
+    First, theorems are applied. Laws made of isometries (polygonal walls, specular reflection, retroreflection) have no
+    gap: 1 is in the essential spectrum, and the gap of a grid is an artefact. Otherwise `essential_edge` bounds the
+    essential spectrum. Enclosures, or Galerkin matrices, whose eigenvalues above the edge converge from below, decide
+    whether an eigenvalue lies beyond the edge. If so, the gap is *isolated*. If the eigenvalues on all bases stay below
+    the edge, the gap ends at the *essential edge*.
 
-    First the structure of the law is asked. Laws made of isometries (polygonal walls, specular reflection,
-    retroreflection) have no gap: 1 is in the essential spectrum, and whatever a grid shows is an artefact of the grid.
-    Else `essential_edge` says how far the essential spectrum reaches, and Galerkin matrices, whose eigenvalues above
-    it converge from below, say whether an eigenvalue lies beyond. If one does, the gap is *isolated*; if on all bases
-    all of them stay short of the edge, the gap ends at the *essential edge*.
+    A law P J that is not self-adjoint in its convention, such as the law of a wall without mirror symmetry in the
+    specular frame, need not have a real spectrum. The value is then 1 - ||P J|| on functions of mean 0, where ||P J||
+    is the slem of P since J is unitary; ``method`` and ``evidence`` say so.
 
     Examples
     --------
@@ -162,12 +160,12 @@ def spectral_gap(
 def gaps_in_both_conventions(
     law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None
 ) -> tuple[SpectralGap, SpectralGap]:
-    """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
+    """The gaps of a mirror-symmetric law in its own and in the other convention, from the same matrices.
 
     Raises
     ------
     InputError
-        If the law is not known to be mirror-symmetric: in the other convention it need not be self-adjoint then.
+        If the law is not known to be reversible and mirror-symmetric, hence self-adjoint in both conventions.
 
     Examples
     --------
@@ -192,7 +190,7 @@ def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
 
 
 def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.random.Generator) -> SpectralGap:
-    """The spectrum of P^n consists of the n-th powers of that of P: an even power turns its lower end up."""
+    """The gap of P^n, from the gap of P for odd n and from 1 - slem of P for even n."""
     ask = modulus_gap if exponent % 2 == 0 else spectral_gap
     found = ask(base, tolerance / exponent, rng)
     value, error = gap_of_power(found.value, found.error, exponent)
@@ -202,7 +200,7 @@ def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.rand
 
 
 def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None) -> SpectralGap:
-    """1 - slem, the distance from 1 of the largest modulus in the spectrum off the constants, as `spectral_gap` is.
+    """The gap 1 - slem, where slem is the largest modulus in the spectrum off the constants.
 
     Examples
     --------
@@ -219,7 +217,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | No
         return small
     upper = spectral_gap(law, tolerance, rng)
     if upper.verdict == "no gap" or lambertian_fraction(law) == upper.value:
-        # of modulus 1, or as large as the rest of a law with a Lambertian fraction can be
+        # the slem is 1, or is the norm 1 - a of the rest of a law with a Lambertian fraction a
         return upper
     listed = law_eigenvalues(law, MODULI, tolerance, rng)
     lowest = int(np.argmin(listed.values))
@@ -227,7 +225,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | No
     top = 1.0 - upper.value
     edge = essential_edge(law)
     if least + error < top - upper.error or least <= edge.high:
-        # the essential spectrum reaches no farther below than above: the parts of the law are positive operators
+        # the edge bounds the modulus of the essential spectrum, because the parts of the law are positive operators
         return upper
     evidence = (*upper.evidence, f"the least eigenvalue is {-least:.10g} +- {error:.2g}")
     method = f"least eigenvalue, {listed.basis!r}, {listed.method}"
@@ -242,8 +240,7 @@ def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | No
 
 
 def _shallow_modulus(law: Law, tolerance: float) -> SpectralGap | None:
-    """Of mirror-symmetric shallow walls: slow functions are kept or turned round, and in the two conventions the gap is
-    that of either; fast ones have moduli further from 1."""
+    """The gap 1 - slem of mirror-symmetric shallow walls, the lesser of the gaps in both conventions."""
     if not law.mirror_symmetric:
         return None
     both = [shallow_gap(one, essential_edge(one)) for one in (law, law.in_specular_frame())]
@@ -255,7 +252,7 @@ def _shallow_modulus(law: Law, tolerance: float) -> SpectralGap | None:
 
 
 def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generator) -> SpectralGap:
-    """1 - ||P J|| on functions of mean 0, for P J that is not self-adjoint where P is."""
+    """The value 1 - ||P J|| on functions of mean 0, for a self-adjoint P whose P J is not self-adjoint."""
     found = modulus_gap(other, tolerance, rng)
     evidence = (why_not_self_adjoint(other), what_is_true(), *found.evidence)
     method = f"norm of P J on functions of mean 0, the slem of P; {found.method}"
@@ -265,7 +262,7 @@ def _contraction(law: Law, other: Law, tolerance: float, rng: np.random.Generato
 
 
 def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> SpectralGap:
-    """By what is known best: of shallow walls the form of 1 - P, else enclosures and matrices."""
+    """The gap from the quadratic form of 1 - P for shallow walls, or from enclosures and matrices."""
     fraction, rest = without_identity(law)
     if fraction < 1.0:
         own = SharedMatrices(matrices.rng)
@@ -281,7 +278,7 @@ def _by_refinement(law: Law, tolerance: float, matrices: SharedMatrices) -> Spec
 
 
 def _scaled(found: SpectralGap, fraction: float) -> SpectralGap:
-    """The gap of (1 - fraction) + fraction R from that of R."""
+    """The gap of (1 - fraction) + fraction R from the gap of R."""
     reason = (
         f"the law is R in a fraction {fraction:.6g} and the identity in the rest: its gap is that fraction of R's gap"
     )
@@ -291,7 +288,7 @@ def _scaled(found: SpectralGap, fraction: float) -> SpectralGap:
 
 def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> SpectralGap:
     if edge.high >= 1.0 and edge.low >= 1.0 - tolerance:
-        # the edge cannot be told from 1, and no eigenvalue fits between that the tolerance could tell
+        # within the tolerance, no eigenvalue fits between the edge and 1
         return _at_edge(law, edge, (*edge.reasons, f"the edge is 1 within {2.0 * edge.error:.1g}: no gap is visible"))
     found_at_once = rough_gap(law, tolerance, matrices, edge) or enclosed_gap(law, tolerance, edge)
     if found_at_once is not None:
@@ -306,14 +303,14 @@ def _by_matrices(law: Law, tolerance: float, matrices: SharedMatrices, edge: Ess
     if edge.low > 0.0 and top < edge.high + steps.noise and _is_relevant(edge, steps):
         short = f"no eigenvalue beyond the edge {edge.value:.8g} on any basis: {top:.6g} is the largest"
         return _at_edge(law, edge, (*reasons, short), found, steps.overshoot(edge.high))
-    # two grids say nothing where refinement does not converge; the gap of a Galerkin matrix is never too small
+    # without convergence the two-grid error is meaningless; the gap of a Galerkin matrix is an upper bound
     method = made_from(found, "not converged: an upper bound but for its noise")
     error = max(error, abs(found.gap))
     return SpectralGap(found.gap, error, "estimate", method, "undecided", reasons, law.frame, found)
 
 
 def _is_relevant(edge: EssentialEdge, steps: Refinement) -> bool:
-    """Whether the edge is known better than what refinement leaves open between its largest eigenvalue and the edge."""
+    """Whether the error of the edge is less than its distance from the largest eigenvalue of the refinement."""
     top = 1.0 - steps.finest.gap
     return edge.error <= max(edge.value - top, steps.noise, 1e-3 * (1.0 - edge.value))
 
@@ -332,14 +329,14 @@ def _lower_bound(law: Law) -> tuple[str, ...]:
 
 
 def held_against_oscillations(law: Law, found: SpectralGap) -> SpectralGap:
-    r"""A gap found in slow functions, unless cos(t theta + phase) of some large t has a smaller quotient.
+    r"""Replace a gap found in slow functions if cos(t theta + phase) for some large t has a smaller quotient.
 
     Notes
     -----
-    The quotient 1/2 E (f(theta') - f(theta))^2 / Var f is at least the gap, whatever f. Straight pieces move angles by
-    a few constants c_k, and if all t c_k are nearly multiples of 2 pi, cos(t theta) is nearly kept. Where pieces are
-    slightly bent this still holds for such t as are not too large, while the essential spectrum is gone: a matrix in
-    slow functions knows nothing of it. A few thousand rays show such t; that they show none is no proof.
+    The quotient 1/2 E (f(theta') - f(theta))^2 / Var f is at least the gap for every f. Straight pieces change angles
+    by a few constants c_k. If all t c_k are nearly multiples of 2 pi, cos(t theta) is nearly invariant. If the pieces
+    are slightly curved, this still holds for moderate t, although the essential spectrum disappears. A matrix in slow
+    functions does not detect it. A few thousand rays detect such t, but do not prove that there are none.
     """
     try:
         frequency, quotient, spread = least_quotient(law)

@@ -29,49 +29,48 @@ def spectrum(
     rng: np.random.Generator | None = None,
     **discretisation: Any,
 ) -> Spectrum:
-    """Eigenvalues of a reversible kernel, largest moduli first chosen, then sorted descending.
+    """The k eigenvalues of largest modulus of a reversible kernel, sorted descending.
 
     Parameters
     ----------
     kernel : KernelMatrix, Law or CollisionLaw
-        A collision law has the eigenvalues of its P~ with both signs. A matrix is taken as it is.
+        A reversible kernel. A collision law has the eigenvalues of its P~ with both signs. A matrix is not refined.
     k : int
-        Number of eigenvalues; a matrix of fewer rows has fewer.
+        Number of eigenvalues; a matrix with fewer rows has fewer.
     tolerance : float, optional
-        Error wanted of every eigenvalue of a law, 1e-4 by default; ``errors`` says what was reached. Where a basis is
-        given it is the wanted error of the matrix.
+        Wanted error of every eigenvalue of a law, 1e-4 by default; ``errors`` are the errors reached. If a basis is
+        given, it is the wanted error of the matrix.
     rng : numpy.random.Generator, optional
-        For laws that are traced.
+        Source of rays for traced laws.
     **discretisation
-        ``basis=`` and further keywords of `asperity.kernels.discretise`: the law is taken by its matrix in this basis
-        (Legendre polynomials of degree below 48 where only others are given), and not refined.
+        ``basis=`` and further keywords of `asperity.kernels.discretise`. The law is then replaced by its matrix in this
+        basis (by default Legendre polynomials of degree below 48), without refinement.
 
     Returns
     -------
     Spectrum
-        Of a law with the verdict on its gap: where that is "no gap" or "essential edge" ``gap`` and ``slem`` are the
-        law's, and the eigenvalues listed beyond may belong to the basis alone.
+        The spectrum of a law includes the verdict on its gap. If this is "no gap" or "essential edge", ``gap`` and
+        ``slem`` belong to the law, and some listed eigenvalues may belong to the basis only.
 
     Raises
     ------
     AccuracyError
-        If the kernel is not symmetric within its error: its spectrum need not be real. Of a law that is self-adjoint in
-        the other convention only, the message says what is true in this one.
+        If the kernel is not symmetric within its error, so that its spectrum need not be real. If the law is
+        self-adjoint in the other convention only, the message states the norm bound that holds in this one.
 
     Notes
     -----
-    Walls, arcs, densities, Lambertian reflection and sums of these: trial functions on panels that adapt to the law,
-    and enclosures of the eigenvalues from their residuals (`enclosures`); ``errors`` are the half widths. Powers have
-    the powers of the eigenvalues. Other laws: Galerkin matrices.
+    For walls, arcs, densities, Lambertian reflection and sums of these, eigenvalues are enclosed by residuals of trial
+    functions (`enclosures`); ``errors`` are the half widths. Powers of laws have the powers of the eigenvalues. For
+    other laws Galerkin matrices are used.
 
-    Of a matrix the constant function is split off exactly, and even from odd functions where the law is
-    mirror-symmetric. Small ones are solved by LAPACK's complete symmetric solver; of large ones Lanczos finds what is
-    asked for, and Cholesky factorisations prove that nothing was missed (`asperity.spectral.eigenvalues.dense`).
-    Cost: O(n^3).
+    Matrices are compressed exactly to the complement of the constants, and to even and odd functions if the law is
+    mirror-symmetric. LAPACK solves small matrices completely. For large ones Lanczos finds the wanted eigenvalues, and
+    Cholesky factorisations prove completeness (`asperity.spectral.eigenvalues.dense`). The cost is O(n^3).
 
     Examples
     --------
-    Henyey-Greenstein scattering has the eigenvalues g^l:
+    The Henyey-Greenstein law has the eigenvalues g^l:
 
     >>> from asperity import kernels as ker, spectral as spec
     >>> spec.spectrum(ker.henyey_greenstein(0.5), k=4).values.round(12).tolist()
@@ -102,7 +101,7 @@ def spectrum(
 
 
 def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
-    """With the law's gap and its verdict: what a matrix shows short of the essential spectrum's edge is not the gap."""
+    """Add the gap of the law and its verdict; eigenvalues below the essential edge do not determine the gap."""
     known = gap_by_theorem(law)
     if known is None:
         edge = essential_edge(law)
@@ -122,7 +121,7 @@ def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: np.random.Ge
 
 
 def with_gap(found: Spectrum, known: SpectralGap) -> Spectrum:
-    """The eigenvalues of a matrix of a law, with the law's own gap."""
+    """The eigenvalues of a matrix of a law, with the gap of the law."""
     return replace(
         found, gap=known.value, gap_errors=discretisation_only(np.array([known.error])),
         slem=max(1.0 - known.value, found.slem), verdict=known.verdict, evidence=known.evidence,
@@ -130,7 +129,7 @@ def with_gap(found: Spectrum, known: SpectralGap) -> Spectrum:
 
 
 def _both_signs(half: Spectrum, k: int) -> Spectrum:
-    """spectrum(K) = spectrum(P~) x {+1, -1}: the flip of psi has both eigenvalues. The gap stays that of P~."""
+    """The spectrum of K, spectrum(P~) x {+1, -1} because psi -> pi - psi has both eigenvalues, with the gap of P~."""
     index = np.tile(np.arange(len(half.values)), 2)
     values = np.concatenate([half.values, -half.values])
     order = np.argsort(-np.abs(values), kind="stable")[:k]

@@ -15,23 +15,23 @@ from ..bounds.enclosure import EnclosedTrialSpace, as_power, enclosed_trial_spac
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
 from ..essential.exact import ideal_spectrum
 
-# Legendre polynomials of laws that have no rows with known errors; the first is enough for ten eigenvalues of most.
+# Sizes of Legendre bases for laws without known errors of expectations; the first suffices for ten eigenvalues of most.
 DEGREES = (48, 96)
-# Fraction of the tolerance that the entries of a matrix may spend.
+# Fraction of the tolerance for the errors of the entries of a matrix.
 MATRIX_FRACTION = 0.1
-# Enclosures are asked for to this fraction of the tolerance, for they come out somewhat wider; they are sought again,
-# at most so often and to no less than this fraction of what was asked, while that narrows them by this factor.
+# Enclosures are first computed with FIRST times the tolerance, because they are wider than asked. Up to ATTEMPTS times
+# the tolerance is reduced, by SMALLEST_STEP at most, as long as the width decreases by the factor WORTHWHILE.
 FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 3, 1e-3, 0.5
-# Eigenvalues that are enclosed at most in the search of the largest off the constants.
+# Limit on the enclosed eigenvalues in the search for the largest one off the constants.
 MOST_ENCLOSED = 24
 
 
 def law_eigenvalues(law: Law, k: int, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
-    """The k eigenvalues of largest modulus of a law, without a word on its gap: see `spectrum`."""
+    """The k eigenvalues of largest modulus of a law, without a verdict on its gap; see `spectrum`."""
     power = as_power(law)
     if power is not None:
         base, exponent = power
-        # the largest modulus is listed, so that an even power knows its top
+        # an even power needs the largest modulus off the constants
         found = law_eigenvalues(base, max(k, 2), tolerance / exponent, rng)
         return _raised(found, exponent, k)
     if not made_of_isometries(law) and ideal_spectrum(law) is None:
@@ -56,7 +56,7 @@ def _by_matrices(law: Law, k: int, tolerance: float, rng: np.random.Generator | 
 
 
 def _enclosed(law: Law, k: int, tolerance: float) -> Spectrum:
-    """Enclosures to the tolerance, of as many eigenvalues as it takes to have the largest off the constants."""
+    """Enclosures to the tolerance, with enough eigenvalues to include the largest one off the constants."""
     number, asked = k, FIRST * tolerance
     best = found = enclosed_trial_space(law, number, None, asked)
     for _ in range(ATTEMPTS):
@@ -70,7 +70,7 @@ def _enclosed(law: Law, k: int, tolerance: float) -> Spectrum:
             break
         before, found = found, enclosed_trial_space(law, number, None, asked)
         if len(found.enclosures) == len(before.enclosures) and found.worst > WORTHWHILE * before.worst:
-            # the means are spent
+            # no further progress
             break
         best = found
     return _spectrum_of(best, k)
@@ -87,17 +87,17 @@ def _of_density(law: DensityLaw, k: int, tolerance: float) -> Spectrum:
 
 
 def _has_top(found: EnclosedTrialSpace) -> bool:
-    """Whether the largest eigenvalue off the constants is known to be among those that are listed."""
+    """Whether the largest eigenvalue off the constants is known to be listed."""
     tops = [item.low for item in found.enclosures if item.index != 0]
     return bool(tops) and max(tops) > max(found.enclosures.separation.radius, 0.0)
 
 
 def _spectrum_of(found: EnclosedTrialSpace, k: int) -> Spectrum:
-    """Enclosures as a spectrum: the errors are what the intervals reach beyond the values."""
+    """Enclosures as a spectrum; the errors are the distances from the values to the ends of the intervals."""
     items = found.enclosures.items
     values = np.array([item.value for item in items])
     errors = np.array([max(item.high - item.value, item.value - item.low) for item in items])
-    # the constants' is the first, then by modulus
+    # constants first, then by decreasing modulus
     order = np.append(0, 1 + np.argsort(-np.abs(values[1:]), kind="stable"))[:k]
     chosen = np.append(0, np.sort(order[1:]))
     radius = found.enclosures.separation.radius
@@ -110,7 +110,7 @@ def _spectrum_of(found: EnclosedTrialSpace, k: int) -> Spectrum:
         )
         gap = 1.0 - top
         if not _has_top(found) and found.indexed:
-            # a larger one may lie between the listed ones and what the rest reaches
+            # the rest of the spectrum may contain a larger eigenvalue
             gap_error = max(gap_error, radius - top)
     return Spectrum(
         values=frozen(values[chosen]),
@@ -133,19 +133,19 @@ def _spectrum_of(found: EnclosedTrialSpace, k: int) -> Spectrum:
 
 
 def discretisation_only(width: Floats) -> SpectrumErrors:
-    """Errors that are in no other part."""
+    """Errors with the discretisation part only."""
     nothing = np.zeros(len(width))
     return SpectrumErrors(frozen(nothing), frozen(width), frozen(nothing))
 
 
 def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
-    """The spectrum of a power: an error grows by the largest slope on its interval."""
+    """The spectrum of a power; errors are multiplied by the largest slope on their intervals."""
     width = found.errors.total()
     slope = exponent * np.minimum(np.abs(found.values) + width, 1.0) ** (exponent - 1)
     values = found.values**exponent
     order = 1 + np.argsort(-np.abs(values[1:]), kind="stable")[: k - 1]
     order = np.append(0, order[np.argsort(-values[order], kind="stable")])
-    # the largest modulus is that of the top, or of the most negative value, which is listed then
+    # the largest modulus belongs to the top or to the most negative value, which is then listed
     base, error = 1.0 - found.gap, found.gap_error
     if exponent % 2 == 0 and found.slem > base:
         base, error = found.slem, float(width[np.argmin(found.values)])
@@ -172,9 +172,9 @@ def _raised(found: Spectrum, exponent: int, k: int) -> Spectrum:
 
 
 def gap_of_power(gap: float, error: float, exponent: int) -> tuple[float, float]:
-    """1 - (1 - gap)^n with the largest change within the error: a gap of 1e-13 keeps its digits.
+    """The gap 1 - (1 - gap)^n of a power and its error, without cancellation for small gaps.
 
-    Of an even power the gap given is 1 - slem, at most 1.
+    For an even power the given gap is 1 - slem, at most 1.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Galerkin matrices of growing size, until the gap of one of them is accurate enough."""
+"""The gap from Galerkin matrices of increasing size, until it is sufficiently accurate."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from ...kernels.bases.mirror import is_mirror_symmetric
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge
 
-# Eigenvalues that a gap carries along in its spectrum.
+# Number of eigenvalues in the spectrum of a gap.
 EIGENVALUES = 4
 DEGREES = (12, 24, 48, 96)
-# Panels for one circular arc, whose matrices need no sampling: degree, and the smallest panel at grazing.
+# Panels for one circular arc, whose matrices need no sampling: degree, and width of the smallest panel at grazing.
 ARC_PANELS = ((1, 1e-1), (2, 1e-2), (3, 1e-3), (4, 1e-3), (6, 1e-4))
-# Up to this half angle the eigenfunctions of arcs are close enough to Legendre polynomials.
+# Up to this half angle the eigenfunctions of arcs are close to Legendre polynomials.
 SHALLOW = 0.5
 FIRST_SAMPLES, LARGEST_SAMPLES = 2**17, 2**22
-# At an edge of the essential spectrum more rays show nothing: the edge is known by itself.
+# Limits at an edge of the essential spectrum, where the edge itself is the result and more rays do not help.
 SAMPLES_AT_EDGE, DEGREE_AT_EDGE, TOLERANCE_AT_EDGE = 2**19, 24, 1e-4
-# Quadratures with an error above this many standard errors of as many rays are given up.
+# Quadratures are abandoned if their error exceeds this many standard errors n^(-1/2) of n rays.
 POOR = 4.0
-# Fraction of the tolerance that a matrix may spend.
+# Fraction of the tolerance for the error of a matrix.
 MATRIX_FRACTION = 0.1
 FEWEST_LEVELS = 3
-# Two refinements in a row must each shrink the change of the eigenvalue by this factor before it converges: at an
-# essential edge the change falls only like a power of 1/log(n), by less than this a doubling.
+# For convergence, two successive refinements must each reduce the change of the gap by this factor. At an essential
+# edge the change decreases by less, like a power of 1/log(n).
 SHRINKAGE = 2.0
-# Changes that shrink by less than this do not tell where they lead.
+# Changes whose ratio is above this are not extrapolated.
 STALLED = 0.6
-# A change below this fraction of the gap does not matter, whatever it does.
+# A change below this fraction of the gap is negligible.
 NEGLIGIBLE = 1e-3
-# Changes below this many rounding errors say nothing about convergence.
+# Rounding of a gap; smaller changes are noise.
 ROUNDING_FLOOR = 1e-12
 
 
 @dataclass(frozen=True)
 class Refinement:
-    """Spectra on growing bases.
+    """Spectra on successively larger bases.
 
     Attributes
     ----------
     levels : tuple of Spectrum
     converges : bool
-        Whether the changes of the gap shrink.
+        Whether the changes of the gap decrease.
     evidence : tuple of str
-        One line a level.
+        One line per level.
     """
 
     levels: tuple[Spectrum, ...]
@@ -57,7 +57,7 @@ class Refinement:
 
     @property
     def chosen(self) -> int:
-        """The last level, or the one before if the noise of the last is larger than what it changed."""
+        """Index of the last level, or of the one before if the noise of the last exceeds its change."""
         if len(self.levels) > FEWEST_LEVELS:
             before, last = self.levels[-2:]
             if _noise(last) > abs(last.gap - before.gap) + _noise(before):
@@ -71,22 +71,22 @@ class Refinement:
 
     @property
     def noise(self) -> float:
-        """What is not discretisation in the error of the last level: sampling and the error of the matrix."""
+        """Algebraic, matrix and sampling error of the chosen level."""
         return _noise(self.finest)
 
     @property
     def error(self) -> float:
-        """Change by the last refinement, if the changes shrink, else the two-grid error; plus the noise."""
+        """Change by the last refinement plus noise if the levels converge, else (or if less) the error of the gap."""
         if len(self.levels) < 2 or not self.converges:
             return self.finest.gap_error
         change = abs(self.levels[self.chosen].gap - self.levels[self.chosen - 1].gap)
         return min(change + self.noise, self.finest.gap_error)
 
     def overshoot(self, edge: float) -> float:
-        """How far beyond an edge the largest eigenvalue would come if its changes went on shrinking as they do.
+        """Distance beyond an edge of the largest eigenvalue, extrapolated by a geometric series of its changes.
 
-        0 where the last one is noise, and where they hardly shrink: towards the edge at grazing they fall like a power
-        of 1/log(n). After one change the next ones are taken to halve.
+        0 if the last change is noise or the changes hardly decrease; towards a grazing edge they decrease like a power
+        of 1/log(n). With a single change the ratio is taken as 1/2.
         """
         tops = 1.0 - np.array([level.gap for level in self.levels])
         change = np.diff(tops)
@@ -99,12 +99,12 @@ class Refinement:
 
     @property
     def how(self) -> str:
-        """What the error is made of."""
+        """The composition of the error, in words."""
         return "change by the last refinement + algebraic + matrix + 1.96 x sampling error"
 
 
 class SharedMatrices:
-    """Matrices of one law, made when they are first asked for: both conventions of a mirror-symmetric law use them."""
+    """Cache of the matrices of one law, shared by both conventions of a mirror-symmetric law."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
@@ -112,7 +112,7 @@ class SharedMatrices:
         self._by_rays = False
 
     def __call__(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
-        """The matrix of a law, by a flip where it is the other convention's."""
+        """The matrix of a law, from the matrix in the other convention if possible."""
         if isinstance(law, SpecularFrame) and law.reversible and is_mirror_symmetric(basis):
             return self(law.law, basis, samples, tolerance).in_specular_frame()
         key = (basis, samples, tolerance)
@@ -121,22 +121,22 @@ class SharedMatrices:
         return self._made[key]
 
     def _better(self, law: Law, basis: Basis, samples: int, tolerance: float) -> KernelMatrix:
-        """By quadrature, unless its error is beyond the tolerance and beyond what an eigenvalue has from rays.
+        """The matrix by quadrature, unless its error exceeds the tolerance and the sampling error of an eigenvalue.
 
-        The Frobenius error bounds that of an eigenvalue; from n rays this is about n^(-1/2) whatever the basis.
+        The Frobenius error bounds the error of an eigenvalue; the error from n rays is about n^(-1/2) in any basis.
         """
         if not self._by_rays:
             found = discretise(law, basis, tolerance=tolerance, samples=samples, rng=self.rng)
             poor = float(found.error) > max(tolerance, POOR / np.sqrt(samples))
             if found.samples or not poor or not law.reversible:
                 return found
-            # it would be no better on larger bases
+            # quadrature would be no better on larger bases
             self._by_rays = True
         return discretise(law, basis, method="monte-carlo", tolerance=tolerance, samples=samples, rng=self.rng)
 
 
 def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> Refinement:
-    """Refine until the changes shrink and the error is below the tolerance, or the means are spent."""
+    """Refine until the changes decrease and the error is below the tolerance, or the largest basis is reached."""
     levels: list[Spectrum] = []
     evidence: list[str] = []
     steps = Refinement((), False, ())
@@ -165,7 +165,7 @@ def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essentia
 
 
 def _steps(law: Law) -> Iterator[tuple[Basis, int]]:
-    """Bases and numbers of rays; for sampled laws the basis stops growing before the rays do."""
+    """Pairs of a basis and a number of rays, increasing."""
     inner = law.law if isinstance(law, SpecularFrame) else law
     inner = inner.closed_form or inner
     if isinstance(inner, CircularArcLaw) and inner.half_angle > SHALLOW:
@@ -185,9 +185,9 @@ def _noise(level: Spectrum) -> float:
 
 
 def _converges(levels: list[Spectrum], tolerance: float) -> bool:
-    """Whether each of the last two refinements shrank the change, or left one that is negligible.
+    """Whether each of the last two refinements reduced the change by `SHRINKAGE`, or made a negligible change.
 
-    Negligible is what noise explains, or what is below the tolerance and a small fraction of the gap.
+    A change is negligible within the noise, or below the tolerance and the fraction `NEGLIGIBLE` of the gap.
     """
     if len(levels) < FEWEST_LEVELS:
         return False

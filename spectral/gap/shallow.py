@@ -1,4 +1,4 @@
-"""The gap of shallow walls, as 1 - lambda without cancellation: from the quadratic form of 1 - P."""
+"""The gap of shallow walls, without cancellation, from the quadratic form of 1 - P."""
 
 from __future__ import annotations
 
@@ -18,39 +18,39 @@ if TYPE_CHECKING:
     from ...geometry import Wall
     from ...geometry.curves.curve import Curve
 
-# The steepest slope, in radians, and pieces at most.
+# Largest slope, in radians, and limit on the pieces.
 STEEPEST, MOST_PIECES = 0.1, 64
-# A ray steeper than three times the steepest slope meets the wall once: it leaves steeper than that slope. Rays less
-# steep leave within five times the steepest slope of grazing.
+# A ray steeper than ONCE times the steepest slope s meets the wall once, because it leaves steeper than s. Less steep
+# rays leave within WITHIN times s of grazing.
 ONCE, WITHIN = 3.0, 5.0
-# Panels and nodes on a curved piece, and degrees of Legendre polynomials.
+# Panels and nodes per curved piece, and number of Legendre polynomials.
 PANELS, NODES, DEGREES = 32, 12, 12
 # Panels in the incoming angle, with enough nodes for products of two polynomials.
 ANGLE_PANELS, ANGLE_NODES = 4, 24
-# The factor by which fast oscillations shrink is looked at in steps of this fraction of the fastest of them, up to so
-# many turns of the piece that turns least; pieces that turn more than this ratio less than the steepest slope are
-# refused.
+# Damping is computed at frequencies in steps of STEP over the steepest slope, up to TURNS over the least turn of a
+# piece. Walls whose least turn is below LEAST_TURN times the steepest slope are refused.
 STEP, TURNS, LEAST_TURN = 0.2, 30.0, 0.01
-# Fast oscillations must shrink by this multiple of the gap, and are those by so much faster than its eigenfunction.
+# Least damping of fast oscillations as a multiple of the gap; their frequencies exceed the degree of its eigenfunction
+# by FASTER.
 APART, FASTER = 1.25, 1.5
-# An error above this fraction of the gap is of no use.
+# Largest relative error of an accepted gap.
 LARGEST_ERROR = 0.01
-# Relative rounding of sums of squares with weights of one sign, from slopes that have all but the last few digits.
+# Relative rounding of sums of squares with weights of one sign.
 ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class Slopes:
-    """The slope of a shallow wall at a uniform point of its period.
+    """The slope of a shallow wall at a uniform point of its period, as a quadrature.
 
     Attributes
     ----------
     angle, weight : arrays of shape (k,)
-        Angles to the horizontal, and their probabilities: a quadrature.
+        Angles to the horizontal, radians, and their probabilities.
     steepest : float
         The largest modulus of the angle.
     least_turn : float
-        By how much the curved piece turns that turns least; infinite without curved pieces.
+        The least turn of the tangent along a curved piece; infinite without curved pieces.
     """
 
     angle: Floats
@@ -60,11 +60,11 @@ class Slopes:
 
     @property
     def mean_square(self) -> float:
-        """The mean of sin^2: 4 of it are the gap to leading order."""
+        """The mean of sin(angle)^2; to leading order the gap is 4 times this mean."""
         return float(self.weight @ np.sin(self.angle) ** 2)
 
     def shrinkage(self, frequency: Floats) -> Floats:
-        """1 - |E exp(2 i t angle)|: what a law leaves of cos(t theta + phase) of large t, without cancellation."""
+        """The damping 1 - |E exp(2 i t angle)| of cos(t theta + phase) for large t, without cancellation."""
         centred = self.angle - float(self.weight @ self.angle) / float(self.weight.sum())
         decay = np.array([self.weight @ (2.0 * np.sin(t * centred) ** 2) for t in frequency.tolist()])
         odd_part = np.array([self.weight @ np.sin(2.0 * t * centred) for t in frequency.tolist()])
@@ -73,37 +73,36 @@ class Slopes:
 
 
 def shallow_gap(law: Law, edge: EssentialEdge) -> SpectralGap | None:
-    r"""The gap of a law of shallow walls to a relative error; None for other laws and where nothing can be said.
+    r"""The gap of a law of shallow walls with a small relative error; None for other laws or if the method fails.
 
     Parameters
     ----------
     law : Law
-        Reversible; of walls that are graphs with slopes below 0.1, circular arcs, specular reflection and sums of
-        these, in the paper's convention or, if mirror-symmetric, in the specular one.
+        A reversible law of walls that are graphs with slopes below 0.1, of circular arcs, specular reflection, or sums
+        of these, in the paper's convention or, if mirror-symmetric, in the specular one.
     edge : EssentialEdge
-        Of the same law.
+        The essential edge of the same law.
 
     Notes
     -----
-    A ray steeper than three times the steepest slope meets the wall once. If the slope is phi there, theta'_F =
+    A ray steeper than three times the steepest slope s meets the wall once. If the slope is phi there, theta'_F =
     pi - theta' = theta - 2 phi; the flux weighs slopes with 1 - tan(phi) cot(theta). So
 
         <f, (1 - P_F) f> = 1/2 E (f(theta'_F) - f(theta))^2,  cos(theta'_F) - cos(theta) = 2 sin(theta - phi) sin(phi),
 
-    is a sum of squares of small numbers that are known to full relative accuracy: the difference of two values of a
-    polynomial is its divided difference times that of the cosines. Less steep rays, a fraction of 9 s^2/2 for the
-    steepest slope s, stay within 5 s of grazing, so that their part of the form is at most 1/2 |f'|^2 (25 s^2/2)^2
-    times this fraction. In the paper's convention P~ f = P_F f for even f, and the eigenvalues of odd functions are
-    near -1.
+    is a sum of squares of small numbers with full relative accuracy: the difference of two values of a polynomial is
+    its divided difference times the difference of the cosines. Less steep rays, a fraction of 9 s^2/2, stay within 5 s
+    of grazing. Their part of the form is at most 1/2 |f'|^2 (25 s^2/2)^2 times this fraction. In the paper's convention
+    P~ f = P_F f for even f, and the eigenvalues of odd functions are near -1.
 
-    The smallest value of the form on Legendre polynomials is an upper bound of the gap. By how much the gap is less is
-    estimated from the residual R = (1 - P) f - mu f by <R, (1 - P - mu)^(-1) R>: its part among steep rays with the
-    distance to the next eigenvalue, its part among grazing rays, localised as it is, with what the law leaves of
-    oscillations of their scale. That nothing else is smaller rests on E exp(2 i t phi), by which a law multiplies
-    fast oscillations cos(t theta): an estimate, not a proof.
+    The smallest value mu of the form on Legendre polynomials is an upper bound of the gap. Its excess over the gap is
+    estimated from the residual R = (1 - P) f - mu f by <R, (1 - P - mu)^(-1) R>. The part of steep rays uses the
+    distance to the next eigenvalue; the part of grazing rays, which is localised, uses the damping of oscillations of
+    its scale. Fast oscillations cos(t theta) are multiplied by E exp(2 i t phi); that their quotients are larger than
+    the gap is an estimate, not a proof.
 
-    Where sin(phi) is uniform, as on arcs of circles, the gap is 4 E sin^2 + 2 E sin^4 to a relative error of the order
-    of s^4 ln s.
+    If sin(phi) is uniform, as on arcs of circles, the gap is 4 E sin^2 + 2 E sin^4 with a relative error of order
+    s^4 ln s.
 
     Source: R. Feres and H.-K. Zhang, *The spectrum of the billiard Laplacian of a family of random billiards* (2010),
     for the leading order.
@@ -133,7 +132,7 @@ def shallow_gap(law: Law, edge: EssentialEdge) -> SpectralGap | None:
 
 
 class _Form:
-    """The form on polynomials of one parity: its smallest value, and the error of this as an eigenvalue."""
+    """The smallest value of the quadratic form on polynomials of one parity, and its error as the gap."""
 
     def __init__(self, slopes: Slopes, parity: int, mirrored: bool) -> None:
         from scipy.linalg import eigh
@@ -165,11 +164,11 @@ class _Form:
             float(np.abs(vector) @ norms),
             float(np.abs(vector) @ (norms * degrees * (degrees + 1) / 2.0)),
         )
-        # grazing rays: their fraction of the flux, and how far they move in the cosine
+        # grazing rays: their fraction of the flux, and the change of their cosine
         fraction, moved = 2.0 * np.sin(0.5 * ONCE * steep) ** 2, 2.0 * np.sin(0.5 * WITHIN * steep) ** 2
         self.grazing_error = 0.5 * fraction * (steepness * moved) ** 2
         local = float(slopes.shrinkage(_frequencies(slopes, 1.0 / (ONCE * steep))).min())
-        # their residual, on oscillations of their scale and on slow functions
+        # the residual of grazing rays, on oscillations of their scale and on slow functions
         spread = 1.0 / local + 1.5 * fraction * np.log(1.0 / (ONCE * steep)) / slopes.mean_square
         grazing = fraction * (steepness * moved + self.value * height) ** 2
         steeper = float(mass @ alike**2) / float(values[1] - values[0]) + (0.0 if mirrored else float(mass @ other**2))
@@ -177,7 +176,7 @@ class _Form:
 
     @property
     def error(self) -> float:
-        """Of the value as the gap."""
+        """Error of the value as the gap."""
         return float(self.grazing_error + self.missed + ROUNDING * self.value)
 
 
@@ -186,7 +185,7 @@ def _changes(angle: float, slope: Floats) -> Floats:
     here, there = np.cos(angle), np.cos(angle - 2.0 * slope)
     found = np.empty((slope.size, DEGREES))
     before, value = 1.0, here
-    # divided differences of Legendre polynomials by the recurrence of these
+    # divided differences by the recurrence of Legendre polynomials
     previous, divided = np.zeros(slope.size), np.ones(slope.size)
     for degree in range(1, DEGREES + 1):
         found[:, degree - 1] = np.sqrt(2.0 * degree + 1.0) * divided
@@ -206,7 +205,7 @@ def _frequencies(slopes: Slopes, slowest: float) -> Floats:
     fastest = TURNS / min(slopes.least_turn, 2.0 * slopes.steepest)
     if fastest <= slowest:
         return np.array([slowest])
-    # slow ones in equal ratios, fast ones in equal steps
+    # low frequencies in equal ratios, high ones in equal steps
     step = STEP / slopes.steepest
     return np.concatenate([np.geomspace(slowest, fastest, 200), np.arange(slowest, fastest, step)])
 
@@ -235,7 +234,7 @@ def _slopes_of(law: Law) -> Slopes | None:
 
 
 def _slopes_of_wall(wall: Wall) -> Slopes | None:
-    """None unless the wall is a graph with small slopes."""
+    """The slopes of a wall, or None unless it is a graph with small slopes."""
     from ...geometry import Segment
 
     if not wall.closes or len(wall.pieces) > MOST_PIECES:
@@ -256,12 +255,12 @@ def _slopes_of_wall(wall: Wall) -> Slopes | None:
 
 
 def _slopes_of_curve(piece: Curve) -> tuple[Floats, Floats]:
-    """Slopes, with dx as weight, at the nodes of Gauss rules in the parameter, and at the ends with weights of 0."""
+    """Slopes, with dx as weight, at the nodes of Gauss rules in the parameter, and with weight 0 at panel ends."""
     edges = np.linspace(0.0, 1.0, PANELS + 1)
     parameter, width = gauss_on_intervals(edges[:-1], edges[1:], NODES)
     x = piece.point(parameter)[:, 0].reshape(PANELS, NODES)
     ends = piece.point(edges)[:, 0]
-    # dx/ds of the polynomials through the nodes of a panel
+    # dx/ds of the interpolating polynomials of the panels
     nodes = np.polynomial.legendre.leggauss(NODES)[0]
     through = np.linalg.inv(np.polynomial.legendre.legvander(nodes, NODES - 1))
     rise = np.polynomial.legendre.legvander(nodes, NODES - 2) @ np.polynomial.legendre.legder(through)

@@ -14,7 +14,7 @@ from .verdict import SpectralGap, made_from
 
 
 def gap_by_theorem(law: Law) -> SpectralGap | None:
-    """The gap of a law made of isometries, an involution, of ideal laws or of finite rank; None where none is known.
+    """The gap by theorem of laws of isometries, of ideal laws, of finite rank, and some others; None if none applies.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def _stated(law: Law, value: float, error: float, verdict: Verdict, *evidence: s
 
 
 def _of_finite_rank(law: MatrixLaw) -> SpectralGap:
-    """A law that is constant on bins: its own bins hold every eigenvalue but 0, which has infinite multiplicity."""
+    """The gap of a law that is constant on bins, whose spectrum is 0 and the eigenvalues of its matrix."""
     found = matrix_spectrum(discretise(law, Bins(law.edges)), EIGENVALUES)
     error = float(found.gap_errors.algebraic[0])
     reason = f"the law is constant on {law.edges.size - 1} bins: beyond these its spectrum is 0"

@@ -1,4 +1,4 @@
-"""A spectral gap with its error, its verdict and the evidence."""
+"""A spectral gap with its error, its verdict and its evidence."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SpectralGap(Estimate):
-    """1 - sup of the spectrum off the constants, with its error and a verdict.
+    """The gap 1 - sup(spectrum off the constants), with its error and a verdict.
 
     Attributes
     ----------
     verdict : {"isolated", "essential edge", "no gap", "undecided"}
-        Whether the gap ends at an isolated eigenvalue, at an edge of the essential spectrum, is zero, or cannot be
-        told from the refinements made. Of a law P J that is not self-adjoint, whose value is 1 - the norm on functions
-        of mean 0, the same of its singular values, the moduli in the spectrum of P.
+        Whether the gap ends at an isolated eigenvalue, ends at an edge of the essential spectrum, is zero, or is not
+        decided. For a law P J that is not self-adjoint, the value is 1 minus the norm on functions of mean 0, and the
+        verdict refers to the singular values of P J, the moduli in the spectrum of P.
     evidence : tuple of str
-        What the verdict rests on, line by line.
+        The evidence for the verdict, one statement per entry.
     convention : {"paper", "specular"}
-        The gap that the literature quotes is that of the specular convention (``law.in_specular_frame()``).
+        The literature quotes the gap in the specular convention (``law.in_specular_frame()``).
     spectrum : Spectrum or None
-        The finest spectrum that was computed.
+        The finest spectrum computed.
     self_adjoint : bool
-        False of a law P J that is not known to be self-adjoint though P is: see ``verdict``.
+        False for a law P J that is not known to be self-adjoint although P is.
     """
 
     verdict: Verdict
@@ -43,7 +43,7 @@ class SpectralGap(Estimate):
     self_adjoint: bool = True
 
     def cut_at_zero(self) -> SpectralGap:
-        """The part of the interval at or above 0: the norm of a law is 1, so that no gap is negative."""
+        """The gap with its interval cut at 0, because the norm of a law is 1 and no gap is negative."""
         low, high = self.value - self.error, max(self.value + self.error, 0.0)
         if low >= 0.0 or high == np.inf:
             return self
@@ -56,14 +56,14 @@ class SpectralGap(Estimate):
 
 
 def made_from(found: Spectrum, how: str) -> str:
-    """The method of a gap that was read off a matrix."""
+    """The method, in words, of a gap computed from a matrix."""
     return f"{found.basis!r}, {found.method}; {how}"
 
 
 def isolated(
     found: Spectrum, error: float, how: str, edge: EssentialEdge, convention: str, evidence: tuple[str, ...] = ()
 ) -> SpectralGap | None:
-    """The gap of a matrix as that of the law; None unless its interval lies between the essential spectrum and 1."""
+    """The gap of a matrix as the gap of the law, or None unless the largest eigenvalue is isolated within its error."""
     top = 1.0 - found.gap
     if top - error <= edge.high or found.gap <= error:
         return None
@@ -73,9 +73,9 @@ def isolated(
 
 
 def draw_spectrum(found: Spectrum, gap: SpectralGap, ax: Axes | None = None) -> Axes:
-    """Draw eigenvalues of a matrix with what is known of the gap of the law behind it.
+    """Draw eigenvalues of a matrix and the gap of its law, which is shaded and labelled with its verdict.
 
-    The gap is shaded and named with its verdict; where the law has no gap nothing is shaded.
+    Nothing is shaded if the law has no gap.
     """
     gapless = gap.verdict == "no gap"
     label = f"eigenvalue of the matrix in {found.basis!r}" if gapless else EIGENVALUE
