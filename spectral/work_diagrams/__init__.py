@@ -1,1 +1,1 @@
-"""Error against run time: problems, measured runs, fitted orders, and the report."""
+"""Diagrams of error against run time: problems, measured runs, fitted orders and reports."""

@@ -1,4 +1,4 @@
-"""The machine and the software of a measurement, and the one core on which times are taken."""
+"""The machine and the software of a measurement, and the pinning of a process to cores."""
 
 from __future__ import annotations
 
@@ -17,20 +17,21 @@ PACKAGES = ("asperity", "numpy", "scipy", "numba")
 
 @dataclass(frozen=True)
 class Machine:
-    """What a time depends on besides the code.
+    """The machine and the software on which times were measured.
 
     Attributes
     ----------
     processor : str
     cores : int
     threads : int
-        Threads that were allowed: of the linear algebra, and cores that the process was pinned to.
+        Number of threads of the linear algebra, and of cores that the process was pinned to.
     pinned_to : tuple of int
-        Numbers of these cores; empty where the system cannot pin.
+        Numbers of these cores; empty if the system cannot pin.
     system, python : str
     versions : mapping of str to str
+        Versions of asperity, numpy, scipy and numba.
     linear_algebra : str
-        The library behind numpy.
+        The BLAS library behind numpy.
     """
 
     processor: str
@@ -44,7 +45,7 @@ class Machine:
 
     @classmethod
     def here(cls, threads: int = 1) -> Machine:
-        """This machine with so many threads."""
+        """This machine with the given number of threads."""
         from threadpoolctl import threadpool_info
 
         pools = {
@@ -57,17 +58,17 @@ class Machine:
         )  # fmt: skip
 
     def as_dict(self) -> dict[str, Any]:
-        """What JSON holds."""
+        """A dictionary of plain values for JSON."""
         return {**self.__dict__, "versions": dict(self.versions), "pinned_to": list(self.pinned_to)}
 
     @classmethod
     def of_dict(cls, data: dict[str, Any]) -> Machine:
-        """The machine that `as_dict` gave."""
+        """The machine from the result of `as_dict`."""
         versions = MappingProxyType(dict(data["versions"]))
         return cls(**{**data, "versions": versions, "pinned_to": tuple(data["pinned_to"])})
 
     def is_comparable_with(self, other: Machine) -> bool:
-        """Whether times on both may be compared: processor, cores and threads are the same."""
+        """Whether processor, cores and threads are the same, so that times may be compared."""
         return (self.processor, self.cores, self.threads) == (other.processor, other.cores, other.threads)
 
     def __str__(self) -> str:
@@ -81,9 +82,9 @@ class Machine:
 
 @contextmanager
 def on_few_cores(threads: int) -> Iterator[None]:
-    """Pin this thread, and those that it starts, to so many cores, and the linear algebra to so many threads.
+    """Pin this thread and the threads it starts to ``threads`` cores, and limit the threads of the linear algebra.
 
-    The tracer's own threads inherit the cores, so that they share them.
+    The threads of the tracer inherit these cores.
     """
     from threadpoolctl import threadpool_limits
 
@@ -100,8 +101,7 @@ def on_few_cores(threads: int) -> Iterator[None]:
 
 
 def _cores(threads: int) -> list[int]:
-    """The last of the cores that are allowed: the first one has the system's interrupts."""
-    # the system's: only some have it
+    """The last of the allowed cores, because the first one handles interrupts; empty if the system cannot pin."""
     return sorted(os.sched_getaffinity(0))[-threads:] if hasattr(os, "sched_getaffinity") else []
 
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
 
-# Fits need this many points to have a confidence interval.
+# Least number of points of a fit with a confidence interval.
 FEWEST_POINTS = 3
 CONFIDENCE = 0.95
-# Orders are told apart to this: the next ones worth a name are a quarter away.
+# Largest difference of orders that agree.
 ALLOWANCE = 0.15
 
 OrderVerdict = Literal["agrees", "differs", "not resolved"]
@@ -22,7 +22,7 @@ OrderVerdict = Literal["agrees", "differs", "not resolved"]
 
 @dataclass(frozen=True)
 class FittedOrder:
-    """The slope p of error ~ size^-p in the logarithms.
+    """The order p of error ~ size^-p, fitted in the logarithms.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class FittedOrder:
     low, high : float
         Ends of its 95 % confidence interval; see `fit_order`.
     points : int
-        Number of measurements that the fit rests on.
+        Number of measurements.
     """
 
     order: float
@@ -43,7 +43,7 @@ class FittedOrder:
         return abs(self.order - declared) <= ALLOWANCE
 
     def verdict(self, declared: float) -> OrderVerdict:
-        """Whether the declared order is within 0.15; if not, whether the interval excludes it.
+        """The verdict: "agrees" within 0.15, "differs" if the interval excludes ``declared``, else "not resolved".
 
         Examples
         --------
@@ -59,24 +59,23 @@ class FittedOrder:
 
 
 def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = None) -> FittedOrder | None:
-    """Least squares of log(error) on log(size); None for fewer than three different sizes.
+    """Fit the order by least squares of log(error) on log(size); None for fewer than three different sizes.
 
     Parameters
     ----------
     size, error : array_like, shape (points,)
-        Positive.
+        Positive numbers.
     repeats : array_like, shape (points,), optional
-        Of random methods: over how many independent repeats each error is a root mean square.
+        For random methods, the number of independent repeats whose root mean square is the error.
 
     Returns
     -------
     FittedOrder or None
-        Without ``repeats`` the interval is Student's, from the scatter about the line: errors of a deterministic
-        method are exact, but do not lie on a line. With them every error has a spread of its own: n times its square
-        is as a chi-square with n degrees of freedom if the errors are Gaussian numbers, so that the variance of its
-        logarithm is trigamma(n/2)/4. The points are weighted by that, and the interval is Gaussian; where the scatter
-        about the line is larger than the spreads explain, it is widened by Birge's ratio. Errors of arrays scatter
-        less, so that their interval is too wide rather than too narrow.
+        Without ``repeats`` the interval is Student's, from the scatter about the line. With ``repeats`` errors are
+        treated as random: for Gaussian errors, n times the squared error is proportional to a chi-square with n degrees
+        of freedom, and the variance of its logarithm is trigamma(n/2)/4. The points are weighted accordingly, and the
+        interval is Gaussian; a scatter larger than these variances widens it by Birge's ratio. Errors of arrays scatter
+        less, so their interval is conservative.
 
     Raises
     ------
@@ -105,7 +104,7 @@ def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = Non
 
 
 def _by_scatter(sizes: Floats, errors: Floats) -> tuple[float, float]:
-    """Slope and half the width of its interval, by Student's t."""
+    """Slope and half width of its interval, by Student's t."""
     from scipy.stats import linregress, t
 
     fit = linregress(np.log(sizes), np.log(errors))
@@ -113,7 +112,7 @@ def _by_scatter(sizes: Floats, errors: Floats) -> tuple[float, float]:
 
 
 def _by_spread(sizes: Floats, errors: Floats, repeats: Floats) -> tuple[float, float]:
-    """Slope and half the width of its interval, from the spreads of root mean squares over repeats."""
+    """Slope and half width of its interval, from the variances of root mean squares over repeats."""
     from scipy.special import polygamma
     from scipy.stats import norm
 

@@ -1,4 +1,4 @@
-"""A quantity whose error is measured against run time: its reference value, and the methods that compute it."""
+"""The reference values of a quantity, and the methods that compute it, for diagrams of error against run time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ...core.checks import Floats, finite_array, finite_number, frozen
 from ...core.errors import InputError
 from ...core.rounding import EPS
 
-# A value that is exact in the text may carry the rounding of a few thousand operations.
+# Relative error of a value that counts as exact: rounding of a few thousand operations.
 ROUNDED = 4096.0 * EPS
 ErrorNorm = Callable[[Floats], float]
 
@@ -28,11 +28,11 @@ class ReferenceValue:
     value : array_like
         A number or an array of any shape.
     error : float
-        How far the truth may be from ``value``, in the problem's first norm; 0 if it is exact to rounding.
+        Error of ``value`` in the problem's first norm; 0 if ``value`` is exact to rounding.
     source : str
-        Where it comes from, in words: "closed form", "beams", "2^24 rays of independent Sobol sequences".
+        Origin in words, such as "closed form", "beams", "2^24 rays of independent Sobol sequences".
     made_by : tuple of str
-        Names of methods that share their code with the reference; they are measured against another one.
+        Names of methods that share code with the reference; they are compared with another reference.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class ReferenceValue:
 
     @property
     def is_exact(self) -> bool:
-        """Whether its error is no more than rounding."""
+        """Whether the error is not larger than rounding."""
         return self.error <= ROUNDED * max(1.0, float(np.max(np.abs(self.value), initial=0.0)))
 
 
@@ -88,18 +88,18 @@ MATRIX_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({**ARRAY_NORMS, "operat
 
 @dataclass(frozen=True, eq=False)
 class WorkProblem:
-    """A quantity with its references.
+    """A quantity with its reference values and error norms.
 
     Parameters
     ----------
     name : str
     references : ReferenceValue or tuple of ReferenceValue
-        A method is measured against the first of them that it did not make.
+        A method is compared with the first reference that does not share its code.
     norms : mapping of str to callable, optional
-        What is measured of the difference of a value and its reference; the first one decides on orders and fronts. By
-        default ``absolute`` for a number; ``Frobenius``, ``largest entry`` and, for matrices, ``operator`` for arrays.
+        Norms of the difference of a value from its reference. The first one is used for orders and fronts. By default
+        ``absolute`` for a number; ``Frobenius``, ``largest entry`` and, for matrices, ``operator`` for arrays.
     auto : str
-        Name of the method in which the library chooses for itself.
+        Name of the method by which the library chooses a method itself.
 
     Raises
     ------
@@ -131,7 +131,7 @@ class WorkProblem:
         object.__setattr__(self, "norms", MappingProxyType(dict(self.norms or usual)))
 
     def reference_for(self, method: str) -> ReferenceValue:
-        """The first reference that ``method`` did not make; an InputError if it made them all."""
+        """The first reference that does not share its code with ``method``; an InputError if there is none."""
         for reference in self.references:
             if method not in reference.made_by:
                 return reference
@@ -148,18 +148,18 @@ class WorkProblem:
 
 @dataclass(frozen=True, eq=False)
 class WorkMethod:
-    """One way to compute the quantity of a problem.
+    """A method that computes the quantity of a problem.
 
     Parameters
     ----------
     name : str
     solve : callable
         ``solve(budget)``, or ``solve(budget, rng)`` if ``is_random``; returns a number, an array, an `Estimate` or a
-        `KernelMatrix`. A budget is whatever makes the method work harder as it grows: rays, nodes, 1/tolerance.
+        `KernelMatrix`. The work increases with the budget, such as the number of rays or nodes, or 1/tolerance.
     is_random : bool
-        Every repeat then has a generator of its own, and the error is the root mean square over the repeats.
+        If True, every repeat has its own generator, and the error is the root mean square over the repeats.
     order : float, optional
-        Declared order p: error ~ budget^-p. It is compared with the fitted one.
+        Declared order p of error ~ budget^-p, which is compared with the fitted order.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A report on error against run time: its rows, its Markdown table and its picture."""
+"""A report on error against run time: its rows, its Markdown table and its plot."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 RowStatus = Literal["done", "failed", "timed out", "left out"]
 FORMAT = 1
-# An error within so many errors of its reference measures the reference.
+# Errors below this multiple of the error of the reference are not significant.
 ABOVE_REFERENCE = 3.0
 MARKERS = "osv^D<>Ph*X"
-# An axis covers a power of ten at least, so that one is labelled.
+# Least ratio of the ends of an axis, so that at least one power of ten is labelled.
 DECADE = 10.0
 
 
@@ -38,15 +38,15 @@ class WorkRow:
     method : str
     budget : float
     status : {"done", "failed", "timed out", "left out"}
-        ``"left out"``: a smaller budget had used up the time.
+        ``"left out"`` if a smaller budget reached the time limit.
     errors : mapping of str to float
-        By norm. Of a random method the root mean squares over the repeats.
+        Errors by norm; for a random method root mean squares over the repeats.
     seconds : tuple of float
         Wall time of every repeat.
     reported : float or None
-        The error that the method itself reports, where it reports one.
+        The error reported by the method, if any.
     note : str
-        How the value was made, in the method's words; or the reason why there is none.
+        The method's description of the computation, or the reason for a missing value.
 
     Examples
     --------
@@ -72,32 +72,32 @@ class WorkRow:
 
     @property
     def is_done(self) -> bool:
-        """Whether there is a value."""
+        """Whether the row has a value."""
         return self.status == "done"
 
     @property
     def least(self) -> float:
-        """Least time of the repeats; infinite without one."""
+        """Least time of the repeats in seconds; infinite without repeats."""
         return min(self.seconds, default=float("inf"))
 
     @property
     def spread(self) -> float:
-        """Greatest minus least time of the repeats as a fraction of the least."""
+        """Range of the times of the repeats as a fraction of the least time."""
         return (max(self.seconds) - self.least) / self.least if self.seconds else 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """What JSON holds."""
+        """A dictionary of plain values for JSON."""
         plain = {name: getattr(self, name) for name in ("method", "budget", "status", "reported", "note")}
         return {**plain, "errors": dict(self.errors), "seconds": list(self.seconds)}
 
     @classmethod
     def of_dict(cls, data: Mapping[str, Any]) -> WorkRow:
-        """The row that `as_dict` gave."""
+        """The row from the result of `as_dict`."""
         return cls(**{**data, "seconds": tuple(data["seconds"])})
 
 
 def table_of(report: WorkReport) -> str:
-    """The table of `WorkReport.table`."""
+    """The Markdown table of a report, see `WorkReport.table`."""
     front = set(map(id, report.front()))
     norms = " | ".join(f"{norm} error" for norm in report.norms)
     heads = f"method | budget | {norms} | reported | seconds | spread | "
@@ -131,16 +131,16 @@ def _cells(report: WorkReport, row: WorkRow, in_front: bool) -> list[str]:
 
 @dataclass(frozen=True)
 class MethodFacts:
-    """What a report says of a method besides its rows.
+    """Properties of a method in a report.
 
     Attributes
     ----------
     declared_order : float or None
     is_random : bool
     reference : str
-        Where the reference that it is measured against comes from.
+        Source of the reference of the method.
     floor : float
-        Error of that reference, or rounding; errors below it are not told apart.
+        Error of this reference, or rounding; smaller errors are not significant.
     """
 
     declared_order: float | None
@@ -151,15 +151,15 @@ class MethodFacts:
 
 @dataclass(frozen=True)
 class WorkReport:
-    """What `work_precision` measured.
+    """Errors and run times measured by `work_precision`.
 
     Attributes
     ----------
     problem : str
     norms : tuple of str
-        The first one decides on orders, the front and the choice.
+        Error norms; the first one is used for orders, the front and the choice.
     auto : str
-        Name of the method in which the library chooses.
+        Name of the method by which the library chooses a method itself.
     methods : mapping of str to MethodFacts
     machine : Machine
     rows : tuple of WorkRow
@@ -193,11 +193,11 @@ class WorkReport:
         return cls(problem.name, tuple(problem.norms), problem.auto, MappingProxyType(records), machine)
 
     def with_row(self, row: WorkRow) -> WorkReport:
-        """The report with one row more."""
+        """The report with an additional row."""
         return replace(self, rows=(*self.rows, row))
 
     def continued(self, earlier: WorkReport) -> WorkReport:
-        """This report with the rows of an earlier one; an InputError if these are not of the same problem."""
+        """This report with the rows of an earlier one; an InputError if its problem or machine differs."""
         if (earlier.problem, earlier.norms) != (self.problem, self.norms):
             raise InputError(f"path: expected rows of {self.problem!r}, got {earlier.problem!r}; name another file")
         if not earlier.machine.is_comparable_with(self.machine):
@@ -205,14 +205,11 @@ class WorkReport:
         return replace(self, methods=MappingProxyType({**earlier.methods, **self.methods}), rows=earlier.rows)
 
     def error(self, row: WorkRow) -> float:
-        """Error of a row that is done, in the first norm."""
+        """Error of a completed row in the first norm."""
         return row.errors[self.norms[0]]
 
     def level(self, row: WorkRow) -> float:
-        """The row's error; where its reference cannot tell it from zero, what the method reports if that is less.
-
-        Never below rounding.
-        """
+        """The error of a row, or the reported error if less and the former is not significant; at least rounding."""
         floor = self.methods[row.method].floor
         error = max(self.error(row), floor)
         if error > ABOVE_REFERENCE * floor or row.reported is None:
@@ -222,8 +219,8 @@ class WorkReport:
     def lasting_level(self, row: WorkRow, *, known: bool = False) -> float:
         """The largest `level` at this and all larger budgets of the row's method.
 
-        A rule that happens to hit, and misses again when it is refined, has not reached that error. With ``known``, of
-        the level and what the method reports the larger counts, which is infinite where it reports nothing.
+        A small error by chance at a single budget therefore does not count. With ``known``, it is the maximum of level
+        and reported error, where a missing report counts as infinite.
         """
         later = [other for other in self._done(row.method) if other.budget >= row.budget]
         levels = [self.level(other) for other in later]
@@ -232,7 +229,7 @@ class WorkReport:
         return max(levels)
 
     def order(self, method: str) -> FittedOrder | None:
-        """The order in the budget, fitted to errors well above the reference's; None for fewer than three of them."""
+        """The order in the budget, fitted to the significant errors; None for fewer than three of them."""
         least = ABOVE_REFERENCE * self.methods[method].floor
         rows = [row for row in self._done(method) if self.error(row) > least]
         if not rows:
@@ -241,7 +238,7 @@ class WorkReport:
         return fit_order([row.budget for row in rows], [self.error(row) for row in rows], repeats)
 
     def front(self) -> tuple[WorkRow, ...]:
-        """The rows that no other one beats in both error (see `level`) and least time, fastest first."""
+        """The Pareto front: rows not surpassed by another in both error (see `level`) and least time, fastest first."""
         found: list[WorkRow] = []
         for row in sorted(self._done(), key=lambda row: (row.least, self.error(row))):
             if not found or self.level(row) < self.level(found[-1]):
@@ -249,10 +246,10 @@ class WorkReport:
         return tuple(found)
 
     def choice(self, *, known: bool = False) -> float | None:
-        """Time of the method that chooses over that of the best other one at equal error, the worst of its rows.
+        """Largest ratio, over the rows of ``auto``, of its time to the best time of the other methods at equal error.
 
-        Between the rows of a method its time is interpolated in the logarithms. Errors are those of `lasting_level`:
-        true ones or, with ``known``, those that who uses a method may count on. None without rows of both kinds.
+        Times between the rows of a method are interpolated logarithmically. Errors are taken from `lasting_level`: true
+        errors or, with ``known``, errors that the method also reports. None without rows of both kinds.
         """
         ratios = []
         for row in self._done(self.auto):
@@ -264,15 +261,15 @@ class WorkReport:
         return max(ratios, default=None)
 
     def table(self) -> str:
-        """A Markdown table, with the reference, the orders, the choice and the machine below it."""
+        """A Markdown table, followed by references, orders, choice and machine."""
         return table_of(self)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw errors against least times, both logarithmic."""
+        """Draw errors against least times on logarithmic axes."""
         return draw_work(self, ax)
 
     def to_json(self) -> str:
-        """Everything, as JSON without NaN or infinity."""
+        """The report as JSON, without NaN or infinity."""
         data = {
             "format": FORMAT,
             "problem": self.problem,
@@ -286,7 +283,7 @@ class WorkReport:
 
     @classmethod
     def of_json(cls, text: str) -> WorkReport:
-        """The report that `to_json` gave; an InputError for any other text."""
+        """The report from the result of `to_json`; an InputError for other text."""
         try:
             data: dict[str, Any] = json.loads(text)
             if data["format"] != FORMAT:
@@ -302,7 +299,7 @@ class WorkReport:
         return [row for row in self.rows if row.is_done and method in (None, row.method)]
 
     def _time_to(self, method: str, error: float, known: bool) -> float | None:
-        """The time after which a method has a finite error and keeps it, or None if it has not."""
+        """The time after which a method has at most this error, now and at larger budgets; None if it never does."""
         best: list[tuple[float, float]] = []
         for row in sorted(self._done(method), key=lambda row: row.least):
             level = self.lasting_level(row, known=known)
@@ -317,7 +314,7 @@ class WorkReport:
 
 
 def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
-    """Draw the errors (see `WorkReport.level`) over the least times, the front in grey and the chosen one in black."""
+    """Draw the errors (see `WorkReport.level`) over the least times, the front in grey and ``auto`` in black."""
     if ax is None:
         from matplotlib.figure import Figure
 
@@ -343,7 +340,7 @@ def draw_work(report: WorkReport, ax: Axes | None = None) -> Axes:
     for axis, (low, high), limit in ((ax.xaxis, ax.get_xlim(), ax.set_xlim), (ax.yaxis, ax.get_ylim(), ax.set_ylim)):
         middle, reach = sqrt(low * high), sqrt(max(high / low, DECADE))
         limit(middle / reach, middle * reach)
-        # matplotlib labels minor ticks of a few decades, too, and they overlap
+        # matplotlib also labels minor ticks of a few decades, which overlap
         axis.set_minor_formatter(NullFormatter())
     ax.legend(fontsize="x-small", framealpha=0.6)
     return ax

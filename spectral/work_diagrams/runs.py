@@ -1,4 +1,4 @@
-"""Measured runs: the errors and times of each method at each budget, or the reason why there are none."""
+"""Errors and run times of each method at each budget, measured or with the reason of a failure."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from .machine import Machine, on_few_cores
 from .problem import WorkMethod, WorkProblem
 from .report import WorkReport, WorkRow
 
-# Independent generators of the repeats come from this and the repeat's number.
+# Seed of the generators of the repeats, together with the number of the repeat.
 SEED = 20220
 Budgets = Sequence[float] | Mapping[str, Sequence[float]]
-# What makes one row from problem, method, budget, repeats, seconds: in this process, or in one that can be ended.
+# A function that measures one row from problem, method, budget, repeats and seconds, in this or another process.
 Runner = Callable[[WorkProblem, WorkMethod, float, int, float], WorkRow]
 
 
 def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
-    """One row; repeats end early, but not before the first, when together they take longer than ``seconds``.
+    """Measure one row; no further repeat begins after a total of ``seconds``.
 
-    Errors of ours, of arithmetic, of linear algebra and of memory become a row with their message.
+    An AsperityError, ArithmeticError, LinAlgError or MemoryError becomes a row with its message.
     """
     times: list[float] = []
     errors: list[dict[str, float]] = []
@@ -52,7 +52,7 @@ def _solve(method: WorkMethod, budget: float, repeat: int) -> Any:
 
 
 def _parts(result: Any) -> tuple[Floats, float | None, str]:
-    """Value, reported error and method of whatever a method returns."""
+    """Value, reported error and description from the result of a method."""
     if isinstance(result, KernelMatrix):
         return result.symmetric, _number(result.error.value), result.method
     if isinstance(result, Estimate):
@@ -76,7 +76,7 @@ def work_precision(
     path: str | PathLike[str] | None = None,
     runner: Runner = measure,
 ) -> WorkReport:
-    """Error against run time of methods for one quantity.
+    """Measure the error against the run time of several methods for one quantity.
 
     Parameters
     ----------
@@ -84,21 +84,21 @@ def work_precision(
         The quantity, its references and the norms of the error.
     methods : sequence of WorkMethod
     budgets : sequence of numbers, or mapping from a method's name to one
-        What every method is given; smaller ones come first.
+        Budgets of every method, measured in increasing order.
     repeats : int
-        Timed runs of each.
+        Timed runs per method and budget.
     seconds : float
-        When the repeats of a row have taken so long, no further one is begun; when a single run has, larger budgets of
-        its method are left out. A run itself is ended only by a ``runner`` that can.
+        Time limit of a row in seconds: no further repeat begins after it. If every run of a row exceeds it, larger
+        budgets of the method are left out. A running computation is ended only by a ``runner`` with a hard limit.
     warm_up : bool
-        Whether one run more, at a method's smallest budget, goes before the others: it loads what is loaded once.
+        Whether each method first runs once, untimed, at its smallest budget, for compilation and loading.
     threads : int
         Number of cores that the measurement is pinned to, and of threads of the linear algebra.
     path : path-like, optional
-        A JSON file that is written after every row. If it exists, its rows are taken over and the rest is measured.
+        A JSON file that is written after every row. If it exists, its rows are reused and only the rest is measured.
     runner : callable
-        Makes a row from problem, method, budget, repeats and seconds; by default in this process.
-        Compiled code must not be interrupted inside a process: one with a hard limit works in another one.
+        Function that measures a row from problem, method, budget, repeats and seconds, by default in this process.
+        Compiled code must not be interrupted, so a runner with a hard limit uses another process.
 
     Returns
     -------
@@ -107,8 +107,8 @@ def work_precision(
     Raises
     ------
     InputError
-        If names repeat, a method has no budgets or no independent reference, or the file holds another problem or
-        times of another machine.
+        If names repeat, a method has no budgets or no independent reference, or the file belongs to another problem or
+        machine.
 
     Examples
     --------
@@ -141,7 +141,7 @@ def _climb(
     problem: WorkProblem, method: WorkMethod, ladder: list[float], earlier: list[WorkRow],
     how: tuple[int, float, bool, Runner],
 ) -> Iterator[WorkRow]:  # fmt: skip
-    """The rows of one method that are not there yet; once the time limit is met they are left out."""
+    """The missing rows of one method; after the time limit is reached, rows are left out."""
     repeats, seconds, warm_up, runner = how
     missing = [budget for budget in ladder if budget not in {row.budget for row in earlier}]
     exhausted = any(_met_the_limit(row, seconds) for row in earlier)
@@ -157,7 +157,7 @@ def _climb(
 
 
 def _met_the_limit(row: WorkRow, seconds: float) -> bool:
-    """Whether a run was ended or took so long that the next budget would hardly be done in time."""
+    """Whether a run was ended, or its least time exceeds the limit."""
     return row.status == "timed out" or (row.is_done and row.least > seconds)
 
 
@@ -173,7 +173,7 @@ def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[
 
 
 def _write(file: Path, text: str) -> None:
-    """Replace the file in one step, so that a run that is stopped leaves a whole one."""
+    """Replace the file in one step, so that an interrupted run leaves a complete file."""
     beside = file.with_name(file.name + ".part")
     beside.write_text(text, encoding="utf-8")
     beside.replace(file)
