@@ -1,4 +1,4 @@
-"""Pictures of spectra."""
+"""Plots of eigenvalues and eigenfunctions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..core.checks import Floats
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's blue and vermilion, which stay apart for colour-blind readers.
+# Okabe and Ito's blue and vermilion, which colour-blind readers can distinguish.
 KNOWN, UNKNOWN = "#0072B2", "#D55E00"
 CONVENTIONS = {"paper": "retroreflection is the identity", "specular": "specular reflection is the identity"}
 
@@ -25,14 +25,14 @@ def draw_eigenvalues(
     Parameters
     ----------
     values, width : ndarray, shape (k,)
-        Eigenvalues, sorted descending, and the half widths of their intervals; not finite where not known.
+        Eigenvalues, sorted descending, and the half widths of their intervals; not finite if unknown.
     convention : {"paper", "specular"}
     label : str
-        What the eigenvalues are.
+        Legend of the eigenvalues.
     gap : (float, str) or None
-        The gap, which is shaded, and the words about it; None where the law has no gap, and nothing is shaded.
+        The gap, which is shaded, and its legend; None for a law without gap.
     ax : matplotlib Axes, optional
-        A new figure is made if there is none.
+        By default axes of a new figure.
     """
     if ax is None:
         from matplotlib import pyplot
@@ -46,7 +46,7 @@ def draw_eigenvalues(
                    label="the law has no gap: 1 is in its essential spectrum")  # fmt: skip
     else:
         ax.axhspan(1.0 - gap[0], 1.0, color="0.87", zorder=0, label=gap[1])
-    # where there is no gap the eigenvalues are those of the grid, so they are drawn hollow
+    # without a gap the eigenvalues belong to the grid, so the markers are hollow
     ax.errorbar(
         rank[known], values[known], yerr=width[known], fmt="o", markersize=5.5, capsize=3, color=KNOWN, zorder=3,
         mfc="white" if gap is None else KNOWN, label=label,
@@ -56,11 +56,11 @@ def draw_eigenvalues(
     ax.set_xticks(rank)
     ax.set_xlabel(f"rank among the {len(rank)} largest moduli, sorted descending")
     ax.set_ylabel("eigenvalue")
-    # the error bars inside the picture, within [-1, 1] where the spectrum lies
+    # limits that contain the error bars, within [-1, 1] where the spectrum lies
     lowest = max(float(np.min(values - np.where(known, width, 0.0))), -1.0)
     ax.set_ylim(-1.1 if lowest < -0.5 else min(-0.15, lowest - 0.1), 1.1)
     ax.set_title(f"Spectrum, {convention} convention ({CONVENTIONS[convention]})", fontsize=11)
-    # below the axes: a spectrum may fill any corner
+    # below the axes, because a spectrum may fill any corner
     ax.legend(frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=1 if gap is None else 2)
     return ax
 
@@ -74,7 +74,7 @@ def draw_eigenfunctions(
 
         ax = pyplot.figure(layout="constrained").subplots()
     for values, label in zip(functions, labels, strict=True):
-        # the sign is arbitrary: positive at small angles
+        # the sign is chosen positive at small angles
         ax.plot(theta, np.sign(values[0] or 1.0) * values, label=label)
     ax.axhline(0.0, color="0.6", linewidth=0.8, zorder=1)
     ax.set_xlabel("incoming angle θ")

@@ -270,7 +270,7 @@ def _unresolved(law: Law) -> float:
 
 
 def _of_rules(means: Callable[..., Floats], functions: int) -> Means:
-    """Means by two Gauss rules; where these differ, by a much finer rule, and the error is its distance from both."""
+    """Means by two Gauss rules, or by a much finer rule if they differ; the error is its distance from both."""
 
     def rule(theta: Floats, tolerance: float) -> tuple[Floats, Floats]:
         first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))

@@ -77,7 +77,7 @@ def rest_of_spectrum(law: Law, values: Floats, width: float, next_value: float) 
 
 
 def _of_matrix(law: MatrixLaw, listed: int) -> Separation:
-    """The bound for a law that is constant on bins, whose spectrum is that of its matrix, and 0."""
+    """The bound for a law that is constant on bins, whose spectrum is 0 and the eigenvalues of its matrix."""
     root = np.sqrt(SINE.mass(law.edges[:-1], law.edges[1:]))
     symmetric = root[:, None] * law.array / root
     moduli = np.sort(np.abs(np.linalg.eigvalsh(0.5 * (symmetric + symmetric.T))))[::-1]
