@@ -41,7 +41,7 @@ class LimitStudy:
     floor : array
         Distance in theta' of the cylinder law for the same samples, a measure of the sampling error of ``distance``.
     psi_defect : array
-        Mean of |psi' - (pi - psi)|.
+        Mean absolute difference of psi' from pi - psi.
     two_satellites : array
         Fraction of collisions in which two satellites touch the wall.
     outliers : array

@@ -18,9 +18,9 @@ LARGEST_COUNT = 2.0**62
 
 @dataclass(frozen=True)
 class RectangularTeethLaw(BranchLaw):
-    r"""The law of rectangular teeth in closed form: a flat top on one half of the period, a crevice on the other.
+    r"""The law of rectangular teeth in closed form: flat top on the first half of the period, crevice on the second.
 
-    A ray crosses d = 2 r |cot theta| crevice widths on its way down and up. Specular reflection has probability
+    A ray crosses d = 2 r abs(cot theta) crevice widths on its way down and up. Specular reflection has probability
     1 - {d}/2 if floor(d) is even and 1/2 + {d}/2 if it is odd, which is
     1 - (distance from d to the nearest even number)/2. All other rays are retroreflected.
 
@@ -61,7 +61,7 @@ class RectangularTeethLaw(BranchLaw):
         object.__setattr__(self, "height_to_width", positive_number("height_to_width", self.height_to_width))
 
     def crossings(self, theta: ArrayLike) -> Floats:
-        """The number of crevice widths crossed between entry and exit, d = 2 r |cot theta|."""
+        """The number of crevice widths crossed between entry and exit, d = 2 r abs(cot theta)."""
         with np.errstate(over="ignore"):
             return np.asarray(2.0 * self.height_to_width / np.abs(np.tan(angles("theta", theta))))
 
@@ -72,7 +72,7 @@ class RectangularTeethLaw(BranchLaw):
         return np.stack([1.0 - retro, retro], axis=-1), np.stack([mirrored_angle(theta), theta], axis=-1)
 
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
-        """The angles |cot theta| = k / (2 r), where d is a whole number, and the probability beyond the last one."""
+        """The angles cot theta = +-k / (2 r), where d is a whole number, and the probability beyond the last one."""
         return crevice_breakpoints(self.height_to_width, limit)
 
     def isometry_table(self) -> IsometryTable:

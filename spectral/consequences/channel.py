@@ -22,14 +22,14 @@ MOST_CROSSINGS = 1_000_000
 
 @dataclass(frozen=True)
 class ExitTimes:
-    """Times to leave |x| < L, for particles that start at x = 0 from a wall with the invariant distribution of angles.
+    """Times to leave -L < x < L, for particles that start at x = 0 with the invariant distribution of angles.
 
     Attributes
     ----------
     lengths : array of shape (n,)
         Increasing values of L.
     times : array of shape (particles, n)
-        Time at which a particle first reaches |x| = L.
+        Time at which a particle first reaches x = L or x = -L.
     radius, speed : float
         Half the width of the channel, and the speed of the particles.
     """

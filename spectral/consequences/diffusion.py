@@ -28,7 +28,7 @@ BALLISTIC = 1e-12
 class Diffusivity(Estimate):
     r"""The diffusivity D of a rarefied gas in a channel with two parallel rough walls.
 
-    The mean time to leave |x| < L is asymptotically L^2 / (D ln(L/r)). The displacements between collisions have
+    The mean time to leave -L < x < L is asymptotically L^2 / (D ln(L/r)). The displacements between collisions have
     infinite variance, and the tails of their distribution determine D.
 
     Attributes
