@@ -43,7 +43,7 @@ def sampled_sums(wall: geo.Wall, bases: dict[str, ker.Basis], rays: int) -> dict
         for theta, out in rays_of(wall, rays // NETS, net):
             for name, basis in bases.items():
                 if basis.is_partition:
-                    sums[name] += count_pairs(basis, theta, out) * np.outer(basis.heights, basis.heights)
+                    sums[name] += count_pairs(basis, theta, out) * np.outer(basis.normalisation, basis.normalisation)
                 else:
                     sums[name] += sum_products(basis, theta, out)
         for name, total in sums.items():

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # A slope with an error needs three points.
 FEWEST_SCALES = 3
-COLUMNS = ("distance", "floor", "psi_defect", "two_satellites", "strays", "drift", "shift")
+COLUMNS = ("distance", "floor", "psi_defect", "two_satellites", "outliers", "drift", "shift")
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def limit_study(
     generator(rng)
     eps = np.atleast_1d(finite_array("scales", scales))
     number_between("psi", psi, 0.0, math.pi)
-    for name, number in zip(("angles", "turns", "places"), samples, strict=True):
+    for name, number in zip(("angles", "rotations", "positions"), samples, strict=True):
         whole_number(f"samples ({name})", number, 1)
     whole_number("repetitions", repetitions, 2)
     spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]

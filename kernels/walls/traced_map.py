@@ -40,7 +40,7 @@ def traced_angles(wall: Wall, x: ArrayLike, theta: ArrayLike) -> Floats:
         raise AccuracyError(
             f"WallLaw(wall={wall!r}): {unresolved:.2g} of {escaped.size} rays did not escape, more than "
             f"{UNRESOLVED_TOLERANCE:g}; geometry.trace(wall, x, theta).counts() says how they ended, "
-            "WallLaw.outcomes() which they were",
+            "WallLaw.reflect_with_status() which they were",
             unresolved,
         )
     return outgoing

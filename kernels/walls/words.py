@@ -87,7 +87,7 @@ def _chain(parts: Sequence[Sum | None]) -> Sum | None:
 
 def reduced(word: Word) -> Word:
     """The word for the same operator after applying the rules above."""
-    return _joined(_mirrored_angle(_forgotten(word)))
+    return _joined(_mirror_moved(_forgotten(word)))
 
 
 def _forgotten(word: Word) -> Word:
@@ -101,7 +101,7 @@ def _forgotten(word: Word) -> Word:
     return (lambertian(), *after[irreversible:])
 
 
-def _mirrored_angle(word: Word) -> Word:
+def _mirror_moved(word: Word) -> Word:
     """Move J through mirror-symmetric laws: each run of these has at most one J, absorbed by an HG law if possible."""
     found: list[Law] = []
     run: list[Law] = []
