@@ -1,6 +1,6 @@
-"""Verification of formulas: identities by proof, numbers by comparison, and the entry that holds both.
+"""Verification of formulas: proofs of identities, comparisons of numbers, and ledger entries.
 
-Names are imported when they are first used; sympy and flint only when an identity is asked about.
+Modules that import sympy or flint are imported inside functions only, when an identity is verified.
 """
 
 from __future__ import annotations

@@ -1,10 +1,7 @@
-"""Values and ranges of real expressions in ball arithmetic, which a rounding error cannot make wrong.
+"""Values and ranges of real expressions in ball arithmetic, with rigorous bounds on rounding errors.
 
-An expression is defined at a point where it and all its parts are real numbers. The powers 0**0 and x**0 are 1, as in
-sympy; a root of a negative number is not real, and a power of a negative number is real where its exponent is an
-integer.
-
-Imported only by functions, because it imports sympy and flint.
+An expression is defined at a point if it and all its parts are real there. As in sympy, 0**0 and x**0 are 1, and a root
+of a negative number is not real. A power of a negative number is real only if its exponent is an integer.
 """
 
 from __future__ import annotations
@@ -18,23 +15,23 @@ from flint import arb, ctx, fmpq
 
 
 class Undefined(Exception):
-    """The expression is certainly not a real number: at the point, or anywhere in the box."""
+    """The expression is certainly not real: at the point, or anywhere in the box."""
 
 
 class Unclear(Exception):
-    """At this precision, or for want of a rule, the value cannot be told."""
+    """The value cannot be determined at this precision, or no rule for a function is known."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """A ball that contains the value, and the value itself where it is a rational number times a power of pi."""
+    """A ball that contains the value, and the exact value if it is a rational number times a power of pi."""
 
     ball: Any
     exact: Any = None
 
     @property
     def sign(self) -> int:
-        """-1, 0 or 1; `Unclear` is raised where the ball does not tell."""
+        """-1, 0 or 1; raises `Unclear` if the ball does not determine the sign."""
         if self.exact is not None:
             return int(sp.sign(self.exact))
         if self.ball > 0:
@@ -45,28 +42,28 @@ class Value:
 
 
 def evaluate(expression: Any, point: Mapping[Any, Any], bits: int) -> Value:
-    """Return the value of an expression where every symbol is an exact number, or a ball of numbers.
+    """Return the value of an expression in which every symbol is an exact number or a ball.
 
     Raises
     ------
     Undefined
-        If it is certainly not defined, for a ball: nowhere in it.
+        If the expression is certainly undefined at the point, or everywhere in the ball.
     Unclear
-        If that cannot be told, or a function is not known.
+        If this cannot be determined, or a function is not known.
     """
     with ctx.workprec(bits):
         return _value(expression, {symbol: _given(number) for symbol, number in point.items()})
 
 
 def interval(low: Any, high: Any, bits: int = 64) -> Any:
-    """A ball that contains all numbers between two exact ones."""
+    """A ball that contains all numbers between two exact numbers."""
     with ctx.workprec(bits):
         ends = [_value(sp.sympify(end), {}).ball for end in (low, high)]
         return ends[0].union(ends[1])
 
 
 def is_true(relation: Any, point: Mapping[Any, Any], bits: int) -> bool:
-    """Whether a relation, or a combination of relations, holds; raises as `evaluate` does."""
+    """Whether a relation or a Boolean combination of relations holds; raises as `evaluate` does."""
     with ctx.workprec(bits):
         return _truth(relation, {symbol: _given(number) for symbol, number in point.items()})
 
@@ -76,7 +73,7 @@ def _given(number: Any) -> Value:
 
 
 def _exactly(number: Any) -> Value | None:
-    """The value of a sympy number that is kept exactly, None of another."""
+    """The exact value of a rational multiple of an integer power of pi, None for other sympy numbers."""
     if number.is_Rational:
         return Value(arb(fmpq(int(number.p), int(number.q))), number)
     fraction, rest = number.as_coeff_Mul(rational=True)
@@ -132,7 +129,7 @@ def _exact_result(function: Any, parts: list[Value]) -> Value | None:
             return _exactly(sp.S.Zero)
         return None
     if function is sp.Pow and not (parts[1].exact.is_Integer and abs(parts[1].exact) < 1000):
-        # a power such as (1/3)**(10**9) is not to be written out
+        # a power such as (1/3)**(10**9) is not written out
         if parts[0].exact not in (0, 1) and not (parts[1].exact.is_Rational and parts[1].exact.q < 7):
             return None
         if abs(parts[1].exact) > 1000:
@@ -177,7 +174,7 @@ def _power(base: Value, exponent: Value) -> Any:
             raise Undefined
         raise Unclear
     if base.ball >= 0 and exponent.ball > 0:
-        # from 0 to the power of the upper end
+        # the range over [0, upper end]
         top = base.ball.upper()
         return arb(0).union((exponent.ball * top.log()).exp()) if power is not None else _unclear()
     return _unclear()
@@ -188,7 +185,7 @@ def _unclear(*_: Value) -> Any:
 
 
 def _within(low: float | None, high: float | None, function: Callable[[Any], Any], open_ends: bool = False) -> Any:
-    """A function that is real between two numbers."""
+    """A function that is real on [low, high], or on (low, high) with ``open_ends``."""
 
     def image(x: Value) -> Any:
         if (low is not None and x.ball < low) or (high is not None and x.ball > high):
@@ -277,7 +274,7 @@ _FUNCTIONS: dict[Any, Any] = {
     sp.log: _logarithm,
     sp.asin: _ARCSINE,
     sp.acos: _ARCCOSINE,
-    # sympy's arc cotangent jumps at 0, where it is pi/2
+    # sympy's arc cotangent jumps at 0, where its value is pi/2
     sp.acot: _of_inverse(_by("atan")),
     sp.asec: _of_inverse(_ARCCOSINE),
     sp.acsc: _of_inverse(_ARCSINE),

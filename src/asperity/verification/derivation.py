@@ -1,10 +1,8 @@
 """Exact derivations of equalities and inequalities on a domain, part by part.
 
-The domain is taken apart into its inside and its faces, and these at the points where a function jumps or bends. On
-each part both sides are resolved into smooth functions, and compared by a normal form, by squares, or because the
-derivative of their difference vanishes. A part on which a side is defined nowhere needs no proof.
-
-Imported only by functions, because it imports sympy.
+The domain is divided into its interior and its faces, and further at the points where a function jumps or bends. On
+each part both sides are resolved into smooth functions. They are compared by a normal form, by squares, or by a
+vanishing derivative of their difference. A part on which one side is defined nowhere needs no proof.
 """
 
 from __future__ import annotations
@@ -25,16 +23,16 @@ from .signs import NOT_NEGATIVE, POSITIVE, Part, is_continuous, is_infinite, is_
 from .verdict import Verdict
 from .zeros import zeros
 
-# More parts than this, or parts of parts, are not looked at.
+# Limits on the number of parts and on the depth of their subdivision.
 PARTS = 400
 DEPTH = 8
-# Beyond so many operations an algebraic number is not examined.
+# Algebraic numbers with more operations are not examined.
 LARGEST_NUMBER = 60
 NUMBER_BITS = 256
 
-# Half the lengths of such intervals; on a long one a point is found at which both sides are known.
+# Half-widths of the intervals around a fixed value on which a proof is also tried.
 NEAR = (sp.Rational(1, 64), sp.Integer(4))
-# A symbol of this beginning is half of an integer, which is not halved again.
+# A symbol with this prefix is half of an integer and is not halved again.
 HALF = "half of "
 
 EXPANSION = "expansion"
@@ -59,14 +57,14 @@ class Derivation:
     left, right : sympy expressions
     relation : {"==", "<=", "<"}
     refute : callable
-        Looks for a counterexample on a part, among so many points.
+        Searches a part for a counterexample, with a given number of points.
     spreads : bool
-        Whether what is not proved at one value of a symbol is tried on an interval around it.
+        Whether a claim that is not proved at one value of a symbol is tried on an interval around this value.
 
     Attributes
     ----------
     methods : list of str
-        How the parts were proved, those on which a side is defined.
+        The methods that proved the parts on which both sides are defined.
     reason : str
         Why no proof was found.
     """
@@ -82,7 +80,7 @@ class Derivation:
     _failed: bool = field(default=False, init=False)
 
     def verdict(self, domain: Domain) -> Verdict | None:
-        """Proved or refuted, or None with a `reason`."""
+        """Return *proved* or *refuted*, or None with a `reason`."""
         cells = domain.cells()
         if cells is None:
             self.reason = "the domain has too many faces"
@@ -108,7 +106,7 @@ class Derivation:
             return None
 
     def _on(self, domain: Domain, depth: int) -> Verdict | None:
-        """A refutation on an open part, or None: then it is proved there, unless `_failed` is set."""
+        """Return a refutation on an open part, or None; then the part is proved unless `_failed` is set."""
         if domain.is_empty or not domain.has_allowed_values:
             return None
         self._parts += 1
@@ -146,7 +144,7 @@ class Derivation:
             return None
         expressions = [*resolution.undetermined, *resolution.limits]
         if self.relation != "==":
-            # where the difference, or its slope, changes its sign
+            # the part is also cut where the difference or its slope changes sign
             difference = right - left
             slopes = [sp.diff(difference, symbol) for symbol in box.symbols]
             arguments = [f.args[0] for f in sorted(difference.atoms(sp.Function), key=str)]
@@ -163,7 +161,7 @@ class Derivation:
         return None
 
     def _is_proved_around(self, domain: Domain) -> bool:
-        """Whether the claim is proved on an open neighbourhood of a part where a symbol has a value."""
+        """Whether the claim is proved on an open interval around the value of one fixed symbol."""
         fixed = [s for s, v in domain.values.items() if s in domain.original and not s.is_integer and v.is_number]
         for symbol, reach in product(fixed if self.spreads else [], NEAR):
             value = domain.values[symbol]
@@ -197,7 +195,7 @@ class Derivation:
 
     @staticmethod
     def _pieces(domain: Domain, expressions: list[Any], undetermined: list[Any]) -> list[Domain] | None:
-        """The part cut at the zeros of the first of the points that can be cut at, or by the sign of what decides."""
+        """The part cut at the zeros of the first suitable expression, else by the sign of an undetermined one."""
         for e in dict.fromkeys(factor for point in expressions for factor in sp.Mul.make_args(point)):
             symbols = [s for s in domain.symbols if e.has(s)]
             if len(symbols) == 1 and e.free_symbols <= set(symbols):
@@ -219,7 +217,7 @@ class Derivation:
                 return [piece for piece in pieces if piece is not None]
         for e in dict.fromkeys(undetermined):
             if len(e.free_symbols & set(domain.symbols)) > 1:
-                # what is found with the sign of e as a condition
+                # the sign of e becomes a condition of each piece
                 return [
                     replace(domain, conditions=(*domain.conditions, relation(e, 0, evaluate=False)))
                     for relation in (sp.Gt, sp.Lt, sp.Eq)
@@ -232,7 +230,7 @@ class Derivation:
 
 
 def _signs_of_steps(difference: Any, part: Part) -> frozenset[int]:
-    """The signs of an expression in which a whole part is its argument less a number from 0 to 1, 1 excluded."""
+    """The signs of an expression after floor(x) is replaced by x - f with a new symbol 0 <= f < 1."""
     steps = sorted(difference.atoms(sp.floor), key=str)
     if len(steps) != 1 or steps[0].args[0].has(sp.floor):
         return frozenset({-1, 0, 1})
@@ -266,7 +264,7 @@ def _cut(domain: Domain, symbol: Any, cuts: list[Any]) -> list[Domain] | None:
             piece = piece.where(tightened(Inequality({symbol: sp.Integer(1)}, -low, strict=True)))
         if high is not None:
             piece = piece.where(tightened(Inequality({symbol: sp.Integer(-1)}, high, strict=True)))
-        # an integer may have few values left
+        # few values of an integer may remain
         cells = piece.cells() if symbol.is_integer else [piece]
         if cells is None:
             return None
@@ -276,7 +274,7 @@ def _cut(domain: Domain, symbol: Any, cuts: list[Any]) -> list[Domain] | None:
 
 
 def boxed(domain: Domain) -> Domain:
-    """The domain with a new symbol for the slack of every inequality between symbols, as far as symbols suffice."""
+    """Introduce a new symbol for the slack of each inequality between symbols, while symbols suffice."""
     slacks: set[Any] = set()
     while True:
         ties = [one for one in domain.inequalities if len(one.coefficients) > 1 and not slacks & set(one.coefficients)]
@@ -293,12 +291,12 @@ def boxed(domain: Domain) -> Domain:
 
 
 def expands_to_zero(difference: Any) -> bool:
-    """Whether multiplying out shows that it is 0 wherever it is defined."""
+    """Whether expansion shows that the difference is 0 wherever it is defined."""
     return bool(sp.expand(difference, power_exp=False, log=False) == 0)
 
 
 def equal_as_written(left: Any, right: Any, part: Part) -> str | None:
-    """The method by which two sides are found equal without regard to branches."""
+    """The method that shows two sides equal without resolving branches, or None."""
     if expands_to_zero(left - right):
         return EXPANSION
     if vanishes(left - right, part.plain) or vanishes(left - right, part.parameters):
@@ -307,7 +305,7 @@ def equal_as_written(left: Any, right: Any, part: Part) -> str | None:
 
 
 def derive_equality(left: Any, right: Any, part: Part, differentiate: int = 2) -> str | None:
-    """The method by which two resolved sides are found equal on an open part, or None."""
+    """The method that shows two resolved sides equal on an open part, or None."""
     method = equal_as_written(left, right, part)
     if method is not None:
         return method
@@ -334,13 +332,13 @@ _FRACTIONS = (1, -1, sp.S.Half, -sp.S.Half, 2, -2)
 
 
 def _zero(part: Part) -> list[Any]:
-    """What is 0 on the part by a condition."""
+    """The expressions that a condition sets to 0 on the part."""
     values = dict(part.domain.values)
     return [(c.lhs - c.rhs).xreplace(values) for c in part.domain.conditions if isinstance(c, sp.Eq)]
 
 
 def _equal_inside(left: Any, right: Any, part: Part, differentiate: int) -> bool:
-    """Whether both are one function of things that are found equal."""
+    """Whether both sides are the same function of arguments that are found equal."""
     if left.func != right.func or len(left.args) != len(right.args) or not (left.is_Function or left.is_Pow):
         return False
     pairs = [(a, b) for a, b in zip(left.args, right.args, strict=True) if a != b]
@@ -364,7 +362,7 @@ def _resolves_to_zero(slope: Any, part: Part) -> bool:
 
 
 def _vanishes_somewhere(difference: Any, symbol: Any, part: Part, differentiate: int) -> bool:
-    """Whether the difference is 0 for one value of a symbol, inside or at an end up to which it is continuous."""
+    """Whether the difference is 0 at one value of a symbol: inside, or at an end where it is continuous."""
     low, high, *_ = part.domain.interval(symbol)
     inside = [point for point in _POINTS if bool(low < point) and bool(point < high)][:4]
     if low.is_finite and high.is_finite:
@@ -403,7 +401,7 @@ _POINTS = (
 
 
 def _equal_numbers(difference: Any) -> str | None:
-    """The method by which a number is found to be 0."""
+    """The method that shows a number to be 0, or None."""
     try:
         ball = evaluate(difference, {}, NUMBER_BITS).ball
     except (Undefined, Unclear):

@@ -1,7 +1,4 @@
-"""The domain of an identity: real or integer symbols, inequalities between them, and further conditions.
-
-Imported only by functions, because it imports sympy.
-"""
+"""The domain of an identity: real or integer symbols, inequalities between them, and further conditions."""
 
 from __future__ import annotations
 
@@ -18,42 +15,42 @@ from ..core.errors import InputError
 from .balls import Unclear, Undefined, is_true
 from .polyhedron import BITS, Inequality, Polyhedron, sign_of
 
-# Simple numbers first, because a counterexample of small numbers is read more easily.
+# Simple numbers are tried first, because a counterexample with small numbers is easier to read.
 SIMPLE = tuple(sp.Rational(p, q) for q in (1, 2, 3, 5) for p in range(1, 16))
-# At these an inverse function or a step has a known value, or a pole or a jump stands.
+# Points at which an inverse function or a step has a known value, or a pole or a jump occurs.
 SPECIAL = (0, 1, -1, sp.pi / 2, sp.pi, -sp.pi / 2, 2 * sp.pi, -sp.pi, sp.pi / 4, sp.pi / 3)
-# Some random points lie this close to an end of the interval, or this far out, on a logarithmic scale.
+# Range of the logarithmic scale on which some random points are close to an end or far out.
 CLOSEST = 1e-6
 FARTHEST = 1e4
-# Random numbers are rounded to so many digits, or to more where the interval is shorter than that.
+# Digits of random numbers; shorter intervals need more.
 DIGITS = (9, 17, 40)
-# So many points are tried for one that is found, before the conditions are taken for empty.
+# Attempts per point, after which the conditions are considered unsatisfiable.
 ATTEMPTS = 40
-# So often a symbol is given the value of another, or its negative.
+# Probability that a symbol gets the value of another symbol or its negative.
 TOGETHER = 0.15
-# So often it is given a special one, once simple ones have been tried.
+# Probability of a special value, once simple values have been tried.
 OFTEN = 0.2
-# Domains with more faces, and integers with more values, are not taken apart.
+# Domains with more faces are not divided; integers with more values are not enumerated.
 FACES = 200
 VALUES = 24
 
 
 @dataclass(frozen=True)
 class Domain:
-    """Where an identity is asked about, or a part of that.
+    """The domain of an identity, or a part of that domain.
 
     Parameters
     ----------
     symbols : tuple of symbols
-        Those that vary, real.
+        The real symbols that vary.
     inequalities : tuple of Inequality
-        Linear ones, in these symbols.
+        The linear inequalities in these symbols.
     conditions : tuple of relations
-        All others, in the original symbols.
+        All other conditions, in the original symbols.
     values : mapping
-        Symbols that do not vary here, as expressions in those that do.
+        The symbols that do not vary on this part, as expressions in those that do.
     original : tuple of symbols
-        Those of the whole domain, of which `points` gives the values.
+        The symbols of the whole domain, whose values `points` returns.
     """
 
     symbols: tuple[Any, ...]
@@ -64,12 +61,12 @@ class Domain:
 
     @classmethod
     def of(cls, symbols: Iterable[Any], relations: Iterable[Any]) -> Domain:
-        """Read what the symbols carry, and relations.
+        """The domain given by relations and by the properties of symbols.
 
         Raises
         ------
         InputError
-            If a relation is no inequality, or a symbol is not real, or no point meets them.
+            If a relation is not an inequality, a symbol may only be 0, or no point meets the relations.
         """
         relations = [part for given in relations for part in _parts(given)]
         every = sorted(set(symbols).union(*(relation.free_symbols for relation in relations)), key=str)
@@ -95,7 +92,7 @@ class Domain:
 
     @cached_property
     def is_empty(self) -> bool:
-        """Whether it is seen that no point lies in it."""
+        """Whether the domain is known to contain no point."""
         if self.polyhedron.is_empty:
             return True
         for symbol in self.symbols:
@@ -111,7 +108,7 @@ class Domain:
         return False
 
     def interval(self, symbol: Any) -> tuple[Any, Any, bool, bool]:
-        """The ends between which a symbol varies, and whether they belong to the interval."""
+        """The ends of a symbol's interval, and whether each end belongs to the interval."""
         if symbol not in self._intervals:
             others = [s for s in self.symbols if s != symbol]
             self._intervals[symbol] = Polyhedron([symbol, *others], self.inequalities).bounds(0, {})
@@ -124,7 +121,7 @@ class Domain:
     # ---- parts
 
     def fixed(self, symbol: Any, value: Any) -> Domain | None:
-        """The part in which a symbol has a value, an expression in the others; None where it is not linear."""
+        """The part in which a symbol has a value, an expression in the others; None if this is not linear."""
         inequalities = [one.substituted(symbol, value) for one in self.inequalities]
         if None in inequalities:
             return None
@@ -134,7 +131,7 @@ class Domain:
         return replace(self, symbols=symbols, inequalities=tuple(filter(None, inequalities)), values=values)
 
     def face(self, symbol: Any, end: Any) -> Domain | None:
-        """What bounds it where a symbol reaches an end of its interval that no other symbol moves; None otherwise."""
+        """The face on which a symbol reaches an end of its interval; None if the end depends on other symbols."""
         if any(symbol in one.coefficients and len(one.coefficients) > 1 for one in self.inequalities):
             return None
         others = tuple(one for one in self.inequalities if symbol not in one.coefficients)
@@ -145,15 +142,15 @@ class Domain:
         return replace(self, inequalities=(*self.inequalities, one))
 
     def replaced(self, symbol: Any, value: Any, new: Any, inequalities: Iterable[Inequality] = ()) -> Domain:
-        """The same with ``symbol`` written as an expression in a new symbol."""
+        """The domain with ``symbol`` written as an expression in a new symbol."""
         part = self.fixed(symbol, value)
         assert part is not None
         return replace(part, symbols=(*part.symbols, new), inequalities=(*part.inequalities, *inequalities))
 
     def cells(self) -> list[Domain] | None:
-        """Open parts that make up the whole: the inside and the faces; None if there are too many.
+        """Open parts whose union is the domain: the interior and the faces; None if there are too many.
 
-        An integer with few values is taken value by value, an even or odd one through its half.
+        An integer with few values gives one part for each value. An even or odd integer is replaced by its half.
         """
         parts = [self]
         for symbol in self.symbols:
@@ -175,7 +172,7 @@ class Domain:
                     cell = cell.on(one) if cell is not None else None
                 if cell is not None and not cell.is_empty and cell.has_allowed_values:
                     found.append(cell)
-        # the inside first
+        # the interior comes first
         return sorted(found, key=lambda cell: -len(cell.symbols))
 
     def _by_integers(self, symbol: Any) -> list[Domain]:
@@ -200,7 +197,7 @@ class Domain:
 
     @property
     def has_allowed_values(self) -> bool:
-        """Whether the values of the fixed symbols have the properties that the symbols carry, and meet conditions."""
+        """Whether the fixed symbols have values that agree with their properties and with the conditions."""
         fixed = {s: v for s, v in self.values.items() if not v.free_symbols}
         if any(lacks_properties(symbol, value) for symbol, value in fixed.items()):
             return False
@@ -210,9 +207,10 @@ class Domain:
     # ---- points
 
     def points(self, rng: np.random.Generator, count: int, most: int = 0) -> Iterator[dict[Any, Any]]:
-        """Exact points as values of the original symbols; each meets every condition.
+        """Yield exact points as values of the original symbols; each point meets every condition.
 
-        Half of the first ``count`` are simple; then come special ones if they are many, and others, up to ``most``.
+        Half of the first ``count`` points are simple. Special points follow if ``count`` is large, then others up to
+        ``most``.
         """
         found, specials = 0, len(self.symbols) == 1 and count // 2 > len(SPECIAL)
         for attempt in range(ATTEMPTS * count):
@@ -228,7 +226,7 @@ class Domain:
                 return
 
     def _special_points(self) -> Iterator[dict[Any, Any]]:
-        """Where a function may jump."""
+        """The points where a function may jump."""
         (symbol,) = self.symbols
         bounds = self.interval(symbol)
         for value in map(sp.sympify, SPECIAL):
@@ -242,7 +240,7 @@ class Domain:
             bounds = self.polyhedron.bounds(position, point)
             value = None
             if point and rng.random() < TOGETHER:
-                # as large as another, up to the sign
+                # the value of another symbol, up to the sign
                 value = list(point.values())[rng.integers(len(point))] * int(rng.choice([-1, 1]))
                 value = value if _is_inside(value, bounds) and has_properties(symbol, value) else None
             if value is None:
@@ -253,7 +251,7 @@ class Domain:
         return self._whole(point)
 
     def _whole(self, point: Mapping[Any, Any]) -> dict[Any, Any] | None:
-        """The values of the original symbols, None where they do not meet every condition."""
+        """The values of the original symbols, None if they violate a condition."""
         point = {**point, **{s: value.xreplace(dict(point)) for s, value in self.values.items()}}
         whole = {s: point[s] for s in self.original}
         return whole if self.allows(whole) else None
@@ -268,7 +266,7 @@ class Domain:
             return False
 
 
-# Properties that a value must be known to have; sympy does not know all others of every number.
+# Properties that must be known of a value; sympy cannot decide the others for every number.
 _DECISIVE = {
     "integer", "noninteger", "even", "odd", "rational", "irrational", "prime", "composite", "real", "positive",
     "negative", "nonnegative", "nonpositive", "zero", "nonzero",
@@ -276,7 +274,7 @@ _DECISIVE = {
 
 
 def has_properties(symbol: Any, value: Any) -> bool:
-    """Whether a number has the properties that a symbol carries: even, say, or not zero."""
+    """Whether a number has all properties of a symbol, such as even or nonzero."""
     return all(
         (known := getattr(value, f"is_{name}")) == given or (known is None and name not in _DECISIVE)
         for name, given in symbol.assumptions0.items()
@@ -284,7 +282,7 @@ def has_properties(symbol: Any, value: Any) -> bool:
 
 
 def lacks_properties(symbol: Any, value: Any) -> bool:
-    """Whether a number is known not to have one of them."""
+    """Whether a number is known to lack a property of a symbol."""
     return any(getattr(value, f"is_{name}") is (not given) for name, given in symbol.assumptions0.items())
 
 
@@ -320,7 +318,7 @@ def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng:
         return special
     value = _between(float(low), float(high), rng)
     if symbol.is_integer:
-        # small ones, or as far out as other numbers
+        # small, or in the range of other numbers
         number = sp.Integer(round(value) if rng.random() < 0.5 else int(rng.integers(-3, 4)))
         if symbol.is_even is not None and symbol.is_even != number.is_even:
             number += 1
@@ -329,13 +327,13 @@ def _number(symbol: Any, bounds: tuple[Any, Any, bool, bool], simple: bool, rng:
         exact = sp.Rational(np.format_float_positional(value, digits, unique=False, fractional=False))
         if bool(low < exact) and bool(exact < high):
             return exact
-    # shorter than floats can tell
+    # the interval is shorter than floats resolve
     middle = (low + high) / 2
     return middle if middle.is_Rational else sp.Rational(str(sp.N(middle, DIGITS[-1])))
 
 
 def _between(low: float, high: float, rng: np.random.Generator) -> float:
-    """A number in an interval: anywhere, or near an end or far out on a logarithmic scale."""
+    """A random number in an interval: uniform, or on a logarithmic scale near an end or far out."""
     if np.isinf(low) and np.isinf(high):
         return float(rng.choice([-1.0, 1.0])) * _logarithmic(rng, FARTHEST)
     if np.isinf(high):
@@ -376,7 +374,7 @@ def _own_bounds(symbol: Any) -> list[Inequality]:
 
 
 def tightened(one: Inequality) -> Inequality:
-    """A bound of one integer moved to the next integer, which then belongs to it."""
+    """Move the bound of a single integer symbol to the next integer and make it non-strict."""
     if len(one.coefficients) != 1:
         return one
     ((symbol, coefficient),) = one.coefficients.items()

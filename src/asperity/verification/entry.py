@@ -1,4 +1,4 @@
-"""The entry of a ledger: a formula as it is printed, as it should be, and the check that tells them apart."""
+"""Ledger entries: a formula as printed, its corrected form, and the check that distinguishes them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .verdict import Verdict
 
 Status = Literal["verified", "erratum", "convention"]
 Kind = Literal["symbolic", "numeric", "by reading"]
-# A formula as code: whatever its check calls. Written over ``xp``, it serves numbers (numpy) and proofs (sympy).
+# A formula as code for its check. Code written over ``xp`` takes numbers (numpy) and symbols (sympy).
 Code = Callable[..., Any]
 Check = Callable[[Code], Verdict]
 
@@ -22,7 +22,7 @@ _ID = re.compile(r"S\d\.\d\d")
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula in LaTeX and, where a check can call it, as code."""
+    """A formula in LaTeX and, if a check calls it, as code."""
 
     latex: str
     code: Code | None = None
@@ -37,23 +37,23 @@ class Entry:
     id : str
         ``S<section>.<number>``, stable.
     section, equation : str
-        Where it stands in Rudzis 2022; the equation may be empty.
+        The position in Rudzis 2022; the equation may be empty.
     statement : str
-        What it says, in words.
+        The statement in words.
     printed : Formula
-        As it is printed. Of an erratum its code is what the check must refute.
+        The formula as printed. For an erratum the check must refute its code.
     corrected : Formula or None
-        What is right instead, or under the named convention; None for a verified row.
+        The correct formula, or the formula in the named convention; None for a verified entry.
     perturbed : callable or None
-        A formula that is slightly wrong, which the check must refute: of a verified row, and of an erratum whose
+        A slightly wrong formula that the check must refute. It is needed for a verified entry, and for an erratum whose
         printed formula the audit describes but does not quote.
     status : {"verified", "erratum", "convention"}
     reason : str
-        Two sentences: why it is right or wrong, and what follows or how it is checked.
+        Two sentences: why the formula is right or wrong, and the consequence or the method of the check.
     kind : {"symbolic", "numeric", "by reading"}
-        A symbolic check answers *proved*, a numeric one *agrees*. What rests on reading has no check.
+        A symbolic check answers *proved*, a numeric check *agrees*. An entry by reading has no check.
     check : callable or None
-        Takes a formula's code, returns a `Verdict`.
+        Takes a formula's code and returns a `Verdict`.
 
     Entries are written with the decorators `verified`, `erratum` and `convention`, and with `by_reading`.
 
@@ -95,12 +95,12 @@ class Entry:
 
     @property
     def right(self) -> Code | None:
-        """The formula that the check must accept: corrected, or as printed in a verified row."""
+        """The formula that the check must accept: corrected, or as printed in a verified entry."""
         return (self.corrected or self.printed).code
 
     @property
     def wrong(self) -> Code | None:
-        """The formula that the check must refute: as printed where that is wrong, else perturbed."""
+        """The formula that the check must refute: ``perturbed`` if given, else the printed formula."""
         return self.perturbed if self.perturbed is not None else self.printed.code
 
     def run(self) -> Finding:
@@ -114,10 +114,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Finding:
-    """What the check of an entry found.
+    """The result of an entry's check.
 
-    ``right`` and ``wrong`` are the verdicts on `Entry.right` and `Entry.wrong`, None of a row by reading; ``seconds``
-    is the time that both took.
+    ``right`` and ``wrong`` are the verdicts on `Entry.right` and `Entry.wrong`, None for an entry by reading.
+    ``seconds`` is the time for both.
     """
 
     entry: Entry
@@ -127,7 +127,7 @@ class Finding:
 
     @property
     def as_stated(self) -> bool | None:
-        """Whether the status is what the check finds; None of a row by reading."""
+        """Whether the verdicts confirm the entry's status; None for an entry by reading."""
         if self.right is None or self.wrong is None:
             return None
         expected = "proved" if self.entry.kind == "symbolic" else "agrees"
@@ -174,7 +174,7 @@ def by_reading(
     *, id: str, section: str, statement: str, printed: str, corrected: str, reason: str,
     status: Status = "erratum", equation: str = "",
 ) -> Entry:  # fmt: skip
-    """The entry of a slip that reading shows and no computation can: its formulas are LaTeX only."""
+    """The entry of a slip that only reading can show; its formulas are LaTeX without code."""
     return Entry(
         id, section, statement, Formula(printed), status, reason, "by reading", Formula(corrected), equation=equation
     )

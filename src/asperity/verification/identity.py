@@ -1,4 +1,4 @@
-"""Decides identities and inequalities of a user's own: proved, refuted with a counterexample, or undecided."""
+"""Decide identities and inequalities given by a user: proved, refuted with a counterexample, or undecided."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..core.errors import InputError
 from .verdict import Verdict, every
 
 TIME_LIMIT = 10.0
-# Points at which both sides are compared before a proof is sought, of an equality and of an inequality.
+# Points at which both sides are compared before a proof is sought: for an equality, and for an inequality.
 POINTS = 24
 MORE_POINTS = 60
 
@@ -26,33 +26,34 @@ def verify(
     Parameters
     ----------
     lhs, rhs : sympy expressions, numbers, matrices or nested sequences of them
-        Both of one shape; they are compared entry by entry. Decimal numbers are taken as the fractions that they are
-        in binary. ``lhs`` may be a relation such as ``a <= b`` instead, or a sequence of them; then there is no
-        ``rhs``, and the assumptions may stand second.
-    assumptions : sympy relation, iterable of them, or mapping from symbols to open intervals
-        Inequalities such as ``0 < theta`` or ``x <= y``, or ``{theta: (0, sympy.pi)}``, beside what the symbols
-        themselves carry (``positive=True``, ``integer=True``). Symbols stand for real numbers.
-    time_limit : float or None
-        Seconds after which the answer is ``"undecided"``. The work is done in a process of its own, which is ended
-        then; it is started with the first call, which takes about a second, and kept. None: no limit, and no process.
+            Both have the same shape and are compared entry by entry. Decimal numbers are read as their exact binary
+            fractions. ``lhs`` may be a relation such as ``a <= b`` or a sequence of relations. Then there is no
+            ``rhs``, and the assumptions may be the second argument.
+        assumptions : sympy relation, iterable of them, or mapping from symbols to open intervals
+            Inequalities such as ``0 < theta`` or ``x <= y``, or ``{theta: (0, sympy.pi)}``, in addition to the
+            properties of the symbols (``positive=True``, ``integer=True``). Symbols stand for real numbers.
+        time_limit : float or None
+            Seconds after which the answer is ``"undecided"``. The work runs in a separate process, which is killed at
+            the limit. The process starts with the first call, which takes about a second, and serves later calls. None:
+            no limit, and no separate process.
 
     Returns
     -------
     Verdict
-        ``"proved"`` rests on an exact derivation. ``"refuted"`` has a counterexample: an exact point that meets the
-        assumptions, at which both sides are defined and balls that contain their values show that the relation fails.
-        ``"undecided"`` names the reason.
+            ``"proved"`` rests on an exact derivation. ``"refuted"`` has a counterexample: an exact point that meets the
+            assumptions and at which both sides are defined. Balls that contain the two values show that the relation
+            fails. ``"undecided"`` names the reason.
 
     Raises
     ------
     InputError
-        If the shapes differ, an assumption is not an inequality, no point meets the assumptions, or at none of the
-        points of the domain that were looked at both sides are defined and real.
+            If the shapes differ, an assumption is not an inequality, no point meets the assumptions, or at each
+            examined point of the domain one side is undefined or not real.
 
     Notes
     -----
-    An expression is defined at a point where it and all its parts are real numbers, with the conventions of sympy:
-    0**0 is 1, the cube root of -1 is not real, sign(0) is 0, and ``acot`` jumps at 0.
+    An expression is defined at a point if it and all its parts are real there, with the conventions of sympy: 0**0 is
+    1, the cube root of -1 is not real, sign(0) is 0, and ``acot`` jumps at 0.
 
     Examples
     --------
@@ -84,7 +85,7 @@ def verify(
 
 
 def decide(claims: list[tuple[Any, Any, str]], relations: list[Any]) -> Verdict:
-    """The verdict on claims (left, right, "==", "<=" or "<"), all on the same assumptions."""
+    """The verdict on claims (left, right, "==", "<=" or "<") under the same assumptions."""
     from .balls import Unclear
 
     verdicts = []
@@ -110,7 +111,7 @@ def _relations_as_claims(sp: Any, given: Any) -> list[tuple[Any, Any, str]]:
     if isinstance(given, sp.And):
         return [claim for part in given.args for claim in _relations_as_claims(sp, part)]
     if given in (True, False, sp.true, sp.false):
-        # sympy has decided it, or python has
+        # sympy or Python has already decided it
         return [(sp.Integer(0), sp.Integer(0 if given else 1), "==")]
     kinds = {sp.Eq: "==", sp.Le: "<=", sp.Ge: "<=", sp.Lt: "<", sp.Gt: "<"}
     if type(given) not in kinds:
@@ -155,7 +156,7 @@ def _decided(left: Any, right: Any, relation: str, assumptions: list[Any]) -> Ve
     from .refutation import Search
 
     relations = [sp.sympify(given).replace(lambda e: e.is_Float, lambda e: sp.Rational(e)) for given in assumptions]
-    # the variable of an integral may bear the name of another
+    # the variable of an integral may have the name of another symbol
     left, right = (side.replace(sp.Integral, lambda *parts: sp.Integral(*parts).as_dummy()) for side in (left, right))
     symbols = set(left.free_symbols | right.free_symbols).union(*(given.free_symbols for given in relations))
     real = {symbol: _as_real(sp, symbol) for symbol in symbols}

@@ -1,7 +1,4 @@
-"""Integrals by antiderivatives that are proved, derivatives carried out, and imaginary exponents as sines.
-
-Imported only by functions, because it imports sympy.
-"""
+"""Integrals by proved antiderivatives, evaluation of derivatives, and sines for imaginary exponents."""
 
 from __future__ import annotations
 
@@ -17,18 +14,18 @@ from .polyhedron import Inequality
 from .resolution import Nowhere, Resolution
 from .signs import Part, is_continuous, is_infinite
 
-# Where the derivative of an expression made of these is undefined, so is what sympy writes for it.
+# For expressions of these functions, sympy's derivative is undefined wherever the true derivative is.
 _SMOOTH = {sp.sin, sp.cos, sp.tan, sp.cot, sp.exp, sp.sinh, sp.cosh, sp.tanh, sp.atan}
 _ENTIRE = {sp.exp, sp.sin, sp.cos, sp.sinh, sp.cosh}
 
 
 def prepared(e: Any, domain: Domain) -> Any:
-    """The expression with its derivatives, integrals and fractional parts carried out, as far as that is proved.
+    """Evaluate derivatives, integrals and fractional parts, as far as the result is proved.
 
     Raises
     ------
     InputError
-        If it is written with the imaginary unit otherwise than in exponents and polynomials.
+        If the imaginary unit stands anywhere but in polynomials and exponential, trigonometric or hyperbolic functions.
     """
     e = e.replace(sp.frac, lambda x: x - sp.floor(x))
     # sympy would write 0**(-x) as a power of infinity, whatever the sign of x
@@ -67,7 +64,7 @@ def _integral(e: Any, domain: Domain) -> Any:
 
 
 def _definite(integrand: Any, variable: Any, low: Any, high: Any, domain: Domain) -> Any:
-    """The difference of an antiderivative, proved to be one between the ends and continuous up to them."""
+    """The difference of an antiderivative that is proved between the ends and continuous up to them, else None."""
     t = sp.Dummy(str(variable), real=True)
     f = integrand.xreplace({variable: t})
     if f.is_number:
@@ -99,7 +96,7 @@ def _definite(integrand: Any, variable: Any, low: Any, high: Any, domain: Domain
         )
         values = dict(cell.values)
         if inside.polyhedron.is_empty:
-            # no length: the integral is 0, and so must be the difference
+            # an empty interval: the integral is 0, and the difference must be 0 too
             at_end = antiderivative.xreplace({t: low}).xreplace(values)
             if is_infinite(at_end) or not is_continuous(at_end, Part(cell)):
                 return None
@@ -127,7 +124,7 @@ def _definite(integrand: Any, variable: Any, low: Any, high: Any, domain: Domain
 
 
 def _between(t: Any, low: Any, high: Any, domain: Domain) -> list[Inequality] | None:
-    """Bounds of an interval that holds everything between two ends."""
+    """Bounds of an interval that contains all numbers between two ends."""
     above, below = Inequality.of(t - low, True), Inequality.of(high - t, True)
     if above is None or (below is None and high is not sp.oo):
         return None
@@ -137,7 +134,7 @@ def _between(t: Any, low: Any, high: Any, domain: Domain) -> list[Inequality] | 
         order = Inequality.of(last - first, False)
         if order is not None and domain.polyhedron.implies(order):
             return [Inequality.of(t - first, True), Inequality.of(last - t, True)]  # type: ignore[list-item]
-    # whichever comes first: beyond the bounds that both have
+    # either end may come first, so only bounds common to both orders are used
     bounds = []
     for sign in (1, -1):
         for bound in {0, *(end for s in domain.symbols for end in domain.interval(s)[:2] if end.is_finite)}:

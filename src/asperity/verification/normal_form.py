@@ -1,12 +1,11 @@
-"""The normal form in which an expression that is zero becomes the polynomial 0.
+"""A normal form in which an expression that vanishes becomes the polynomial 0.
 
-Every symbol is replaced by parameters that run over its interval and over nothing else, so that signs are known: an
-angle in (0, pi) by 2 arctan t with t > 0, which makes its sines rational; an angle without bounds, or where signs do
-not matter, by a pair (c, s) with c^2 + s^2 = 1; a number in (a, b) by (a + b t)/(1 + t). Roots become symbols with a
-relation, after factors of known sign have been drawn out. What remains is a polynomial in quantities that are taken for
-independent: if it is 0, so is the expression, at every point of the domain. The converse fails where they are not.
-
-Imported only by functions, because it imports sympy.
+Every symbol is replaced by parameters that run exactly over its interval, so that signs are known. An angle in (0, pi)
+becomes 2 arctan t with t > 0, which makes its sines rational. An unbounded angle, or one whose signs do not matter,
+becomes a pair (c, s) with c^2 + s^2 = 1. A number in (a, b) becomes (a + b t)/(1 + t). Roots become symbols with a
+relation, after factors of known sign have been extracted. The result is a polynomial in quantities that are treated as
+independent. If it is 0, the expression is 0 at every point of the domain. The converse fails where the quantities are
+dependent.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ _BY_SINES = {
 }
 
 
-# Sine and cosine of inverse functions, wherever these are defined.
+# Sine and cosine of inverse functions, wherever the inverse functions are defined.
 _OF_INVERSE = {
     sp.asin: lambda x: (x, sp.sqrt(1 - x**2)),
     sp.acos: lambda x: (sp.sqrt(1 - x**2), x),
@@ -39,15 +38,17 @@ _OF_INVERSE = {
 
 
 def vanishes(expression: Any, parameters: Parameters) -> bool:
-    """Whether the normal form is 0, which proves that the expression is: on open intervals, and where it is continuous
-    at their ends too."""
+    """Whether the normal form is 0.
+
+    Then the expression is 0 on open intervals, and at those of their ends where it is continuous.
+    """
     e = parameters.normal(expression)
-    # functions without a normal form of their own: equal ones have become one expression
+    # a function without a normal form becomes a symbol; equal functions are already equal expressions
     e = e.xreplace({f: sp.Dummy("f") for f in e.atoms(sp.Function, sp.Max, sp.Min) if f.func is not sp.Abs})
     roots: dict[Any, tuple[Any, int]] = {}
     e = _without_roots(e, roots)
     e = sp.together(e).as_numer_denom()[0]
-    # from the outermost root to the innermost, for a root's radicand may hold others
+    # from the outermost root to the innermost, because a radicand may contain other roots
     for root, (radicand, index) in reversed(roots.items()):
         e = _reduced(e, root, index, radicand)
     for cosine, sine in parameters.circles.values():
@@ -58,10 +59,10 @@ def vanishes(expression: Any, parameters: Parameters) -> bool:
 
 
 class Parameters:
-    """What stands for the symbols of a domain; filled as expressions are met, so that all of them share it.
+    """The parameters that replace the symbols of a domain; all expressions of a part share them.
 
-    Without ``half_angles`` every angle is a pair (c, s): less is known then, but polynomials stay short. ``positive``
-    are expressions that are known to be so.
+    Without ``half_angles`` every angle is a pair (c, s): fewer signs are known, but polynomials stay short.
+    ``positive`` contains expressions that are known to be positive.
     """
 
     def __init__(self, domain: Domain, half_angles: bool, positive: Set[Any] = frozenset()) -> None:
@@ -78,7 +79,7 @@ class Parameters:
 
     @property
     def alternations(self) -> tuple[Any, ...]:
-        """What stands for powers of -1."""
+        """The symbols that replace powers of -1."""
         return tuple(self._alternations.values())
 
     def _interval(self, symbol: Any) -> tuple[Any, Any]:
@@ -88,7 +89,7 @@ class Parameters:
         return low, high
 
     def normal(self, e: Any) -> Any:
-        """The expression in the parameters, roots and absolute values drawn apart into factors of known sign."""
+        """The expression in the parameters, with roots and absolute values split into factors of known sign."""
         for function, by_sines in _BY_SINES.items():
             e = e.replace(function, by_sines)
         arguments = {f.args[0] for f in e.atoms(sp.sin, sp.cos)}
@@ -100,14 +101,14 @@ class Parameters:
                 changed |= divisor != self._divisors.get(unit, 1)
                 self._divisors[unit] = divisor
         if changed:
-            # the unit angle is smaller now: what stood for the old one is no longer used
+            # the unit angle is smaller now, so the old substitutions are obsolete
             self._angles.clear()
             self._exponentials.clear()
             self.circles.clear()
         return self._rebuilt(e)
 
     def factored(self, e: Any) -> Any:
-        """The normal form as a product, whose sign sympy knows if it knows that of every factor."""
+        """The normal form as a product; sympy knows its sign if it knows the sign of every factor."""
         return sp.factor(sp.together(self.normal(e)))
 
     def _rebuilt(self, e: Any) -> Any:
@@ -124,7 +125,7 @@ class Parameters:
         if not e.args:
             return e
         if not _is_arithmetic(e):
-            # equal to what is written alike
+            # one symbol for equal expressions
             return self._opaque.setdefault(e, sp.Dummy("o"))
         parts = [self._rebuilt(part) for part in e.args]
         if e.is_Pow and parts[1].is_Rational and not parts[1].is_Integer:
@@ -132,7 +133,7 @@ class Parameters:
         if e.is_Pow and e.base == -1 and e.exp.is_integer:
             return self._alternating(e.exp)
         if e.is_Pow and not parts[1].is_Rational:
-            # equal to what is written alike: it jumps where its base is 0
+            # one symbol for equal powers; the power jumps where its base is 0
             return self._opaque.setdefault((parts[0], parts[1]), sp.Dummy("p"))
         if e.func is sp.Abs:
             return sp.Mul(*(_absolute(factor) ** times for factor, times in _factors(parts[0])))
@@ -143,7 +144,7 @@ class Parameters:
         return e.func(*parts)
 
     def _on_circles(self, e: Any) -> Any:
-        """The same value, with no more than the first power of every sine."""
+        """Reduce every sine to at most its first power; the value does not change."""
         if not self.circles or not e.is_polynomial(*(sine for _, sine in self.circles.values())):
             return e
         for cosine, sine in self.circles.values():
@@ -179,7 +180,7 @@ class Parameters:
         if unit not in self._angles:
             low, high = (end / self._divisors[unit] for end in self._interval(unit))
             low, high = _plain_end(low, sp.floor), _plain_end(high, sp.ceiling)
-            # half turns by which the interval is brought between -pi and pi
+            # half turns that move the interval between -pi and pi
             turns = sp.floor(low / sp.pi) + (1 if high - low > sp.pi else 0) if (high - low).is_finite else 0
             low, high = low - turns * sp.pi, high - turns * sp.pi
             if self._half_angles and bool(low >= -sp.pi) and bool(high <= sp.pi):
@@ -194,7 +195,7 @@ class Parameters:
         return self._angles[unit]
 
     def _exponent(self, e: Any) -> Any:
-        """u where e is exp(u), or a power of a positive base that is none of the rational powers; else None."""
+        """u if e is exp(u), or a power with a positive base and a non-rational exponent; else None."""
         if e.func is sp.exp:
             return e.args[0]
         if not e.is_Pow or e.exp.is_Rational:
@@ -232,26 +233,26 @@ class Parameters:
 
 
 def _is_arithmetic(e: Any) -> bool:
-    """Whether it is an operation or a function of numbers; cases, integrals, sums and the like are not."""
+    """Whether it is an operation or a function of numbers, unlike cases, integrals or sums."""
     return bool(e.is_Add or e.is_Mul or e.is_Pow or e.is_Function) and all(isinstance(part, sp.Expr) for part in e.args)
 
 
 def _terms(argument: Any) -> list[tuple[Any, Any]]:
-    """An argument as a sum of rational multiples of units."""
+    """The argument as a sum of rational multiples of units."""
     return [term.as_coeff_Mul(rational=True) for term in sp.Add.make_args(sp.expand(argument))]
 
 
 def _plain_end(end: Any, outward: Any) -> Any:
-    """The end of an interval of angles, or a multiple of pi/2 beyond it if its half has no plain tangent.
+    """The end of an angle's interval, moved outward to a multiple of pi/2 if the tangent of its half is not elementary.
 
-    What holds on the wider interval holds on the given one.
+    A statement on the wider interval also holds on the given one.
     """
     quarters = 2 * end / sp.pi
     return end if end.is_infinite or quarters.is_Integer else outward(quarters) * sp.pi / 2
 
 
 def _running(interval: tuple[Any, Any], symbol: Any) -> Any:
-    """An expression in one new symbol that takes exactly the values of an open interval."""
+    """An expression in one new symbol whose values are exactly an open interval."""
     low, high = interval
     name = str(symbol)
     if low == -sp.oo and high == sp.oo:
@@ -267,7 +268,7 @@ def _running(interval: tuple[Any, Any], symbol: Any) -> Any:
 
 
 def _factors(e: Any) -> list[tuple[Any, Any]]:
-    """Factors and their exponents, those of known sign apart; numbers as powers of primes."""
+    """Factors and their exponents: factors of known sign separately, numbers as powers of primes."""
     found: list[tuple[Any, Any]] = []
     for factor in sp.Mul.make_args(sp.factor(sp.together(e))):
         base, times = factor.as_base_exp()
@@ -288,7 +289,7 @@ def _absolute(factor: Any) -> Any:
 
 
 def _power(base: Any, exponent: Any) -> Any:
-    """base ** exponent for a base that is not negative, without the factors whose root is known."""
+    """base ** exponent for a base that is not negative, with known roots extracted."""
     outside, inside = sp.Integer(1), sp.Integer(1)
     for factor, times in _factors(base):
         if factor.is_nonnegative:
@@ -336,7 +337,7 @@ def _root(radicand: Any, index: int, roots: dict[Any, tuple[Any, int]]) -> Any:
 
 
 def _reduced(e: Any, symbol: Any, index: int, power: Any) -> Any:
-    """The numerator of e after symbol^index = power."""
+    """The numerator of e after the substitution symbol^index = power."""
     if not e.has(symbol):
         return e
     total = sp.Integer(0)

@@ -1,7 +1,4 @@
-"""Linear inequalities between symbols: whether they can be met, and a point that meets them.
-
-Imported only by functions, because it imports sympy.
-"""
+"""Linear inequalities between symbols: whether they are consistent, and the bounds of each symbol."""
 
 from __future__ import annotations
 
@@ -14,13 +11,13 @@ import sympy as sp
 
 from .balls import Unclear, Undefined, evaluate
 
-# Enough to compare any two numbers that a user writes as ends of intervals and that differ.
+# Bits that suffice to compare any two different numbers that a user writes as ends of intervals.
 BITS = 2000
 
 
 @dataclass(frozen=True)
 class Inequality:
-    """sum of coefficient * symbol, plus a constant, is positive (``strict``), or not negative."""
+    """sum of coefficient * symbol + constant is positive (``strict``) or not negative."""
 
     coefficients: Mapping[Any, Any]
     constant: Any
@@ -49,21 +46,21 @@ class Inequality:
         return sp.Add(*(c * s for s, c in self.coefficients.items()), self.constant)
 
     def negated(self) -> Inequality:
-        """What holds where this does not."""
+        """The opposite inequality."""
         return Inequality({s: -c for s, c in self.coefficients.items()}, -self.constant, not self.strict)
 
     def substituted(self, symbol: Any, value: Any) -> Inequality | None:
-        """The inequality for a value of one symbol, None if it is not linear then."""
+        """The inequality for a value of one symbol, None if it is then not linear."""
         return Inequality.of(self.expression.xreplace({symbol: value}), self.strict)
 
     def end(self, symbol: Any, point: Mapping[Any, Any]) -> Any:
-        """The bound that it sets to one symbol where the others are given."""
+        """The bound that the inequality sets to one symbol if the others are given."""
         rest = sp.Add(*(c * point[s] for s, c in self.coefficients.items() if s != symbol), self.constant)
         return -rest / self.coefficients[symbol]
 
 
 def sign_of(number: Any) -> int:
-    """The sign of an exact number; `Unclear` is raised of one that cannot be told from 0, or is not real."""
+    """The sign of an exact number; raises `Unclear` if the number is not real or cannot be distinguished from 0."""
     if number.is_Rational or number.is_infinite:
         return int(sp.sign(number))
     try:
@@ -77,14 +74,14 @@ def sign_of(number: Any) -> int:
 
 
 class Polyhedron:
-    """The points that meet some linear inequalities; symbols are eliminated one by one (Fourier and Motzkin)."""
+    """The solutions of linear inequalities; symbols are eliminated one by one (Fourier and Motzkin)."""
 
     def __init__(self, symbols: Sequence[Any], inequalities: Iterable[Inequality]) -> None:
         self.symbols, self.inequalities = tuple(symbols), tuple(inequalities)
 
     @cached_property
     def _tower(self) -> tuple[list[tuple[Any, list[Inequality]]], bool]:
-        """For every symbol the bounds in terms of those before it, and whether all can be met."""
+        """The bounds of every symbol in terms of earlier symbols, and whether all inequalities are consistent."""
         remaining, tower = list(self.inequalities), []
         for symbol in reversed(self.symbols):
             here = [one for one in remaining if symbol in one.coefficients]
@@ -101,7 +98,7 @@ class Polyhedron:
         return not self._tower[1]
 
     def bounds(self, position: int, point: Mapping[Any, Any]) -> tuple[Any, Any, bool, bool]:
-        """Ends of the interval of a symbol for given values of those before it, and whether they belong to it."""
+        """Ends of a symbol's interval for given values of earlier symbols, and whether each end belongs to it."""
         symbol, here = self._tower[0][position]
         low, high, low_closed, high_closed = -sp.oo, sp.oo, False, False
         for one in here:

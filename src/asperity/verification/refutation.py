@@ -1,7 +1,4 @@
-"""Counterexamples: exact points of the domain at which balls that contain both sides are disjoint.
-
-Imported only by functions, because it imports sympy and flint.
-"""
+"""Counterexamples: exact points at which disjoint balls contain the two sides."""
 
 from __future__ import annotations
 
@@ -17,27 +14,27 @@ from .domain import Domain
 from .verdict import Verdict
 
 SEED = 0
-# Both sides are evaluated with so many bits, one after the other; with most at the first point, with many at a few.
+# Increasing bits of evaluation: MOST_BITS at the first point only, the third of BITS at the first CLOSE_LOOKS points.
 BITS = (64, 256, 2048)
 CLOSE_LOOKS = 4
 MOST_BITS = 1 << 15
 SHOWN = 20
-# So many times as many points are tried where a side is often undefined.
+# Factor on the number of points if a side is often undefined.
 MORE = 4
 
 
 @dataclass
 class Search:
-    """The search for a counterexample to a relation, and what it saw.
+    """The search for a counterexample to a relation.
 
     Attributes
     ----------
     tried : int
-        Points of the domain at which both sides were looked at.
+        Number of points at which both sides were evaluated.
     defined : int
-        Those among them at which both are certainly defined.
+        Number of these points at which both sides are certainly defined.
     undefined : int
-        Those among them at which one is certainly not.
+        Number of these points at which one side is certainly undefined.
     """
 
     left: Any
@@ -52,7 +49,8 @@ class Search:
         self._rng = np.random.default_rng(SEED)
 
     def refutation(self, part: Domain, count: int, until_defined: bool = False) -> Verdict | None:
-        """The first counterexample among some points of a part, or among those up to one where both are defined."""
+        """The first counterexample among ``count`` points of a part, or up to the first point where both are
+        defined."""
         before = self.defined
         for point in part.points(self._rng, count, MORE * count):
             found = self._at(point)
@@ -96,7 +94,7 @@ class Search:
         return sign != 0 if self.relation == "==" else sign > 0 if self.relation == "<=" else sign >= 0
 
     def _shown(self, point: dict[Any, Any], bits: int) -> tuple[str, str]:
-        """Both values, with as many digits as it takes to tell them apart."""
+        """Both values, with enough digits to distinguish them."""
         digits = SHOWN
         while True:
             with ctx.workprec(bits):

@@ -1,9 +1,7 @@
-"""An expression on an open part of a domain without the functions that jump, bend or have branches.
+"""Resolution of functions that jump, bend or have branches, on an open part of a domain.
 
-Every rule holds wherever the expression is defined. Where a sign is not known, the expression whose sign decides is
-handed back, so that the part can be cut at its zeros.
-
-Imported only by functions, because it imports sympy.
+Every rule holds wherever the expression is defined. If a sign is unknown, the deciding expression is recorded, so that
+the part can be cut at its zeros.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from .balls import Unclear, Undefined, evaluate
 from .signs import NEGATIVE, NOT_NEGATIVE, NOT_POSITIVE, POSITIVE, ZERO, Part, is_infinite, is_muddled
 
 BITS = 128
-# A function with more pieces than this on one part is left as it is.
+# A function with more pieces than PIECES on one part is not resolved.
 PIECES = 40
 LARGEST = 120
 
@@ -31,9 +29,9 @@ class Resolution:
     Attributes
     ----------
     undetermined : list
-        Expressions whose signs decide what an expression is.
+        Expressions whose signs decide which branch applies.
     limits : list
-        Expressions whose signs decide where it is defined, or smooth.
+        Expressions whose signs decide where an expression is defined or smooth.
     """
 
     def __init__(self, part: Part) -> None:
@@ -43,7 +41,7 @@ class Resolution:
         self._done: dict[Any, Any] = {}
 
     def resolved(self, e: Any) -> Any:
-        """The expression without what could be resolved; `Nowhere` is raised if it is defined nowhere."""
+        """Return the resolved expression; raise `Nowhere` if it is defined nowhere."""
         if is_infinite(e):
             raise Nowhere
         if not e.args or isinstance(e, sp.Integral | sp.Sum | sp.Product | sp.Derivative | sp.Subs | sp.Limit):
@@ -55,7 +53,7 @@ class Resolution:
                 args = [self.resolved(argument) for argument in e.args]
                 again = e if tuple(args) == e.args else e.func(*args)
                 if is_muddled(again):
-                    # left as it is
+                    # not resolved
                     self._done[e] = e
                     return e
                 if is_infinite(again):
@@ -115,7 +113,8 @@ class Resolution:
         return e if whole.has(sp.floor) else x - y * whole
 
     def _piece(self, e: Any, start: Any, length: Any) -> int | None:
-        """k where start + k length <= e < start + (k + 1) length on the whole part; at the ends only e matters."""
+        """k with start + k length <= e < start + (k + 1) length on the whole part; None if there is none or it is
+        unknown."""
         for point in self._part.domain_points():
             try:
                 value = evaluate((e - start) / length, point, BITS)
@@ -148,7 +147,7 @@ class Resolution:
     # ---- cases
 
     def _cases(self, e: Any) -> Any:
-        """The branch that applies; e itself where that is not known."""
+        """The branch that applies; e itself if the branch is unknown."""
         for branch, condition in e.args:
             truth = self._truth(condition)
             if truth is None:
@@ -164,7 +163,7 @@ class Resolution:
             parts = [self._truth(part) for part in condition.args]
             deciding = isinstance(condition, sp.Or)
             if None in parts:
-                # a part that is not known may also not be defined
+                # a condition of unknown truth may also be undefined
                 return None
             return deciding if deciding in parts else not deciding
         if isinstance(condition, sp.Not):
@@ -205,7 +204,7 @@ class Resolution:
             k = self._piece_of_angle(core.args[0], -sp.pi / 2)
             if k is not None:
                 return sign * (-1) ** k * (core.args[0] - k * sp.pi)
-        # one function for both
+        # arcsine and arccosine share one function
         return sign * (sp.pi / 2 - sp.acos(core))
 
     def _arccosine(self, e: Any) -> Any:
@@ -250,7 +249,7 @@ class Resolution:
     # ---- where an expression is defined, and products under roots and logarithms
 
     def _limit(self, *expressions: Any) -> None:
-        """What must not be negative."""
+        """Record expressions that must not be negative; raise `Nowhere` if one is negative."""
         for expression in expressions:
             if self._signs(expression, limit=True) <= NEGATIVE:
                 raise Nowhere
@@ -286,7 +285,7 @@ class Resolution:
         return e
 
     def _root_of_product(self, e: Any) -> Any:
-        """Even powers under a square root, outside it."""
+        """Extract even powers from a square root."""
         outside, inside = sp.Integer(1), sp.Integer(1)
         for factor in sp.Mul.make_args(sp.factor(e.base)):
             base, times = factor.as_base_exp()
@@ -304,7 +303,7 @@ class Resolution:
         total, rest = sp.Integer(0), sp.Integer(1)
         for factor in sp.Mul.make_args(sp.factor(e.args[0])):
             base, times = factor.as_base_exp()
-            # none is 0 where the logarithm is defined
+            # no factor is 0 where the logarithm is defined
             signs = self._signs(base) - {0}
             if times.is_Rational and signs == POSITIVE:
                 total += times * sp.log(base)

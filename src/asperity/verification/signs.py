@@ -1,7 +1,4 @@
-"""The sign of an expression on an open part of a domain.
-
-Imported only by functions, because it imports sympy.
-"""
+"""The sign of an expression on an open part of a domain."""
 
 from __future__ import annotations
 
@@ -25,20 +22,20 @@ NEGATIVE, NOT_POSITIVE, NONZERO, ANY = frozenset({-1}), frozenset({-1, 0}), froz
 
 _CONTAINERS = (sp.Piecewise, sp.Integral, sp.Sum, sp.Product, sp.Limit, sp.Derivative, sp.Subs)
 BITS = 128
-# Boxes that are tried before a sign is given up, and sizes beyond which expressions are not factored.
+# Boxes tried before the sign stays unknown, and operations beyond which expressions are not factored.
 BOXES = 400
 LARGEST = 150
-# A sign is sought through that of the derivative so many times.
+# Nested derivatives used to find a sign.
 DEPTH = 5
 FIRST_POINTS = 6
 
 
 class Part:
-    """An open part of a domain, with what is known on it: signs, and the parameters of its normal form."""
+    """An open part of a domain, with known signs and the parameters of its normal form."""
 
     def __init__(self, domain: Domain) -> None:
         if domain.polyhedron.is_empty:
-            # everything would hold on it
+            # every statement would hold on an empty part
             raise ValueError("expected a part with points in it")
         if any(one.coefficients and not one.strict for one in domain.inequalities):
             raise ValueError("expected an open part")
@@ -51,7 +48,7 @@ class Part:
         self._given: dict[Any, Signs] | None = None
 
     def signs(self, e: Any) -> Signs:
-        """The signs that e may have where it is defined; a superset of those that it has."""
+        """A superset of the signs of e where it is defined."""
         if e not in self._known:
             self._known[e] = self._signs(e) & self._assumed().get(e, ANY)
         return self._known[e]
@@ -90,7 +87,7 @@ class Part:
         return found
 
     def _assumed(self) -> dict[Any, Signs]:
-        """The signs that conditions give, as they are written."""
+        """The signs that the conditions give directly."""
         if self._given is None:
             self._given = {}
             for condition in self.domain.conditions:
@@ -114,7 +111,7 @@ class Part:
         return ANY
 
     def _of_sum(self, e: Any) -> Signs:
-        """From bounds of the terms: products of sines lie between -1 and 1, others have a sign."""
+        """The sign of a sum from bounds of its terms: products of sines lie in [-1, 1], other terms have a sign."""
         found = self._of_root_and_rest(e)
         if found is not None:
             return found
@@ -131,7 +128,7 @@ class Part:
         return ANY
 
     def _of_root_and_rest(self, e: Any) -> Signs | None:
-        """The sign of the root where it is larger than the rest."""
+        """The sign of a square root whose absolute value exceeds the other terms."""
         for term in e.args:
             fraction, root = term.as_coeff_Mul(rational=True)
             if root.is_Pow and root.exp == sp.S.Half:
@@ -141,7 +138,7 @@ class Part:
         return None
 
     def _bounds(self, term: Any) -> tuple[Any, Any, bool]:
-        """Bounds of a term, and whether one of them, 0, is not reached."""
+        """Bounds of a term, and whether its finite bound is not attained."""
         if term.is_number:
             return term, term, False
         fraction, rest = term.as_coeff_Mul(rational=True)
@@ -195,12 +192,12 @@ class Part:
         return ANY
 
     def domain_points(self) -> list[dict[Any, Any]]:
-        """Some points inside, as values of the symbols that vary."""
+        """Some interior points, as values of the symbols that vary."""
         free = replace(self.domain, values={}, conditions=(), original=self.domain.symbols)
         return list(free.points(np.random.default_rng(0), FIRST_POINTS))
 
     def thorough_signs(self, e: Any, depth: int = DEPTH) -> Signs:
-        """The same with more effort: by bisection, and through derivatives."""
+        """As `signs`, but also by bisection and by derivatives."""
         key = (e, depth)
         if key not in self._thorough:
             found = self.signs(e)
@@ -217,7 +214,7 @@ class Part:
         if not symbols or any(end.is_infinite for ends in box.values() for end in ends):
             return ANY
         waiting, found, tried = [{s: (float(a), float(b)) for s, (a, b) in box.items()}], frozenset[int](), 0
-        # ends are rounded outwards
+        # rounded outward
         waiting = [{s: (np.nextafter(a, -np.inf), np.nextafter(b, np.inf)) for s, (a, b) in waiting[0].items()}]
         while waiting:
             tried += 1
@@ -235,7 +232,7 @@ class Part:
         return found
 
     def _is_nowhere_constant(self, e: Any, slope: Any) -> bool:
-        """Whether a continuous function of one symbol is analytic, and its slope not 0 somewhere, so on no interval."""
+        """Whether an analytic function of one symbol has a nonzero slope somewhere, so that no interval is constant."""
         roots = any(not power.exp.is_Integer for power in e.atoms(sp.Pow))
         if len(e.free_symbols) != 1 or roots or e.has(*_NOT_ANALYTIC):
             return False
@@ -248,7 +245,7 @@ class Part:
         return False
 
     def along(self, symbol: Any) -> Part:
-        """The part without the conditions that may cut a line on which one symbol varies into pieces."""
+        """The part without conditions that may cut the line of one symbol into pieces."""
         values = dict(self.domain.values)
         remaining = tuple(
             condition
@@ -260,9 +257,9 @@ class Part:
         return self if remaining == self.domain.conditions else Part(replace(self.domain, conditions=remaining))
 
     def _by_derivative(self, e: Any, depth: int) -> Signs:
-        """Positive at the lower end and growing, say, for every symbol in turn."""
+        """The sign at an end of a symbol's interval, if the derivative has the matching sign."""
         if self.domain.conditions:
-            # a line from the end may leave where they hold
+            # a line from the end may leave the region of the conditions
             return Part(replace(self.domain, conditions=()))._by_derivative(e, depth)
         if not e.free_symbols or sp.count_ops(e) > LARGEST:
             return ANY
@@ -291,7 +288,7 @@ class Part:
         return ANY
 
 
-# Of these all but the arc cosine stay inside.
+# All but the arc cosine do not attain their bounds.
 _RANGES = {sp.acos: (sp.S.Zero, sp.pi), sp.atan: (-sp.pi / 2, sp.pi / 2), sp.tanh: (-sp.S.One, sp.S.One)}
 
 
@@ -299,18 +296,18 @@ _NOT_ANALYTIC = (sp.asin, sp.acos, sp.acosh)
 
 
 def is_muddled(e: Any) -> bool:
-    """Whether it holds what sympy makes of 0**(-x), infinity to the power of x, which is 0 where x is negative."""
+    """Whether e contains sympy's form of 0**(-x): infinity to the power of x, whose value is 0 for negative x."""
     return any(power.base is sp.zoo and power.free_symbols for power in e.atoms(sp.Pow))
 
 
 def is_infinite(e: Any) -> bool:
-    """Whether a part of it, which every value needs, is undefined, infinite or imaginary."""
+    """Whether a part that every value requires is undefined, infinite or imaginary."""
     if isinstance(e, _CONTAINERS) or is_muddled(e):
         return False
     return e in (sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I) or isinstance(e, sp.AccumBounds) or any(map(is_infinite, e.args))
 
 
-# Functions that are continuous wherever they are defined, and analytic inside.
+# Functions that are continuous wherever they are defined, and analytic in the interior.
 _SMOOTH = (
     sp.sin, sp.cos, sp.tan, sp.cot, sp.sec, sp.csc, sp.asin, sp.acos, sp.atan, sp.exp, sp.log, sp.sinh, sp.cosh,
     sp.tanh, sp.asinh, sp.acosh, sp.atanh, sp.erf, sp.erfc,
@@ -318,9 +315,11 @@ _SMOOTH = (
 
 
 def is_continuous(e: Any, part: Part, end: tuple[Any, ...] | None = None) -> bool:
-    """Whether an expression is shown to be defined and continuous on the whole part, and analytic inside but for a
-    thin set; with ``end``, also on the face where one symbol has the value of that end: the two, and the face where it
-    is not that of the part."""
+    """Whether e is proved continuous on the whole part, and analytic there up to a thin set.
+
+    With ``end`` = (symbol, value) or (symbol, value, face), e is also continuous on the face at this value of the
+    symbol. ``face`` is needed if it differs from the part's face.
+    """
     if not all(is_continuous(argument, part, end) for argument in e.args):
         return False
     if e.is_Add or e.is_Mul or e.is_Symbol or e.is_number:
@@ -383,14 +382,14 @@ def _powered(signs: Signs, exponent: int) -> Signs:
 
 
 def _without_roots(e: Any) -> Any:
-    """A product in which a positive parameter under a square root has become a square."""
+    """Replace a positive parameter under a square root by a square, and factor."""
     rooted = {p.base for p in e.atoms(sp.Pow) if p.exp.is_Rational and p.exp.q == 2 and p.base.is_Symbol}
     squares = {t: sp.Dummy(positive=True) ** 2 for t in rooted if t.is_positive}
     return sp.factor(e.xreplace(squares)) if squares else e
 
 
 def _of_product(e: Any) -> Signs:
-    """From the signs of factors whose symbols are positive parameters."""
+    """The sign of a product from its factors in positive parameters."""
     return _product([_of_factor(factor) for factor in sp.Mul.make_args(e)])
 
 
@@ -408,7 +407,7 @@ def _of_factor(factor: Any) -> Signs:
         (t,) = base.free_symbols
         polynomial = sp.Poly(base, t)
         if t.is_positive and (polynomial.domain.is_ZZ or polynomial.domain.is_QQ):
-            # no root beyond 0 (Sturm): the sign is that of the leading coefficient
+            # no root beyond 0 (Sturm): the leading coefficient gives the sign
             if polynomial.count_roots(0, None) == (1 if polynomial.eval(0) == 0 else 0):
                 return _powered(frozenset({int(sp.sign(polynomial.LC()))}), int(exponent))
             return _powered(ANY, int(exponent))

@@ -1,4 +1,4 @@
-"""The verdict of a check, never a bare yes or no, and verdicts from comparisons of numbers."""
+"""Verdicts of checks, with evidence, and verdicts from comparisons of numbers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..core.errors import InputError
 
 Answer = Literal["proved", "agrees", "refuted", "undecided"]
-# from the answer that decides a conjunction to the one that decides it least
+# from the answer that decides a conjunction first to the answer that decides it last
 _WEIGHT: dict[Answer, int] = {"refuted": 0, "undecided": 1, "agrees": 2, "proved": 3}
 
 
@@ -24,19 +24,21 @@ class Verdict:
     Parameters
     ----------
     answer : {"proved", "agrees", "refuted", "undecided"}
-        ``"proved"``: by an exact derivation. ``"agrees"``: by numbers, which can support a formula but not prove it.
-        ``"refuted"``: there is a counterexample. ``"undecided"``: neither a proof nor a counterexample was found.
+            ``"proved"``: by an exact derivation. ``"agrees"``: by numbers, which can support a formula but not prove
+            it. ``"refuted"``: there is a counterexample. ``"undecided"``: neither a proof nor a counterexample was
+            found.
     evidence : str
         How the answer was found, in words and numbers.
     counterexample : mapping from str to values, optional
-        The point at which a refuted formula fails; of `verify` exact numbers as text, such as ``8/3`` or ``pi/2``.
+            The point at which a refuted formula fails. `verify` gives exact numbers as text, such as ``8/3`` or
+            ``pi/2``.
     values : tuple of str, optional
         Both sides at the counterexample.
 
     Notes
     -----
-    A verdict has no truth value: ``if verify(...)`` would read *undecided* as one or the other, so it raises. Ask for
-    `answer`, or for `stands`.
+    A verdict has no truth value, and ``bool(verdict)`` raises: ``if verify(...)`` would count *undecided* as one of the
+    two. Use `answer` or `stands`.
 
     Examples
     --------
@@ -86,16 +88,16 @@ def every(*verdicts: Verdict) -> Verdict:
 
 
 def agreement(found: ArrayLike, expected: ArrayLike, allowed: float, **where: ArrayLike) -> Verdict:
-    """Whether two arrays agree within ``allowed``, everywhere.
+    """Whether two arrays agree within ``allowed`` everywhere.
 
     Parameters
     ----------
     found, expected : array_like
-        What the formula gives, and what an independent computation gives; they broadcast.
-    allowed : float
-        The largest difference that rounding, sampling or the order of an approximation can explain.
-    **where : array_like
-        The points, by name, broadcast with the values: the worst of them is the counterexample.
+            Values of the formula, and of an independent computation; they broadcast.
+        allowed : float
+            The largest difference that rounding, sampling or the order of an approximation explains.
+        **where : array_like
+            The points, by name, broadcast with the values; the worst point is the counterexample.
 
     Examples
     --------
@@ -107,7 +109,7 @@ def agreement(found: ArrayLike, expected: ArrayLike, allowed: float, **where: Ar
 
 
 def no_excess(small: ArrayLike, large: ArrayLike, allowed: float = 0.0, **where: ArrayLike) -> Verdict:
-    """Whether ``small <= large + allowed`` everywhere: a search that tries to break an inequality.
+    """Whether ``small <= large + allowed`` everywhere.
 
     Examples
     --------
@@ -142,7 +144,7 @@ def _compared(
     index = np.unravel_index(int(np.argmax(np.where(broken, np.inf, defect))), defect.shape)
     point = _point(index, defect.shape, where)
     if broken.any():
-        # neither for the formula nor against it
+        # NaN neither supports nor refutes the formula
         return Verdict("undecided", f"not a number at {int(broken.sum())} of {defect.size} points", point)
     evidence = words.format(worst=f"{float(defect[index]):.2g}") + f", allowed {allowed:.2g}"
     if defect[index] <= allowed:

@@ -1,6 +1,6 @@
-"""A separate process that decides identities, so that it can be ended when the time is up.
+"""A separate process that decides identities and can be killed at the time limit.
 
-It is no copy of this process, which may have threads, but a fresh interpreter; it ends with this one.
+The process is a fresh interpreter, because a copy of this process might have threads. It ends with this process.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from typing import Any
 from ..core.errors import InputError
 from .verdict import Verdict
 
-# A start takes about a second; beyond this it has failed.
+# A start takes about a second; after this time it has failed.
 START_SECONDS = 120.0
-# So long after the limit the process ends itself, should nobody have ended it.
+# Seconds after the time limit at which the process ends itself.
 GRACE = 5.0
 _COMMAND = (
     "import sys; sys.path[:] = {path!r}; from asperity.verification.identity import decide; "
@@ -34,7 +34,7 @@ class _Worker:
     def __init__(self) -> None:
         self.connection, theirs = Pipe()
         command = _COMMAND.format(path=sys.path, handle=theirs.fileno())
-        # a session of its own, so that an interrupt reaches this process alone
+        # its own session, so that an interrupt reaches only the parent process
         self.process = subprocess.Popen(
             [sys.executable, "-c", command],
             pass_fds=[theirs.fileno()],
@@ -59,7 +59,7 @@ _worker: _Worker | None = None
 
 
 def decide_in_time(claims: list[Any], relations: list[Any], seconds: float) -> Verdict:
-    """The verdict of `identity.decide`, or *undecided* after so many seconds."""
+    """The verdict of `identity.decide`, or *undecided* after ``seconds``."""
     global _worker
     try:
         question = pickle.dumps((claims, relations, seconds))
@@ -98,7 +98,7 @@ def _end() -> None:
 
 
 def serve(handle: int, decide: Callable[[list[Any], list[Any]], Verdict]) -> None:
-    """Answer one question after the other, until nobody asks."""
+    """Answer requests until the connection is closed."""
     connection: Connection[Any, Any] = Connection(handle)
     import flint  # noqa: F401
     import sympy  # noqa: F401

@@ -1,7 +1,4 @@
-"""All zeros and poles of a function of one symbol in an interval, exactly, where its form is simple enough.
-
-Imported only by functions, because it imports sympy.
-"""
+"""All zeros and poles of a function of one symbol in an interval, exactly, if its form is simple enough."""
 
 from __future__ import annotations
 
@@ -13,15 +10,15 @@ from flint import ctx
 from .balls import Unclear, Undefined, evaluate, interval
 from .polyhedron import sign_of
 
-# A function with more zeros than this is not taken apart at them.
+# Domains are not divided at more zeros than MOST.
 MOST = 60
 LARGEST = 300
 
 
 def zeros(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
-    """The points in the open interval at which e is 0 or infinite, ascending; None where they are not known.
+    """The points of the open interval at which e is 0 or infinite, ascending; None if they are not known.
 
-    An expression that is 0 everywhere has none that are known.
+    They are not known for an expression that is 0 everywhere.
     """
     if not e.has(symbol):
         return [] if e.is_zero is False or (e.is_number and _differs_from_zero(e)) else None
@@ -36,7 +33,7 @@ def zeros(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
 
 
 def _points(e: Any, symbol: Any, low: Any, high: Any) -> set[Any] | None:
-    """Zeros and poles, and possibly other points, some of them outside."""
+    """A set that contains all zeros and poles, and possibly other points, some outside the interval."""
     if sp.count_ops(e) > LARGEST:
         return None
     points: set[Any] = set()
@@ -110,7 +107,7 @@ def _of_polynomial(e: Any, symbol: Any) -> list[Any] | None:
 
 
 def _where(function: Any, level: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
-    """The points where a function of something takes a value."""
+    """The points at which a function of an inner expression takes a value."""
     inner = function.args[0]
     solutions: list[Any] | None
     try:
@@ -122,14 +119,14 @@ def _where(function: Any, level: Any, symbol: Any, low: Any, high: Any) -> list[
             else:
                 solutions = _periodic([sp.acos(level), -sp.acos(level)], 2 * sp.pi, inner, symbol, low, high)
         elif function.func in (sp.tan, sp.cot):
-            # its poles too
+            # includes the poles
             base = sp.atan(level) if function.func is sp.tan else sp.pi / 2 - sp.atan(level)
             pole = sp.pi / 2 if function.func is sp.tan else 0
             solutions = _periodic([base, pole], sp.pi, inner, symbol, low, high)
         elif function.func is sp.exp:
             solutions = [sp.log(level)] if sign_of(level) > 0 else []
         elif function.func is sp.log:
-            # and the end of its domain
+            # includes the end of its domain
             solutions = [sp.exp(level), sp.S.Zero]
         elif function.func is sp.Abs:
             solutions = [level, -level] if sign_of(level) >= 0 else []
@@ -171,7 +168,7 @@ def _periodic(bases: list[Any], period: Any, inner: Any, symbol: Any, low: Any, 
 
 
 def _of_sine_and_cosine(e: Any, pair: list[Any], symbol: Any, low: Any, high: Any) -> list[Any] | None:
-    """a sin v + b cos v = 0 where tan v = -b/a."""
+    """Zeros of a sin v + b cos v, from tan v = -b/a."""
     by_function = {f.func: f for f in pair}
     if set(by_function) != {sp.sin, sp.cos}:
         return None
