@@ -9,15 +9,15 @@ import numpy as np
 
 ENTRIES = 1000
 HALVINGS = 40
-# An outcome changes at a handful of positions, each known to (1/ENTRIES) 2^-HALVINGS and to the rounding of the tracer.
+# Error bound: a few changes of outcome, each known to (1/ENTRIES) 2^-HALVINGS and to the tracer's rounding.
 FRACTION_ERROR = 1e-10
 
 
 def fraction(occurs: Callable[[Any, Any], Any], theta: Any, low: float = 0.0) -> Any:
-    """How large a part of the entry points from ``low`` to 1 has an outcome, for every angle.
+    """The fraction of the entry points from ``low`` to 1 that have an outcome, for every angle.
 
-    ``occurs`` says so of arrays of entry points and angles. An outcome that comes and goes between two neighbours of
-    ENTRIES equally spaced points is not seen.
+    ``occurs`` maps arrays of entry points and angles to booleans. An outcome that occurs only between two neighbours of
+    ENTRIES equally spaced points is missed.
     """
     x = low + (1.0 - low) * (np.arange(ENTRIES) + 0.5) / ENTRIES
     found = occurs(*np.broadcast_arrays(x[:, None], theta))

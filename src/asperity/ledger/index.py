@@ -1,4 +1,4 @@
-"""The ledger: every formula of Rudzis 2022 that was checked, collected from its folders."""
+"""The index of the ledger: an entry for every checked formula of Rudzis 2022."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FOLDERS = ("plane", "disk", "proof")
 
 @cache
 def entries() -> tuple[Entry, ...]:
-    """Every entry, sorted by its id; a new file in one of the folders is found by itself.
+    """All entries, sorted by id; new files in the ledger's folders are found automatically.
 
     Examples
     --------
@@ -33,12 +33,12 @@ def entries() -> tuple[Entry, ...]:
 
 
 def selected(ids: Iterable[str]) -> tuple[Entry, ...]:
-    """The entries whose id is given or starts with what is given; all of them if nothing is given.
+    """The entries whose id equals or starts with one of ``ids``; all entries if ``ids`` is empty.
 
     Raises
     ------
     InputError
-        If an id is not that of an entry, nor the beginning of one.
+        If one of ``ids`` is neither the id of an entry nor the beginning of one.
     """
     wanted = tuple(ids)
     if not wanted:
@@ -50,6 +50,6 @@ def selected(ids: Iterable[str]) -> tuple[Entry, ...]:
 
 
 def findings(chosen: Iterable[Entry]) -> Iterator[Finding]:
-    """Run the checks, one by one."""
+    """Run the checks one by one and yield their findings."""
     for entry in chosen:
         yield entry.run()

@@ -11,14 +11,14 @@ from ..verification.verdict import Verdict
 
 WIDTH = 66
 FOUND = {None: "not checked", True: "as stated", False: "NOT AS STATED"}
-# the order and the headings of the page: errata first
+# headings of the page in their order, errata first
 HEADINGS = {"erratum": "Errata", "convention": "Conventions", "verified": "Verified"}
-# what stands before the second formula of a row
+# label of the second formula of a row
 AMENDED = {"erratum": "corrected", "convention": "under the convention"}
 
 
 def table_of(findings: Sequence[Finding]) -> str:
-    """One line a row, the verdicts beneath those that are not as stated, and the totals."""
+    """A table with one line for each row, verdicts below rows that are not as stated, and totals."""
     lines = []
     for finding in findings:
         lines.append(_line(finding))
@@ -39,7 +39,7 @@ def _totals(findings: Sequence[Finding]) -> str:
 
 
 def totals_of(entries: Sequence[Entry]) -> str:
-    """How many rows there are of each status and of each kind, in two sentences."""
+    """The numbers of rows by status and by kind, in two sentences."""
     status, kinds = Counter(entry.status for entry in entries), Counter(entry.kind for entry in entries)
     return (
         f"{len(entries)} rows: {status['verified']} verified, {status['erratum']} errata, "
@@ -49,7 +49,7 @@ def totals_of(entries: Sequence[Entry]) -> str:
 
 
 def finding_as_dict(finding: Finding) -> dict[str, Any]:
-    """One row, ready for JSON; ``docs/command-line.md`` lists the keys."""
+    """One row as a JSON-ready dictionary; ``docs/command-line.md`` lists the keys."""
     entry = finding.entry
     return {
         "id": entry.id, "section": entry.section, "equation": entry.equation, "statement": entry.statement,
@@ -70,7 +70,7 @@ def _verdict(verdict: Verdict | None) -> dict[str, Any] | None:
 
 
 def latex_of(entries: Iterable[Entry]) -> str:
-    """The formulas in LaTeX, one paragraph a row; the words need an engine that reads Unicode."""
+    """The formulas in LaTeX, one paragraph for each row; the words need a LaTeX engine with Unicode."""
     return "\n\n".join(
         "\n".join(
             [

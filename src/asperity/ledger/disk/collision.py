@@ -1,4 +1,4 @@
-"""Sections 2.3 and 5.1: collision laws on velocities, and how the wall that a disk feels decides them."""
+"""Sections 2.3 and 5.1: collision laws on velocities, and the foreshortened wall that determines them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...geometry.disk.disk import contact_normal, foreshortening
 from ...verification import Formula, Verdict, agreement, erratum, every, verified, verify
 from ...verification.entry import Code
 
-# Rounding of a dozen reflections.
+# Rounding error of a dozen reflections.
 TRACED = 1e-10
 MOST_BOUNCES = 1000
 
@@ -108,7 +108,7 @@ def wall_that_is_felt_as_given(point: Code) -> Verdict:
     factor = foreshortening(sym.m, sym.J, sp)
     felt1, felt2 = factor * x1, x2
     given1, given2 = point(x1, x2, factor)
-    # up to scale: the points felt are those of the given wall, each times the factor
+    # up to scale: a point of the foreshortened wall is the given point times the factor
     return verify([factor * given1, factor * given2], [felt1, felt2])
 
 
@@ -141,7 +141,7 @@ def symmetry_of_the_two_laws(maps: Code) -> Verdict:
 
 
 def next_side(vertices: Any, point: Any, along: Any, last: int) -> tuple[float, int]:
-    """When a particle in the plane of a polygonal wall next hits a side, and which; -1 is the line y = 0."""
+    """The time to the next side of a polygonal wall and the side's index; -1 is the line y = 0."""
     time, side = (-point[1] / along[1], -1) if along[1] > 0 and last >= 0 else (math.inf, -1)
     for index, (start, end) in enumerate(pairwise(vertices)):
         edge, offset = end - start, start - point
@@ -158,8 +158,8 @@ def next_side(vertices: Any, point: Any, along: Any, last: int) -> tuple[float, 
 def bounce_on_the_cylinder(disk: Disk, wall: Wall, at: Any, velocity: Any) -> Any:
     """The outgoing velocity of a disk on the cylinder over a polygonal wall, by reflections in three dimensions.
 
-    The free configurations are those with (x1 + alpha, x2) outside the wall; at a side with unit normal k the velocity
-    is reflected at n = `contact_normal` in the kinetic-energy metric. Not a number after too many bounces.
+    Free configurations have (x1 + alpha, x2) outside the wall. At a side with unit normal k the velocity is reflected
+    at n = `contact_normal` in the kinetic-energy metric. NaN after MOST_BOUNCES bounces.
     """
     vertices, last = wall.vertices, -1
     position, velocity = np.array(at, dtype=float), np.array(velocity, dtype=float)

@@ -1,4 +1,4 @@
-"""Section 1.3.6: the frame of the disk, the sphere of its velocities and the measure there."""
+"""Section 1.3.6: the frame of the disk, and the sphere of its velocities with its measure."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def flip_of_the_polar_angle(flip: Code) -> Verdict:
     def outgoing(angle: Any) -> Any:
         return sym.G.subs({sym.theta: angle, sym.psi: flip(sym.psi, sp)}, simultaneous=True)
 
-    # where the angle follows an isometry the velocity does, too: the library's matrices
+    # if the angle follows an isometry, the velocity follows the library's branch matrix
     isometries = [
         verify(sym.branch_matrix(sign, offset) * -sym.G, outgoing(sign * sym.theta + offset)) for sign in (1, -1)
     ]

@@ -146,7 +146,7 @@ def angular_momentum(momentum: Code) -> Verdict:
     w1, w2 = sp.symbols("omega1 omega2", real=True)
     before = [(m1, j1, x, v, w1), (m2, j2, y, u, w2)]
     after = [_struck(body, c, (s * p[0], s * p[1])) for body, s in zip(before, (1, -1), strict=True)]
-    # of bodies that turn at rest it is the sum of their spins
+    # the momentum of bodies that only rotate is the sum of their spins
     resting = [(M, J, x, (0, 0), omega) for M, J, x, _, omega in before]
     return every(verify(momentum(after), momentum(before)), verify(momentum(resting), j1 * w1 + j2 * w2))
 
@@ -186,11 +186,11 @@ def energy_of_the_heavy_body(bound: Code) -> Verdict:
     other = own / np.stack([ratio[0], ratio[0], ratio[1]])
     w = rng.normal(size=(3, count))
     change = np.where(rng.random(count) < 0.5, w, rng.normal(size=(3, count)))
-    # w' = w - s change, with the s for which own w'^2 + own^2/other (w - w')^2 = own w^2
+    # w' = w - s change, with s from own w'^2 + own^2/other (w - w')^2 = own w^2
     s = 2 * np.sum(own * w * change, axis=0) / np.sum((own + own**2 / other) * change**2, axis=0)
     taken = s**2 * np.sum(own**2 / other * change**2, axis=0)
     whole = np.sum(own * w**2, axis=0)
-    # head on, w' = (own - other)/(own + other) w: the fraction taken is 4 ratio/(1 + ratio)^2
+    # head-on, w' = (own - other)/(own + other) w: the transferred fraction is 4 ratio/(1 + ratio)^2
     light = np.array([1e-7, 1e-6])
     head_on = 4 * light / (1 + light) ** 2
     return every(

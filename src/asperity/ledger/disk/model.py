@@ -1,4 +1,4 @@
-"""Section 1.3: the disk with satellites, how it rolls, and the cylinder that replaces its configuration space."""
+"""Section 1.3: the disk with satellites, its rolling, and the cylinder that replaces its configuration space."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...verification.entry import Code
     statement="The k-th satellite after the disk has turned by α, counter-clockwise.",
     printed=Formula(
         r"S_k = (x_1 + \sin(\alpha + k\rho),\ x_2 - \cos(\alpha + k\rho))",
-        # heights of the library are greater by 1
+        # heights in the library are greater by 1
         lambda x1, x2, alpha, turn, xp: rolling.satellite(x1, x2 - 1, alpha + turn, 1, xp),
     ),
     perturbed=lambda x1, x2, alpha, turn, xp: rolling.satellite(x1, x2 - 1, alpha - turn, 1, xp),
@@ -51,10 +51,10 @@ def inner_disk_is_clear_of_the_wall(radius: Code) -> Verdict:
     depth = 15 / 8 * spacing**2
     bar = rng.uniform(-0.5, 0.5, (500, 400)) * spacing[:, None]
     bar[:, 0] = 0.5 * spacing
-    # tops at height -1, bottoms at -1 - depth: the centre whose lowest satellite lies at a bottom
+    # tops at height -1, bottoms at -1 - depth: the height of a centre whose lowest satellite is at a bottom
     centre = -1 - depth + np.min(np.cos(bar), axis=1)
     left = centre - radius(spacing) + 1
-    # 1 - cos(rho/2) is rho^2/8 - rho^4/384 + ...
+    # 1 - cos(rho/2) = rho^2/8 - rho^4/384 + ...
     return every(
         no_excess(0.0, left, 1e-15, spacing=spacing), no_excess(left, spacing**4 / 384, 1e-15, spacing=spacing)
     )

@@ -1,4 +1,4 @@
-"""The limit of the physical disk: one satellite, the impulse law and small asperities give the foreshortened wall."""
+"""The small-scale limit of a disk with one satellite and the impulse law: the foreshortened wall."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def limit_of_the_disk(factor: Code) -> Verdict:
         x = rng.uniform(0, 1, RAYS)
         expected = trace(wall, kappa * x, theta).theta
         found = np.array([_angle_after(*ray, m, J) for ray in zip(x, theta, psi, strict=True)])
-        # a ray that passes next to a corner may be reflected by another side: at most one ray in twenty
+        # near a corner a ray may be reflected by another side: at most one ray in twenty
         verdicts.append(agreement(np.sort(np.abs(found - expected))[: RAYS - RAYS // 20], 0.0, 100 * EPS))
     return every(*verdicts)
 
 
 def _angle_after(x: float, theta: float, psi: float, m: float, J: float) -> float:
-    """Follow the disk through the wall, in units of eps, and return the angle of its outgoing velocity."""
+    """The angle of the outgoing velocity of a disk traced through the wall, in units of eps."""
     from ...geometry.disk.disk import Disk
 
     disk = Disk(m, J)
@@ -67,7 +67,7 @@ def _angle_after(x: float, theta: float, psi: float, m: float, J: float) -> floa
 
 
 def _next_contact(position: np.ndarray, w: np.ndarray) -> tuple[float, tuple[float, float] | None]:
-    """The time to the next side that the satellite meets, and its unit normal; None where it leaves."""
+    """The time to the satellite's next contact with a side, and the side's unit normal; None if it escapes."""
 
     def satellite(t: float) -> tuple[float, float, float, float]:
         turn = EPS * (position[2] + t * w[2])
@@ -85,7 +85,7 @@ def _next_contact(position: np.ndarray, w: np.ndarray) -> tuple[float, tuple[flo
             if approach >= 0.0:
                 continue
             t = 0.0
-            for _ in range(6):  # Newton: the path is straight but for eps
+            for _ in range(6):  # Newton: the path is straight up to order eps
                 x, y, vx, vy = satellite(t)
                 t -= ((x - foot) * k[0] + y * k[1]) / (vx * k[0] + vy * k[1])
             x, y, _, _ = satellite(t)

@@ -9,13 +9,13 @@ from ...verification import Formula, Verdict, agreement, by_reading, erratum, ev
 from ...verification.entry import Code
 from ..samples import generator
 
-# The table: an ellipse with these semi-axes.
+# Semi-axes of the elliptical table.
 AXES = np.array([[1.6], [1.0]])
 STATES = 600
 
 
 def _states() -> tuple[Floats, Floats]:
-    """Random points (2, n) of the table and unit directions into it."""
+    """Random points (2, n) of the table and inward unit directions."""
     rng = generator()
     t, angle = rng.uniform(0, 2 * np.pi, STATES), rng.uniform(0.05, np.pi - 0.05, STATES)
     q = AXES * np.stack([np.cos(t), np.sin(t)])
@@ -36,14 +36,14 @@ def reflection(q: Floats, p: Floats) -> tuple[Floats, Floats]:
 
 
 def billiard_map(q: Floats, p: Floats) -> tuple[Floats, Floats]:
-    """Phi: fly to the other end of the chord, then reflect."""
+    """Phi: move to the other end of the chord, then reflect."""
     time = -2 * np.sum(q * p / AXES**2, axis=0) / np.sum(p**2 / AXES**2, axis=0)
     # forward in time only
     return reflection(q + np.maximum(time, 0.0) * p, p)
 
 
 def reversal(q: Floats, p: Floats) -> tuple[Floats, Floats]:
-    """-R: turn round before the reflection."""
+    """-R: the reflection, then the opposite direction."""
     q, p = reflection(q, p)
     return q, -p
 
@@ -128,13 +128,13 @@ def invariant_measure(density: Code) -> Verdict:
 
 
 def _speed(t: Floats) -> Floats:
-    """The arc length per parameter of the ellipse."""
+    """The speed of the ellipse's parametrisation."""
     a, b = AXES[:, 0]
     return np.asarray(np.hypot(a * np.sin(t), b * np.cos(t)))
 
 
 def _in_coordinates(t: Floats, angle: Floats) -> Floats:
-    """The billiard map in the parameter of the ellipse and the angle of the direction from the tangent (n2, -n1)."""
+    """The billiard map in the ellipse's parameter and the angle of the direction from the tangent (n2, -n1)."""
     q = AXES * np.stack([np.cos(t), np.sin(t)])
     n = _normal(q)
     q, p = billiard_map(q, np.sin(angle) * n + np.cos(angle) * np.stack([n[1], -n[0]]))

@@ -1,4 +1,4 @@
-"""Sections 2.2.3 and 2.3.3: the law of focusing circular arcs, and the elliptical arcs that a disk feels as such."""
+"""Sections 2.2.3 and 2.3.3: the law of focusing circular arcs, and their foreshortened form, elliptical arcs."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ...verification.entry import Code
 
 HALF_ANGLES = (0.3, 0.8, 1.3)
 RAYS = 4000
-# Rounding of a ray on an arc, with up to a hundred bounces.
+# Rounding error of a ray on an arc with up to a hundred bounces.
 TRACED = 1e-9
-# Rays this near to a change of N may round to either side of it.
+# Rays this close to a change of N may round to either side.
 UNDECIDED = 1e-9
-# The position of a ray that enters beside a corner, and how far from the corner it hits.
+# Distances from a corner, along the entry line and of the first hit.
 BESIDE_THE_CORNER, NEAR = 1e-9, 1e-5
 
 
 def first_hit(x: Any, theta: Any, xi: float) -> Any:
-    """gamma: where the ray that enters at x first hits the arc, from the bottom; by the chord of the circle."""
+    """gamma, the angle from the bottom of the first hit of the ray that enters at x, from the chord of the circle."""
     radius = 0.5 / np.sin(xi)
     px, py = x - 0.5, -radius * np.cos(xi)
     v1, v2 = -np.cos(theta), -np.sin(theta)
@@ -42,7 +42,7 @@ def rays() -> tuple[Any, Any]:
 
 
 def step_and_hits(theta: Any, gamma: Any, xi: float, rounded: Code = np.ceil) -> tuple[Any, Any]:
-    """Delta gamma, by which every hit turns the ray, and the number N of hits."""
+    """Delta gamma, the angle from one hit to the next, and the number N of hits."""
     forward = theta - gamma >= np.pi / 2
     step = np.where(forward, 2 * (np.pi - theta + gamma), -2 * (theta - gamma))
     return step, rounded((xi - np.where(forward, gamma, -gamma)) / np.abs(step))
@@ -54,7 +54,7 @@ def undecided(theta: Any, gamma: Any, xi: float) -> Any:
 
 
 def entry_of(theta: Any, gamma: Any, xi: Any, numerator: Any, xp: Any) -> Any:
-    """X from the angle whose cosine stands in the numerator of eq. 2.18."""
+    """X from the angle whose cosine is in the numerator of eq. 2.18."""
     return (xp.cos(numerator) - xp.cos(theta + xi)) / (xp.cos(theta - xi) - xp.cos(theta + xi))
 
 
@@ -135,7 +135,7 @@ def hits_on_an_arc(step_and_number: Code) -> Verdict:
         hits = trace(focusing_arcs(xi), x, theta).collisions
         decided = ~undecided(theta, gamma, xi)
         step, number = step_and_number(theta, gamma, xi)
-        # the direction after the first hit, by reflection, and the other end of the chord along it
+        # the direction after the first hit, and the other end of the chord in this direction
         at_circle, moving = np.exp(1j * gamma), -np.exp(1j * (theta + np.pi / 2))  # from the bottom, counter-clockwise
         moving = moving - 2 * np.real(moving * np.conj(at_circle)) * at_circle
         following = at_circle - 2 * np.real(moving * np.conj(at_circle)) * moving
@@ -230,7 +230,7 @@ def range_of_the_arccosine(condition: Code) -> Verdict:
         x, theta = rays()
         return holds(condition(theta, first_hit(x, theta, xi)), "rays", x=x, theta=theta)
 
-    # a ray hits the arc at gamma from inside if it moves along the outward normal there, and only then
+    # a ray hits the arc at gamma from inside if and only if it moves along the outward normal there
     rng = np.random.default_rng(5)
     theta, gamma = rng.uniform(0, np.pi, RAYS), rng.uniform(-np.pi / 2, np.pi / 2, RAYS)
     gamma[::4], gamma[1::4] = theta[::4] + 1e-4, theta[1::4] - 1e-4

@@ -11,9 +11,9 @@ from ...verification import Formula, Verdict, agreement, by_reading, convention,
 from ...verification.entry import Code
 
 POINTS = 2000
-# A sum over POINTS equal cells of a piecewise linear integrand.
+# Error of a sum over POINTS equal cells, for a piecewise linear integrand.
 GRID_ERROR = 1e-5
-# The next term is of order K in the coefficient, with a factor that is less than 1/100 at K = 0.1; the grid adds 2e-4.
+# The next term changes the coefficient by O(K), with a factor below 1/100 at K = 0.1; the grid adds 2e-4.
 SHALLOW_ERROR = 1e-3
 
 
@@ -81,13 +81,13 @@ def generator_of_shallow_arcs(angle: Code) -> Verdict:
     out = np.cos(angles)
 
     def coefficient(function: Code, eigenvalue: float) -> Any:
-        """Of the generator, from the quadratic form of P - I at an eigenfunction of the generator."""
+        """The coefficient of the generator, from the quadratic form of P - I at an eigenfunction of the generator."""
         change = np.mean(function(out), axis=0) - function(z)
         form = np.sum(weight * function(z) * change) / np.sum(weight * function(z) ** 2)
         return form / (eigenvalue * curvature**2)
 
     found = [coefficient(lambda z: z, -2.0), coefficient(lambda z: z**2 - 1 / 3, -6.0)]
-    # between two eigenfunctions, one even and one odd, the form is 0 by the symmetry of the arcs
+    # between an even and an odd eigenfunction the form is 0, by the symmetry of the arcs
     drift = np.sum(weight * z * (np.mean(out**2, axis=0) - z**2)) / curvature**2
     return every(
         agreement(found, 1 / 6, SHALLOW_ERROR),
@@ -113,7 +113,7 @@ def resistance_of_a_disk(integrand: Code) -> Verdict:
     angle = sp.Symbol("phi", real=True)
     incidence = integrand(sp.Integer(1), sp.cos(angle)) * sp.cos(angle)
     total = 2 * sp.pi * sp.integrate(incidence, (angle, -sp.pi / 2, sp.pi / 2))
-    # the lines that meet a convex body have the measure 2 x perimeter (Cauchy, Crofton)
+    # the measure of the lines that meet a convex body is 2 x perimeter (Cauchy, Crofton)
     return verify(total, 4 * sp.pi)
 
 
@@ -140,12 +140,12 @@ def continuous_reflections(hypothesis: Code) -> Verdict:
     ]  # fmt: skip
 
     def satisfied(image: Any, again: Any) -> bool:
-        # ranks of a measure preserving image are the points themselves, but for the order
+        # the sorted image of a measure-preserving map is the grid itself
         preserves = bool(np.max(np.abs(np.sort(image) - x)) < 2 / POINTS)
         return bool(hypothesis(preserves, bool(np.allclose(again, x))))
 
     admitted = [image for image in maps if satisfied(image(x), image(image(x)))]
-    # a hypothesis that admits neither would say nothing
+    # a hypothesis that admits neither map would be empty
     return every(
         holds(len(admitted) >= 2, "searches admit two maps"),
         holds([np.allclose(np.abs(image(x)), np.abs(x)) for image in admitted], "maps are x or -x"),

@@ -1,4 +1,4 @@
-"""Sections 2.2.1 and 2.3.1: the law of rectangular teeth, and of the foreshortened ones."""
+"""Sections 2.2.1 and 2.3.1: the laws of rectangular teeth and of their foreshortened form."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ HEIGHTS_TO_WIDTHS = (0.4, 1.0, 2.7)
 
 
 def fraction_of_specular(height_to_width: float, theta: Any, low: float) -> Any:
-    """How many of the rays that enter between ``low`` and 1 leave specularly, by tracing."""
+    """The fraction of rays with entry points between ``low`` and 1 that leave specularly, by tracing."""
 
     def is_specular(x: Any, theta: Any) -> Any:
         out = trace(rectangular_teeth(height_to_width), x, theta).theta
@@ -28,7 +28,7 @@ def fraction_of_specular(height_to_width: float, theta: Any, low: float) -> Any:
 
 
 def compared_with_tracing(probability: Code, low: float) -> Verdict:
-    """The probability of specular reflection against its frequency, for several teeth."""
+    """The probability of specular reflection compared with its frequency, for several teeth."""
     theta = np.linspace(0.15, 3.0, 40)
     ratios = np.array(HEIGHTS_TO_WIDTHS)
     found = [probability(ratio, theta) for ratio in ratios]
@@ -37,7 +37,7 @@ def compared_with_tracing(probability: Code, low: float) -> Verdict:
 
 
 def crossings(height_to_width: float, theta: Any) -> Any:
-    """d = 2 r |cot theta|, whole and fractional part."""
+    """The whole and fractional parts of d = 2 r |cot theta|."""
     return np.divmod(2 * height_to_width / np.abs(np.tan(theta)), 1.0)
 
 

@@ -12,9 +12,9 @@ from ...verification import Formula, Verdict, agreement, by_reading, erratum, ev
 from ...verification.entry import Code
 
 RAYS = 400
-# Rounding of a ray grows with the curvature of the wall and its bounces; these walls and rays have few.
+# Rounding error of a ray. It grows with curvature and bounces, both small here.
 REFLECTED = 1e-10
-# Central differences of step 1e-5: truncation 1e-10 times third derivatives up to 1e4, rounding 1e-11.
+# Central differences of step 1e-5: truncation is 1e-10 times third derivatives up to 1e4, rounding is 1e-11.
 STEP, DIFFERENTIATED = 1e-5, 1e-4
 
 

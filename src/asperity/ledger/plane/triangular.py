@@ -1,4 +1,4 @@
-"""Sections 2.2.2 and 2.3.2: the law of triangular teeth, and of the foreshortened ones."""
+"""Sections 2.2.2 and 2.3.2: the laws of triangular teeth and of their foreshortened form."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ..entry_probability import FRACTION_ERROR, fraction
 
 APEX_ANGLES = (0.35, 0.9, 1.6, 2.4)
 ENTRIES = 2000
-# How near to the angles where N changes, and to the tips.
+# Distances from the angles at which N changes, and from the tips.
 EDGE, TIP = 1e-4, 1e-9
-# Rounding of a ray between straight sides, with up to twenty bounces.
+# Rounding error of a ray between straight sides with up to twenty bounces.
 TRACED = 1e-11
-# Of a midpoint sum over angles at which the law has breakpoints.
+# Error of a midpoint sum over angles at which the law has breakpoints.
 FLUX_ERROR = 1e-4
 
 
 def rays_between(psi: float, low: float, high: float, number: int) -> tuple[Any, Any, Any]:
-    """Entry points (rows), angles (columns) strictly between two, and their traces; no ray aims at a corner."""
+    """Entry points (rows), angles (columns) in an open interval, and traces; no ray meets a corner."""
     theta = low + (high - low) * (np.arange(number) + 0.381966) / number
     x = (np.arange(ENTRIES) + 0.5) / ENTRIES
     return x, theta, trace(triangular_teeth(psi), x[:, None], theta)
@@ -40,7 +40,7 @@ def most_hits(psi: float, theta: Any) -> Any:
 
 
 def fraction_of_fewer(psi: float, theta: Any, shift: float = 0.0) -> Any:
-    """p_psi, with N shifted for the comparison."""
+    """p_psi, with N shifted for comparison."""
     last = (most_hits(psi, theta) + shift - 0.5) * psi - theta
     return (np.cos(theta - psi / 2) - np.cos(last)) / (2 * np.sin(theta) * np.sin(psi / 2))
 
@@ -55,7 +55,7 @@ def outgoing_angles(psi: float, theta: Any, half: Code) -> tuple[Any, Any]:
 
 
 def two_outgoing_angles(psi: float, theta: Any) -> tuple[Any, Any]:
-    """Probabilities and angles of the form with two outcomes, taken for all theta."""
+    """Probabilities and angles of the two-outcome form, applied to all theta."""
     fewer = np.clip(fraction_of_fewer(psi, theta), 0.0, 1.0)
     return np.stack([fewer, 1.0 - fewer], axis=-1), np.stack(outgoing_angles(psi, theta, np.floor), axis=-1)
 
@@ -138,7 +138,7 @@ def number_of_hits(most: Code) -> Verdict:
     def check(psi: float) -> Verdict:
         _, theta, traced = rays_between(psi, 0.05, (np.pi - psi) / 2, 17)
         missing = most(psi, theta) - traced.collisions
-        # beside multiples of psi/2, where N changes, the rays next to the two tips
+        # at the multiples of psi/2, where N changes, the rays next to the two tips
         edges = psi / 2 * np.arange(1, np.floor((np.pi - psi) / psi) + 1)
         beside = np.concatenate([[0.1 * psi], edges - EDGE, edges + EDGE])
         beside = beside[beside < (np.pi - psi) / 2]
@@ -227,10 +227,10 @@ def flux_of_triangular_teeth(law: Code) -> Verdict:
     def check(psi: float) -> Verdict:
         probability, angle = law(psi, theta)
         square = np.mean(np.sum(probability * np.cos(angle) ** 2, axis=-1))
-        # a symmetric law has <f, P g> = <P f, g>
+        # a symmetric law satisfies <f, P g> = <P f, g>
         forward = np.mean(z * np.sum(probability * np.cos(angle) ** 3, axis=-1))
         backward = np.mean(z**3 * np.sum(probability * np.cos(angle), axis=-1))
-        # that it is the law of these teeth and of no others: the outcomes of traced rays, and how often they occur
+        # the law is compared with the outcomes of traced rays and their frequencies
         x, some, traced = rays_between(psi, 0.05, np.pi - 0.05, 7)
         probability, angle = law(psi, some)
         apart = np.abs(traced.theta[..., None] - angle)

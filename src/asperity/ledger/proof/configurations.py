@@ -1,4 +1,4 @@
-"""Section 4.1: the configurations M of disk and wall, the chart F and the gaps."""
+"""Section 4.1: the configurations M of disk and wall, the chart F, and the gaps."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _configurations(count: int = 1500) -> np.ndarray:
 
 
 def _lowest(x1: np.ndarray, alpha: np.ndarray, eps: float) -> np.ndarray:
-    """The height x2 of the centre from which no satellite is in the solid."""
+    """The least height x2 of the centre at which no satellite is in the solid."""
     return -clearance(np.stack([x1, 0 * x1, alpha]), eps, SATELLITES)
 
 
@@ -60,7 +60,7 @@ def periods_of_the_configurations(shift: Code) -> Verdict:
 )
 def heights_of_the_boundary(bound: Code) -> Verdict:
     rng = generator()
-    # both satellites beside the lowest point of the rim reach bottoms if they are a whole number of periods apart
+    # the two lowest satellites both reach bottoms if their distance is a whole number of periods
     eps = 2 * np.sin(SPACING / 2) / 157
     x1, alpha = rng.uniform(0, 1, 20_000), rng.uniform(0, SPACING, 20_000)
     alpha[:5000] = SPACING / 2
@@ -158,12 +158,12 @@ def heights_while_rolling(bounds: Code) -> Verdict:
         x1, x2 = rolling.roll(0 * bar, depth, bar, 1.0)
         heights = np.sort(satellites(np.stack([x1, x2, bar]), SATELLITES)[1], axis=-1)
         centre, others = bounds(eps, SPACING)
-        # 1 - cos at the edge of the gap is rho^2/8 less rho^4/384 and rho/2 times the gap, which is about eps/rho
+        # 1 - cos at the edge of the gap is rho^2/8 minus rho^4/384 and rho/2 times the gap, about eps/rho
         return every(
             no_excess(centre, x2, alpha=bar),
             no_excess(others, heights[:, 1] - 1.0, 1e-12, alpha=bar),
             agreement(centre, x2.min(), SPACING**4 / 384 + eps),
-            # beside a gap, over a wall at its deepest, the second satellite is level with the tops
+            # beside a gap, over the deepest wall, the second satellite is level with the tops
             agreement(others, heights[:, 1].min() - 1.0, 1e-9),
         )
 
@@ -221,7 +221,7 @@ def rolling_from_rest(claim: Code) -> Verdict:
     turn = k * SPACING + number * SPACING
     pivot = x1 + 1j * x2 - 1j * np.exp(1j * turn)
     centre = pivot + np.exp(1j * bar) * (x1 + 1j * x2 - pivot)
-    # the paper's F, heights from the centre's level
+    # the paper's F, with heights relative to the centre
     expected = (x1 - np.sin(bar)) + 1j * (height + np.cos(bar))
     return agreement(np.stack([centre.real, centre.imag]), np.stack([expected.real, expected.imag]), 1e-13, k=k)
 

@@ -1,4 +1,4 @@
-"""Section 5.3.4: the paths of the contact, reflections near each other, and the constants of the estimates."""
+"""Section 5.3.4: the paths of the contact, nearby reflections, and the constants of the estimates."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def acceleration_of_the_contact(acceleration: Code) -> Verdict:
 )
 def constants_of_the_claims(fractions: Code) -> Verdict:
     rng = generator()
-    # along a flight of length and time 1, with the acceleration for which the miss is a fifth
+    # a segment of length and time 1, with the acceleration at which the deviation is a fifth
     acceleration = 2 / 5
     turn = rng.uniform(0, 2 * np.pi, (2, 4000))
     turn[:, :4] = np.pi * np.array([[0, 0, 1, 1], [0, 1, 0, 1]])
@@ -118,7 +118,7 @@ def splitting_of_a_reflection(first_term: Code) -> Verdict:
     apart = (a - 2 * np.sum(a * p, axis=0) * p) - (b - 2 * np.sum(b * q, axis=0) * q)
     bound = 3 * np.linalg.norm(a - b, axis=0) + 4 * np.linalg.norm(p - q, axis=0)
     split, bounded = verify(left, right), no_excess(np.linalg.norm(apart, axis=0), bound, 1e-12)
-    # the identity is proved; the bound was only searched, and says no more than that it was not broken
+    # the identity is proved, while the bound was only tested on samples
     return split if bounded.stands else bounded
 
 
@@ -196,7 +196,7 @@ def distance_along_a_curve(bound: Code) -> Verdict:
 )
 def sum_of_the_constants(bounds: Code) -> Verdict:
     total = 12 / 5 + 24 * np.sqrt(10)
-    # the least whole numbers above the sums
+    # the least integers above the sums
     return agreement(bounds(), np.ceil([total, 1 + total]), 0.0)
 
 

@@ -47,7 +47,7 @@ def normal_at_a_satellite(normal: Code) -> Verdict:
 
 
 def _is_unit_normal(normal: Code, rotated: bool) -> Verdict:
-    """Whether it is the kinetic gradient of the satellite's distance from the wall, and of norm 1."""
+    """Whether a normal has norm 1 and the direction of the kinetic gradient of a satellite's wall distance."""
     import sympy as sp
 
     from ...geometry.disk import symbolic as sym
@@ -60,6 +60,6 @@ def _is_unit_normal(normal: Code, rotated: bool) -> Verdict:
     raised = [g / weight for g, weight in zip(gradient, (sym.m, sym.m, sym.J), strict=True)]
     n = normal(sym.m, sym.J, k, angle - turn, turn, sp)
     parallel = [verify(n[i] * raised[0], n[0] * raised[i]) for i in (1, 2)]
-    # as n is never 0 it is inward everywhere if it is so at one position: over level ground it points up
+    # n is never 0, so it is inward everywhere if it is inward at one position: over level ground it points up
     level = sp.Matrix(n).subs({direction: sp.pi / 2, angle: 0})
     return every(*parallel, verify(sym.inner(n, n), 1), verify(level, sp.Matrix([0, 1 / sp.sqrt(sym.m), 0])))

@@ -1,4 +1,4 @@
-"""Section 5.1: the cylinder is a plane billiard times a free motion, and its wall is the foreshortened one."""
+"""Section 5.1: the cylinder as a plane billiard with the foreshortened wall, times a free motion."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..samples import generator, masses
 
 
 def _orthonormal(s1: Any, s2: Any) -> Any:
-    """The components along chi_perp and e2^ of a configuration over the point (s1, s2) of the plane."""
+    """The components along chi_perp and e2^ of a configuration above the point (s1, s2) of the plane."""
     import sympy as sp
 
     from ...geometry.disk import symbolic as sym
@@ -142,9 +142,9 @@ def scaled_region(region: Code) -> Verdict:
 def covering_by_squares(factor: Code) -> Verdict:
     rng = generator()
     m, J = masses(rng)
-    step = factor(m, J) / np.sqrt(m + J)  # of alpha, in units of eps; x1 goes back as much
+    step = factor(m, J) / np.sqrt(m + J)  # of alpha, in units of eps; x1 changes by the opposite amount
     x1, alpha = rng.uniform(-40, 40, (2, m.size))
-    # half of them next to the edges
+    # half of the points are next to the edges
     alpha[::2] = np.rint(alpha[::2]) + np.where(np.arange(m.size // 2) % 2, 1e-9, -1e-9)
     number = np.arange(-120, 121)[:, np.newaxis]
     over, above = x1 + alpha - number, alpha - number * step

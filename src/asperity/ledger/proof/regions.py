@@ -1,4 +1,4 @@
-"""Section 5.3.5: the regions that tile the zoomed plane, and the sizes that the iteration keeps."""
+"""Section 5.3.5: the regions that tile the zoomed plane, and the sizes that the iteration preserves."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ def shift_of_the_bands(shift: Code) -> Verdict:
     rng = generator()
     m, J = masses(rng, 400)
     bands = 12
-    band = 1 / (2 * bands)  # rho/eps is 1
+    band = 1 / (2 * bands)  # for rho/eps = 1
     alpha = rng.uniform(-0.5, 0.5, 400)
-    # half of them next to the edges of the bands
+    # half of the angles are next to the edges of the bands
     alpha[::2] = (np.rint(alpha[::2] / band * 0.9) + np.where(np.arange(200) % 2, 1e-9, -1e-9)) * band
     j = np.arange(-bands + 1, bands + 1)[:, np.newaxis]
     above = alpha - j * shift(m, J, band) / np.sqrt(m + J)
@@ -102,16 +102,16 @@ def _corrected_width(rho: np.ndarray, eps: np.ndarray, L: float) -> np.ndarray:
 )
 def width_of_the_good_angles(width: Code) -> Verdict:
     rho = np.array([1e-2, 1e-3, 1e-4, 1e-6, 1e-8])
-    eps = rho**2.5  # so that the gaps take a fraction of 2 rho^(1/2)
+    eps = rho**2.5  # the gaps are a fraction of 2 rho^(1/2)
 
     def check(L: float) -> Verdict:
         found = width(rho, eps, L)
         nearly_all = no_excess(1 - 4 * np.sqrt(rho), found / (rho / (2 * eps)), rho=rho)
-        # a flight of L log + 1 and log/(4 loglog) more of L log each end where a second satellite comes within eps
+        # a segment of L log + 1 and log/(4 loglog) segments of L log end where a second satellite comes within eps
         ell = np.log(1 / rho)
         end = eps * (found + (L * ell + 1) + ell / (4 * np.log(ell)) * (L * ell))
         higher = 2 * np.sin(rho / 2) * np.sin(rho / 2 - end)
-        # in units of rho it is the distance in the zoomed plane
+        # in units of rho this is the distance in the zoomed plane
         return every(nearly_all, agreement((higher / eps - 1) / rho, 0.0, 1e-3, rho=rho))
 
     return every(check(1.0), check(2.0))
@@ -133,7 +133,7 @@ def exponent_of_the_lower_bound(exponent: Code) -> Verdict:
     ell = np.array([1e8, 1e10, 1e12])  # log(1/rho)
     last = ell / (4 * np.log(ell))
     product = exponent(last) * np.log(ell) + last * np.log(2.0)  # minus its logarithm, with C = 2
-    # no exponent below 3 N + 4 will do, and none above it is needed
+    # 3 N + 4 is the least exponent, and it suffices
     return every(agreement(exponent(N), 3 * N + 4, 0.0, N=N), no_excess(product, ell))
 
 
@@ -181,7 +181,7 @@ def size_of_a_displacement(bound: Code) -> Verdict:
     y[2, 1::4] = 0
     g = np.hypot(*rolling.straight_contact(*y))
     size, found = kinetic_norm(y, m, J), bound(g, np.abs(y[2]), m, J)
-    # either term alone is attained
+    # each term alone is attained
     alone = (np.arange(m.size) % 4) < 2
     return every(
         no_excess(size, found, 1e-12, m=m, J=J), agreement(found[alone], size[alone], 1e-12, m=m[alone], J=J[alone])
@@ -227,7 +227,7 @@ def number_of_rectangles(bound: Code) -> Verdict:
     sides, start = (a, b, eps, rho), rng.uniform(0, 1, (2, 4000))
     along = np.floor(a / eps - start[0]) - np.floor(-a / eps - start[0]) + 1
     across = np.floor(b / rho - start[1]) - np.floor(-b / rho - start[1]) + 1
-    # for eps = rho = 1/2 rectangles that are slightly larger than whole cells meet one more on either side
+    # for eps = rho = 1/2, rectangles slightly larger than whole cells meet one more cell on either side
     cells = np.arange(1, 40)
     a, b = cells / 4 + 1e-9, cells[::-1] / 4 + 1e-9
     most = (cells + 2) * (cells[::-1] + 2)
@@ -252,11 +252,11 @@ def bound_of_the_spin(bound: Code) -> Verdict:
     rng = generator()
     m, J = masses(rng)
     w = unit_velocities(rng, m, J)
-    # for J > 1 the printed bound holds too; only what it says for light rims is at stake
+    # for J > 1 the printed bound also holds; only its claim for light rims is tested
     spin = np.stack([0 * J, 0 * J, bound(J)])
     return every(
         no_excess(np.abs(w[2]), bound(J), 1e-12, m=m, J=J),
         agreement(kinetic_norm(w, m, J), 1.0, 1e-12),
-        # attained by spin alone
+        # attained by pure spin
         agreement(kinetic_norm(spin, m, J), 1.0, 1e-12, J=J),
     )

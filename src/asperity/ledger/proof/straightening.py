@@ -1,4 +1,4 @@
-"""Section 4.2: the cylinder M_cyl, the map H_1 onto M, and the graph that it makes of the entry plane."""
+"""Section 4.2: the cylinder M_cyl, the map H_1 onto M, and the graph that H_1 makes of the entry plane."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def size_of_the_straightening(bound: Code) -> Verdict:
     return every(
         no_excess(kinetic_norm(moved, m, J), bound(rho, m), 1e-15, m=m, rho=rho),
         agreement(bound(rho, m), end, 1e-14, m=m, rho=rho),
-        # the greater of the two terms alone, which is of the order rho^2, is attained
+        # the greater of the two terms alone, of order rho^2, is attained
         no_excess(bound(rho, m), (1 + rho / 5) * np.sqrt(m) * (1 - np.cos(0.5 * rho)), 1e-15, m=m, rho=rho),
     )
 

@@ -1,4 +1,4 @@
-"""Sections 4.3.3 and 5.2: the map eta between the entry planes of cylinder and disk, and the tiling of the plane."""
+"""Sections 4.3.3 and 5.2: the map eta between the entry planes of cylinder and disk, and the tiling of a plane."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def transversal_velocities(floor: Code) -> Verdict:
     rho = rng.uniform(0.01, 1, m.size)
     w = unit_velocities(rng, m, J)
     low = floor(m, J, rho)
-    # half of the velocities start on the edge of the set, with all the spin that there can be
+    # half of the velocities start on the edge of the set, with the largest possible spin
     edge = (rng.random(m.size) < 0.5) & (m * low**2 < 1)
     w[:, edge] = np.stack([0 * low, low * (1 + 1e-9), np.sqrt(np.maximum(0, 1 - m * low**2) / J)])[:, edge]
     inside = w[1] > low
     bar = np.where(rng.random(m.size) < 0.5, -0.5, rng.uniform(-0.5, 0.5, m.size)) * rho
     upward = w[1] + np.sin(bar) * w[2]
-    # with all the spin that there can be, v2 = sin(rho/2) |omega| at v2^2 = sin^2/(J + m sin^2)
+    # with the largest possible spin, v2 = sin(rho/2) |omega| at v2^2 = sin^2/(J + m sin^2)
     small = np.geomspace(1e-4, 1e-3, m.size)
     lowest = np.sin(small / 2) / np.sqrt(J + m * np.sin(small / 2) ** 2)
     return every(
@@ -118,7 +118,7 @@ def size_of_the_transfer(order: Code) -> Verdict:
 
 
 def _mirrored(x1: Any, alpha: Any, bar: Any, velocity: Any, scale: Any, xp: Any) -> Any:
-    """phi_w as printed: all corrections have the other sign."""
+    """phi_w as printed: every correction has the opposite sign."""
     right = rolling.transfer(x1, alpha, bar, velocity, scale, xp)
     return 2 * x1 - right[0], 2 * alpha - right[1]
 
@@ -185,7 +185,7 @@ def differential_of_the_transfer(differential: Code) -> Verdict:
     x1, w = sp.Symbol("x1", real=True), _velocity(sp)
     image = sp.Matrix(rolling.transfer(x1, sym.alpha, sym.alpha, w, 1, sp))
     jacobian = sp.Matrix(differential(sym.alpha, w, sp))
-    # the library's, at any scale and in the velocity too
+    # the library's differential, for any scale and including the velocity
     zoomed = sp.Matrix(rolling.transfer(x1, sym.alpha, sym.alpha, w, sym.epsilon, sp))
     whole = rolling.transfer_differential(sym.alpha, w, sym.epsilon, sp)
     return every(
@@ -220,7 +220,7 @@ def translation_along_the_rolling(shift: Code) -> Verdict:
     j, k = rng.integers(-20, 21, (2, m.size))
     ratio = rng.uniform(1, 50, m.size)  # rho / eps
     periods, along = shift(j, k, m, J, ratio)
-    rotated = along / np.sqrt(m + J)  # in units of eps; the centre goes back as much
+    rotated = along / np.sqrt(m + J)  # in units of eps; the centre moves by the opposite amount
     remainder = periods - rotated - j
     inside = (remainder > -1e-9) & (remainder < 1 + 1e-9)
     return every(
