@@ -1,1 +1,1 @@
-"""The library's own measurements: error against run time, extreme cases, savings of the tracer, regressions."""
+"""Measurements of the library: error against run time, extreme cases, savings of the tracer, regressions."""

@@ -15,7 +15,7 @@ from .standard_set import FULL, QUICK, problem_names, run_problems
 def run_bench(
     problems: Sequence[str], *, quick: bool, extremes: bool, savings: bool, out: Path, force: bool, compare: Path | None
 ) -> int:
-    """Run what was asked for, print and write it; returns the exit code."""
+    """Run the requested measurements, print and write the results; return the exit code."""
     names = problem_names(problems)
     earlier = None if compare is None else BenchRun.of_json(compare.read_text(encoding="utf-8"))
     fresh_folder(out, force)

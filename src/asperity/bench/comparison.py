@@ -1,4 +1,4 @@
-"""Two runs of the benchmark compared: rows that became slower or less exact, and whether that is chance."""
+"""Comparison of two benchmark runs: rows that became slower or less accurate, with significance tests."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ..core.tables import table
 from ..spectral import WorkReport, WorkRow
 from .run import BenchRun
 
-# A row is slower only if chance would show it in less than this fraction of the rows, and by more than machines drift
-# in a day. Four repeats that are all slower than four others, the fewest that are run, have the p-value 1/70.
+# A row is slower if its p-value is below SIGNIFICANT and its time ratio exceeds DRIFT, the drift of machines in a day.
+# If four repeats, the fewest of any run, are all slower than four others, the p-value is 1/70.
 SIGNIFICANT, DRIFT = 0.02, 1.25
-# An error that grew by less than this is that of another rounding or another sample.
+# A smaller growth of an error can come from rounding or from another sample.
 GREW = 2.0
 
 
@@ -30,11 +30,11 @@ class RowChange:
     time_ratio : float
         Least time now over least time before.
     p_value : float
-        Of the times being alike, against their being longer (or shorter, as the ratio is), by the Mann-Whitney test.
+        One-sided Mann-Whitney test of equal times, in the direction of ``time_ratio``.
     error_ratio : float
-        Error now over error before, both at least what their reference can tell.
+        Error now over error before, each at least the error of its reference.
     status : str
-        "" or what became of a row that was done.
+        "", or the reason why a row of the earlier run is missing now.
     """
 
     problem: str
@@ -52,13 +52,13 @@ class RowChange:
 
     @property
     def is_worse(self) -> bool:
-        """Whether it is slower, less exact, or gone."""
+        """Whether the row is slower, less accurate, or missing."""
         return self.is_slower or self.error_ratio > GREW or bool(self.status)
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """All rows that both runs have.
+    """Comparison of the rows that both runs contain.
 
     Attributes
     ----------
@@ -69,17 +69,17 @@ class Comparison:
 
     @property
     def is_worse(self) -> bool:
-        """Whether any row is."""
+        """Whether any row is worse."""
         return any(change.is_worse for change in self.changes)
 
     @property
     def drift(self) -> float:
-        """Geometric mean of the ratios of the times: what the whole machine did."""
+        """Geometric mean of the time ratios: the drift of the machine."""
         ratios = [change.time_ratio for change in self.changes if not change.status]
         return float(np.exp(np.mean(np.log(ratios)))) if ratios else 1.0
 
     def table(self) -> str:
-        """The rows that changed, and the drift of all."""
+        """A table of the rows that changed, and the overall drift."""
         rows = (
             f"{one.problem} | {one.method} | {one.budget:g} | {one.time_ratio:.2f} | {one.p_value:.3f} "
             f"| {one.error_ratio:.2g} | {one.status or ('worse' if one.is_worse else 'faster')}"
@@ -92,7 +92,7 @@ class Comparison:
 
 
 def compare_runs(before: BenchRun, now: BenchRun) -> Comparison:
-    """Compare the rows that both runs have; an InputError if they are of different machines or share nothing."""
+    """Compare the rows of both runs; InputError if the machines differ or no row is common."""
     earlier = {report.problem: report for report in before.reports}
     changes: list[RowChange] = []
     for report in now.reports:
@@ -119,7 +119,7 @@ def _change(report: WorkReport, row: WorkRow, old_report: WorkReport, old: WorkR
     p_value = float(mannwhitneyu(row.seconds, old.seconds, alternative=side, method="exact").pvalue)
     floor = max(record.floor for record in (report.methods[row.method], old_report.methods[row.method]))
     errors = [max(one.error(what), floor) for one, what in ((report, row), (old_report, old))]
-    # a random error is known to its own spread only: a factor more for few repeats
+    # a random error has a spread, so a factor is allowed that decreases with the number of repeats
     room = 1.0 + 2.0 / len(row.seconds) ** 0.5 if report.methods[row.method].is_random else 1.0
     return RowChange(
         report.problem, row.method, row.budget, row.least / old.least, p_value, errors[0] / errors[1] / room

@@ -1,4 +1,4 @@
-"""One run of the benchmark: reports of problems, extreme cases and savings, their files and pictures."""
+"""One run of the benchmark: its reports, summary, files and figures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 SUMMARY, TABLES, DATA = "summary.md", "tables.md", "bench.json"
-# The library's choice is called good within this factor of the best method's time at equal error.
+# The library's choice is good if its time is within this factor of the best method's at equal error.
 GOOD_CHOICE = 2.0
 COLUMNS, WIDTH, HEIGHT = 3, 4.6, 3.8
 
@@ -34,7 +34,7 @@ class BenchRun:
     reports: tuple[WorkReport, ...]
 
     def summary(self) -> str:
-        """One line a problem: what the library chose, how far it got, how far its time is from the best."""
+        """A table with the library's choice, its error and its time relative to the best method, for each problem."""
         heads = "problem | chosen | error | reported | seconds"
         heads += " | times the best at equal error | at equal known error | front"
         lines = [table(heads, map(_cells, self.reports)), "", *self._choices(), ""]
@@ -49,7 +49,7 @@ class BenchRun:
         return "\n".join(lines)
 
     def _choices(self) -> list[str]:
-        """How good the library's choices are, in words, and which are not."""
+        """The number of good choices in words, and a list of the others."""
         choosing = [report for report in self.reports if report.auto in report.methods]
         done = [report for report in choosing if any(row.is_done for row in _chosen(report))]
         choices = [(report.problem, choice) for report in done if (choice := report.choice()) is not None]
@@ -65,7 +65,7 @@ class BenchRun:
         return [*lines, "", *slow] if slow else lines
 
     def references(self) -> str:
-        """What every problem is measured against, and how well that is known, as a table."""
+        """A table of each problem's reference and the accuracy of the reference."""
         rows = (
             f"{report.problem} | {source} | {floor:.1e}"
             for report in self.reports
@@ -74,7 +74,7 @@ class BenchRun:
         return table("problem | reference | known to", rows)
 
     def orders(self) -> tuple[list[str], list[str], list[str]]:
-        """Declared orders that the fits agree with, that they contradict, and that they do not resolve."""
+        """Declared orders in three lists: confirmed, contradicted or not resolved by the fits."""
         groups: tuple[list[str], list[str], list[str]] = ([], [], [])
         for report in self.reports:
             for name, record in report.methods.items():
@@ -87,11 +87,11 @@ class BenchRun:
         return groups
 
     def tables(self) -> str:
-        """All rows of all problems."""
+        """Tables of all rows, one for each problem."""
         return "\n\n".join(f"## {report.problem}\n\n{report.table()}" for report in self.reports)
 
     def save(self, folder: Path) -> list[Path]:
-        """Write summary, tables, data, and a picture a scene; returns what was written."""
+        """Write summary, tables, data and a figure for each scene; return the written paths."""
         written = [folder / SUMMARY, folder / TABLES, folder / DATA]
         for path, text in zip(written, (self.summary(), self.tables(), self.to_json()), strict=True):
             path.write_text(text + "\n", encoding="utf-8")
@@ -103,20 +103,20 @@ class BenchRun:
         return written
 
     def by_scene(self) -> dict[str, list[WorkReport]]:
-        """The reports of every scene."""
+        """The reports of each scene."""
         found: dict[str, list[WorkReport]] = {}
         for report in self.reports:
             found.setdefault(report.problem.split("/")[0], []).append(report)
         return found
 
     def to_json(self) -> str:
-        """All reports."""
+        """All reports as JSON."""
         data = {"format": FORMAT, "reports": [json.loads(report.to_json()) for report in self.reports]}
         return json.dumps(data, indent=1, allow_nan=False)
 
     @classmethod
     def of_json(cls, text: str) -> BenchRun:
-        """The run that `to_json` gave; an InputError for any other text."""
+        """The run saved by `to_json`; an InputError for any other text."""
         try:
             data = json.loads(text)
             return cls(tuple(WorkReport.of_json(json.dumps(report)) for report in data["reports"]))
@@ -125,7 +125,7 @@ class BenchRun:
 
 
 def fresh_folder(folder: Path, force: bool) -> None:
-    """Make the folder; with ``force`` remove the rows of an earlier run, so that all are measured again."""
+    """Make the folder; with ``force`` remove the rows of an earlier run, so that all rows are measured again."""
     if folder.exists() and not folder.is_dir():
         raise FileExistsRefusal(f"--out: {folder} is a file; name a folder")
     folder.mkdir(parents=True, exist_ok=True)
@@ -156,7 +156,7 @@ def _cells(report: WorkReport) -> tuple[str, ...]:
 
 
 def draw_scene(reports: Sequence[WorkReport]) -> Figure:
-    """One panel a report, in rows of three."""
+    """Draw one panel for each report, three panels in a row."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

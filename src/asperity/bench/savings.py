@@ -1,4 +1,4 @@
-"""The time that each optimisation of the tracer saves on the walls of the standard set."""
+"""The time saved by each optimisation of the tracer on the walls of the standard set."""
 
 from __future__ import annotations
 
@@ -23,35 +23,35 @@ from .running.timing import SideBySide, side_by_side
 if TYPE_CHECKING:
     from ..geometry import Wall
 
-# Rays enough that a tenth of their time is well above the noise, and turns for the spread.
+# Enough rays that 10 % of their time exceeds the noise, and enough alternating runs to estimate the spread.
 RAYS, REPEATS, QUICK_REPEATS = 2**18, 7, 3
 SEED = 9
-# Rays differ by rounding where a run of hits is taken in one step.
+# Rays may differ by this rounding error if a run of hits is computed in one step.
 ROUNDED = 1e-9
-# Adaptive rows are compared on walls of so few pieces, to these tolerances.
+# Adaptive conditionals are compared on walls with at most this many pieces, at these tolerances.
 MIRROR_PIECES, MIRROR_TOLERANCES = 3, (1e-2, 3e-3, 1e-3)
 BASIS = Legendre(2)
-# Beams a hollow, where the hollows of one shape are resolved once.
+# Beams for each hollow, in the comparison of walls with equal hollows.
 BEAMS = 1000
 
 
 @dataclass(frozen=True)
 class Saving:
-    """One thing that a scene leaves out.
+    """The saving by one optimisation on one scene.
 
     Attributes
     ----------
     scene, what : str
     seconds, seconds_without : float
-        Least times with it left out and with it computed.
+        Least times with and without the optimisation.
     low, high : float
-        Least and greatest ratio of the two in one turn; for rows of half of the angles, at one tolerance.
+        Least and greatest time ratio in one pair of runs; for half of the angles, over the tolerances.
     difference : float
-        Largest difference of the results, or that in units of their errors where they have some.
+        Largest difference of the results, in units of their errors if they have errors.
     is_same : bool
-        Whether the results are the same: to rounding, or within their errors, five of those from samples.
+        Whether the results agree: to rounding, or within their errors, five times the errors for samples.
     unit : str
-        Of the times: seconds, or rays, which have no noise.
+        Unit of the times: seconds, or rays, which have no noise.
     """
 
     scene: str
@@ -66,11 +66,11 @@ class Saving:
 
     @property
     def factor(self) -> float:
-        """How many times as long it takes without."""
+        """The time without the optimisation over the time with it."""
         return self.seconds_without / self.seconds
 
     def row(self) -> str:
-        """A line of the table; a factor that is not beyond its noise says so."""
+        """A line of the table; it says if the factor does not exceed its noise."""
         same = f"{'yes' if self.is_same else 'NO'} ({self.difference:.1g})"
         times = f"{self.factor:.2g} ({self.low:.2g} to {self.high:.2g})"
         if self.low <= 1.0 <= self.high:
@@ -80,7 +80,7 @@ class Saving:
 
 
 class WithoutMirror:
-    """A wall that does not know of its mirror axis."""
+    """A wall without information on its mirror axis."""
 
     is_mirror_symmetric = False
 
@@ -92,14 +92,14 @@ class WithoutMirror:
 
 
 def with_scene(wall: Wall, scene: Scene) -> Wall:
-    """The same wall, whose rays are traced with other tables."""
+    """A copy of the wall whose rays are traced with another scene."""
     other = copy(wall)
     vars(other)["scene"] = scene
     return other
 
 
 def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Saving]:
-    """Everything that one scene leaves out and that can be switched off."""
+    """The savings by all optimisations of one scene that can be switched off."""
     wall = wall_of(name)
     plan, scene = wall.plan(), wall.scene
     followed = without_formulas(scene)
@@ -131,7 +131,7 @@ def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Savi
 
 def _traced(name: str, what: str, wall: Wall, scenes: tuple[Scene, Scene], rays: int, repeats: int) -> Saving:
     rng = np.random.default_rng(SEED)
-    # rays that enter a hollow: those on flat tops are never traced
+    # rays that enter a hollow, because rays on flat tops are never traced
     hollow = scene_hollows(wall)[rng.integers(len(wall.hollows), size=rays)]
     x = hollow[:, 0] + (hollow[:, 1] - hollow[:, 0]) * rng.random(rays)
     theta = np.arccos(1.0 - 2.0 * rng.random(rays))
@@ -156,9 +156,9 @@ def scene_hollows(wall: Wall) -> Floats:
 
 
 def largest_difference(first: Trace, second: Trace) -> float:
-    """Of the outgoing angles of the rays that escaped with the same number of hits in both, but for one in a thousand.
+    """Largest difference of the outgoing angles of rays that escaped in both traces, except for one ray in a thousand.
 
-    Infinite where more rays than that part ways: at a corner rounding decides.
+    Infinite if more rays than that did not escape in both.
     """
     gone = first.escaped & second.escaped
     error = np.sort(np.abs(first.theta - second.theta)[gone])
@@ -167,7 +167,7 @@ def largest_difference(first: Trace, second: Trace) -> float:
 
 
 def _alike(name: str, wall: Wall, repeats: int) -> Saving:
-    """Beams of every hollow, against those of the different ones alone."""
+    """Beams of every hollow compared with beams of the different hollows only."""
     plan = wall.plan()
     parts = [_alone(wall, number) for number in range(len(wall.hollows))]
 
@@ -194,7 +194,7 @@ def _by_beams(wall: Wall) -> KernelMatrix:
 
 
 def _alone(wall: Wall, number: int) -> Wall:
-    """One hollow of a polygonal wall as a wall whose period is its opening."""
+    """One hollow of a polygonal wall, as a wall whose period is the opening."""
     from ..geometry import Wall
 
     hollow = wall.hollows[number]
@@ -204,10 +204,10 @@ def _alone(wall: Wall, number: int) -> Wall:
 
 
 def _tracing(name: str, wall: Wall, rays: int, repeats: int) -> Saving:
-    """The law's matrix from rays, and the same without tracing to the error that these rays leave."""
+    """The law's matrix from rays, compared with the matrix without tracing at the same error."""
     sampled = _by_rays(wall, rays)
     tolerance = sampled.error.value
-    # a law remembers what it has computed, so each run has its own
+    # laws cache their results, so each run has its own law
     times = side_by_side(
         lambda: discretise(WallLaw(wall), BASIS, tolerance=tolerance), lambda: _by_rays(wall, rays), repeats
     )
@@ -222,10 +222,10 @@ def _by_rays(wall: Wall, rays: int) -> KernelMatrix:
 
 
 def _half(name: str, wall: Wall) -> Saving:
-    """Adaptive rows of half of the angles, against those of all, at equal error.
+    """Adaptive conditionals at half of the angles compared with all angles, at equal error.
 
-    Both stop at errors of their own below the tolerance. So times are compared at the errors of the halved rows, those
-    of the others interpolated between their tolerances in the logarithms.
+    Both runs stop at their own errors below the tolerance. The costs are compared at the errors of the halved run; the
+    cost of the other run is interpolated in log-log scale.
     """
     halved, whole = ([_rows(one, tolerance) for tolerance in MIRROR_TOLERANCES] for one in (wall, WithoutMirror(wall)))
     errors, rays = (np.array([row[k] for row in whole], dtype=np.float64) for k in (1, 2))
@@ -242,13 +242,13 @@ def _half(name: str, wall: Wall) -> Saving:
 
 
 def _rows(wall: Wall | WithoutMirror, tolerance: float) -> tuple[Floats, float, float]:
-    """Matrix, error and rays of adaptive rows: their time is that of their rays, without its noise."""
+    """Matrix, error and number of rays of adaptive conditionals; rays measure the cost without noise."""
     symmetric, error, rays = traced_matrix(wall, BASIS, Budget(tolerance))  # type: ignore[arg-type]
     return symmetric, error, float(rays)
 
 
 def savings_table(quick: bool = False) -> str:
-    """All scenes: their plans in words, and a line for everything that can be switched off."""
+    """All scenes: their plans in words, and a line for every optimisation that can be switched off."""
     repeats = QUICK_REPEATS if quick else REPEATS
     rows = (one.row() for name in standard_names() for one in savings_of(name, repeats=repeats))
     plans = ((name, plan_words(wall_of(name))) for name in standard_names())
@@ -257,7 +257,7 @@ def savings_table(quick: bool = False) -> str:
 
 
 def plan_words(wall: Wall) -> str:
-    """The plan of a wall in words, without what it has none of."""
+    """The plan of a wall in words, without the parts that do not apply."""
     plan = wall.plan()
     words = [
         f"{plan.pieces_traced} pieces ({', '.join(plan.primitives)}) in {plan.hollows} hollow{'s' * (plan.hollows > 1)}"

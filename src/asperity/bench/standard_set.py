@@ -1,4 +1,4 @@
-"""The standard set: every problem in a process that can be ended, every report in a file that can be continued."""
+"""The standard set: each problem runs in a process that can be killed, and each report file can be continued."""
 
 from __future__ import annotations
 
@@ -26,21 +26,21 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Effort:
-    """How much work a run takes.
+    """The amount of work of a run.
 
     Attributes
     ----------
     quick : bool
         Whether the shorter ladders are used.
     repeats : int
-        Of every row; random methods, whose error is a mean over them, have ``RANDOM_FACTOR`` times as many.
+        Repeats of every row; random methods, whose error is a mean over them, have ``RANDOM_FACTOR`` times as many.
     seconds : float
-        Repeats and ladders end when they have taken this long; see `work_precision`.
+        Repeats and ladders end after this time; see `work_precision`.
     row_seconds : float
-        A row that takes longer is ended.
+        A row that takes longer is killed.
     total_seconds : float
-        For all problems together, the processes' start included; see `TimePlan`. It is kept: what does not fit is
-        left out, and says so.
+        Limit for all problems together, including the start of processes; see `TimePlan`. Rows beyond the limit are
+        omitted and marked.
     """
 
     quick: bool
@@ -51,20 +51,20 @@ class Effort:
 
 
 RANDOM_FACTOR = 4
-# The library's choice is what is asked for: it has the time of so many other methods.
+# The library's choice gets this multiple of another method's time, because it is the main result.
 AUTO_WEIGHT = 4.0
 QUICK = Effort(True, 4, 0.2, 1.5, 155.0)
 FULL = Effort(False, 4, 1.5, 12.0, 1080.0)
-# A row with less time than this is not begun.
+# A row with less remaining time is not started.
 LEAST_SECONDS = 0.05
-# What is measured of the random walls.
+# The quantity measured on the random walls.
 RANDOM_QUANTITY = "moment"
 
 
 def problem_names(patterns: Sequence[str] = ()) -> list[str]:
-    """Names SCENE/QUANTITY that match one of the patterns; without patterns those of the standard set.
+    """Names SCENE/QUANTITY that match a pattern; without patterns, the names of the standard set.
 
-    A pattern is a name with wildcards, or a scene or a quantity alone.
+    A pattern is a name with wildcards, a scene or a quantity.
     """
     standard = [
         f"{scene}/{one.name}" for scene in standard_names() for one in QUANTITIES.values() if scene in one.scenes
@@ -78,7 +78,7 @@ def problem_names(patterns: Sequence[str] = ()) -> list[str]:
             name
             for name in standard + random
             if any(fnmatch(part, pattern) for part in (name, *name.split("/")))
-            # a quantity alone means that of the standard set
+            # a quantity alone means the scenes of the standard set
             and (name in standard or fnmatch(name, pattern) or fnmatch(name.split("/")[0], pattern))
         ]
         if not found:
@@ -93,7 +93,7 @@ def problem_names(patterns: Sequence[str] = ()) -> list[str]:
 def run_problems(
     names: Sequence[str], effort: Effort, folder: Path | None = None, say: Say = print
 ) -> Iterator[WorkReport]:
-    """The reports of problems, one after the other; a word to the user where there is none."""
+    """Yield the reports of problems; ``say`` names problems without a reference and finished reports."""
     plan = TimePlan(effort.total_seconds, sum(known_reference(name) is not None for name in names))
     for scene, group in groupby(names, key=lambda name: name.split("/")[0]):
         with ChildProcess(partial(prepare, scene)) as child:
@@ -103,7 +103,7 @@ def run_problems(
                     say(f"{name}: left out, no independent reference is known")
                     continue
                 if plan.remaining >= LEAST_SECONDS:
-                    # before the fraction is cut: the first process on a machine compiles for minutes
+                    # before the time is divided: the first process on a machine compiles for minutes
                     child.start()
                 report = _run(_problem(name), effort, folder, child, plan.next_fraction())
                 say(f"{name}: {len(report.rows)} rows")
@@ -111,7 +111,7 @@ def run_problems(
 
 
 def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: ChildProcess, fraction: float) -> WorkReport:
-    """The report of one problem, made within its fraction of the time."""
+    """The report of one problem within ``fraction`` seconds."""
     scene, quantity = problem.name.split("/")
     entries = QUANTITIES[quantity].methods(wall_of(scene))
     methods = [method for method, _, _ in entries]
@@ -122,7 +122,7 @@ def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: Child
     def runner(problem: WorkProblem, method: WorkMethod, budget: float, repeats: int, seconds: float) -> WorkRow:
         if method.name not in ends:
             if plan.remaining >= LEAST_SECONDS:
-                # its start counts to the problem, but not to the method
+                # the start counts for the problem, not for the method
                 child.start()
             ends[method.name] = TimePlan(plan.next_fraction(AUTO_WEIGHT if method.name == problem.auto else 1.0), 1)
         limit = min(effort.row_seconds, ends[method.name].remaining)
@@ -144,12 +144,12 @@ def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: Child
 
 
 def file_stem(name: str) -> str:
-    """What the files of a problem are called."""
+    """File name, without extension, of a problem's files."""
     return name.replace("/", "-")
 
 
 def prepare(scene: str) -> None:
-    """What a new process loads before anything is timed: the wall, and the compiled loops for it."""
+    """Load and compile everything that a new process needs for a scene, before timing starts."""
     from ..geometry import trace
     from ..geometry.polygons.beams import beams_of
     from ..kernels import Legendre, WallLaw, discretise
@@ -158,7 +158,7 @@ def prepare(scene: str) -> None:
     wall = wall_of(scene)
     for one in (wall, wall.foreshorten(DISK)):
         trace(one, [0.3, 0.6], [1.0, 2.0])
-        # towards corners, which takes more than double precision
+        # rays towards corners require more than double precision
         trace(one, np.clip(one.vertices[:, 0], 0.0, np.nextafter(one.period, 0.0)), 0.5 * np.pi)
         adaptive_conditionals(one, [1.0], 1e-2)
     if wall.is_polygonal:
@@ -171,7 +171,7 @@ def prepare(scene: str) -> None:
 @cache
 def _problem(name: str) -> WorkProblem:
     reference = known_reference(name)
-    assert reference is not None  # `run_problems` asks for no other
+    assert reference is not None  # `run_problems` skips problems without a reference
     return WorkProblem(name, (reference,))
 
 

@@ -1,4 +1,4 @@
-"""The true disk at scales from a tenth of its radius to 10^-8, against 50 digits and its own way back."""
+"""The true disk at scales from 0.1 to 10^-8, against 50 digits and its reversed path."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from .row import ExtremeRow
 
 # Written by tests/precise_collision.py
 DATA = "extreme_disks.json"
-# Measured below 0.4; the margin is that of single rays.
+# Measured errors are below 0.4; the limit is the limit for single rays.
 UNITS = 32.0
-# Rounding errors of a handful of contacts, each of which may magnify them some tens of times; measured below 600.
+# Rounding errors of a few contacts, each magnified up to tens of times; measured below 600 EPS.
 ROUNDED = 2.0**14 * EPS
 SCALES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)
 WALL = geo.triangular_teeth(0.7)
@@ -29,7 +29,7 @@ def disk_cases(disks: int) -> dict[str, Callable[[], ExtremeRow]]:
 
 
 def _case(scale: float, disks: int) -> ExtremeRow:
-    """The known disks, then as many random ones sent there and back."""
+    """Compare the stored disks with 50 digits, and reverse ``disks`` random disks."""
     rows = stored(DATA)[f"{scale:g}"]
     start = np.array([[float.fromhex(number) for number in row[0]] for row in rows])
     exact = np.array([[float.fromhex(number) for number in row[1]] for row in rows])
@@ -49,7 +49,7 @@ def _case(scale: float, disks: int) -> ExtremeRow:
 
 
 def _there_and_back(scale: float, disks: int) -> tuple[float, float, int, dict[str, int]]:
-    """Errors of the involution and of the energy, how many came back otherwise, and the statuses."""
+    """Errors of the involution and of the energy, number of disks with another reversed path, and status counts."""
     rng = np.random.default_rng(6)
     velocity = -sampled_velocities(disks, rng)
     position = np.column_stack([scale * rng.random(disks), 2.0 * np.pi * rng.random(disks)])

@@ -1,4 +1,4 @@
-"""Extreme masses, spectra and matrices against what is known exactly."""
+"""Extreme masses, spectra and matrices against exact values."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...kernels.matrices.matrix import frobenius_error
 from ...spectral import spectrum
 from .row import ExtremeRow
 
-# Rounding errors of some tens of operations on quantities of size 1.
+# Rounding errors of tens of operations on quantities of size 1.
 ROUNDED = 256.0 * EPS
 SPECTRUM_SIZE = 64
 GAP_SIZE = 16
@@ -44,27 +44,27 @@ def law_cases(rays: int, most_bins: int) -> dict[str, Callable[[], ExtremeRow]]:
 
 
 def _collision(name: str, ratio: float, rays: int) -> ExtremeRow:
-    """Energy and rolling momentum, both in the kinetic metric, of sampled collisions."""
+    """Conservation of energy and rolling momentum, both in the kinetic metric, in sampled collisions."""
     disk = geo.Disk(mass=ratio, inertia=1.0)
     rng = np.random.default_rng(4)
     psi, theta = np.arccos(rng.uniform(-1.0, 1.0, (2, rays)))
     incoming = -np.asarray(disk.from_angles(theta, psi))
     outgoing = CollisionLaw(TriangularTeethLaw(0.7), disk).sample(incoming, rng)
     energy = np.abs(disk.inner(outgoing, outgoing) / disk.inner(incoming, incoming) - 1.0)
-    # the speed along chi is the rolling momentum over the root of m + J: its natural size is the speed
+    # the speed along chi is the rolling momentum over sqrt(m + J), to be compared with the speed
     rolling = np.abs(disk.rolling_momentum(outgoing) - disk.rolling_momentum(incoming)) / np.sqrt(1.0 + ratio)
     worst = float(max(energy.max(), rolling.max()))
     return ExtremeRow(name, "conservation of energy and rolling momentum", worst, ROUNDED, "relative")
 
 
 def _gap(name: str, gap: float) -> ExtremeRow:
-    """Maxwell's law of a small diffuse fraction: 1 - gap on all that is even, its negative on what is odd."""
+    """Maxwell's law with diffuse fraction ``gap``: eigenvalue 1 - gap on even functions, -(1 - gap) on odd ones."""
     found = spectrum(discretise(maxwell(gap), Legendre(GAP_SIZE)), k=GAP_SIZE)
     return ExtremeRow(name, "Maxwell's law, a", abs(found.gap - gap), 64.0 * EPS, "absolute", found.gap_error)
 
 
 def _known_spectrum(name: str, values: Floats) -> ExtremeRow:
-    """A matrix with these eigenvalues off the constants, in a basis turned at random."""
+    """A matrix with given eigenvalues off the constants, in a random orthonormal basis."""
     rng = np.random.default_rng(5)
     turn, _ = np.linalg.qr(rng.standard_normal((len(values), len(values))))
     symmetric = np.zeros((len(values) + 1,) * 2)
@@ -78,6 +78,6 @@ def _known_spectrum(name: str, values: Floats) -> ExtremeRow:
 
 
 def _many_bins(name: str, bins: int) -> ExtremeRow:
-    """Maxwell's law: eigenvalue 1/2 on all that is even, -1/2 on what is odd, in bins as in truth."""
+    """Maxwell's law in bins: eigenvalue 1/2 on even functions and -1/2 on odd ones, as for the law itself."""
     found = spectrum(discretise(maxwell(0.5), Bins(bins)), k=3)
     return ExtremeRow(name, "Maxwell's law, 1 - a", abs(found.gap - 0.5), bins * EPS, "absolute", found.gap_error)

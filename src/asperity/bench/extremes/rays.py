@@ -1,6 +1,6 @@
 """Single rays on extreme walls and at extreme angles, against 50 digits.
 
-The rays and their references lie in ``extreme_rays.json``, which ``tests/precise_extremes.py`` writes.
+The script ``tests/precise_extremes.py`` writes the rays and their references to ``extreme_rays.json``.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from .walls import extreme_walls
 
 DATA = "extreme_rays.json"
 UNIT = "eps x condition"
-# The tracer's error in these units is below 5 wherever it was measured; a margin of six.
+# Measured errors of the tracer are below 5 in these units; the margin is a factor six.
 UNITS = 32.0
-# What is known of a ray: it passes every corner at a distance that double precision resolves; it meets a corner if its
-# angle is moved by at most half an ulp; or if the wall is moved by its rounding; or its first hit is more flights away
-# than the tracer follows.
+# Classes of rays: the ray passes every corner at a distance that double precision resolves; it meets a corner if its
+# angle changes by at most half an ulp; it meets a corner if the wall changes by its rounding; its first hit is more ray
+# segments away than the tracer follows.
 CLEAR, IN_ANGLE, IN_WALL, TOO_FAR = range(4)
 REASONS = {
     CLEAR: "no corner is within half an ulp of the angle, but double-double arithmetic does not settle it either",
@@ -34,21 +34,21 @@ REASONS = {
 
 @dataclass(frozen=True)
 class KnownRay:
-    """One ray and where it goes.
+    """One ray with its exact result.
 
     Attributes
     ----------
     x, theta : float
     out : float
-        The exact outgoing angle, rounded once; not a number where nobody followed the ray.
+        The exact outgoing angle, rounded once; NaN if the exact path is unknown.
     hits : int
     condition : float
-        1 + the sum of the moduli of the derivatives of the outgoing state.
+        1 + the sum of the absolute derivatives of the outgoing state.
     clearance : int
         ``CLEAR``, ``IN_ANGLE``, ``IN_WALL`` or ``TOO_FAR``.
     others : mapping of float to int
-        Angles and hits of rays some ulps beside it that go another way, and of this ray where the wall's rounded
-        coordinates send it another way than the ideal ones.
+        Angles and hits of rays a few ulps away on other paths, and of this ray if the wall's rounded coordinates change
+        its path.
     """
 
     x: float
@@ -61,11 +61,11 @@ class KnownRay:
 
     @property
     def is_open(self) -> bool:
-        """Whether an ulp of the ray decides everything about its way out."""
+        """Whether one ulp of the ray changes its outgoing angle completely."""
         return EPS * self.condition >= 1.0
 
     def error(self, theta: float, hits: int) -> tuple[float, bool]:
-        """Error of what the tracer found, in ``UNIT``, and whether the ray had to be moved by a few ulps for it."""
+        """Error of the tracer's result in ``UNIT``, and whether it refers to a ray a few ulps away."""
         scale = EPS * (1.0 + self.hits) * self.condition
         here = abs(theta - self.out) / scale if hits == self.hits or self.is_open else np.inf
         beside = min((abs(theta - out) / scale for out in self.others), default=np.inf)
@@ -82,7 +82,7 @@ def _case(name: str, build: Callable[[], geo.Wall]) -> ExtremeRow:
 
 
 def known_rays(name: str) -> tuple[str, tuple[KnownRay, ...]]:
-    """What a case is measured against, and its rays."""
+    """The reference of a case, and its rays."""
     case = stored(DATA)[name]
     return case["reference"], tuple(
         KnownRay(
@@ -94,7 +94,7 @@ def known_rays(name: str) -> tuple[str, tuple[KnownRay, ...]]:
 
 
 def compare_rays(name: str, wall: geo.Wall) -> ExtremeRow:
-    """Trace the rays of a case and compare each with what is known of it."""
+    """Trace the rays of a case and compare each ray with its exact result."""
     reference, rays = known_rays(name)
     traced = geo.trace(wall, [ray.x for ray in rays], [ray.theta for ray in rays])
     errors = [

@@ -1,4 +1,4 @@
-"""The stability report: every extreme case in a process that can be ended."""
+"""The stability report: every extreme case runs in a process that can be killed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...core.tables import table
 from ..running.processes import ChildCrashed, ChildProcess, OutOfTime
 from .row import ExtremeRow
 
-# Disks and collisions a case, bins of the largest matrix, and the limit of a case.
+# Disks and collisions in each case, bins of the largest matrix, and seconds for each case.
 QUICK_SIZE, QUICK_BINS, QUICK_SECONDS = 100, 2_000, 40.0
 SIZE, MOST_BINS, SECONDS = 1_000, 10_000, 180.0
 
@@ -54,7 +54,7 @@ def case_names(quick: bool) -> tuple[str, ...]:
 
 
 def run_case(name: str, quick: bool) -> ExtremeRow:
-    """One case in this process, without a limit; a refusal is a row."""
+    """Run one case in this process, without a time limit; a refusal gives a row."""
     if name not in _cases(quick):
         raise InputError(f"case: expected one of {', '.join(_cases(quick))}, got {name!r}")
     start = time.perf_counter()
@@ -68,7 +68,7 @@ def run_case(name: str, quick: bool) -> ExtremeRow:
 def run_extremes(
     quick: bool = False, names: Sequence[str] | None = None, seconds: float | None = None
 ) -> ExtremeReport:
-    """Every case, or those named, each within its limit."""
+    """Run all cases, or the cases in ``names``, each within its time limit."""
     limit = seconds if seconds is not None else QUICK_SECONDS if quick else SECONDS
     rows = []
     with ChildProcess(_load) as child:
@@ -94,7 +94,7 @@ def _cases(quick: bool) -> dict[str, Callable[[], ExtremeRow]]:
 
 
 def _load() -> None:
-    """What is loaded, and on a new machine compiled, before the first case: loops that serve all walls."""
+    """Load, and on a new machine compile, the loops that serve all walls, before the first case."""
     import numpy as np
 
     from ... import geometry as geo
@@ -102,7 +102,7 @@ def _load() -> None:
     from ..quantities.collision import DISK
     from .disks import WALL
 
-    # a hollow in closed form, and one with a grid
+    # a hollow with a closed form, and a hollow with a grid
     for wall in (geo.triangular_teeth(0.7), geo.koch(4)):
         geo.trace(wall, [0.45, 0.55], [1.0, 2.0])
         refined_trace(wall.scene, np.array([0.5]), np.array([1.0]))

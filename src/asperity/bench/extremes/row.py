@@ -11,27 +11,27 @@ ExtremeVerdict = Literal["met", "degraded as reported", "refused", "not met", "t
 
 @dataclass(frozen=True)
 class ExtremeRow:
-    """What became of one extreme case.
+    """The result of one extreme case.
 
     Attributes
     ----------
     case : str
     reference : str
-        What the error is measured against.
+        The reference of the error.
     error, allowed : float
-        Largest error, and what it may be; in ``unit``.
+        Largest error and its limit, in ``unit``.
     unit : str
         "eps x condition" for rays: rounding errors times the derivative of the exact map and the number of hits.
     reported : float
-        What the library itself says its error is, in the same unit; 0 if it makes no claim.
+        The library's own error estimate in ``unit``; 0 if it has none.
     counts : mapping of str to int
-        Rays by status; empty where none is traced.
+        Rays by status; empty if no ray is traced.
     flagged_rightly : int
-        Of the rays that did not escape, those for which just that is the exact answer.
+        Number of rays that did not escape and whose exact result agrees.
     note : str
     seconds : float
     ended : str
-        "", or why there is no error: "refused", "timed out", "failed".
+        "", or the reason why there is no error: "refused", "timed out", "failed".
 
     Examples
     --------
@@ -53,7 +53,7 @@ class ExtremeRow:
 
     @property
     def verdict(self) -> ExtremeVerdict:
-        """Whether the case meets what it may be off by, says that it does not, is refused, or is simply wrong."""
+        """Whether the case meets its limit, reports that it does not, is refused, or fails."""
         if self.ended == "timed out":
             return "timed out"
         if self.ended:

@@ -1,4 +1,4 @@
-"""The extreme walls of the stability report, by the names of their rows."""
+"""The extreme walls of the stability report, by name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ TOOTH_RATIOS = (1e-6, 1e-3, 1.0, 1e4, 1e8)
 ARC_ANGLES = (1e-8, 1e-4, 0.1, 1.2, pi / 2)
 STEMS = (1e-8, 1e-4, 0.1)
 FACTORS = (1e-6, 1e6)
-# Walls on which every ray enters at the least angle, and at the greatest.
+# Walls on which every ray enters at the least angle, and at the greatest angle.
 GRAZED = {
     "triangular teeth": partial(geo.triangular_teeth, 0.7),
     "rectangular teeth": partial(geo.rectangular_teeth, 1.0),
@@ -24,7 +24,7 @@ OVERHANG = ((0.0, 0.0), (0.4, 0.0), (0.2, -0.5), (0.9, -0.6), (0.6, 0.0), (1.0, 
 
 
 def extreme_walls() -> dict[str, Callable[[], geo.Wall]]:
-    """What builds each wall; the rays that meet it, and where they go, lie in ``extreme_rays.json``."""
+    """A constructor for each wall; the rays and their exact results are in ``extreme_rays.json``."""
     walls: dict[str, Callable[[], geo.Wall]] = {}
     for name, build in GRAZED.items():
         walls |= {f"{name}, theta = 1e-12": build, f"{name}, theta = pi - 1e-12": build}
@@ -57,6 +57,6 @@ def _notch(depth: float) -> geo.Wall:
 
 
 def _islands() -> geo.Wall:
-    """Balls over a zigzag floor: no hollow is closed, so that the tracer wraps rays round the period."""
+    """Balls over a zigzag floor: no hollow is closed, so rays wrap around the period."""
     floor = [geo.Segment((0.0, -0.8), (0.5, -1.0)), geo.Segment((0.5, -1.0), (1.0, -0.8))]
     return geo.Wall(floor, period=1.0, islands=[[geo.Arc((0.4, -0.4), 0.2, 0.0, -2.0 * pi)]])

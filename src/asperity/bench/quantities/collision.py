@@ -1,4 +1,4 @@
-"""The collision of a disk: <v1, K v1>/<v1, v1> in the limit of small scale, and of the true disk."""
+"""The collision of a disk: <v1, K v1>/<v1, v1> in the small-scale limit, and for the true disk."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 DISK = geo.Disk(1.0, 0.5)
 # Means over Lambda^2 of sin(psi)^2 and cos(psi)^2.
 SINE_MEAN, COSINE_MEAN = 0.75, 0.25
-# True disks at every scale: their noise is about 0.002.
+# Number of true disks at every scale; their noise is about 0.002.
 TRUE_DISKS = 2**18
 # The rigid tracer has no Bezier curves.
 DISK_SCENES = tuple(name for name in standard_names() if name != "mixed")
 
 
 def velocity_fraction() -> tuple[float, float]:
-    """Factors a, b of v1 = a cos(theta) sin(psi) + b cos(psi) at speed 1."""
+    """Coefficients a, b of v1 = a cos(theta) sin(psi) + b cos(psi) at speed 1."""
     frame = np.asarray(DISK.frame)
     return float(frame[0, 0]), float(frame[2, 0])
 
@@ -42,7 +42,7 @@ def square_of_v1() -> float:
 def correlation_of(moment: float) -> float:
     r"""<v1, K v1>/<v1, v1> in Lambda^2 from <u, P~ u>/<u, u>.
 
-    v1 = a cos theta sin psi + b cos psi, and K keeps sin psi and turns the sign of cos psi.
+    v1 = a cos theta sin psi + b cos psi. K preserves sin psi and changes the sign of cos psi.
     """
     along, roll = (fraction**2 for fraction in velocity_fraction())
     return (along * SINE_MEAN / 3.0 * moment - roll * COSINE_MEAN) / square_of_v1()
@@ -51,7 +51,7 @@ def correlation_of(moment: float) -> float:
 def sampled_velocities(number: int, rng: np.random.Generator) -> Floats:
     """Outgoing velocities of speed 1 from Lambda^2, shape (number, 3)."""
     cos_theta = 1.0 - 2.0 * rng.random(number)
-    # sin(psi)^2 d psi is the law of the polar angle of a uniform point on the three-dimensional sphere
+    # sin(psi)^2 d psi is the distribution of the polar angle of a uniform point on the three-dimensional sphere
     gauss = rng.standard_normal((number, 4))
     psi = np.arccos(gauss[:, 0] / np.linalg.norm(gauss, axis=1))
     return np.asarray(DISK.from_angles(np.arccos(cos_theta), psi))
@@ -71,10 +71,10 @@ def _collision_methods(wall: Wall) -> Methods:
 
 
 def by_operator(wall: Wall, **how: Any) -> Estimate:
-    """From the matrix of K on polynomials of degree below 2 in either angle, which hold v1."""
+    """From the matrix of K on polynomials of degree below 2 in each angle, whose span contains v1."""
     operator = CollisionLaw.from_wall(wall, DISK).operator(Legendre(2), Legendre(2, weight="sin2"), **how)
     along, roll = velocity_fraction()
-    # v1 in the orthonormal product basis: only the mean over psi of sin(psi) is not a polynomial, so split by hand
+    # sin(psi) is no polynomial in the product basis, so its mean over psi is treated separately
     moment = operator.theta_matrix.symmetric[1, 1]
     psi = operator.flip[1, 1]
     plane, turn = along**2 * SINE_MEAN / 3.0, roll**2 * COSINE_MEAN
@@ -84,7 +84,7 @@ def by_operator(wall: Wall, **how: Any) -> Estimate:
 
 
 def by_velocities(wall: Wall, number: int, rng: np.random.Generator) -> float:
-    """Sampled in the original coordinates: incoming velocities from Lambda^2, one collision each."""
+    """By sampling in the original coordinates: incoming velocities from Lambda^2, one collision each."""
     incoming = -sampled_velocities(number, rng)
     outgoing = CollisionLaw.from_wall(wall, DISK).sample(incoming, rng)
     return float(np.mean(-incoming[:, 0] * outgoing[:, 0]) / square_of_v1())
@@ -113,10 +113,10 @@ def _disk_methods(wall: Wall) -> Methods:
 
 
 def by_true_disks(wall: Wall, scale: float, rng: np.random.Generator, number: int = TRUE_DISKS) -> float:
-    """<v1, K v1>/<v1, v1> of the disk with satellites above a wall whose period is this scale."""
+    """<v1, K v1>/<v1, v1> of the disk with satellites above a wall whose period is ``scale``."""
     incoming = -sampled_velocities(number, rng)
     position = np.column_stack([scale * rng.random(number), 2.0 * np.pi * rng.random(number)])
-    # the incoming velocities follow sin(theta), as the flux through x2 = 0 does
+    # the incoming velocities have the density sin(theta), as the flux through x2 = 0
     hit = geo.collide(DISK, wall, scale / wall.period, position, incoming)
     found = float(np.mean((-incoming[:, 0] * hit.velocity[:, 0])[hit.escaped]))
     return found / square_of_v1()

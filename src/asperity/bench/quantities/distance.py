@@ -1,4 +1,4 @@
-"""The distance of a law from Lambert's: Wasserstein, averaged over the incoming angle."""
+"""The Wasserstein distance of a law from Lambert's law, averaged over the incoming angle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .quantity import Methods, Quantity
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Those with rows in closed form.
+# Scenes whose conditional distributions have a closed form.
 SCENES = ("triangular-teeth", "rectangular-teeth", "focusing-arc")
 SAMPLED_BINS = 64
 
@@ -33,7 +33,7 @@ def _methods(wall: Wall) -> Methods:
         return _to_lambert(monte_carlo_matrix(wall, Bins(SAMPLED_BINS), rays, rng))
 
     sizes = (16.0, 32.0, 64.0)
-    # samples carry the noise floor of their bins, and bins their width: neither has one order
+    # samples have a noise floor from their bins, and bins an error from their width, so neither has one order
     return [
         (WorkMethod("auto", of_laws), (1e2, 1e4), (1e2, 1e3, 1e4, 1e5, 1e6)),
         (WorkMethod("bins", of_bins), sizes, (*sizes, 128.0, 256.0, 512.0)),

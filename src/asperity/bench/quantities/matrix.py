@@ -1,4 +1,4 @@
-"""Quantities that a law's matrix gives: the matrix itself, the first moment, the resistance."""
+"""Quantities computed from a law's matrix: the matrix itself, the first moment, the resistance."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ LAW_BASIS, MOMENT_BASIS, RESISTANCE_BASIS = Bins(32), Legendre(2), Directions()
 
 
 def _by_methods(basis: Basis, read: Callable[[KernelMatrix], Any], in_bins: bool = False) -> Callable[[Wall], Methods]:
-    """Methods for what can be read off a matrix."""
+    """Methods for a quantity that ``read`` computes from a matrix."""
 
     def method(wall: Wall, chosen: MatrixMethod) -> WorkMethod:
-        # strata and nets do better than 3/4 where the integrand does not jump: declared for bins alone
+        # strata and Sobol sequences exceed 3/4 for continuous integrands, so orders are declared for bins only
         order = declared_order(chosen, wall) if in_bins or chosen.order == RANDOM_ORDER else None
         return WorkMethod(
             chosen.name, lambda budget, *rng: read(chosen.matrix(wall, basis, budget, *rng)), chosen.is_random, order
@@ -42,13 +42,13 @@ def moment_of(matrix: KernelMatrix) -> Estimate:
 
 
 def resistance_of(symmetric: Floats) -> float:
-    """(3/4) E[1 + cos(theta' - theta)] from the matrix in 1, cos and sin made orthonormal."""
+    """(3/4) E[1 + cos(theta' - theta)] from the matrix in orthonormalised 1, cos and sin."""
     sine = np.array([MEAN_SINE, 0.0, SINE_NORM])
     return float(0.75 * (1.0 + symmetric[1, 1] / 3.0 + sine @ symmetric @ sine))
 
 
 def _resistance(matrix: KernelMatrix) -> Estimate:
-    # the coefficients of the matrix have this norm
+    # the norm of the coefficients of the matrix
     size = 0.75 * float(np.hypot(1.0 / 3.0, MEAN_SINE**2 + SINE_NORM**2))
     return Estimate(resistance_of(matrix.symmetric), size * matrix.error.value, matrix.error.kind, matrix.method)
 

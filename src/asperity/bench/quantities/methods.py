@@ -1,4 +1,4 @@
-"""The methods for the matrix of a wall's law, each on its own and as the library chooses."""
+"""The methods for the matrix of a wall's law: each method alone, and the library's choice."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
     from ...kernels import Basis
 
 MakeMatrix = Callable[..., KernelMatrix]
-# Sampled rays converge like the root of their number. Strata and scrambled nets in two dimensions gain the root of
-# their own side where the integrand jumps along curves, as indicators of bins and the laws of most walls do: 3/4.
+# The error of sampled rays decreases with order 1/2. Strata and scrambled Sobol sequences in two dimensions reach 3/4
+# if the integrand jumps along curves, as for indicators of bins and the laws of most walls.
 RANDOM_ORDER, JUMPING_ORDER = 0.5, 0.75
-# Where each piece of a wall is smaller than a stratum, rays of one stratum are as good as independent ones. A million
-# strata have a side of 1/1024: walls of more pieces than half of that do not see it made small.
+# If the pieces of a wall are smaller than a stratum, its rays are as good as independent. A million strata have a side
+# of 1/1024, so walls with more pieces than half of 1024 count as random.
 MANY_PIECES = 512
 
 
 @dataclass(frozen=True)
 class MatrixMethod:
-    """One way to a matrix.
+    """One method for a matrix.
 
     Attributes
     ----------
@@ -37,9 +37,9 @@ class MatrixMethod:
     matrix : callable
         ``matrix(wall, basis, budget)`` or ``matrix(wall, basis, budget, rng)``.
     budget : str
-        What the budget is.
+        Meaning of the budget.
     quick, full : tuple of float
-        Budgets of the two sets.
+        Budgets of the quick and the full set.
     is_random : bool
     order : float or None
         Declared order of the error for matrices in bins.
@@ -55,7 +55,7 @@ class MatrixMethod:
 
 
 def methods_for(wall: Wall) -> tuple[MatrixMethod, ...]:
-    """The methods that a wall allows, the library's own choice first."""
+    """The methods that apply to a wall, the library's own choice first."""
     found = [AUTO]
     if WallLaw(wall).closed_form is not None:
         found.append(CLOSED_FORM)
@@ -66,7 +66,7 @@ def methods_for(wall: Wall) -> tuple[MatrixMethod, ...]:
 
 
 def declared_order(chosen: MatrixMethod, wall: Wall) -> float | None:
-    """The order of a method for matrices in bins, at the numbers of rays of the ladders.
+    """The order of a method for matrices in bins, at the ladders' numbers of rays.
 
     >>> from asperity.bench.quantities.walls import wall_of
     >>> [declared_order(STRATIFIED, wall_of(name)) for name in ("cusps", "profile")]
@@ -76,26 +76,26 @@ def declared_order(chosen: MatrixMethod, wall: Wall) -> float | None:
 
 
 def closed_form_matrix(wall: Wall, basis: Basis, budget: float = 1.0) -> KernelMatrix:
-    """From the formula for the wall's hollows."""
+    """From the closed form of the wall's hollows."""
     law = WallLaw(wall).closed_form
-    assert law is not None  # `methods_for` offers this method to no other wall
+    assert law is not None  # `methods_for` checks that the closed form exists
     return discretise(law, basis)
 
 
 def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
-    """From at most so many beams a hollow, with a bound for the others."""
+    """From at most ``budget`` beams for each hollow, with a bound for the others."""
     return discretise(PolygonLaw(wall, max_beams=int(budget)), basis, "exact")
 
 
 def adaptive_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
-    """By adaptive rows to the tolerance 1/budget, whatever the wall."""
+    """By adaptive conditional distributions to the tolerance 1/budget, for every wall."""
     symmetric, error, rays = traced_matrix(wall, basis, Budget(1.0 / budget))
     how = frobenius_error(error, "estimate", f"adaptive rows, {rays} rays")
     return KernelMatrix(symmetric, basis, how, method="adaptive rows")
 
 
 def qmc_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
-    """From so many rays of scrambled Sobol sequences."""
+    """From ``budget`` rays of scrambled Sobol sequences."""
     return discretise(WallLaw(wall), basis, "qmc", samples=int(budget), rng=rng)
 
 
@@ -110,13 +110,13 @@ def stratified_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Ge
 
 
 def monte_carlo_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
-    """From so many independent rays, traced even where a closed form could be sampled."""
+    """From ``budget`` independent rays, traced even if a closed form could be sampled."""
     theta = np.arccos(1.0 - 2.0 * rng.random(int(budget)))
     return estimate(theta, WallLaw(wall).reflect(rng.random(int(budget)), theta), basis)
 
 
 def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
-    """As the library chooses, to the tolerance 1/budget; it may sample, so every repeat has its own generator."""
+    """By the library's choice, to the tolerance 1/budget; each repeat has its own generator for sampling."""
     return discretise(WallLaw(wall), basis, tolerance=1.0 / budget, rng=rng)
 
 

@@ -11,9 +11,9 @@ from ...spectral import WorkMethod
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# A method with its budgets, those of the quick set and those of the full one.
+# Methods with their budgets in the quick set and in the full set.
 Methods = list[tuple[WorkMethod, tuple[float, ...], tuple[float, ...]]]
-# Rays of sampling methods: the full ladder is long enough for orders to be told apart to 0.15.
+# Numbers of rays of sampling methods; the full ladder resolves orders to 0.15.
 QUICK_RAYS, RAYS = tuple(4.0**k for k in (6, 7, 8)), tuple(4.0**k for k in (5, 6, 7, 8, 9, 10))
 
 
@@ -24,10 +24,11 @@ class Quantity:
     Attributes
     ----------
     name, summary : str
+    name, summary : str
     methods : callable
-        ``methods(wall)`` gives triples of a `WorkMethod` and its budgets (quick, full).
+        ``methods(wall)`` returns triples of a `WorkMethod` and its budgets (quick, full).
     scenes : tuple of str
-        Scenes of the standard set for which it is measured.
+        Scenes of the standard set on which the quantity is measured.
     """
 
     name: str

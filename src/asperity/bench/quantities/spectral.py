@@ -1,4 +1,4 @@
-"""The largest spectral value off the constants, and the diffusivity of a channel between two such walls."""
+"""The largest spectral value off the constants, and the diffusivity of a channel between two walls."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .walls import standard_names
 if TYPE_CHECKING:
     from ...geometry import Wall
 
-# Entry points of the rays at one grazing angle; their midpoint rule is better than this angle's own error.
+# Entry points at one grazing angle; the error of their midpoint rule is below the error of the finite angle.
 ENTRY_POINTS = 2**16
 ETA_SCENES = ("focusing-arc", "koch", "mixed")
 
 
 def _second(wall: Wall, basis: Basis) -> Estimate:
-    # of the matrix: of the law the spectrum knows edges and theorems
+    # the spectrum of the matrix, because for the law theorems and essential edges would be used
     found = spectrum(discretise(WallLaw(wall), basis), k=2)
     return Estimate(1.0 - found.gap, found.gap_error, "estimate", f"{found.basis!r}, {found.method}")
 
@@ -58,11 +58,11 @@ def _auto_eta(wall: Wall) -> Estimate:
 
 
 def eta_at(wall: Wall, angle: float) -> float:
-    """(1 + zeta)/(1 - zeta) with zeta = E[cot(Theta)/cot(theta)] at a small angle and at its mirror image."""
+    """(1 + zeta)/(1 - zeta) with zeta = E[cot(Theta)/cot(theta)] at a small angle and its mirror image."""
     entry = (np.arange(ENTRY_POINTS) + 0.5) / ENTRY_POINTS
     law, total = WallLaw(wall), 0.0
     for theta in (angle, np.pi - angle):
-        # the specular convention turns the sign of cot(Theta)
+        # the sign of cot(Theta) is opposite in the specular convention
         total -= float(np.mean(np.tan(theta) / np.tan(law.reflect(entry, theta))))
     return (1.0 + 0.5 * total) / (1.0 - 0.5 * total)
 

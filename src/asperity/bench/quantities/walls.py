@@ -1,4 +1,4 @@
-"""The walls of the standard set, and random walls that are not in it."""
+"""The walls of the standard set, and random walls outside it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Point = tuple[float, float]
 METRES_PER_DEGREE = 111_200.0
 TRANSECT_ROW, EXAGGERATION = 170, 3.0
 RANDOM_WALLS = 20
-# A wall is its generator's first attempt that is a wall; more than a few are never needed.
+# Limit on attempts to generate a valid wall; a few always suffice.
 ATTEMPTS = 1000
 
 
@@ -37,9 +37,9 @@ class BenchScene:
 
 
 def terrain_profile() -> tuple[Floats, Floats]:
-    """Distance along one row of the elevation model that matplotlib ships, and height there, both in metres.
+    """Distance along one row of matplotlib's elevation model, and height there, both in metres.
 
-    The model is of the Jacksboro fault, from the U.S. Geological Survey's National Elevation Dataset.
+    The model shows the Jacksboro fault, from the U.S. Geological Survey's National Elevation Dataset.
     """
     from matplotlib import cbook
 
@@ -94,12 +94,13 @@ def _random(number: int) -> Callable[[], Wall]:
 
 
 def random_wall(number: int) -> Wall:
-    """Random wall ``number``: the first attempt of its own generator that is a wall.
+    """Random wall ``number``: the first valid wall from its own generator.
 
-    The generator is ``numpy.random.default_rng([8, number])``. One to four joints have places uniform in (0.1, 0.9) and
-    depths uniform in (0.05, 0.8). Walls of even number are polygons; in the others every piece is, with equal
+    The generator is ``numpy.random.default_rng([8, number])``. One to four joints have positions uniform in (0.1, 0.9)
+    and depths uniform in (0.05, 0.8). Walls of even number are polygons. On the others every piece is, with equal
     probability, a segment, a circular arc whose height over its chord is 0.05 to 0.3 chords, to either side, or a cubic
-    whose inner control points are off the chord by up to 0.35 chords. Every third has a flat top of a quarter.
+    whose inner control points are off the chord by up to 0.35 chords. Every third wall has an additional flat top of
+    length 0.25.
     """
     from ...geometry import Segment, Wall
 
@@ -155,7 +156,7 @@ def standard_names() -> tuple[str, ...]:
 
 @cache
 def wall_of(name: str) -> Wall:
-    """The wall of a scene, made once a process."""
+    """The wall of a scene, constructed once in each process."""
     if name not in scenes():
         raise InputError(f"scene: expected one of {', '.join(scenes())}, got {name!r}")
     return scenes()[name].build()

@@ -1,1 +1,1 @@
-"""The running of measurements: processes that can be ended, timing, stored references."""
+"""Running of measurements: processes that can be killed, timing, stored references."""

@@ -1,4 +1,4 @@
-"""Processes that can be ended, and the time that they divide: the only safe way to stop a compiled loop."""
+"""Processes that can be killed, which is the only safe way to stop a compiled loop, and the division of run time."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any
 
-# To leave on its own a process needs no more than this.
+# Limit for a process to exit by itself.
 LEAVE_SECONDS = 5.0
 
 
 class OutOfTime(Exception):
-    """A call took longer than it may; its process was ended."""
+    """A call exceeded its time limit; its process was killed."""
 
 
 class ChildCrashed(Exception):
@@ -27,12 +27,12 @@ class ChildCrashed(Exception):
 class ChildProcess:
     """Calls functions in another process, one at a time; use it in a ``with`` statement.
 
-    The process starts with the first call, and anew with the first call after one that was ended.
+    The process starts with the first call, and again with the first call after a process ended.
 
     Parameters
     ----------
     prepare : callable, optional
-        Called without arguments in every new process, before its first call and outside of the time limit.
+        Called without arguments in every new process, before its first call and outside the time limit.
     """
 
     prepare: Callable[[], object] | None = None
@@ -40,14 +40,14 @@ class ChildProcess:
     _pipe: Connection | None = field(default=None, init=False)
 
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
-        """``function(*arguments)``, which both must pass to another process; raises what it raises, or `OutOfTime`."""
+        """``function(*arguments)`` in the process, by pickling; raises the function's errors, or `OutOfTime`."""
         self.start()
         assert self._pipe is not None
         self._pipe.send((function, arguments))
         return self._answer(seconds)
 
     def start(self) -> None:
-        """Start the process and prepare it, if there is none."""
+        """Start and prepare the process if there is none."""
         if self._process is not None:
             return
         # a fresh interpreter: a copy of this one would hold its threads' locks
@@ -77,7 +77,7 @@ class ChildProcess:
         raise result
 
     def _end(self, kindly: bool = False) -> None:
-        """End the process; kindly: let it leave by itself, which it does when its pipe is closed."""
+        """End the process; kindly: close its pipe and let it exit by itself first."""
         if self._process is None:
             return
         assert self._pipe is not None
@@ -99,10 +99,10 @@ class ChildProcess:
 
 
 def _serve(pipe: Connection) -> None:
-    """Answer calls until the other side is gone."""
+    """Answer calls until the pipe is closed."""
     from tqdm import tqdm
 
-    # its usual lock is one between processes, which a process that is killed leaves behind
+    # tqdm's default lock is shared between processes, and a killed process would leave it locked
     tqdm.set_lock(threading.RLock())
     while True:
         try:
@@ -111,17 +111,17 @@ def _serve(pipe: Connection) -> None:
             return
         try:
             answer = (True, function(*arguments))
-        except Exception as reason:  # whatever it was, it belongs to the caller
+        except Exception as reason:  # passed to the caller
             answer = (False, reason)
         pipe.send(answer)
 
 
 @dataclass
 class TimePlan:
-    """Shares ``seconds``, counted from its making, among ``parts``.
+    """Divides ``seconds``, counted from construction, among ``parts``.
 
-    If no part takes more than its part the sum is at most ``seconds``: a fraction is never more than what is left, and
-    what a part leaves the later ones have.
+    If no part exceeds its fraction, the sum is at most ``seconds``. Later parts divide the time that earlier parts
+    leave.
 
     Examples
     --------
@@ -140,11 +140,11 @@ class TimePlan:
 
     @property
     def remaining(self) -> float:
-        """Seconds that are left, at least 0."""
+        """Remaining seconds, at least 0."""
         return max(self.seconds - (time.monotonic() - self._begun), 0.0)
 
     def next_fraction(self, weight: float = 1.0) -> float:
-        """Seconds that the next part may take, if it counts as ``weight`` of the later ones."""
+        """Seconds for the next part, which counts as ``weight`` later parts."""
         fraction = weight / (weight + self._left - 1) * self.remaining
         self._left = max(self._left - 1, 1)
         return fraction

@@ -1,4 +1,4 @@
-"""Stored references: JSON files that committed scripts have written."""
+"""Stored references: JSON files written by committed scripts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FILE = Path(__file__).with_name("standard_references.json")
 
 @cache
 def stored(file: str) -> dict[str, Any]:
-    """The table in a JSON file of this folder, read once a process.
+    """The table in a JSON file of this folder, read once in each process.
 
     Examples
     --------
@@ -28,7 +28,7 @@ def stored(file: str) -> dict[str, Any]:
 
 
 def known_reference(problem: str) -> ReferenceValue | None:
-    """The reference of a problem SCENE/QUANTITY, or None where no independent one is known."""
+    """The reference of a problem SCENE/QUANTITY, or None if no independent reference is known."""
     entry = stored(FILE.name).get(problem)
     if entry is None:
         return None
@@ -37,7 +37,7 @@ def known_reference(problem: str) -> ReferenceValue | None:
 
 
 def _whole(upper: np.ndarray[Any, np.dtype[np.float64]]) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """The symmetric matrix whose upper triangle is kept, row by row."""
+    """The symmetric matrix with the given upper triangle, in row order."""
     size = round((np.sqrt(8.0 * upper.size + 1.0) - 1.0) / 2.0)
     matrix = np.zeros((size, size))
     matrix[np.triu_indices(size)] = upper

@@ -1,4 +1,4 @@
-"""The least time of a job over repeats, and of two jobs side by side."""
+"""The least time of one job over repeats, and of two jobs in alternation."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Other = TypeVar("Other")
 
 
 def least_time(job: Callable[[], Result], repeats: int) -> tuple[Result, float]:
-    """What a job returns, and the least time of its repeats, in seconds; a run before them is not timed."""
+    """The result of a job and the least time of its repeats in seconds; the first run is not timed."""
     result, best = job(), float("inf")
     for _ in range(repeats):
         result, seconds = _timed(job)
@@ -22,16 +22,16 @@ def least_time(job: Callable[[], Result], repeats: int) -> tuple[Result, float]:
 
 @dataclass(frozen=True)
 class SideBySide(Generic[Result, Other]):
-    """Two jobs that were run in turns.
+    """Two jobs run in alternation.
 
     Attributes
     ----------
     first, second : object
-        What they returned.
+        Results of the jobs.
     first_seconds, second_seconds : float
         Least times.
     low, high : float
-        Least and greatest ratio of the second's time to the first's in one turn.
+        Least and greatest ratio of the second's time to the first's in one pair of runs.
     """
 
     first: Result
@@ -48,12 +48,12 @@ class SideBySide(Generic[Result, Other]):
 
     @property
     def differs(self) -> bool:
-        """Whether one was the slower one in every turn."""
+        """Whether the same job was slower in every pair of runs."""
         return self.low > 1.0 or self.high < 1.0
 
 
 def side_by_side(first: Callable[[], Result], second: Callable[[], Other], repeats: int) -> SideBySide[Result, Other]:
-    """Run two jobs in turns, so that a drift of the machine meets both; a run of each before them is not timed."""
+    """Run two jobs alternately, so that drift affects both; the first run of each is not timed."""
     results = first(), second()
     times = [(_timed(first)[1], _timed(second)[1]) for _ in range(repeats)]
     ratios = [other / one for one, other in times]
