@@ -1,8 +1,8 @@
-"""Everything that is measured, in one run: ``python -m benchmarks --write`` regenerates the pages of the documentation.
+"""Run all measurements: ``python -m benchmarks --write`` regenerates the generated pages of the documentation.
 
-The tables of speed and of the goals, the standard set and the random walls, the stability report, and what scenes
-leave out; with ``--peers`` the peers too. Every part has its time, together 39 minutes. A run that was stopped goes on
-where it was, in the folder ``--out``; one that was finished, or was made with other options, begins anew.
+The parts are the tables of speed and goals, the standard set, the random walls, the stability report, and the savings
+of the tracer; ``--peers`` adds the peers. Each part has a time limit, together 39 minutes. An interrupted run continues
+in the folder ``--out``. A finished run, or a run with other options, starts again.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from asperity.bench.run import DATA, BenchRun
 from .pages import BENCHMARKS, STABILITY, pictures, write_between_marks
 from .sections import SECTIONS, section_text, write_section
 
-# What a folder says of the run that it belongs to, until that run is finished.
+# File with the options of an unfinished run.
 RUN = "run.json"
 
 
@@ -62,7 +62,7 @@ def main() -> None:
 
 
 def begin_or_go_on(folder: Path, quick: bool) -> None:
-    """Keep what an interrupted run with the same options left, and nothing else."""
+    """Keep the results of an interrupted run with the same options, and delete all others."""
     this = {"quick": quick, "version": __version__}
     mark = folder / RUN
     if mark.exists() and json.loads(mark.read_text(encoding="utf-8")) == this:

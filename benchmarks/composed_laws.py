@@ -1,15 +1,14 @@
 """Reported errors of matrices of random compositions, mixtures, powers, frames and adjoints, against references.
 
-``python -m benchmarks.composed_laws --count 2000`` draws laws and bases from seeds 0, 1, ... and prints how many of the
-reported errors hold, by method and by basis, and the cases where one does not hold or cannot be told. Outcomes are kept
-in the file ``--record``, so that a run can be stopped and taken up again, or made in ranges (``--first``, ``--count``).
+``python -m benchmarks.composed_laws --count 2000`` draws laws and bases from seeds 0, 1, ... It prints how many
+reported errors hold, by method and by basis, and lists the cases that fail or are undecided. Outcomes are stored in the
+file ``--record``, so that a run can be continued, or split into ranges (``--first``, ``--count``).
 
-The reference expands the expression into words and applies the laws of a word to the functions of the basis, from the
-last one back, as functions of any angle: rays into teeth and arcs by the formulas of single rays, scatterings by their
-eigenvalues, rectangular teeth one after the other by what they do to even and odd functions. Every integral is a
-composite Gauss rule between all angles at which the integrand may not be smooth, which are carried along; all but the
-rows of arcs in extended precision. It is done twice, coarsely and finely; twice the difference and rounding are its own
-error.
+The reference expands the expression into words. It applies the laws of a word, from the last one back, to the functions
+of the basis as functions of any angle. Teeth and arcs use formulas of single rays, scatterings their eigenvalues, and
+consecutive rectangular teeth their action on even and odd functions. Integrals are composite Gauss rules between all
+angles at which the integrand may not be smooth. The arithmetic is extended precision, except for the conditionals of
+arcs. The reference's error is twice the difference of a coarse and a fine rule, plus rounding.
 """
 
 from __future__ import annotations
@@ -36,36 +35,38 @@ from asperity import kernels as ker
 from asperity.core.tables import table
 from asperity.errors import InputError
 
-# Extended precision where the processor has it, so that errors near rounding can be told; rows of arcs are in float64.
+# Extended precision if the processor has it, so that errors near rounding are resolved; conditionals of arcs are
+# float64.
 Floats = NDArray[Any]
 Extended = np.longdouble
 PI = 4.0 * np.arctan(Extended(1.0))
-# The reference's rounding for each function of the basis, in units of the last place: sums of some ten thousand terms.
+# Rounding error of the reference for each basis function, in ulps: sums of about ten thousand terms.
 ROUNDING = 25.0
-# Of matrices by rays the error is a spread, not a bound: how far beyond a wrong one would be.
+# Rays of sampled matrices.
 SAMPLES = 2**14
-# Values of functions held at a time.
+# Function values held in memory at a time.
 CHUNK = 2**20
 
 
-# ---- functions of the angle, and where they are not smooth ---------------------------------------------------------
+# ---- functions of the angle, with the angles at which they are not smooth ------------------------------------------
 @dataclass(frozen=True)
 class Function:
-    """n functions of the angle at once: values of shape (angles, n), and the angles where they are not smooth."""
+    """n functions of the angle: values of shape (angles, n), and the angles at which they are not smooth."""
 
     evaluate: Callable[[Floats], Floats]
     breaks: Floats
 
 
-# Towards grazing, and towards pi/2 where the involution below comes from there.
+# Breakpoints towards grazing, and towards pi/2, where the involution below maps them.
 NEAR = PI * Extended(0.4) ** np.arange(2, 26)
 GRADED = NEAR, PI - NEAR, PI / 2 - NEAR, PI / 2 + NEAR
 
 
 @dataclass(frozen=True)
 class Rule:
-    """How fine the reference's integrals are: panels of (0, pi), Gauss nodes on each, crossings of a crevice and hits
-    of an arc that are told apart; and the type of its numbers.
+    """The resolution of the reference's integrals and the type of its numbers.
+
+    The resolution consists of panels of (0, pi), Gauss nodes on each panel, crossings of a crevice and hits of an arc.
     """
 
     panels: int
@@ -82,7 +83,7 @@ class Rule:
         return angle.astype(self.kind), (weight * np.sin(angle) / 2).astype(self.kind)
 
     def moments(self, functions: Callable[[Floats], Floats], function: Function, breaks: Floats) -> Floats:
-        """Means of products of functions: shape (functions, functions)."""
+        """Means of products of functions, shape (functions, functions)."""
         angle, weight = self.grid(np.concatenate((function.breaks, breaks)))
         size = function.evaluate(angle[:1]).shape[1] + functions(angle[:1]).shape[1]
         step = max(CHUNK // size, 1)
@@ -93,7 +94,7 @@ class Rule:
 
 
 def nodes_between(low: Floats, high: Floats, number: int) -> tuple[Floats, Floats]:
-    """Gauss nodes in s, angle = low + (high - low) s^2 (3 - 2 s): square roots at the ends become smooth."""
+    """Gauss nodes in s with angle = low + (high - low) s^2 (3 - 2 s), which makes square roots at the ends smooth."""
     node, weight = gauss(number)
     s = (1 + node) / 2
     width = (high - low)[:, None]
@@ -102,7 +103,7 @@ def nodes_between(low: Floats, high: Floats, number: int) -> tuple[Floats, Float
 
 @cache
 def gauss(number: int) -> tuple[Floats, Floats]:
-    """Gauss nodes and weights on (-1, 1) in extended precision: float64 ones after two steps of Newton's method."""
+    """Gauss nodes and weights on (-1, 1) in extended precision, by two Newton steps from the float64 values."""
     x = np.polynomial.legendre.leggauss(number)[0].astype(Extended)
     for _ in range(2):
         table = np.polynomial.legendre.legvander(x, number)
@@ -124,7 +125,7 @@ def polynomials(number: int, angle: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Diagonal:
-    """The operator with these eigenvalues on the first Legendre polynomials, and 0 on the others."""
+    """The operator with given eigenvalues on the first Legendre polynomials and 0 on the others."""
 
     eigenvalues: Floats
 
@@ -148,7 +149,7 @@ def scattering(g: float) -> Operator:
 
 
 def piecewise(array: Floats) -> Operator:
-    """From bin to bin of equal measure, uniformly within the bin."""
+    """Transitions between bins of equal measure, uniform within the bin."""
     edges = equal_bins(len(array))
 
     def act(function: Function, rule: Rule) -> Function:
@@ -165,9 +166,9 @@ def equal_bins(size: int) -> Floats:
 
 
 def indicators(edges: Floats, angle: Floats) -> Floats:
-    """The functions of bins, normalised, shape (angles, bins)."""
+    """The normalised indicators of bins, shape (angles, bins)."""
     cell = np.clip(np.searchsorted(edges.astype(angle.dtype), angle, side="right") - 1, 0, edges.size - 2)
-    # the difference of two cosines as a product, so that it keeps its digits
+    # the difference of two cosines as a product, which avoids cancellation
     mass = np.sin((edges[1:] + edges[:-1]) / 2) * np.sin((edges[1:] - edges[:-1]) / 2)
     return np.asarray(np.eye(mass.size, dtype=angle.dtype)[cell] / np.sqrt(mass).astype(angle.dtype))
 
@@ -189,12 +190,12 @@ def exchange(function: Function, rule: Rule) -> Function:
 
 
 def exchanged(theta: Floats) -> Floats:
-    """The involution: the half below pi/2 turned round, the other half as it is."""
+    """The involution: reversed below pi/2, the identity above."""
     theta = np.asarray(theta)
     return np.where(theta < PI / 2, 2 * np.arcsin(np.sqrt(np.abs(np.cos(theta)) / 2)), theta)
 
 
-# Crossings of a crevice are followed so many times further where functions are not smooth near grazing.
+# Number of crossings of a crevice followed towards grazing for functions that are not smooth there.
 MOST_TIMES = 30
 
 
@@ -227,7 +228,7 @@ class Isometries:
 
 @dataclass(frozen=True)
 class Triangular:
-    """Triangular teeth, from the formula of a single ray by the bounds of the number n of hits."""
+    """Triangular teeth, from the formula of a single ray with bounds of the number n of hits."""
 
     apex: float
 
@@ -262,22 +263,22 @@ class Triangular:
 
 @dataclass(frozen=True)
 class Rectangular:
-    r"""Rectangular teeth one after the other: on f(pi - theta) = -f(theta) the factor -c, c = 1/2 + |1/2 - d/2 mod 1|.
+    r"""Consecutive rectangular teeth: a function with f(pi - theta) = -f(theta) is multiplied by -c, c = |1 - d mod 2|.
 
-    That is specular with probability 1 - {d}/2 or 1/2 + {d}/2, d = 2 r |cot theta|; on even functions it is the
-    identity. Far towards grazing the power c^n is replaced by its mean over a period, little by little within a range
-    of many periods, so that the integral of the difference against a smooth function is beyond all powers of that.
+    Reflection is specular with probability 1 - {d}/2 or 1/2 + {d}/2, d = 2 r |cot theta|; even functions are invariant.
+    Far towards grazing the power c^n is replaced by its mean over a period. The transition is smooth over a range of
+    many periods, so that the error against a smooth function is smaller than any power of that range.
 
     Parameters
     ----------
     powers : dict
-        r and how often it occurs.
+        r and its number of occurrences.
     """
 
     powers: dict[float, int]
 
     def __call__(self, function: Function, rule: Rule) -> Function:
-        # what is not smooth near grazing is to lie where nothing is replaced yet
+        # points where the function is not smooth near grazing must lie where the power is not replaced yet
         near = np.minimum(function.breaks, PI - function.breaks)
         nearest = float(np.min(near[near > 1e-12], initial=np.pi))
         last = int(np.clip(2.0 * 2.2 * max(self.powers) / nearest, rule.crossings, MOST_TIMES * rule.crossings))
@@ -287,7 +288,7 @@ class Rectangular:
             for r, n in self.powers.items():
                 d = 2 * theta.dtype.type(r) / np.abs(np.tan(theta))
                 rest = d - 2 * np.floor(d / 2)
-                # w from 1 where d is even to 1/2 where it is odd; 1 - 2 (1 - w) is the factor, up to its sign
+                # w is 1 for even d and 1/2 for odd d; the factor is 1 - 2 (1 - w) up to its sign
                 w = 1 - np.minimum(rest, 2 - rest) / 2
                 kept = (erfc(6.0 * (4.0 * np.minimum(d, 1e9).astype(float) / last - 3.0)) / 2).astype(d.dtype)
                 product *= (-1) ** n * (kept * (2 * w - 1) ** n + (1 - kept) / (n + 1))
@@ -305,7 +306,7 @@ class Rectangular:
 
 
 def joined(word: tuple[Operator, ...]) -> tuple[Operator, ...]:
-    """The word with rectangular teeth that follow one another as one operator; mirrors between them pass by."""
+    """The word with consecutive rectangular teeth joined into one operator; mirrors between them commute with it."""
     found: list[Operator] = []
     for operator in word:
         place = len(found)
@@ -322,25 +323,24 @@ def joined(word: tuple[Operator, ...]) -> tuple[Operator, ...]:
     return tuple(found)
 
 
-# Rows of arcs are followed to so many times the hits whose breakpoints are followed in theta; so many nodes do for
-# these.
+# Multiple of the hits with theta breakpoints up to which conditionals of arcs are followed, and their number of nodes.
 MORE_HITS, FEW_NODES = 16, 6
 
 
 # ---- circular arcs ------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Arcs:
-    """Focusing arcs: Gauss rules in delta between the changes of the number of hits N and of what is hit.
+    """Focusing arcs: Gauss rules in delta between the changes of the number of hits N and the target breakpoints.
 
-    For delta < pi/2 the outgoing angle is theta + pi - 2 N delta, (xi + theta)/(2 N + 1) < delta < (xi + theta)/
-    (2 N - 1), |theta - xi| < delta < min(theta + xi, 2 pi - theta - xi); beyond it is the mirror image of this.
+    For delta < pi/2 the outgoing angle is theta + pi - 2 N delta, with (xi + theta)/(2 N + 1) < delta < (xi + theta)/(2
+    N - 1) and |theta - xi| < delta < min(theta + xi, 2 pi - theta - xi). For delta > pi/2 it is the mirror image.
     """
 
     half_angle: float
 
     def __call__(self, function: Function, rule: Rule) -> Function:
         targets = np.sort(function.breaks.astype(float))
-        # also where the function is smooth but varies much
+        # also where the function is smooth but varies strongly
         regular = np.linspace(0.0, np.pi, 8 + rule.panels // 3)[1:-1]
         cuts = np.unique(np.concatenate((targets, regular)))
 
@@ -366,7 +366,8 @@ class Arcs:
         return Function(evaluate, np.concatenate((forward, back)))
 
     def _row(self, theta: Floats, targets: Floats, rule: Rule) -> Iterator[tuple[Floats, Floats, Floats]]:
-        """Rows, outgoing angles and weights, shapes (pieces,) and (pieces, nodes), of the chords below pi/2."""
+        """Indices of ``theta``, shape (pieces,), with outgoing angles and weights of chords below pi/2 (pieces,
+        nodes)."""
         number = np.arange(1.0, MORE_HITS * rule.hits + 1.0)
         begin, end = self._ends(theta)
         reach = (self.half_angle + theta)[:, None]
@@ -392,7 +393,7 @@ class Arcs:
             piece = owner[chosen]
             chord, weight = (part.astype(float) for part in nodes_between(start[chosen], stop[chosen], nodes))
             yield row[piece], theta[row[piece], None] + np.pi - 2.0 * hits[piece, None] * chord, weight * np.sin(chord)
-        # and the chords with more hits
+        # the chords with more hits
         rest = np.minimum(reach[:, 0] / (2.0 * number[-1] + 1.0), end)
         more = np.flatnonzero(begin < rest)
         chord, weight = (part.astype(float) for part in nodes_between(begin[more], rest[more], FEW_NODES))
@@ -405,7 +406,7 @@ class Arcs:
         return begin, np.maximum(np.minimum(np.minimum(theta + xi, 2.0 * np.pi - theta - xi), 0.5 * np.pi), begin)
 
     def _breaks(self, targets: Floats, most: int) -> Floats:
-        """Angles at which a change of N meets an end, or a target one of both."""
+        """Angles at which a change of N meets an end, or a target meets a change of N or an end."""
         xi, n = self.half_angle, np.arange(1.0, most + 1.0)[:, None]
         zero, one = np.zeros_like(n), np.ones_like(n)
         sides = [
@@ -416,7 +417,7 @@ class Arcs:
         ]
         found = [xi * (1.0 + 1.0 / n).ravel(), xi * (n / (n + 1.0)).ravel()]
         found.append(np.array([xi, 0.5 * np.pi - xi]))
-        # a series of changes accumulates at xi
+        # a sequence of changes accumulates at xi
         found += [xi * (1.0 + sign / most * 0.4 ** np.arange(1.0, 12.0)) for sign in (-1.0, 1.0)]
         for slope, offset in sides:
             theta = (targets - np.pi + 2.0 * n * offset) / (1.0 - 2.0 * n * slope)
@@ -436,7 +437,7 @@ Word = tuple[Operator, ...]
 
 @dataclass(frozen=True)
 class Expression:
-    """A law, and the words that it is the sum of, their operators from the first to the last."""
+    """A law and the words whose sum it is; the operators of a word are listed from the first to the last."""
 
     law: ker.Law
     words: tuple[tuple[float, Word], ...]
@@ -465,7 +466,7 @@ class Expression:
         return Expression(law, words, back, max(self.cost, other.cost))
 
     def turned(self) -> Expression:
-        """In the other frame."""
+        """The law in the other frame."""
         words = tuple((a, (*word, flip)) for a, word in self.words)
         back = tuple((a, (flip, *word)) for a, word in self.adjoint_words)
         return Expression(self.law.in_specular_frame(), words, back, self.cost)
@@ -482,7 +483,7 @@ def leaf(law: ker.Law, operator: Operator, cost: int = 0, adjoint: Operator | No
 
 LOPSIDED = np.array([[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
 CYCLE = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-# What a law of isometries or of arcs costs in a word, and the most that one may have.
+# Cost of a law of isometries or of arcs in a word, and limits on the cost of a word and on the number of words.
 TEETH, ARCS, DEAREST, MOST_WORDS = 1, 4, 4, 12
 
 
@@ -530,7 +531,7 @@ def _two_moments(a: float, b: float) -> Callable[[Floats, Floats], Floats]:
 
 
 def random_expression(rng: np.random.Generator, depth: int, turned: bool) -> Expression:
-    """A random tree of at most that depth, all of whose laws are in one frame."""
+    """A random tree of at most ``depth``, all of whose laws are in one frame."""
     if depth == 0:
         one = random_leaf(rng)
         return one.turned() if turned else one
@@ -547,7 +548,7 @@ def random_expression(rng: np.random.Generator, depth: int, turned: bool) -> Exp
 
 
 def random_basis(rng: np.random.Generator) -> tuple[str, ker.Basis]:
-    """Bins uniform in u or not, polynomials, panels; and what kind it is."""
+    """Random bins, polynomials or panels, and the kind of the basis."""
     kind = rng.choice(["Bins(n)", "Bins(edges)", "Legendre", "Panels"], p=[0.25, 0.2, 0.35, 0.2])
     if kind == "Bins(n)":
         return kind, ker.Bins(int(rng.choice([2, 4, 8, 16])))
@@ -557,10 +558,10 @@ def random_basis(rng: np.random.Generator) -> tuple[str, ker.Basis]:
     return kind, ker.Bins(edges) if kind == "Bins(edges)" else ker.Panels(edges, int(rng.integers(0, 4)))
 
 
-# ---- what came out ------------------------------------------------------------------------------------------------
+# ---- outcomes -----------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Outcome:
-    """One matrix: its case, how it was made, what it reports, how far it is off, and the reference's own error."""
+    """One matrix: its case, its method, its reported error, its true error, and the reference's own error."""
 
     seed: int
     law: str
@@ -573,17 +574,17 @@ class Outcome:
 
     @property
     def exceeds(self) -> bool:
-        """Whether the true error is above the reported one, whatever the reference's error does."""
+        """Whether the true error certainly exceeds the reported error, given the reference's error."""
         return self.distance - self.reference > self.reported
 
     @property
     def is_open(self) -> bool:
-        """Whether the reference is too coarse to tell."""
+        """Whether the reference is too coarse to decide."""
         return not self.exceeds and not self.holds
 
     @property
     def holds(self) -> bool:
-        """Whether the true error is below the reported one, whatever the reference's error does."""
+        """Whether the true error is certainly below the reported error, given the reference's error."""
         return self.distance + self.reference <= self.reported
 
     @property
@@ -593,12 +594,12 @@ class Outcome:
 
 
 COARSE, FINE = Rule(40, 16, 400, 40), Rule(56, 20, 600, 64)
-# Crevices are followed less far where other teeth multiply the breakpoints.
+# Divisor of the number of crossings if other teeth multiply the breakpoints.
 FEWER_CROSSINGS = 3
 
 
 def reference(expression: Expression, basis: ker.Basis) -> tuple[Floats, float]:
-    """<e_i, P e_j>, and twice the difference from a coarser rule plus rounding."""
+    """<e_i, P e_j>, and its error: twice the difference from a coarser rule, plus rounding."""
     (coarse, _), (fine, rounding) = (_by_rule(expression, basis, rule) for rule in (COARSE, FINE))
     return fine, 2.0 * float(np.linalg.norm(fine - coarse)) + rounding
 
@@ -614,7 +615,7 @@ def _by_rule(expression: Expression, basis: ker.Basis, rule: Rule) -> tuple[Floa
         arcs = any(isinstance(operator, Arcs) for operator in operators)
         own = replace(
             rule,
-            # rows of arcs are dear, and their nodes do for some oscillations
+            # conditionals of arcs are expensive, and their nodes resolve several oscillations
             panels=rule.panels + max(degrees) // (4 if arcs else 1),
             crossings=rule.crossings if teeth < 2 else rule.crossings // FEWER_CROSSINGS,
             kind=float if arcs else Extended,
@@ -657,7 +658,7 @@ def _local(angle: Floats, edges: Floats, place: int) -> Floats:
 
 
 def _orthonormal(low: Any, high: Any, degree: int) -> Floats:
-    """Combinations of the Legendre polynomials on (low, high) that are orthonormal, by Gram and Schmidt."""
+    """Combinations of Legendre polynomials that are orthonormal on (low, high), by Gram-Schmidt."""
     node, weight = gauss(degree + 16)
     angle = low + (high - low) * (1 + node) / 2
     mass = (high - low) * weight * np.sin(angle) / 4
@@ -680,7 +681,7 @@ def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
         try:
             expression = random_expression(rng, depth, turned)
         except InputError:
-            # an adjoint that is not known in closed form
+            # the adjoint has no closed form
             continue
         if rng.random() < 0.1:
             expression = expression.turned()
@@ -692,7 +693,7 @@ def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
 
 
 def outcome(seed: int) -> tuple[str, Outcome] | None:
-    """The kind of basis and the outcome of a seed; None if its law does not have the method that was drawn."""
+    """The kind of basis and the outcome of a seed; None if the law does not have the drawn method."""
     begun = time.process_time()
     expression, kind, basis, method = drawn(seed)
     try:
@@ -708,9 +709,9 @@ def outcome(seed: int) -> tuple[str, Outcome] | None:
 
 
 def recorded(seeds: Iterable[int], record: Path, jobs: int) -> list[tuple[str, Outcome]]:
-    """The outcomes of all that have the method drawn, in the order of the seeds; those in the record are not repeated.
+    """The outcomes of all seeds whose law has the drawn method, in order; recorded seeds are not repeated.
 
-    The record is a file of JSON lines: the seed, and the kind of basis and the outcome or null.
+    The record is a file of JSON lines: the seed, and the kind of basis with the outcome, or null.
     """
     lines = record.read_text(encoding="utf-8").splitlines() if record.exists() else []
     known: dict[int, Any] = dict(map(json.loads, lines))
@@ -726,7 +727,8 @@ def recorded(seeds: Iterable[int], record: Path, jobs: int) -> list[tuple[str, O
 
 
 def summary(found: Sequence[Outcome]) -> str:
-    """How many, how many hold, do not, cannot be told; the largest true over reported; the median of the inverse."""
+    """Counts of all outcomes and of those that hold, fail or are undecided; largest error ratio, median of its
+    inverse."""
     told = [one for one in found if not one.is_open]
     false = sum(one.exceeds for one in told)
     unknown = len(found) - len(told)
@@ -748,7 +750,7 @@ def table_of(found: Sequence[tuple[str, Outcome]]) -> str:
 
 
 def main() -> None:
-    """Print the table and the cases that speak against it."""
+    """Print the table and the cases whose errors fail or are undecided."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.composed_laws", description=__doc__)
     parser.add_argument("--count", type=int, default=2000)
     parser.add_argument("--first", type=int, default=0, help="the first seed")

@@ -1,9 +1,8 @@
-"""Coverage of reported errors where sampling is the only one: 95 % of the true values lie within them.
+"""Coverage of reported errors in sampled estimates: 95 % of the true values should lie within them.
 
-``python -m benchmarks.coverage`` repeats every estimate with other rays, 1000 times or as often as ``--repeats`` says,
-and counts how often its error holds. The truths are not sampled: diagonal matrices of laws that Legendre's polynomials
-diagonalise, written here; tables of isometries for triangular teeth, whose rays are followed by their own formula; and
-quadrature for arcs.
+``python -m benchmarks.coverage`` repeats every estimate with other rays, 1000 times or ``--repeats`` times, and counts
+how often its error holds. The true values are not sampled: diagonal matrices for laws that Legendre polynomials
+diagonalise, isometry tables for triangular teeth with a separate formula for their rays, and quadrature for arcs.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ class Tally:
     ----------
     held, repeats : int
     ratio : float
-        The mean reported error over the root mean square of the true one.
+        Mean reported error over root mean square true error.
     """
 
     held: int
@@ -48,7 +47,7 @@ class Tally:
 
     @property
     def coverage(self) -> float:
-        """The fraction that held."""
+        """The fraction of repeats whose error held."""
         return self.held / self.repeats
 
     def line(self) -> str:
@@ -57,7 +56,7 @@ class Tally:
 
 
 def tally(once: Callable[[np.random.Generator], tuple[float, float]], repeats: int, seed: int = 0) -> Tally:
-    """Repeat what gives a true error and a reported one."""
+    """Repeat a computation of a true error and a reported error."""
     found = np.array([once(np.random.default_rng([seed, number])) for number in range(repeats)])
     true, reported = found.T
     size = float(np.sqrt(np.mean(true**2)))
@@ -70,7 +69,7 @@ def truth(law: ker.Law, basis: ker.Basis) -> np.ndarray:
     if isinstance(basis, ker.Legendre) and law is SCATTERING:
         return np.diag(0.6 ** np.arange(basis.size))
     if isinstance(basis, ker.Legendre) and law is MAXWELL:
-        # the specular part changes the sign of odd polynomials, the diffuse one keeps the constants alone
+        # the specular part changes the sign of odd polynomials; the diffuse part keeps only the constants
         return np.diag(0.6 * (-1.0) ** np.arange(basis.size) + 0.4 * (np.arange(basis.size) == 0))
     found = ker.discretise(law, basis, tolerance=1e-10)
     assert float(found.error) < 1e-6
@@ -88,7 +87,7 @@ def matrix_once(law: ker.Law, basis: ker.Basis, method: str, rays: int, symmetri
 
 
 def pairs_once(basis: ker.Basis, rays: int, invariant: bool, symmetrise: bool):  # type: ignore[no-untyped-def]
-    """The error of a matrix from pairs, whose incoming angles follow the measure or not."""
+    """The error of a matrix from pairs; ``invariant`` tells whether their incoming angles follow the measure."""
 
     def once(rng: np.random.Generator) -> tuple[float, float]:
         theta = ker.SINE.sample(rays, rng) if invariant else np.pi * rng.beta(1.2, 1.6, rays)
@@ -99,7 +98,7 @@ def pairs_once(basis: ker.Basis, rays: int, invariant: bool, symmetrise: bool): 
 
 
 def eigenvalue_once(law: ker.Law, basis: ker.Basis, method: str, rays: int, which: str):  # type: ignore[no-untyped-def]
-    """The sampling error of the gap's eigenvalue, or of that of largest modulus."""
+    """The sampling error of the gap's eigenvalue, or of the eigenvalue of largest modulus."""
     exact = truth(law, basis)
     rest = np.sort(np.linalg.eigvalsh(0.5 * (exact + exact.T)))
     constant = int(np.argmin(np.abs(rest - 1.0)))
@@ -138,7 +137,7 @@ def distance_once(order: float, kind: str, alike: bool, sampled: int):  # type: 
 
 @dataclass(frozen=True)
 class Rays(ker.DrivenLaw):
-    """Triangular teeth, known only by their rays."""
+    """Triangular teeth, accessible through rays only."""
 
     closed: ker.TriangularTeethLaw
     seed: int
@@ -146,7 +145,7 @@ class Rays(ker.DrivenLaw):
     reversible = True
 
     def reflect(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        # other rays for every seed: the library's own are the same for every law
+        # each seed needs its own rays, because the library's rays are the same for every law
         return self.closed.reflect(np.mod(x + self.seed * 0.6180339887498949, 1.0), theta)
 
 

@@ -1,8 +1,8 @@
-"""Enclosures of the eigenvalues of five curved walls, each held against a far finer run and against a second method.
+"""Enclosures of the eigenvalues of five curved walls, against a far finer run and against a second method.
 
-``python -m benchmarks.enclosures`` prints for each wall the enclosures to a coarse tolerance, whether the far finer one
-lies inside, how many times the enclosure is as wide as its value is off, and the eigenvalues of a matrix in Legendre
-polynomials, whose moduli can only be too small.
+``python -m benchmarks.enclosures`` prints for each wall the enclosures at a coarse tolerance and whether they contain
+the far finer ones. It also prints the ratio of width to error, and the eigenvalues of a matrix in Legendre polynomials,
+whose moduli can only be too small.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from asperity import spectral as spec
 
 from .pages import print_table
 
-# The constants' eigenvalue and the next two by modulus.
+# The eigenvalue of the constants and the next two by modulus.
 LISTED = 3
 DEGREES, MATRIX_TOLERANCE = 24, 1e-6
 
@@ -33,7 +33,7 @@ class Case:
 
 
 def cases() -> tuple[Case, ...]:
-    """Five walls: two in closed form, three that are traced, the last without mirror symmetry."""
+    """Five walls: two with a closed form, three traced, the last without mirror symmetry."""
     skew = geo.Wall([geo.Bezier([(0, 0), (0.2, -0.5), (0.7, -0.3), (1, 0)])], period=1.0)
     return (
         Case("focusing arcs, 1.2", geo.focusing_arcs(1.2), 1e-5, 1e-9),
@@ -46,7 +46,7 @@ def cases() -> tuple[Case, ...]:
 
 @dataclass(frozen=True)
 class Held:
-    """One enclosure, the far finer one, and the eigenvalue of a matrix with its error."""
+    """One enclosure, its far finer enclosure, and the eigenvalue of a matrix with its error."""
 
     wall: str
     coarse: spec.Enclosure
@@ -56,7 +56,7 @@ class Held:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether the finer interval is inside, and the matrix' eigenvalue not beyond, by more than its error."""
+        """Whether the finer interval is inside, and the matrix eigenvalue exceeds it by at most its error."""
         low, high = self.coarse.low, self.coarse.high
         inside = low <= self.fine.low and self.fine.high <= high
         if self.matrix > 0.0:
@@ -65,13 +65,13 @@ class Held:
 
     @property
     def exaggeration(self) -> float:
-        """Width over the error of the coarse value, as far as the finer run tells it."""
+        """Width over the error of the coarse value, as far as the finer run resolves this error."""
         error = abs(self.coarse.value - 0.5 * (self.fine.low + self.fine.high))
         return self.coarse.width / max(error, 0.5 * self.fine.width)
 
 
 def held(case: Case) -> Iterator[Held]:
-    """Each eigenvalue off the constants."""
+    """Compare each eigenvalue off the constants."""
     law = ker.WallLaw(case.wall)
     coarse = spec.enclosures(law, LISTED, tolerance=case.coarse)
     fine = spec.enclosures(law, LISTED, tolerance=case.fine)

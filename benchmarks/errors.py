@@ -1,8 +1,8 @@
-"""Reported errors of adaptive rows and matrices against the references of a second method.
+"""Reported errors of adaptive conditionals and matrices, against references by a second method.
 
-``python -m benchmarks.errors`` takes 24 random curved walls and tolerances from 1e-4 to 1e-9: of each the first moment
-and five rows. It prints how many true errors exceed the reported ones, and how many times the reported ones exceed the
-true ones in the median, by wall and by tolerance. Where the reference is not exact enough to tell, it says so.
+``python -m benchmarks.errors`` computes the first moment and five conditionals for 24 random curved walls and
+tolerances from 1e-4 to 1e-9. It prints how many true errors exceed the reported errors, and the median ratio of
+reported to true errors, by wall and by tolerance. Cases beyond the reference's accuracy are marked.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FLIGHTS = 8_000_000
 
 @dataclass(frozen=True)
 class Outcome:
-    """One number: which, the tolerance, the reported error, the distance from the reference, and that one's error."""
+    """One number: its name, tolerance, reported error, distance from the reference, and the reference's error."""
 
     what: str
     wall: int
@@ -40,7 +40,7 @@ class Outcome:
 
     @property
     def exceeds(self) -> bool:
-        """Whether the true error is above the reported one, whatever the reference's error does."""
+        """Whether the true error certainly exceeds the reported error, given the reference's error."""
         return self.distance > self.reported + self.reference
 
     @property
@@ -50,12 +50,12 @@ class Outcome:
 
     @property
     def ratio(self) -> float | None:
-        """Reported over true error, where the reference is exact enough to tell a hundred."""
+        """Reported over true error, if the reference is accurate enough to resolve a ratio of 100."""
         return self.reported / max(self.distance, 1e-16) if self.reference < 0.01 * self.reported else None
 
 
 def references() -> list[dict[str, object]]:
-    """What tests/reference_rows.py has written."""
+    """The references written by tests/reference_rows.py."""
     found: list[dict[str, object]] = json.loads((TESTS / "reference_rows.json").read_text(encoding="utf-8"))
     return found
 
@@ -63,8 +63,8 @@ def references() -> list[dict[str, object]]:
 def outcomes(
     kinds: Sequence[int], tolerances: Sequence[float], most_segments: int, moments: bool = True
 ) -> Iterator[Outcome]:
-    """Rows and moments of these walls to these tolerances."""
-    # of the tests, not of the library
+    """Conditionals and moments of these walls at these tolerances."""
+    # a module of the tests, not of the library
     from random_curved_walls import random_curved_wall
 
     table = {entry["kind"]: entry for entry in references()}
@@ -81,12 +81,12 @@ def outcomes(
                 matrix, error, _ = traced_matrix(wall, ker.Legendre(2), Budget(tolerance, segments=most_segments))
                 miss = abs(float(matrix[1, 1]) - float.fromhex(entry["moment"]))
                 yield Outcome("moment", kind, tolerance, error, miss, entry["moment_error"])
-                # finer tolerances would end at the same number of flights
+                # finer tolerances would end at the same number of ray segments
                 within = error <= tolerance
 
 
 def summary(found: Sequence[Outcome]) -> str:
-    """How many, how many exceed what was reported, how many cannot be told, and the median of the ratios."""
+    """Counts of all outcomes, of exceeded errors and of undecided outcomes, and the median of the ratios."""
     ratios = [outcome.ratio for outcome in found if outcome.ratio is not None]
     median = f"{np.median(ratios):.2g} of {len(ratios)}" if ratios else "-"
     exceeding, unknown = (sum(getattr(outcome, name) for outcome in found) for name in ("exceeds", "is_open"))
@@ -94,7 +94,7 @@ def summary(found: Sequence[Outcome]) -> str:
 
 
 def by_wall(found: Sequence[Outcome]) -> str:
-    """A line a wall: its rows and moments together, the errors reached, and that of the reference moment."""
+    """A line for each wall: conditionals and moments together, errors reached, and the reference moment's error."""
     lines = []
     for wall in sorted({outcome.wall for outcome in found}):
         some = [outcome for outcome in found if outcome.wall == wall]
@@ -108,7 +108,7 @@ def by_wall(found: Sequence[Outcome]) -> str:
 
 
 def by_tolerance(found: Sequence[Outcome]) -> str:
-    """A line for each tolerance, rows and moments apart."""
+    """A line for each tolerance, with separate counts for conditionals and moments."""
     lines = []
     for what in ("row", "moment"):
         some = [outcome for outcome in found if outcome.what == what]

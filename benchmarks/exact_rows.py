@@ -1,7 +1,7 @@
-"""Rows of three laws from their formulas in the entry point X, by code that shares nothing with the library's laws.
+"""Conditional distributions of three laws from their formulas in the entry point X, independent of the library's laws.
 
-Triangular teeth of apex angle psi and circular arcs of half angle xi reflect as docs/theory/closed-forms.md says;
-`Row` is the distribution of the outgoing angle for one incoming angle.
+The formulas for triangular teeth of apex angle psi and circular arcs of half angle xi are in
+docs/theory/closed-forms.md. `Row` is the distribution of the outgoing angle for one incoming angle.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 
 from asperity.core.checks import Floats
 
-# Runs along an arc of more hits than this carry less than 1e-11 of the flux; theirs are counted with the last ones.
+# Longer runs of hits along an arc carry less than 1e-11 of the flux and are counted with the longest runs.
 MOST_HITS = 20_000
 # Points at which distribution functions of arcs are compared.
 POINTS = 4096
@@ -48,7 +48,8 @@ class Atoms:
 
 
 def tooth_row(theta: float, psi: float) -> Atoms:
-    """Triangular teeth: between the values of X at which the number of hits changes all rays leave alike."""
+    """Triangular teeth: all rays between two values of X at which the number of hits changes leave at the same
+    angle."""
     here, there = np.cos(theta - 0.5 * psi), np.cos(theta + 0.5 * psi)
     hits = np.arange(-1.0, np.ceil(2.0 * np.pi / psi) + 2.0)
     cuts = np.concatenate([np.cos((hits + 0.5) * psi - theta), -np.cos((hits + 0.5) * psi - np.pi + theta), [0.0]])
@@ -70,7 +71,7 @@ def crevice_row(theta: float, height_to_width: float) -> Atoms:
 
 @dataclass(frozen=True)
 class ArcRow:
-    """The row of a circular arc: on pieces of delta, from low to high, theta' = start - 2 hits delta.
+    """The conditional distribution of a circular arc: on pieces [low, high] of delta, theta' = start - 2 hits delta.
 
     The density of delta is ``scale`` sin(delta).
     """
@@ -83,10 +84,10 @@ class ArcRow:
 
     @classmethod
     def of(cls, theta: float, xi: float) -> ArcRow:
-        """The row at an incoming angle."""
+        """The conditional distribution at an incoming angle."""
         low, high = abs(theta - xi), np.pi - abs(np.pi - theta - xi)
         tiny = np.finfo(float).tiny
-        # hits at the least and at the greatest delta
+        # hits at the least and the greatest delta
         most = 2.0 + 0.5 * max((xi + theta) / max(low, tiny), (xi - theta + high) / max(np.pi - high, tiny))
         many = np.arange(int(min(most, MOST_HITS)))
         cuts = np.concatenate([(2.0 * many * np.pi - xi + theta) / (1 + 2 * many), (xi + theta) / (1 + 2 * many)])

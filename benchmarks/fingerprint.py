@@ -1,13 +1,13 @@
 """The fingerprint of the results: the sha256 of the bytes of each of a fixed set of calls.
 
-A change that moves code, or renames it, must leave every line as it is:
+A change that only moves or renames code must leave every line unchanged:
 
     python -m benchmarks.fingerprint > before
     python -m benchmarks.fingerprint > after
     diff before after
 
-Both runs on one machine: other processors, and other versions of numpy, round elsewhere. A call
-that is refused counts by its message.
+Both runs must use one machine, because rounding depends on the processor and the version of numpy. A refused call
+counts by its message.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def digest(result: Any) -> str:
 
 def _parts(result: Any) -> Iterator[bytes]:
     if dataclasses.is_dataclass(result) and not isinstance(result, type):
-        # times and measured seconds differ from run to run
+        # measured times differ from run to run
         for field in dataclasses.fields(result):
             if field.name not in ("seconds", "machine"):
                 yield field.name.encode()
@@ -67,7 +67,7 @@ def _parts(result: Any) -> Iterator[bytes]:
 
 
 def walls() -> dict[str, geo.Wall]:
-    """The named walls with their defaults, and some that bring every piece of the tracer into play."""
+    """The named walls with their defaults, and walls that use every part of the tracer."""
     found = {name: wall.build() for name, wall in geo.WALLS.items()}
     rng = np.random.default_rng(5)
     x = np.sort(rng.random(12))
@@ -86,7 +86,7 @@ def walls() -> dict[str, geo.Wall]:
 
 
 def laws() -> dict[str, ker.Law]:
-    """Laws of every kind, and compounds of them."""
+    """Laws of every kind, and compound laws."""
     retro, scatter, teeth = ker.retroreflection(), ker.henyey_greenstein(0.5), ker.RectangularTeethLaw(0.8)
     arcs = ker.CircularArcLaw(0.9)
     found: dict[str, ker.Law] = {
@@ -185,7 +185,7 @@ def _spectrum(law: ker.Law) -> Call:
 @click.command()
 @click.option("--only", default="", help="Only the calls whose names contain this.")
 def main(only: str) -> None:
-    """Print one line a call: the digest of its result, and its name."""
+    """Print one line for each call: the digest of its result, and its name."""
     for name, call in calls():
         if only in name:
             try:

@@ -1,4 +1,4 @@
-"""The numbers to reach, beside what this run reached."""
+"""The performance goals, with the values reached in this run."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from asperity.spectral.work_diagrams.runs import measure
 from .memory import MemoryUse
 from .robustness import Verdict
 
-# <u, P u> / <u, u>, u = cos(theta): closed forms and independent quadrature, see docs/theory/closed-forms.md
+# <u, P u> / <u, u> for u = cos(theta): closed forms and independent quadrature, see docs/theory/closed-forms.md
 TRIANGULAR_MOMENT, ARC_MOMENT = 0.134541971359171, 0.327558333378
 ARC_LAMBDA2 = 0.3670253152
-# Repeats of a computation, and seconds after which no further one is begun.
+# Repeats of a computation, and seconds after which no further repeat starts.
 REPEATS, SECONDS = 4, 10.0
 LARGE_BINS, LARGE_SAMPLES = 4096, 2**22
-# Million bounces a second that the four walls of `speed` should reach on one thread, in their order.
+# Goals in million bounces a second on one thread, for the four walls of `speed` in their order.
 BOUNCE_GOALS = (50.0, 35.0, 20.0, 5.0)
 
 
 @dataclass(frozen=True)
 class Goal:
-    """One goal: what, how much, and what was reached."""
+    """One goal: its name, its required value, and the value reached."""
 
     what: str
     goal: str
@@ -52,10 +52,10 @@ def all_goals(
     memory: MemoryUse,
     disks: float,
 ) -> list[Goal]:
-    """The goals, from measurements already made and some more.
+    """The goals, from the given measurements and further ones.
 
-    Given are the walls with bounces a second by one thread and by two; runs with hits and seconds a ray; seconds of
-    fresh processes; rays that were aimed; the memory of estimates; true disks a second.
+    The arguments are: walls with bounces a second on one and two threads; runs with hits and seconds for each ray;
+    seconds of fresh processes; verdicts on aimed rays; the memory of estimates; true disks a second.
     """
     goals = [
         Goal(
@@ -85,20 +85,20 @@ def goal_table(goals: Sequence[Goal]) -> str:
 
 
 def _laws() -> list[Goal]:
-    """Moments, matrices and eigenvalues: their errors and times."""
+    """Errors and times of moments, matrices and eigenvalues."""
     teeth, arc, closed = geo.triangular_teeth(0.7), geo.focusing_arcs(1.2), ker.TriangularTeethLaw(0.7)
     bins, legendre = ker.Bins(precise_triangular.BINS), ker.Legendre(64)
     precise = ker.TriangularTeethLaw(precise_triangular.ANGLE)
     beams, _ = table_matrix(table_of_beams(beams_of(teeth.vertices)), legendre)
     goals = [
         _in_time("triangular teeth, first moment", TRIANGULAR_MOMENT, lambda: _moment(teeth), 1e-14, 0.01),
-        # the Frobenius norm, which is what an error of a matrix bounds, is for the next one
+        # the next goal uses the Frobenius norm, which a matrix error bounds
         _in_time(
             f"triangular teeth, Bins({bins.size}) as an operator", precise_triangular.reference(),
             lambda: ker.discretise(precise, bins), 1e-13, 0.1, norm="operator",
         ),
         _in_time("triangular teeth, Legendre(64)", beams, lambda: ker.discretise(closed, legendre), 1e-13, 0.1),
-        # the bound that its beams carry
+        # the error bound from its beams
         _in_time("polygon of 16 vertices, whole law", 0.0, lambda: _unresolved(random_polygon()), 1e-12, 0.5),
         _in_time("focusing arc, first moment", ARC_MOMENT, lambda: _moment(arc), 1e-10, 1.0),
     ]  # fmt: skip
@@ -116,7 +116,7 @@ def _in_time(
     what: str, right: ArrayLike, solve: Callable[[], Any], goal: float, limit: float, *, norm: str = "",
     holds: bool = False,
 ) -> Goal:  # fmt: skip
-    """A goal of error and time; if ``holds``, the reported error must lie between the true one and the goal."""
+    """A goal of error and time; if ``holds``, the reported error must lie between the true error and the goal."""
     problem = spec.WorkProblem(what, spec.ReferenceValue(right, 0.0, "closed form or independent quadrature"))
     row = measure(problem, spec.WorkMethod("auto", lambda _: solve()), 1.0, REPEATS, SECONDS)
     error = row.errors[norm or next(iter(problem.norms))]
@@ -132,7 +132,7 @@ def _moment(wall: geo.Wall) -> float:
 
 
 def random_polygon() -> geo.Wall:
-    """Sixteen vertices over the opening."""
+    """A polygonal wall with sixteen random vertices below the opening."""
     rng = np.random.default_rng(16)
     x = np.concatenate([[0.0], np.sort(rng.random(14)), [1.0]])
     y = np.concatenate([[0.0], -0.1 - 0.8 * rng.random(14), [0.0]])
@@ -161,7 +161,7 @@ def _memory(memory: MemoryUse) -> Goal:
 
 
 def _large_matrices() -> list[Goal]:
-    """A smooth law, a curved wall's law sampled, and pairs of which no mirror symmetry is known."""
+    """A smooth law, a sampled law of a curved wall, and pairs without a known mirror symmetry."""
     rng, basis = np.random.default_rng(0), ker.Bins(LARGE_BINS)
     arc = ker.CircularArcLaw(1.2)
     incoming = np.arccos(1.0 - 2.0 * rng.random(LARGE_SAMPLES))
@@ -170,7 +170,7 @@ def _large_matrices() -> list[Goal]:
         "focusing arc": ker.discretise(arc, basis, method="qmc", samples=LARGE_SAMPLES, rng=rng),
         "pairs of angles": ker.estimate(incoming, arc.sample(incoming, rng), basis, symmetrise=True),
     }
-    # what is imported at the first use is no part of it
+    # exclude imports at first use
     spec.spectrum(ker.discretise(ker.maxwell(0.5), ker.Bins(LARGE_BINS // 4)), k=2)
     return [_large_matrix(name, matrix) for name, matrix in matrices.items()]
 

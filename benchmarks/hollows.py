@@ -1,7 +1,7 @@
-"""The exact laws of fifty random polygonal hollows, against identities of theirs and against traced rays, 10^6 each.
+"""The exact laws of fifty random polygonal hollows, against identities and against 10^6 traced rays each.
 
-``python -m benchmarks.hollows`` prints a row for each and the smallest of the fifty p-values. The second exact method,
-interval marching, is compared with the beams of the same hollows in ``tests/test_marching.py``.
+``python -m benchmarks.hollows`` prints a row for each hollow and the smallest of the fifty p-values.
+``tests/test_marching.py`` compares the beams of the same hollows with interval marching, the second exact method.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Random identities and inequalities, true and false ones, and what `verify` says about them.
+"""Random true and false identities and inequalities, and the answers of `verify`.
 
-Every claim joins two expressions of which the second is the first rewritten by a rule that holds on some domains, or
-rewritten and perturbed, be it by 1e-25 or at one point; the domain is drawn apart from the rule. Whether a claim is
-true is judged by values in 50 digits, computed by mpmath with an evaluator of its own, at points of the domain that are
-random, ends, special or neighbours of those. A proof is false if the values differ at one of them; a refutation is
-false if its counterexample is not in the domain, or if the values agree there or one is not real.
+In each claim the second expression is the first one rewritten by a rule that holds on some domains, possibly with a
+perturbation, down to 1e-25 or at one point only. The domain is drawn independently of the rule. The judge evaluates
+both sides in 50 digits by mpmath, with its own evaluator. Its points are random points, ends and special points of the
+domain, and neighbours of these. A proof is false if the values differ at a point. A refutation is false if its
+counterexample is not in the domain, or if there the values agree or one is not real.
 
     python -m benchmarks.identity_fuzz [claims] [first seed] [processes]
 """
@@ -27,9 +27,9 @@ from asperity import InputError, verify
 from asperity.core.tables import table
 
 DIGITS = 50
-# Values that differ in no more than the last quarter of the digits are taken for equal.
+# Values that differ only in the last quarter of the digits count as equal.
 SAME = 0.75
-# An argument this close to a jump stands on it.
+# An argument this close to a jump counts as on the jump.
 ON_A_JUMP = mpmath.mpf(10) ** -40
 POINTS = 80
 SECONDS = 10.0
@@ -47,7 +47,7 @@ class NotReal(Exception):
 
 
 class Unsure(Exception):
-    """The judge cannot tell."""
+    """The judge cannot decide."""
 
 
 def value(e: Any, point: dict[Any, Any]) -> Any:
@@ -162,9 +162,9 @@ FUNCTIONS: dict[Any, Any] = {
 
 
 def compared(claim: Claim, point: dict[Any, Any]) -> bool | None:
-    """Whether the relation holds at a point, None where a side is not real or the judge is unsure.
+    """Whether the relation holds at a point, None if a side is not real or the judge is unsure.
 
-    A difference is looked at again in more digits, because terms may cancel and a large number may stand in a sine.
+    A difference is checked with more digits, because terms may cancel and a sine may have a large argument.
     """
     sides = _sides(claim, point, DIGITS)
     if sides is None:
@@ -173,7 +173,7 @@ def compared(claim: Claim, point: dict[Any, Any]) -> bool | None:
 
 
 def compared_in_more_digits(claim: Claim, point: dict[Any, Any]) -> bool | None:
-    """The same in 200 digits, None unless 1000 digits give the same values."""
+    """As `compared` in 200 digits; None unless 1000 digits give the same values."""
     few, many = (_sides(claim, point, times * DIGITS) for times in (4, 20))
     if few is None or many is None:
         return None
@@ -183,7 +183,7 @@ def compared_in_more_digits(claim: Claim, point: dict[Any, Any]) -> bool | None:
 
 
 def _sides(claim: Claim, point: dict[Any, Any], digits: int) -> tuple[Any, Any] | None:
-    """Both values, None where a relation of the domain does not hold or a side is not real."""
+    """Both values; None if a relation of the domain fails or a side is not real."""
     with mpmath.workdps(digits):
         try:
             numbers = {s: value(sp.sympify(v), {}) for s, v in point.items()}
@@ -209,7 +209,7 @@ def _agree(claim: Claim, sides: tuple[Any, Any], digits: int) -> bool:
 
 @dataclass(frozen=True)
 class Claim:
-    """left relation right wherever both are real, for symbols that meet the relations of the domain."""
+    """left relation right wherever both sides are real, for symbols that satisfy the relations of the domain."""
 
     kind: str
     left: Any
@@ -366,7 +366,7 @@ class Maker:
 
 
 def places(claim: Claim, rng: np.random.Generator) -> Iterator[dict[Any, Any]]:
-    """Points that meet the domain or not: random, nice, and beside nice ones."""
+    """Random and simple points and neighbours of simple points, inside and outside the domain."""
     named = {atom for part in (claim.left, claim.right, *claim.domain) for atom in part.atoms(sp.Rational)}
     nice = list(dict.fromkeys([*NICE, *named]))
     ends = {s: (max([-12.0, *_bounds(claim, s, sp.Gt, sp.Ge)]), min([12.0, *_bounds(claim, s, sp.Lt, sp.Le)]))
@@ -394,7 +394,7 @@ def _bounds(claim: Claim, symbol: Any, *kinds: Any) -> list[float]:
 
 
 def judged(claim: Claim, seed: int) -> tuple[str, str, str, float]:
-    """The kind, what the values say, what `verify` says, and its seconds."""
+    """The kind, the verdict from values, the answer of `verify`, and its seconds."""
     rng = np.random.default_rng(seed)
     outcomes = [compared(claim, point) for point in places(claim, rng)]
     broken, seen = outcomes.count(False), outcomes.count(True)
@@ -452,7 +452,7 @@ COLUMNS = ("proved", "refuted", "error", "undecided", "out of time", "FALSE proo
 
 
 def table_of(found: list[tuple[int, str, str, str, float]]) -> str:
-    """Counts by kind, and by what the values say."""
+    """Counts by kind and by the verdict from values."""
     rows = [(kind, [one for one in found if one[1] == kind]) for kind in sorted({one[1] for one in found})]
     rows += [
         (f"values say: {label}", [one for one in found if one[2] == label]) for label in ("true", "false", "nowhere")

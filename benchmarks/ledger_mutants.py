@@ -1,10 +1,10 @@
-"""Wrong formulas put instead of the ledger's right ones: every check must refuse them.
+"""Mutants of the ledger's right formulas: every check must refute them.
 
-``python -m benchmarks.ledger_mutants`` changes every right formula, and the helpers beside it, in one position at a
-time: a constant by one or in its sign, + for -, * for /, sin for cos, floor for ceil, min for max, a comparison turned,
-a hypothesis that always or never holds. It also moves each argument and each part of the result, and changes its sign.
-The formula alone sees the change, its check does not. ``--library`` changes the formulas of the library that rows use,
-for the whole ledger, checks included, and asks whether any row notices.
+``python -m benchmarks.ledger_mutants`` changes every right formula, and its helpers, in one position at a time: a
+constant by one or in its sign, + to -, * to /, sin to cos, floor to ceil, min to max, a reversed comparison, a
+hypothesis that always or never holds. It also shifts each argument and each part of the result, and changes their
+signs. Only the formula sees the change, not its check. ``--library`` changes the library's formulas that rows use, for
+the whole ledger including the checks, and tests whether any row notices.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from asperity.verification import Entry
 from .pages import print_table
 
 ROOT = Path(asperity.__file__).parent
-# A formula's own helpers are written here, beside it.
+# Modules with the formulas' own helpers.
 HELPERS = ("ledger",)
-# The library's formulas that rows use. Rectangular teeth are not among them: most of their code is the arithmetic of
-# extreme numbers of crossings, which the tests of that law look at. Nor is the class of disks, which has its own tests.
+# The library's formulas that rows use. Rectangular teeth are excluded: most of their code handles extreme numbers of
+# crossings, which the tests of that law cover. The class of disks is excluded because it has its own tests.
 LIBRARY = (disk, rolling, triangular, circular_arc)
-# Processor seconds: checks take one or less, and a mutant that takes longer than this is counted apart.
+# Limit in processor seconds: checks take at most one, and slower mutants are counted separately.
 SECONDS = 20.0
 SWAPPED_OPERATORS: dict[type[ast.AST], tuple[type[ast.AST], ...]] = {
     ast.Add: (ast.Sub,), ast.Sub: (ast.Add,), ast.Mult: (ast.Div,), ast.Div: (ast.Mult,), ast.Pow: (ast.Mult,),
@@ -56,9 +56,9 @@ SWAPPED_NAMES = {
     "sin": "cos", "cos": "sin", "arcsin": "arccos", "arccos": "arcsin", "asin": "acos", "acos": "asin",
     "floor": "ceil", "ceil": "floor", "minimum": "maximum", "maximum": "minimum", "min": "max", "max": "min",
 }  # fmt: skip
-# By how much an argument or a result is moved: no multiple of the periods and sizes in the checks.
+# Shift of an argument or a result: not a multiple of the periods and sizes in the checks.
 STEP, SYMBOLIC_STEP = 0.00123, sp.Rational(1, 8)
-# Arguments that say how and not what.
+# Arguments that are options, not quantities.
 SETTINGS = {"axis", "keepdims", "dtype"}
 
 
@@ -67,7 +67,7 @@ Formula = Callable[..., Any]
 
 @dataclass(frozen=True)
 class Change:
-    """A function changed in one position; ``label`` names it and has the changed line as it reads now."""
+    """A function changed in one position; ``label`` contains its name and the changed line."""
 
     label: str
     function: FunctionType
@@ -75,7 +75,7 @@ class Change:
 
     @contextmanager
     def in_place(self) -> Iterator[None]:
-        """Put the changed code into the function, for all who call it."""
+        """Install the changed code in the function, for all callers."""
         kept, self.function.__code__ = self.function.__code__, self.code
         try:
             yield
@@ -93,7 +93,7 @@ class Mutant:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a row says of a mutant of its formula: refused, undecided, raised, slow, or accepted."""
+    """A row's answer to a mutant of its formula: refused, undecided, raised, slow, or accepted."""
 
     row: str
     label: str
@@ -102,7 +102,7 @@ class Outcome:
 
 
 def changes(function: FunctionType) -> list[Change]:
-    """Every version of the function with one position changed."""
+    """All versions of the function with one changed position."""
     name, node = _parsed(function.__code__)
     if node is None:
         return []
@@ -122,7 +122,7 @@ def _tree(filename: str) -> ast.Module:
 
 
 def _parsed(code: CodeType) -> tuple[str, ast.FunctionDef | ast.Lambda | None]:
-    """The name and the source of a code object, as a tree."""
+    """The name and the syntax tree of a code object."""
     path = Path(code.co_filename)
     for node in ast.walk(_tree(code.co_filename)):
         if isinstance(node, ast.FunctionDef) and node.name == code.co_name:
@@ -155,7 +155,7 @@ def _compiled(node: ast.FunctionDef | ast.Lambda, like: CodeType) -> CodeType:
 
 
 def _changed(node: ast.FunctionDef | ast.Lambda) -> Iterator[tuple[Any, str]]:
-    """Copies of the function with one position changed, each with the changed line."""
+    """Copies of the function with one changed position, each with the changed line."""
     for number, (line, field) in enumerate(_lines(node)):
         start: Steps = ((field, None),)
         for path in _places(_at(line, start), start):
@@ -170,7 +170,7 @@ def _changed(node: ast.FunctionDef | ast.Lambda) -> Iterator[tuple[Any, str]]:
 
 
 def _lines(node: ast.FunctionDef | ast.Lambda) -> list[tuple[ast.AST, str]]:
-    """What is computed, and in which field: but for docstrings, errors raised and their conditions."""
+    """The computing nodes and their fields, without docstrings, raised errors and the errors' conditions."""
     if isinstance(node, ast.Lambda):
         return [(node, "body")]
     found: list[tuple[ast.AST, str]] = []
@@ -216,7 +216,7 @@ def _put(node: Any, path: Steps, new: ast.AST) -> None:
 
 
 def _replacements(node: ast.AST) -> Iterator[ast.AST]:
-    """What may stand in a position instead of what stands there."""
+    """Possible replacements of a node."""
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
         yield ast.Constant(node.value + 1)
         if node.value:
@@ -235,7 +235,7 @@ def _replacements(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def mutants_of(entry: Entry) -> list[Mutant]:
-    """Every mutant of the right formula of a row, of the helpers beside it, of its arguments and of its result."""
+    """Every mutant of a row's right formula, of its helpers, its arguments and its result."""
     called: dict[CodeType, None] = {}
     calls: list[tuple[tuple[Any, ...], Any]] = []
 
@@ -297,7 +297,7 @@ def _written_in(places: tuple[str, ...], code: CodeType) -> bool:
 
 
 def _within(formula: Formula, change: Change) -> Formula:
-    """The formula, which alone sees the change."""
+    """The formula as the only function that sees the change."""
 
     def changed(*args: Any) -> Any:
         with change.in_place():
@@ -324,7 +324,7 @@ def _with_part(formula: Formula, index: int, turn: Formula) -> Formula:
 
 
 def _shifted(value: Any) -> Any:
-    """Moved by STEP, whole numbers by 1, conditions to what always holds; None of what is no number."""
+    """The value shifted by STEP, integers by 1, conditions set to always hold; None if it is not a number."""
     if isinstance(value, list | tuple):
         parts = [_shifted(part) for part in value]
         return None if any(part is None for part in parts) else type(value)(parts)
@@ -339,7 +339,7 @@ def _shifted(value: Any) -> Any:
 
 
 def _negated(value: Any) -> Any:
-    """With the other sign, conditions to what never holds; None of what is no number."""
+    """The value with the opposite sign, conditions set to never hold; None if it is not a number."""
     if isinstance(value, list | tuple):
         parts = [_negated(part) for part in value]
         return None if any(part is None for part in parts) else type(value)(parts)
@@ -349,7 +349,7 @@ def _negated(value: Any) -> Any:
 
 
 class TooSlow(Exception):
-    """A check took longer than it may."""
+    """A check exceeded its time limit."""
 
 
 @contextmanager
@@ -367,7 +367,7 @@ def _at_most(seconds: float) -> Iterator[None]:
 
 
 def judged(entry: Entry, mutant: Mutant) -> Outcome:
-    """What the check of a row says of a mutant that its formula sees."""
+    """The result of a row's check for a mutant that only its formula sees."""
     assert entry.check is not None
     expected = "proved" if entry.kind == "symbolic" else "agrees"
     try:
@@ -383,7 +383,7 @@ def judged(entry: Entry, mutant: Mutant) -> Outcome:
 
 
 def outcomes_of(entry: Entry) -> list[Outcome]:
-    """What the check of a row says of every mutant."""
+    """The results of a row's check for all mutants."""
     return [judged(entry, mutant) for mutant in mutants_of(entry)]
 
 
@@ -397,7 +397,7 @@ class LibraryFunction:
 
 
 def library(entries: list[Entry]) -> list[LibraryFunction]:
-    """Every function of the library's formulas with the rows that call it."""
+    """Every function of the library's formulas, with the rows that call it."""
     functions: dict[str, FunctionType] = {}
     for module in LIBRARY:
         for owner in (
@@ -406,7 +406,7 @@ def library(entries: list[Entry]) -> list[LibraryFunction]:
         ):
             for function in vars(owner).values():
                 here = isinstance(function, FunctionType) and function.__code__.co_filename == module.__file__
-                # the code of one that calls super() cannot be exchanged
+                # the code of a function that calls super() cannot be exchanged
                 if here and not function.__closure__ and function.__name__ != "__post_init__":
                     functions[f"{module.__name__.rpartition('.')[2]}.{function.__qualname__}"] = function
     callers: dict[str, list[Entry]] = {name: [] for name in functions}
@@ -421,7 +421,7 @@ def library(entries: list[Entry]) -> list[LibraryFunction]:
 
 @contextmanager
 def _watched(functions: dict[str, FunctionType]) -> Iterator[set[str]]:
-    """The names of the functions that are called meanwhile, whoever calls them."""
+    """The names of the functions called inside the context, by any caller."""
     called: set[str] = set()
     kept = {name: function.__code__ for name, function in functions.items()}
     originals = {name: FunctionType(f.__code__, f.__globals__, name, f.__defaults__) for name, f in functions.items()}
@@ -443,7 +443,7 @@ def _watched(functions: dict[str, FunctionType]) -> Iterator[set[str]]:
 
 
 def noticed(function: LibraryFunction, change: Change) -> str | None:
-    """The first row that is no longer as stated with the changed function, None if all of them are."""
+    """The first row whose status fails with the changed function, None if all rows hold."""
     for entry in function.rows:
         with change.in_place():
             outcome = judged(entry, Mutant(change.label, entry.right))
@@ -453,7 +453,7 @@ def noticed(function: LibraryFunction, change: Change) -> str | None:
 
 
 def table_of(outcomes: list[Outcome], rows: list[Entry]) -> str:
-    """One line a row: its mutants, how many its check refused, could not decide or raised on, and what is left."""
+    """One line for each row: its mutants, how many were refused, undecided or raised, and the accepted ones."""
     lines: list[tuple[object, ...]] = []
     totals = [0] * 5
     for entry in rows:
@@ -469,7 +469,7 @@ def table_of(outcomes: list[Outcome], rows: list[Entry]) -> str:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Print the tables; 1 if a check accepts a wrong formula or no row notices a wrong library."""
+    """Print the tables; return 1 if a check accepts a wrong formula or no row notices a wrong library."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("ids", nargs="*", help="rows, by the beginning of their ids")
     parser.add_argument("--library", action="store_true", help="change the library's formulas for the whole ledger")

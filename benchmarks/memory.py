@@ -1,4 +1,4 @@
-"""Memory of an estimate by rays: does it grow with their number?"""
+"""Memory of an estimate by rays as a function of the number of rays."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from asperity import geometry as geo
 from asperity import kernels as ker
 
-# Bins, and rays of one estimate after another; 10^10 would be as many chunks more, each added to the same counts.
+# Bins, and rays of successive estimates; 10^10 rays would be more chunks, each added to the same counts.
 BINS, RAYS = 512, (2**20, 2**22, 2**23)
-# Objects of the interpreter come and go by this fraction.
+# Fraction by which the interpreter's own objects may change the memory.
 SAME = 0.02
 
 
@@ -31,7 +31,7 @@ class MemoryUse:
 
 
 def measure_memory(rays: tuple[int, ...] = RAYS) -> MemoryUse:
-    """Allocations of numpy included; those before the first estimate are not counted."""
+    """Measure peaks, including numpy's allocations, without the memory in use before the first estimate."""
     law, basis = ker.WallLaw(geo.dispersing_arcs(1.0)), ker.Bins(BINS)
     peaks = []
     _estimate(law, basis, min(rays) // 4)

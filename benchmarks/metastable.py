@@ -1,4 +1,4 @@
-"""A chain of 30 wells: the same matrix for asperity, scipy and, in the peers' environment, deeptime."""
+"""A chain of 30 wells: the same matrix solved by asperity, by scipy and, in the peers' environment, by deeptime."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from asperity.core.tables import table
 from asperity.spectral import leading_eigenvalues
 
 WELLS, STATES = 30, (10, 333)
-# Rates between the wells: three groups, whose eigenvalues make three clusters of ten.
+# Rates between the wells: three groups, which give three clusters of ten eigenvalues.
 RATES = np.repeat([1e-6, 1e-9, 1e-12], [10, 10, 9])
 
 
 class Solution(NamedTuple):
-    """The eigenvalues that a solver finds, what it says of them, and its seconds where it measured them itself."""
+    """The eigenvalues found by a solver, its own statement on them, and its seconds if it measured them itself."""
 
     values: np.ndarray[Any, Any]
     claim: str
@@ -30,7 +30,7 @@ Solver = Callable[["csr_array[Any]"], Solution]
 
 
 def chain(inside: int) -> csr_array[Any]:
-    """Hopping at rate 1/4 within wells of ``inside`` states, and at ``RATES`` between them."""
+    """Hopping at rate 1/4 within wells of ``inside`` states, and at ``RATES`` between wells."""
     hop = np.full(WELLS * inside - 1, 0.25)
     hop[inside - 1 :: inside] = RATES
     diagonal = 1.0 - np.append(hop, 0.0) - np.append(0.0, hop)
@@ -38,13 +38,13 @@ def chain(inside: int) -> csr_array[Any]:
 
 
 def expected_gaps(inside: int) -> np.ndarray[Any, Any]:
-    """1 - lambda to first order in the rates: those of the chain of wells over ``inside``."""
+    """1 - lambda to first order in the rates: the gaps of the chain of wells, divided by ``inside``."""
     coarse = np.diag(np.append(RATES, 0.0) + np.append(0.0, RATES)) - np.diag(RATES, 1) - np.diag(RATES, -1)
     return np.asarray(np.sort(np.linalg.eigvalsh(coarse)) / inside)
 
 
 def _row(name: str, solve: Solver, inside: int) -> str:
-    """One solver on one chain; wrong are gaps 1 - lambda off by more than the larger of a tenth and 1e-13."""
+    """One solver on one chain; a gap 1 - lambda is wrong if its error exceeds a tenth of it and 1e-13."""
     matrix = chain(inside)
     start = time.perf_counter()
     try:

@@ -1,7 +1,7 @@
-"""The modified law K~ = eta^(-1) K eta against the cylinder's law K_cyl, and against itself, as the scale tends to 0.
+"""The modified law K~ = eta^(-1) K eta against the cylinder's law K_cyl, and as an involution, for decreasing scale.
 
 ``python -m benchmarks.modified_law`` draws states of the cylinder from the invariant measure over one period of the
-wall and one spacing of the satellites, and prints how far both laws are apart and whether K~ undoes itself.
+wall and one spacing of the satellites. It prints the distance of the two laws and how often K~ is its own inverse.
 """
 
 from __future__ import annotations
@@ -28,30 +28,30 @@ WALLS = {
 DISK = geo.Disk(mass=1.0, inertia=0.6)
 SCALES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 STATES = 20_000
-# A state that comes back elsewhere by more than this, in a unit velocity or in a cell, does not come back.
+# A state does not return if K~ applied twice misses it by more than this, in unit velocity or in a cell.
 MISMATCH = 1e-3
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What was found at one scale.
+    """The results at one scale.
 
     Attributes
     ----------
     spacing : float
     inside : float
-        The fraction of the states at which K~ is defined as in the paper.
+        Fraction of the states at which K~ is defined as in the paper.
     distance, distance_error : float
-        The mean of |w~' - w'|, kinetic norm of unit velocities, over the states inside, and the half width of its 95 %
+        Mean of |w~' - w'|, the kinetic norm for unit velocities, over the states inside, and the half width of its 95 %
         interval.
     distance_of_all : float
-        The same mean over all states that came back, those outside included.
+        The same mean over all states that escaped, including the states outside.
     displacement : float
-        The mean of |y~' - y'|, of the greater coordinate, in units of the scale.
+        Mean of |y~' - y'|, the larger coordinate, in units of the scale.
     defect : float
-        The median over the states inside of |K~(K~(s)) - s| in the velocity.
+        Median of |K~(K~(s)) - s| in the velocity, over the states inside.
     mismatches, mismatches_outside : float
-        The fractions of the states inside, and of those outside that escaped, which do not come back.
+        Fractions of the states inside, and of the escaped states outside, that do not return.
     """
 
     spacing: float
@@ -77,7 +77,7 @@ def states(
 
 
 def measured(wall: geo.Wall, disk: geo.Disk, scale: float, n: int, rng: np.random.Generator) -> Measured:
-    """Draw states, collide them by both laws, and send those inside back by K~."""
+    """Draw states, apply both laws to them, and apply K~ twice to the states inside."""
     spacing = geo.ConfigurationSpace(wall, disk, scale).spacing
     position, velocity = states(wall, disk, scale, spacing, n, rng)
     out = geo.collide_modified(disk, wall, scale, position, velocity, spacing)
