@@ -1,12 +1,12 @@
-"""Which wrong lines the tests would let pass: python -m benchmarks.mutants [MODULE ...] prints a table of mutants.
+"""Mutation tests: python -m benchmarks.mutants [MODULE ...] prints a table of the faults that the tests miss.
 
-cosmic-ray writes one small fault at a time into a module (another number, - for +, / for *, a comparison turned, a
-condition negated, ...), and the module's own tests are run on it. A mutant that survives is a fault that nobody would
-see, unless the changed line means the same: `equivalent_mutants.toml` has those, each with its reason. The modules are
-those whose errors do not show in the results that they prove or weigh.
+cosmic-ray writes one small fault at a time into a module (another number, - for +, / for *, a reversed comparison, a
+negated condition, ...), and the module's own tests are run on it. A mutant that survives is a fault that the tests
+miss, unless the changed line has the same meaning. `equivalent_mutants.toml` lists such equivalent mutants with their
+reasons. The modules are those whose errors do not show in the results that they prove or weight.
 
-A mutant runs in a fork of a process that has imported what does not need the module; nothing is written to the tree.
-One that survives and is not known to be equivalent is tried again, by a fresh Python in a copy of the tree.
+A mutant runs in a fork of a process that has imported everything that does not need the module; nothing is written to
+the tree. A survivor that is not known to be equivalent is tested again, by a fresh Python in a copy of the tree.
 ``--fraction 0.1`` takes every tenth mutant.
 """
 
@@ -40,7 +40,7 @@ from .pages import print_table
 
 ROOT = Path(__file__).resolve().parent.parent
 EQUIVALENT = Path(__file__).with_name("equivalent_mutants.toml")
-# The tests that are to see a fault in a module; the quick ones first, since the first failure ends a run.
+# The tests of each module, quick ones first, because the first failure ends a run.
 TESTS = {
     "spectral/eigenvalues/completeness.py": ("test_completeness.py",),
     "spectral/bounds/enclosure.py": ("test_enclosure_intervals.py",),
@@ -55,7 +55,7 @@ TESTS = {
     "geometry/disk/disk.py": ("test_disk.py",),
     "geometry/cells/profile.py": ("test_profiles.py",),
 }
-# Mutants of these kinds: exchanges of operators whose faults people make, not every operator by every other.
+# Kinds of mutants: plausible human errors, not every operator exchanged with every other.
 KINDS = (
     "NumberReplacer", "AddNot", "Delete_Not", "Delete_USub", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue",
     "ReplaceOrWithAnd", "ReplaceAndWithOr", "ZeroIterationForLoop", "ReplaceBreakWithContinue",
@@ -63,9 +63,9 @@ KINDS = (
     "Eq_NotEq", "NotEq_Eq", "Lt_LtE", "Lt_Gt", "LtE_Lt", "LtE_GtE", "Gt_GtE", "Gt_Lt", "GtE_Gt", "GtE_LtE", "Is_IsNot",
     "IsNot_Is", "In_NotIn", "NotIn_In",
 )  # fmt: skip
-# A mutant has ten times the processor time of the module itself and so many seconds more, and so many bytes.
+# Limits of a mutant: PATIENCE times the module's own processor time plus SECONDS, and BYTES of memory.
 PATIENCE, SECONDS, BYTES = 10.0, 20.0, 2**34
-# What tests import besides asperity.
+# Imports of the tests besides asperity.
 LIBRARIES = ("hypothesis", "mpmath", "numba", "numpy.testing", "pytest", "scipy.linalg", "scipy.special", "scipy.stats")
 INTERNAL_ERROR = 3
 PYTEST = ("-x", "-q", "--assert=plain", "-p", "no:cacheprovider", "-p", "no:xdist")
@@ -76,7 +76,7 @@ LEFT_OUT = shutil.ignore_patterns(
 
 @dataclass(frozen=True)
 class Mutant:
-    """A changed line, and whether the tests saw it."""
+    """A changed line, and whether the tests failed on it."""
 
     module: str
     line: int
@@ -86,12 +86,12 @@ class Mutant:
 
     @property
     def change(self) -> tuple[str, str, str]:
-        """What `equivalent_mutants.toml` knows it by."""
+        """The key of the mutant in `equivalent_mutants.toml`."""
         return self.module, self.before, self.after
 
 
 def main() -> None:
-    """Print a row a module, and the survivors that are not known to be equivalent."""
+    """Print a row for each module, and the survivors that are not known to be equivalent."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.mutants", description=__doc__)
     parser.add_argument("modules", nargs="*", metavar="MODULE", help=f"among {', '.join(TESTS)}")
     parser.add_argument("--fraction", type=float, default=1.0, help="fraction of the mutants that are tried")
@@ -123,13 +123,13 @@ def main() -> None:
 
 
 def known_equivalents() -> set[tuple[str, str, str]]:
-    """Module, line and changed line of the mutants that mean the same, as the file lists them."""
+    """Module, line and changed line of the equivalent mutants listed in the file."""
     listed = tomllib.loads(EQUIVALENT.read_text(encoding="utf-8"))["mutant"]
     return {(entry["module"], entry["before"], entry["after"]) for entry in listed}
 
 
 def mutants_of(module: str, fraction: float, seed: int, same: set[tuple[str, str, str]]) -> list[Mutant]:
-    """Try the mutants of one module; the process must be a fresh one."""
+    """Test the mutants of one module; the process must be fresh."""
     original = (ROOT / module).read_text(encoding="utf-8")
     _warm(module)
     killed, seconds = _is_killed(module, original, resource.RLIM_INFINITY)
@@ -146,7 +146,8 @@ def mutants_of(module: str, fraction: float, seed: int, same: set[tuple[str, str
 
 
 def _changed_sources(original: str) -> Iterator[str]:
-    """The module with one fault, of the kinds that are listed; not in decorators, whose arguments are no arithmetic."""
+    """Copies of the module with one fault of the listed kinds, outside decorators, whose arguments are not
+    arithmetic."""
     from cosmic_ray.ast import ast_nodes, get_ast
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator, operator_names
@@ -175,7 +176,7 @@ class _Source(MetaPathFinder, InspectLoader):
 
 
 def _warm(module: str) -> None:
-    """Import whatever can be imported without the module."""
+    """Import everything that can be imported without the module."""
     os.environ |= {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL")}
     os.chdir(ROOT)
     sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
@@ -191,7 +192,7 @@ def _warm(module: str) -> None:
 
 
 def _is_killed(module: str, source: str, seconds: int) -> tuple[bool, float]:
-    """Whether the module's tests fail in a fork where it has this source, and the CPU seconds that they took."""
+    """Whether the module's tests fail in a fork with this source, and the CPU seconds of the tests."""
     process = os.fork()
     if process == 0:
         with suppress(BaseException):
@@ -208,7 +209,7 @@ def _run_tests(module: str, source: str, seconds: int) -> int:
     import pytest
     from hypothesis import Phase, settings
 
-    # one counterexample will do, however long
+    # one counterexample suffices, without shrinking
     phases = (Phase.explicit, Phase.generate)
     settings.register_profile("mutants", deadline=None, derandomize=True, phases=phases, report_multiple_bugs=False)
 

@@ -1,4 +1,4 @@
-"""What the scripts write: the pages docs/benchmarks.md and docs/stability.md with pictures, and tables as they grow."""
+"""Output of the scripts: the generated pages docs/benchmarks.md and docs/stability.md, and tables line by line."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ BEGIN, END = "<!-- measured -->", "<!-- end -->"
 
 
 def write_between_marks(page: Path, text: str) -> None:
-    """Put the text where the page's marks are."""
+    """Replace the text between the page's marks."""
     head, rest = page.read_text(encoding="utf-8").split(BEGIN)
     page.write_text(f"{head}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", encoding="utf-8")
 
 
 def print_table(heads: str, rows: Iterable[str | Iterable[object]]) -> None:
-    """Print a table line by line, each as soon as it is there."""
+    """Print a table line by line, each line as soon as it is available."""
     for line in table_lines(heads, rows):
         print(line, flush=True)
 
 
 def pictures(run: BenchRun, folder: Path) -> list[str]:
-    """Put the pictures of a saved run into the documentation instead of those there; the lines that show them."""
+    """Replace the figures in the documentation by the figures of a saved run; return the lines that show them."""
     PICTURES.mkdir(exist_ok=True)
     for old in PICTURES.glob("*.png"):
         old.unlink()

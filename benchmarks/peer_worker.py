@@ -1,7 +1,7 @@
 """Runs one peer, in the peers' own environment: ``python peer_worker.py PEER DATA.npz`` prints one line of JSON.
 
-Imports nothing of asperity. Every peer is run as its best users would run it. Rays: x, theta in, theta out by the
-reference; the wall is a tooth with the vertices ``corners``. Spectra: a row-stochastic matrix and its right gap.
+It imports nothing of asperity. Every peer is run as its expert users run it. Data of rays: x, incoming theta, outgoing
+theta of the reference, and the ``corners`` of the tooth. Data of spectra: a row-stochastic matrix and its exact gap.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 MOST_BOUNCES = 100
-# How far a ray is moved off a surface before it goes on: the usual remedy against hitting it again, and its cost.
+# Distance by which a ray is moved off a surface, the usual remedy against hitting it again, which costs accuracy.
 STEP = 1e-6
 # The z extent of the extruded wall.
 DEPTH = 10.0
@@ -27,7 +27,7 @@ RUNS = 4
 
 
 def embree(data):
-    """A program in C that is compiled here: Embree's own interface, without Python between the reflections."""
+    """A C program, compiled here, with Embree's own interface and no Python between reflections."""
     source = Path(__file__).with_name("embree_peer.c")
     corners, x, theta = (np.asarray(data[name], np.float32) for name in ("corners", "x", "theta"))
     with tempfile.TemporaryDirectory() as folder:
@@ -44,7 +44,7 @@ def embree(data):
 
 
 def mitsuba(data):
-    """All reflections in one loop that Dr.Jit compiles with LLVM, rectangles for the sides of the teeth, one thread."""
+    """All reflections in one loop that Dr.Jit compiles with LLVM; the sides of the teeth are rectangles; one thread."""
     import drjit as dr
     import mitsuba as mi
 
@@ -91,7 +91,7 @@ def rectangle(mi, start, end):
 
 def judged(out, right, seconds, version):
     lost = np.isnan(out)
-    # single precision holds an angle to 1e-7; a hundred bounces and a step of 1e-6 do not make 1e-3 of that
+    # single precision resolves angles to 1e-7, and a hundred bounces and a step of 1e-6 stay below 1e-3
     wrong = ~lost & (np.abs(out - right) > 1e-3)
     return {
         "version": version, "rate": len(out) / seconds, "wrong": float(wrong.mean()), "lost": float(lost.mean()),
@@ -102,7 +102,7 @@ def deeptime(data):
     from deeptime.markov.msm import MarkovStateModel
 
     start = time.perf_counter()
-    # three of the largest modulus: one may be near -1
+    # three eigenvalues of largest modulus, because one may be near -1
     values = np.sort(np.real(MarkovStateModel(data["matrix"]).eigenvalues(3)))
     return spectral(1.0 - values[-2], data, time.perf_counter() - start, "deeptime")
 
@@ -113,7 +113,7 @@ def deeptime_wells(data):
     from scipy.sparse import csr_matrix
 
     matrix = csr_matrix((data["entries"], data["columns"], data["starts"]))
-    # told that the chain is reversible and what its stationary law is, it takes the symmetric solver
+    # with reversibility and the stationary law given, deeptime uses its symmetric solver
     uniform = np.full(matrix.shape[0], 1.0 / matrix.shape[0])
     start = time.perf_counter()
     values = eigenvalues(matrix, k=int(data["wanted"]), reversible=True, mu=uniform)

@@ -1,4 +1,4 @@
-"""Peers in the same run: installed into an environment of their own, each in a process with a time limit."""
+"""Peers in the same run: installed in their own environment, each in a process with a time limit."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from asperity.core.tables import table
 from .metastable import WELLS, Solution, metastable_table
 
 WORKER = Path(__file__).with_name("peer_worker.py")
-# name in `peer_worker`, what it computes with, and requirements
-# Embree comes with the system, as libembree-dev does in Debian; its program needs numpy only
+# Name in `peer_worker`: precision and requirement. Embree is a system package, such as libembree-dev in Debian; its
+# program needs numpy only.
 TRACERS = {"embree": ("single", "numpy"), "mitsuba": ("single", "mitsuba")}
 CHAINS = {"deeptime": "deeptime", "pydtmc": "PyDTMC"}
 INTRODUCTION = (
@@ -31,17 +31,17 @@ INTRODUCTION = (
     "reversible; scipy with shift and inversion. Direct simulation codes such as SPARTA are not measured: their time "
     "goes into moving particles between cells."
 )
-# Limits of single commands, and of all of them together, which end before their section does.
+# Limits of single commands, and of all commands together.
 MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 210.0
-# Without an index pip should say so soon.
+# Short timeouts, so that pip fails soon without an index.
 PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
 RAYS, REPEATS, ANGLE = 2**17, 3, 0.7
-# Maxwell's law in bins: a gap that any solver finds, and one that only a careful one tells from 0.
+# Maxwell's law in bins: an easy gap, and a gap that only an accurate solver distinguishes from 0.
 BINS, GAPS = 256, (0.5, 1e-9)
 
 
 def peer_tables(folder: Path) -> str:
-    """Rays and spectra by the peers and by asperity, as Markdown."""
+    """Markdown tables of rays and spectra computed by the peers and by asperity."""
     peers = PeerEnvironment(folder / "environment")
     folder.mkdir(parents=True, exist_ok=True)
     wells = metastable_table({"deeptime": lambda matrix: _deeptime_wells(folder, peers, matrix)})
@@ -49,12 +49,12 @@ def peer_tables(folder: Path) -> str:
 
 
 class PeerEnvironment:
-    """The peers' own Python, made in a folder by the first that asks for it; each package is installed once.
+    """The peers' own Python, created in a folder at the first use; each package is installed once.
 
     Parameters
     ----------
     folder : Path
-        An environment that an earlier run left there is used again.
+        An environment left there by an earlier run is reused.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -63,7 +63,7 @@ class PeerEnvironment:
         self._refusals: dict[str, str] = {}
 
     def run(self, peer: str, package: str, data: Path) -> dict[str, Any] | str:
-        """What the peer's function in `peer_worker` gives for the data; or in words why it gives nothing."""
+        """The result of the peer's function in `peer_worker`, or the reason of its failure in words."""
         if package not in self._refusals:
             self._refusals[package] = self._make() or self._install(package)
         if self._refusals[package]:
@@ -86,7 +86,7 @@ class PeerEnvironment:
         return f"cannot be installed: {refusal}" if refusal else ""
 
     def _output(self, command: list[str], seconds: float) -> tuple[str, str]:
-        """What a command prints, and in words why it failed, or nothing."""
+        """The output of a command, and the reason of its failure in words, or an empty string."""
         limit = min(seconds, self._end - time.monotonic())
         if limit <= 0.0:
             return "", "the peers' time was up"
@@ -141,7 +141,7 @@ def _chains(folder: Path, peers: PeerEnvironment) -> str:
 
 
 def _deeptime_wells(folder: Path, peers: PeerEnvironment, matrix: csr_array[Any]) -> Solution:
-    """Eigenvalues of a sparse chain by deeptime, in a process whose start is not part of the time."""
+    """Eigenvalues of a sparse chain by deeptime, timed without the start of the process."""
     data = folder / "wells.npz"
     np.savez(data, entries=matrix.data, columns=matrix.indices, starts=matrix.indptr, wanted=WELLS)
     answer = peers.run("deeptime_wells", CHAINS["deeptime"], data)

@@ -1,4 +1,4 @@
-"""lambda_2 of the standard set by other ways than the library's: theorems, another program, rays and extrapolation."""
+"""lambda_2 of the standard set by independent methods: theorems, another program, rays and extrapolation."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from asperity.core.checks import Floats
 from .reference_rays import NETS, Found, sampled_sums
 
 RAYS = 2**24
-# Of the focusing arcs, by piecewise polynomials in another program; how far it knows it.
+# Value for the focusing arcs, by piecewise polynomials in another program, and its error.
 ARC_LAMBDA2, ARC_ERROR = 0.3670253152, 3e-10
-# Sizes in which Legendre matrices are extrapolated.
+# Sizes of the extrapolated Legendre matrices.
 SIZES = (16, 32, 64)
-# Degrees of the panels of the cusps, coarser and finer; towards each special angle there are so many, the last of this
-# fraction of the first.
+# Coarse and fine degree of the panels of the cusps, number of panel edges towards each special angle, and ratio of the
+# smallest to the largest distance.
 DEGREES, PANELS, SMALLEST = (2, 3), 9, 1e-3
 GRAZING_ANGLES, GRAZING_POINTS = (1e-5, 1e-6, 1e-7), 2**22
 
 
 def reference_eigenvalue(scene: str) -> Found | None:
-    """The largest spectral value off the constants, or None where it is not known independently."""
+    """The largest spectral value off the constants, or None if no independent value is known."""
     wall = wall_of(scene)
     if wall.is_polygonal:
         return Found(np.asarray(1.0), 0.0, "theorem: 1 is in the essential spectrum of isometries")
@@ -36,7 +36,7 @@ def _of_arc(wall: geo.Wall) -> Found:
 
 
 def _of_cusps(wall: geo.Wall) -> Found:
-    """On panels graded towards pi/2, where rays stay in the cusp for long, as well as towards grazing."""
+    """On panels graded towards grazing and towards pi/2, where rays stay long in the cusp."""
     near = 0.25 * np.pi * np.geomspace(SMALLEST, 1.0, PANELS)
     edges = np.unique(
         np.concatenate([[0.0, np.pi], near, np.pi - near, 0.5 * np.pi - near, [0.5 * np.pi], 0.5 * np.pi + near])
@@ -52,7 +52,7 @@ def _of_cusps(wall: geo.Wall) -> Found:
 
 
 def _of_mixed(wall: geo.Wall) -> Found:
-    """Galerkin values rise with the basis, at a rate that three sizes show: Aitken's extrapolation."""
+    """Aitken's extrapolation of Galerkin values for three sizes, which increase with the basis."""
     basis = ker.Legendre(SIZES[-1])
     nets = sampled_sums(wall, {"": basis}, RAYS)[""]
     parts = [_jackknifed([net[:n, :n] for net in nets], basis.constant[:n]) for n in SIZES]
@@ -63,7 +63,7 @@ def _of_mixed(wall: geo.Wall) -> Found:
 
 
 def _of_mushroom(wall: geo.Wall) -> Found:
-    """The edge of the essential spectrum, E[sin(theta)/sin(theta')] as theta -> 0, by rays at three small angles."""
+    """The edge of the essential spectrum, E[sin(theta)/sin(theta')] as theta -> 0, from rays at three small angles."""
     entry = (np.arange(GRAZING_POINTS) + 0.5) / GRAZING_POINTS
     law = ker.WallLaw(wall)
     ratios = [
@@ -76,7 +76,7 @@ def _of_mushroom(wall: geo.Wall) -> Found:
 
 
 def _jackknifed(nets: list[Floats], constant: Floats) -> tuple[float, float]:
-    """Largest eigenvalue off the constants of the mean of independent matrices, without its bias, and its error."""
+    """Largest eigenvalue off the constants of the mean of independent matrices, with bias removed, and its error."""
     total = np.sum(nets, axis=0)
     whole = _largest(total / NETS, constant)
     parts = np.array([_largest((total - net) / (NETS - 1), constant) for net in nets])

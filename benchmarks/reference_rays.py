@@ -1,4 +1,4 @@
-"""Means over rays of scrambled Sobol sequences of their own, whose spread is their error."""
+"""Means over rays of independent scrambled Sobol sequences, with errors from the spread of the sequences."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NETS, CHUNK, SEED = 16, 2**18, 20261121
 
 @dataclass(frozen=True)
 class Found:
-    """A value, its error and where it comes from."""
+    """A value, its error and its source."""
 
     value: Floats
     error: float
@@ -26,7 +26,7 @@ class Found:
 
 
 def rays_of(wall: geo.Wall, number: int, net: int) -> Iterator[tuple[Floats, Floats]]:
-    """Incoming and outgoing angles of one scrambled net, in chunks."""
+    """Incoming and outgoing angles of one scrambled Sobol sequence, in chunks."""
     law, engine = ker.WallLaw(wall), Sobol(2, scramble=True, bits=52, rng=np.random.default_rng([SEED, net]))
     tiny, below_one = np.finfo(float).tiny, np.nextafter(1.0, 0.0)
     for start in range(0, number, CHUNK):
@@ -36,7 +36,7 @@ def rays_of(wall: geo.Wall, number: int, net: int) -> Iterator[tuple[Floats, Flo
 
 
 def sampled_sums(wall: geo.Wall, bases: dict[str, ker.Basis], rays: int) -> dict[str, list[Floats]]:
-    """Symmetrised means of e_i(theta) e_j(theta') for every net and basis."""
+    """Symmetrised means of e_i(theta) e_j(theta') for every sequence and basis."""
     nets: dict[str, list[Floats]] = {name: [] for name in bases}
     for net in range(NETS):
         sums = {name: np.zeros((basis.size, basis.size)) for name, basis in bases.items()}
@@ -52,6 +52,6 @@ def sampled_sums(wall: geo.Wall, bases: dict[str, ker.Basis], rays: int) -> dict
 
 
 def mean_and_error(values: list[Floats]) -> tuple[Floats, float]:
-    """Mean of the nets, and the Frobenius norm of its standard errors."""
+    """Mean over the sequences, and the Frobenius norm of its standard errors."""
     table = np.asarray(values)
     return table.mean(axis=0), float(np.sqrt(np.sum(table.var(axis=0, ddof=1)) / len(table)))

@@ -1,4 +1,4 @@
-"""The true disk: collisions a second, and the involution on many random states (python -m benchmarks.rigid)."""
+"""The true disk: collisions a second, and the involution for many random states (python -m benchmarks.rigid)."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ CHECKED = {
 }
 SCALES = (1e-1, 1e-2, 1e-4, 1e-6, 1e-8)
 EPS = float(np.finfo(float).eps)
-# The largest of so many random errors of the way back stands for its conditioning; with six, two states in 10^6 whose
-# three coordinates happened to cancel seemed worse than that.
+# Random perturbations of the reversed path; the largest change estimates its conditioning. With six perturbations, two
+# states in 10^6 seemed worse than their conditioning because their three coordinates happened to cancel.
 SHAKES = 20
 # Disks for each plate and scale.
 PLATE_STATES = 200
@@ -42,7 +42,7 @@ PLATE_STATES = 200
 
 @dataclass(frozen=True)
 class Speed:
-    """Collisions a second of the true disk, by one thread and by two."""
+    """Collisions a second of the true disk, on one thread and on two."""
 
     wall: str
     scale: float
@@ -53,7 +53,7 @@ class Speed:
 
 @dataclass(frozen=True)
 class InvolutionCheck:
-    """Worst and median errors of K(K(s)) = s, and how many states miss it by more than their conditioning allows."""
+    """Worst and median errors of K(K(s)) = s, and the number of states beyond their conditioning."""
 
     wall: str
     scale: float
@@ -66,14 +66,14 @@ class InvolutionCheck:
 
 
 def random_states(wall: geo.Wall, scale: float, n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Positions over one cell and one spacing, velocities with independent cosines."""
+    """Positions over one cell and one spacing, and velocities with independent uniform cosines."""
     spacing = Satellites.around(scale, scale * wall.depth).spacing
     position = np.stack([rng.random(n) * scale * wall.period, (rng.random(n) - 0.5) * spacing], axis=1)
     return position, -DISK.from_angles(np.arccos(1 - 2 * rng.random(n)), np.arccos(1 - 2 * rng.random(n)))
 
 
 def measure_rigid() -> list[Speed]:
-    """One row a wall and scale; the least time of the repeats counts."""
+    """One row for each wall and scale, with the least time of the repeats."""
     rng, rows = np.random.default_rng(0), []
     for what, wall in TIMED.items():
         for scale in (1e-2, 1e-4, 1e-6):
@@ -87,7 +87,7 @@ def measure_rigid() -> list[Speed]:
 
 
 def check_involution() -> list[InvolutionCheck]:
-    """Share the states among walls and scales; the conditioning of each is measured by shaking its way back."""
+    """Divide the states among walls and scales; perturb each reversed path to measure its conditioning."""
     rng, rows = np.random.default_rng(1), []
     n = STATES // (len(CHECKED) * len(SCALES))
     for what, wall in CHECKED.items():
@@ -97,7 +97,7 @@ def check_involution() -> list[InvolutionCheck]:
             good = out.escaped
             back = geo.collide(DISK, wall, scale, out.position[good], -out.velocity[good])
             error = np.abs(back.velocity + velocity[good]).max(axis=1)
-            # positions are computed from angles of up to the spacing, and keep the rounding error of that size
+            # positions are computed from angles up to the spacing and have the rounding error of that size
             size = np.array([1e-3 * scale, Satellites.around(scale, scale * wall.depth).spacing])
             shaken = np.zeros(len(error))
             for _ in range(SHAKES):
@@ -116,7 +116,7 @@ def check_involution() -> list[InvolutionCheck]:
 
 
 def standing_plate(thickness: float, lean: float) -> geo.Wall:
-    """A plate in a rectangular hollow."""
+    """A wall with a plate in a rectangular hollow."""
     foot = 0.5 - 0.5 * thickness
     points = [(foot, -0.9), (foot + lean, -0.2), (foot + lean + thickness, -0.2), (foot + thickness, -0.9)]
     points = [point for k, point in enumerate(points) if k == 0 or point != points[k - 1]]
@@ -124,7 +124,7 @@ def standing_plate(thickness: float, lean: float) -> geo.Wall:
 
 
 def floating_plate(thickness: float, tilt: float) -> geo.Wall:
-    """A plate over a floor."""
+    """A wall with a plate over a floor."""
     along, down = (
         0.3 * np.array([math.cos(tilt), math.sin(tilt)]),
         thickness * np.array([math.sin(tilt), -math.cos(tilt)]),
@@ -137,7 +137,7 @@ def floating_plate(thickness: float, tilt: float) -> geo.Wall:
 
 
 def check_plates() -> Iterator[str]:
-    """Plates and sharp peaks against the tests' brute force: rows with the disks that are lost or wrong."""
+    """Rows for plates and sharp peaks, compared with the tests' brute force: counts of unresolved and wrong disks."""
     walls = {f"standing plate, {t:g} thick": standing_plate(t, 0.0) for t in (0.0, 1e-16, 1e-15, 1e-14, 1e-13, 1e-10)}
     walls |= {f"leaning plate, {t:g} thick": standing_plate(t, 0.04) for t in (0.0, 3e-16, 1e-14)}
     walls |= {
@@ -159,7 +159,7 @@ def check_plates() -> Iterator[str]:
 
 
 def speed_table(measured: Iterable[Speed]) -> str:
-    """The speeds as a table."""
+    """A table of the speeds."""
     rows = (
         f"{speed.wall} | {speed.scale:.0e} | {speed.contacts:.2f} | {speed.one_thread / 1e6:.2f} "
         f"| {speed.two_threads / 1e6:.2f}"

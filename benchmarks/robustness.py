@@ -1,9 +1,9 @@
-"""Rays aimed at corners and tangencies, and rays at grazing angles, against another tracer: every one of them.
+"""Rays aimed at corners and tangencies, and rays at grazing angles, all compared with another tracer.
 
-``python -m benchmarks.robustness`` traces a million of each on twelve walls against the double-double twin, and a
-million rays aimed at the corners of random polygons of each kind in `POLYGONS` against the tests' brute-force tracer in
-31 digits, and prints what became of them. Twin and brute force are judged in turn by the tests' tracer in 50 digits: on
-a thousand rays, and on every ray where they and the tracer disagree.
+``python -m benchmarks.robustness`` traces a million of each on twelve walls against the double-double tracer, its twin.
+A million rays aimed at the corners of random polygons of each kind in `POLYGONS` are traced against the tests'
+brute-force tracer in 31 digits. The tests' tracer in 50 digits checks both references: on a thousand rays, and on every
+ray where a reference and the tracer disagree.
 """
 
 from __future__ import annotations
@@ -30,22 +30,23 @@ from .pages import print_table
 
 Floats = NDArray[np.float64]
 EPS = 2.0**-52
-# The tracer's error on a ray that its twin leaves open: hundreds of bounces with a derivative of some 10^6.
+# Allowed error on a ray that the twin leaves undecided: hundreds of bounces with a derivative of about 10^6.
 OPEN_ERROR = 1e-6
 RAYS = 1_000_000
-# Rays that are traced in 50 digits besides those in dispute, on all walls together.
+# Rays traced in 50 digits besides the rays in dispute, on all walls together.
 PRECISE_RAYS = 1000
-# The twin's error, in units of its own rounding error times the derivative and the bounces.
+# Allowed error of the twin, in units of its rounding error times the derivative and the bounces.
 TWIN_UNITS = 2.0**10
-# Rays still inside after so many collisions are not compared: on both sides they end with the bounce limit.
+# Rays still inside after this many collisions are not compared: both tracers end them with the bounce limit.
 COLLISIONS = 200
-# An aimed ray is off its target by up to so many ulps of its angle.
+# Largest deviation of an aimed ray from its target, in ulps of its angle.
 AIM_ULPS = 4
 # Bisections from an interval of angles to two neighbouring doubles.
 BISECTIONS = 64
-# The double tracer's error, in units of EPS times the norm of the derivative, a bounce; measured below 5 in all.
+# Allowed error of the double tracer, in units of EPS times the norm of the derivative times the bounces; measured < 5.
 ERROR_UNITS = 32.0
-# A disagreement is one of conditioning where the twin, its ray moved by at most so many ulps, does what the tracer did.
+# A disagreement is due to conditioning if the twin, with its ray moved by at most this many ulps, agrees with the
+# tracer.
 CONDITION_ULPS = 64
 
 WALLS: dict[str, geo.Wall] = {
@@ -91,29 +92,29 @@ WALLS: dict[str, geo.Wall] = {
 }
 
 
-# Random polygons of each kind, and what their peaks and plates are like: uniform in the logarithm.
+# Number of random polygons of each kind, and ranges of their peaks and plates, uniform on a logarithmic scale.
 POLYGON_WALLS = 100
 PEAK_ANGLES = (1e-4, 0.1)
 PLATE_THICKNESS = (1e-17, 1e-12)
-# Every third plate has no thickness.
+# Fraction of the plates that have no thickness.
 THIN_FRACTION = 1 / 3
 # Distances from a corner at which rays are aimed.
 BESIDE_CORNERS = (1e-17, 1e-9)
 FLOOR = -0.9
-# Sine of the shallowest of the rays at edges between itineraries.
+# Least sine of the angle of rays at edges between itineraries.
 SHALLOWEST = 1e-3
 
 Point = tuple[float, float]
-# A wall and rays to the end, or to the judge's.
+# Traces the rays of a wall to the end, as a reference.
 Follow = Callable[[geo.Wall, Floats, Floats], RefinedTrace]
-# Rays of a kind: positions and angles of so many on a wall.
+# Makes positions and angles of a number of rays on a wall.
 Rays = Callable[[geo.Wall, int, np.random.Generator], tuple[Floats, Floats]]
 COUNTED = ("rays", "lost", "flagged", "conditioned", "wrong")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of rays on one wall: all, lost, left flagged, wrong but for conditioning, and wrong."""
+    """Counts of rays on one wall: all, unresolved, flagged, wrong because of conditioning, and otherwise wrong."""
 
     rays: int
     lost: int
@@ -122,14 +123,14 @@ class Verdict:
     wrong: int
     worst: float
     disagreements: tuple[tuple[float, float], ...]
-    # what is lost or wrong
+    # unresolved or wrong rays
     failures: tuple[tuple[float, float], ...]
 
 
 def aimed_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Half of the rays at joints straight away; half at the edges between itineraries, found by bisection.
+    """Half of the rays aim at visible joints; half lie at edges between itineraries, found by bisection.
 
-    Such an edge is a later corner or a tangency. ``rng`` also spreads the rays over a few ulps about their target.
+    Such an edge is a later corner or a tangency. ``rng`` also spreads the rays by a few ulps around their targets.
     """
     joints = wall.scene.joints[wall.scene.joints[:, 1] < 0.0]
     # a wall of single arcs has no joint below its openings
@@ -139,7 +140,7 @@ def aimed_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Fl
     theta = np.arctan2(-target[:, 1], x - target[:, 0])
     edges_x, edges_theta = _edges(wall, (count - straight + AIM_ULPS) // (AIM_ULPS + 1), rng)
     if not len(edges_x):
-        # none among so few tries
+        # no edge was found among the few tries
         edges_x, edges_theta = np.array([0.5 * wall.period]), np.array([1.0])
     copies = -(-(count - straight) // max(1, len(edges_x)))
     x = np.concatenate([x, np.repeat(edges_x, copies)[: count - straight]])
@@ -148,18 +149,18 @@ def aimed_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Fl
 
 
 def grazing_rays(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Angles 1e-12 to 1e-3, uniform in the logarithm, from either side."""
+    """Angles 1e-12 to 1e-3 from either side, uniform on a logarithmic scale."""
     theta = 10.0 ** rng.uniform(-12.0, -3.0, count)
     return wall.period * rng.random(count), np.where(rng.random(count) < 0.5, theta, math.pi - theta)
 
 
 def twin_trace(wall: geo.Wall, x: Floats, theta: Floats) -> RefinedTrace:
-    """The double-double twin as a judge."""
+    """Trace with the double-double twin."""
     return refined_trace(wall.scene, x, theta, COLLISIONS)
 
 
 def brute_force(wall: geo.Wall, x: Floats, theta: Floats) -> RefinedTrace:
-    """The brute-force tracer of polygons as a judge."""
+    """Trace with the brute-force tracer of polygons."""
     return brute_trace(wall, x, theta, COLLISIONS)
 
 
@@ -176,12 +177,12 @@ def rays_beside_corners(wall: geo.Wall, count: int, rng: np.random.Generator) ->
     target = corner + _log_uniform(BESIDE_CORNERS, rng, straight)[:, None] * along
     target = np.where((target[:, 1] < -0.01)[:, None], target, [0.5 * wall.period, FLOOR])
     x = wall.period * rng.random(straight)
-    # every other ray comes steeply, along the peaks and plates
+    # half of the rays are steep, along the peaks and plates
     steep = rng.random(straight) < 0.5
     x[steep] = np.clip(target[steep, 0] + rng.normal(0.0, 0.05, steep.sum()), 1e-3 * wall.period, 0.999 * wall.period)
     theta = np.clip(np.arctan2(-target[:, 1], x - target[:, 0]), 1e-12, math.pi - 1e-12)
     rest_x, rest_theta = aimed_rays(wall, count - straight, rng)
-    # over an open wall these would pass a thousand cells
+    # over an open wall flatter rays would pass a thousand cells
     rest_theta = np.where(np.sin(rest_theta) < SHALLOWEST, 1.0, rest_theta)
     return np.concatenate([x, rest_x]), np.concatenate([theta, rest_theta])
 
@@ -191,13 +192,13 @@ def _log_uniform(limits: tuple[float, float], rng: np.random.Generator, count: i
 
 
 def _slots(rng: np.random.Generator) -> Floats:
-    """The middles of 3 to 6 intervals of one width in [0, 1]."""
+    """The midpoints of 3 to 6 intervals of equal width in [0, 1]."""
     count = int(rng.integers(3, 7))
     return (np.arange(count) + 0.5) / count
 
 
 def _ground(rng: np.random.Generator, feet: list[list[Point]]) -> geo.Wall:
-    """A hollow of vertices from left to right, between upright sides or slopes."""
+    """A hollow with the given vertices from left to right, between vertical sides or slopes."""
     left, right = ([(x, float(rng.uniform(-0.9, -0.5)))] if rng.random() < 0.5 else [] for x in (0.0, 1.0))
     points = [(0.0, 0.0), *left, *(point for foot in feet for point in foot), *right, (1.0, 0.0)]
     return geo.Wall.from_vertices(_without_repeats(points))
@@ -208,7 +209,7 @@ def _without_repeats(points: list[Point]) -> list[Point]:
 
 
 def sharp_peaks(rng: np.random.Generator) -> geo.Wall:
-    """A polygon with sharp peaks, from 1e-4 to 0.1 radians, upright or leaning."""
+    """A polygon with vertical or leaning sharp peaks, from 1e-4 to 0.1 radians."""
     feet = []
     for x in _slots(rng).tolist():
         bottom, top = float(rng.uniform(-1.0, -0.6)), float(rng.uniform(-0.5, -0.02))
@@ -234,7 +235,7 @@ def standing_plates(rng: np.random.Generator) -> geo.Wall:
 
 
 def _floor(rng: np.random.Generator, islands: list[list[Point]]) -> geo.Wall:
-    """Islands over a flat floor, between sides or none."""
+    """Islands over a flat floor, with or without side walls."""
     floor = [(0.0, FLOOR), (1.0, FLOOR)]
     path = [(0.0, 0.0), *floor, (1.0, 0.0)] if rng.random() < 0.5 else floor
     pieces = [geo.Segment(a, b) for a, b in pairwise(path)]
@@ -243,7 +244,7 @@ def _floor(rng: np.random.Generator, islands: list[list[Point]]) -> geo.Wall:
 
 
 def floating_plates(rng: np.random.Generator) -> geo.Wall:
-    """Plates that float over a floor, lie on it, in the opening or in a side, upright, level or tilted."""
+    """Plates above a floor, on it, in the opening or in a side; vertical, level or tilted."""
     islands = [[(0.0, -0.7), (0.0, -0.2)]] if rng.random() < 0.3 else []
     for x in _slots(rng).tolist():
         half, thickness = float(rng.uniform(0.02, 0.07)), _thickness(rng)
@@ -252,7 +253,7 @@ def floating_plates(rng: np.random.Generator) -> geo.Wall:
         tilt = (0.0, 1.0) if angle == 0.5 * math.pi else (math.cos(angle), math.sin(angle))
         ex, ey = (1.0, 0.0) if y in (FLOOR, 0.0) else tilt
         a, b = (x - half * ex, y - half * ey), (x + half * ex, y + half * ey)
-        # the other face lies below, but above it on the floor
+        # the other face is below, except for plates on the floor
         down = -thickness if y == FLOOR else thickness
         c, d = (b[0] + down * ey, b[1] - down * ex), (a[0] + down * ey, a[1] - down * ex)
         islands.append([a, b, c, d])
@@ -260,7 +261,7 @@ def floating_plates(rng: np.random.Generator) -> geo.Wall:
 
 
 def sharp_islands(rng: np.random.Generator) -> geo.Wall:
-    """Triangles with a sharp tip, some of them with an edge or a tip on the floor."""
+    """Triangles with a sharp tip, some with an edge or a tip on the floor."""
     islands = []
     for x in _slots(rng).tolist():
         length, direction = float(rng.uniform(0.03, 0.07)), float(rng.uniform(0.0, 2.0 * math.pi))
@@ -298,16 +299,16 @@ def random_polygon(kind: str, rng: np.random.Generator) -> geo.Wall:
 
 
 def judge(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace) -> Verdict:
-    """Compare the tracer with another one on every ray."""
+    """Compare the tracer with a reference tracer on every ray."""
     traced = geo.trace(wall, x, theta, max_collisions=COLLISIONS)
     twin = follow(wall, x, theta)
     flagged = (traced.status == geo.Status.CORNER) | (traced.status == geo.Status.GRAZING)
     same, distance = _agree(wall, traced, twin)
     other = np.flatnonzero(~same)
-    # lost: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
+    # unresolved: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
     lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == LOST)
     explained = _explained(wall, _part(traced, other), x[other], theta[other], follow)
-    # the twin flags a ray where half an ulp of its angle meets a corner; one that misses it is not wrong
+    # the twin flags a ray if half an ulp of its angle meets a corner; a tracer that passes this corner is not wrong
     for k in np.flatnonzero(~explained & (twin.status[other] != geo.Status.ESCAPED)):
         explained[k] = _is_precise(wall, traced, other[k], float(x[other[k]]), float(theta[other[k]]))
     worst = float(distance[same].max(initial=0.0))
@@ -321,7 +322,7 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace)
 
 
 def measure_robustness(rays: int) -> dict[str, Verdict]:
-    """Rays of each kind, shared among the walls, and what became of them all."""
+    """The verdict for each kind of rays, divided among the walls and summed."""
     each = -(-rays // len(WALLS))
 
     def judged(number: int, make: Rays) -> Verdict:
@@ -339,7 +340,7 @@ def measure_robustness(rays: int) -> dict[str, Verdict]:
 
 
 def wrong_twins(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace) -> int:
-    """How many of these rays a judge takes elsewhere than the tracer in 50 digits does."""
+    """The number of these rays on which a reference and the tracer in 50 digits disagree."""
     twin = follow(wall, x, theta)
     wrong = 0
     for k in np.flatnonzero(twin.status == geo.Status.ESCAPED):
@@ -349,13 +350,13 @@ def wrong_twins(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_
             continue
         difference = abs(float((ray.theta - twin.theta[k, 0]) - twin.theta[k, 1]))
         room = TWIN_UNITS * EPS_DOUBLE_DOUBLE * twin.amplification[k] * (1.0 + twin.collisions[k])
-        # the twin gives the angle in two doubles, and those are no better than this
+        # the twin's angle consists of two doubles, which limits its accuracy
         wrong += difference > room + EPS**2 * abs(twin.theta[k, 0])
     return wrong
 
 
 def _is_precise(wall: geo.Wall, traced: geo.Trace, k: int, x: float, theta: float) -> bool:
-    """Whether the tracer agrees in 50 digits on a ray that its twin left open or flagged."""
+    """Whether the tracer agrees with 50 digits on a ray that its twin left undecided or flagged."""
     ray = trace_precisely(wall.scene, x, theta, COLLISIONS)
     if ray.theta is None:
         return bool(traced.status[k] == geo.Status.BOUNCE_LIMIT)
@@ -364,23 +365,23 @@ def _is_precise(wall: geo.Wall, traced: geo.Trace, k: int, x: float, theta: floa
 
 
 def _agree(wall: geo.Wall, traced: geo.Trace, twin: RefinedTrace) -> tuple[NDArray[np.bool_], Floats]:
-    """Which rays end alike within conditioning, and how far apart in units of EPS times the derivative.
+    """Which rays end alike within conditioning, and their distances in units of EPS times the derivative.
 
-    They are as far apart as their angles, or as their positions seen from along the ray.
+    The distance is the larger of the difference of angles and the difference of positions across the ray.
     """
     gone = (traced.status == geo.Status.ESCAPED) & (twin.status == geo.Status.ESCAPED)
     difference = np.abs((traced.theta - twin.theta[:, 0]) - twin.theta[:, 1])
     across = np.abs((traced.x - twin.x[:, 0]) - twin.x[:, 1]) * np.sin(twin.theta[:, 0]) / (wall.period + wall.depth)
     difference = np.maximum(difference, across)
     distance = np.where(gone, difference / (EPS * twin.amplification * (1.0 + twin.collisions)), 0.0)
-    # a run on an arc is counted in full by the tracer, however long, but followed step by step by the twin
+    # the tracer counts a whole run on an arc, but the twin follows it step by step
     limited = (twin.status == geo.Status.BOUNCE_LIMIT) & (traced.collisions >= COLLISIONS)
     near = gone & (distance <= ERROR_UNITS) & (traced.collisions == twin.collisions)
     return near | limited | ((traced.status == twin.status) & ~gone), distance
 
 
 def _explained(wall: geo.Wall, traced: geo.Trace, x: Floats, theta: Floats, follow: Follow) -> NDArray[np.bool_]:
-    """Which rays the twin takes where the tracer took them, once moved by a few ulps of the cell or of the angle."""
+    """Which rays of the twin agree with the tracer after a move by a few ulps of the cell or of the angle."""
     result = np.zeros(len(x), np.bool_)
     ulps = [sign * 2.0**k for k in range(-2, int(math.log2(CONDITION_ULPS)) + 1) for sign in (-1.0, 1.0)]
     moves = [move for ulp in ulps for move in ((ulp, 0.0), (0.0, ulp), (ulp, ulp), (ulp, -ulp))]
@@ -399,7 +400,7 @@ def _part(traced: geo.Trace, rays: NDArray[np.int64]) -> geo.Trace:
 
 
 def _edges(wall: geo.Wall, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """Rays at the edge between two numbers of collisions: a few more than ``count`` are tried, some pairs agree."""
+    """Rays at the edge between two numbers of collisions; more pairs than ``count`` are tried, because some agree."""
     x = wall.period * rng.random(4 * count)
     low, high = np.sort(np.arccos(1.0 - 2.0 * rng.random((2, 4 * count))), axis=0)
     hits = [geo.trace(wall, x, angle, max_collisions=COLLISIONS).collisions for angle in (low, high)]
@@ -428,7 +429,7 @@ def main() -> None:
 
 
 def _rows(all_rays: int, all_precise: int, failures: list[str]) -> Iterator[str]:
-    """The rows of the table; rays that are lost or wrong are appended to ``failures``."""
+    """The rows of the table; unresolved or wrong rays are appended to ``failures``."""
     rng = np.random.default_rng(0)
     rays, precise = all_rays // len(WALLS), all_precise // (2 * len(WALLS))
     for name, wall in WALLS.items():
@@ -450,7 +451,7 @@ def _rows(all_rays: int, all_precise: int, failures: list[str]) -> Iterator[str]
 def _judged(
     wall: geo.Wall, make: Rays, rays: int, precise: int, follow: Follow, rng: np.random.Generator
 ) -> tuple[Verdict, int, int]:
-    """The verdict on rays of a wall, how many of them were traced in 50 digits, and how often the judge was wrong."""
+    """The verdict on rays of a wall, the number traced in 50 digits, and the number of errors of the reference."""
     x, theta = make(wall, rays, rng)
     verdict = judge(wall, x, theta, follow)
     sample = np.column_stack([x, theta])[:: -(-rays // max(1, precise))]
@@ -459,7 +460,7 @@ def _judged(
 
 
 def _cells(name: str, kind: str, rows: list[tuple[Verdict, int, int]]) -> str:
-    """The sums over some walls as a row of the table."""
+    """The sums over several walls as a row of the table."""
     verdicts = [row[0] for row in rows]
     rays, *others = (sum(getattr(one, count) for one in verdicts) for count in COUNTED)
     lost, flagged, conditioned, wrong = others

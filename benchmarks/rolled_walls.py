@@ -1,8 +1,8 @@
 """Walls whose period begins anywhere and below y = 0, against the same walls begun at a highest point.
 
-``python -m benchmarks.rolled_walls`` prints a table: rays, collisions of disks and matrices of the rolled walls are
-those of the others, and some rays are followed by a textbook tracer in the coordinates of the rolled wall. Then it says
-how many paths with a slit of no width are refused, and with a plate of no width accepted.
+``python -m benchmarks.rolled_walls`` prints a table that compares rays, collisions of disks and matrices of both walls.
+A textbook tracer follows some rays in the coordinates of the rolled wall. The script also prints how many paths with a
+slit of zero width are refused, and how many with a plate of zero width are accepted.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from asperity.core.tables import table
 from asperity.errors import AccuracyError, WallError
 
 WALLS, RAYS, JUDGED, DISKS, SPIKES = 200, 20_000, 40, 2_000, 2_000
-# Rays that leave after more hits have places and angles that rounding has changed.
+# After more hits, rounding changes positions and angles too much for a comparison.
 MOST_HITS = 200
-# Angles agree to this; rounding grows along a ray, in a wall of bumps by a factor of up to ten a hit.
+# Allowed difference of angles; rounding grows along a ray, on bumps by up to a factor of ten at each hit.
 SAME_ANGLE = 1e-6
 SCALE, SPACING = 1e-3, 2.0 * np.pi / 80
-# Rays flatter than this pass too many cells for the textbook tracer.
+# Flatter rays pass too many cells for the textbook tracer.
 STEEP = 0.3
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What came out for one wall; counts, but for the ratio of matrices and the property."""
+    """The results for one wall: counts, the ratio for the matrices, and whether the properties agree."""
 
     rays: int
     other_rays: int
@@ -43,7 +43,7 @@ class Comparison:
 
 
 def compare(one: Rolled, number: int, most_rays: int, judged: int, disks: int, matrices: bool) -> Comparison:
-    """Compare a rolled wall with what it was made of."""
+    """Compare a rolled wall with its original."""
     rng = np.random.default_rng([number, 17])
     counted, other = _compare_rays(one, most_rays, rng)
     found, wrong = _judge(one, judged, rng)
@@ -103,7 +103,7 @@ def _compare_disks(one: Rolled, count: int, rng: np.random.Generator) -> tuple[i
 
 
 def _compare_matrices(one: Rolled) -> float:
-    """The distance of the two laws' matrices over what their errors and rounding allow."""
+    """The distance of the two laws' matrices over the sum of their errors and rounding."""
     basis, rng = ker.Legendre(8), np.random.default_rng(18)
     try:
         here, there = (
@@ -117,7 +117,7 @@ def _compare_matrices(one: Rolled) -> float:
 
 
 def _same_facts(one: Rolled) -> bool:
-    """Whether closing, symmetry, length, openings and flat tops are those of the other wall."""
+    """Whether both walls have the same closing, symmetry, length, openings and flat tops."""
     wall, rolled = one.wall, one.rolled
     widths = [sorted(hollow.width for hollow in each.hollows) for each in (wall, rolled)]
     return (
@@ -132,7 +132,7 @@ def _same_facts(one: Rolled) -> bool:
 
 
 def is_taken_rightly(number: int) -> bool:
-    """Whether a path with a spike is accepted with its depth and length if the spike is a plate, else refused."""
+    """Whether a path whose spike is a plate is accepted with its depth and length, and any other spike is refused."""
     vertices, is_plate = spiked_path(number)
     try:
         wall = geo.Wall.from_vertices(vertices)

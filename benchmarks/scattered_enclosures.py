@@ -1,12 +1,15 @@
-"""Enclosures of random compositions, and in random bases, against spectra that are known otherwise.
+"""Enclosures of random compositions, and in random bases, against independently known spectra.
 
-``python -m benchmarks.scattered_enclosures`` prints how many intervals hold their eigenvalue and how many indices are
-right. *Diagonal*: words in HG, specular and Lambertian reflection and sums of these, whose eigenvalues on the Legendre
-polynomial of degree l are products and sums of g^l, (-1)^l and 0. *Teeth*: HG(a) T HG(a) with triangular teeth T,
-against a matrix of scipy's Legendre polynomials by Gauss rules on many panels, with twice as many for its error.
-*Given basis*: powers and sums of scatterings, once as Henyey-Greenstein laws and once as a user's density, random
-matrices with their powers, and circular arcs, in random polynomials, bins and panels. *Only apply*: a user's law whose
-means are sums over a few directions must be refused, whatever is made of it.
+``python -m benchmarks.scattered_enclosures`` prints how many intervals contain their eigenvalue and how many indices
+are right.
+
+- *Diagonal*: words in HG, specular and Lambertian reflection, and their sums. The eigenvalues on the Legendre
+  polynomial of degree l are products and sums of g^l, (-1)^l and 0.
+- *Teeth*: HG(a) T HG(a) with triangular teeth T, against a matrix of scipy's Legendre polynomials by Gauss rules on
+  many panels; twice as many panels give its error.
+- *Given basis*: powers and sums of scatterings, as Henyey-Greenstein laws and as a user's density, random matrices with
+  their powers, and circular arcs, in random polynomials, bins and panels.
+- *Only apply*: a user's law whose means are sums over a few directions must be refused in every compound.
 """
 
 from __future__ import annotations
@@ -31,17 +34,17 @@ from .pages import print_table
 Floats = NDArray[np.float64]
 
 DIAGONAL, TEETH, LISTED, DEGREES = 200, 12, 5, 3000
-# A tolerance so coarse that what the polynomials leave out shows.
+# A tolerance coarse enough for the truncation of the polynomials to matter.
 COARSE = 0.1
-# The judge's panels, nodes on each, and breakpoints; differences of roundings.
+# The judge's panels, nodes on each panel, and breakpoints; its rounding.
 PANELS, NODES, BREAKPOINTS, ROUNDING = 750, 4, 256, 1e-15
-# Laws in given bases, and eigenvalues of arcs of half angle 1.2 by a second method.
+# Number of laws in given bases and of refused laws; eigenvalues of arcs of half angle 1.2 by a second method.
 GIVEN, REFUSED, ARC, ARC_ERROR = 120, 12, (1.0, 0.3670253152, -0.311346443), 5e-10
 
 
 @dataclass(frozen=True)
 class Case:
-    """A law and its eigenvalues by modulus, the constants' first, with their error."""
+    """A law and its eigenvalues by decreasing modulus, with their error; the constants' eigenvalue is first."""
 
     law: ker.Law
     exact: Floats
@@ -51,7 +54,7 @@ class Case:
 
 
 class FewDirections(ker.Law):
-    """Scattering as a user may write it: sums over a few directions, without a word on their error."""
+    """Scattering as a user may write it: sums over a few directions, without an error estimate."""
 
     reversible = mirror_symmetric = True
 
@@ -110,7 +113,7 @@ def teeth_case(number: int) -> Case:
 
 
 def given_case(number: int) -> Case:
-    """A law of one of five kinds in a basis of one of three."""
+    """A law of one of five kinds in a basis of one of three kinds."""
     rng = np.random.default_rng([20261126, number])
     kind, power = number % 5, int(rng.integers(1, 4))
     g, h = rng.uniform(-0.93, 0.93, 2).tolist()
@@ -129,7 +132,7 @@ def given_case(number: int) -> Case:
         edges = np.concatenate([[0.0], np.sort(rng.uniform(0.1, 3.0, 5)), [np.pi]])
         mass = 0.5 * np.diff(-np.cos(edges))
         for _ in range(5000):
-            # symmetric, with the masses of the bins as sums
+            # symmetric, with the masses of the bins as row sums
             factor = np.sqrt(mass / flux.sum(axis=1))
             flux = factor[:, None] * flux * factor
         array, root = flux / mass[:, None], np.sqrt(mass)
@@ -145,13 +148,13 @@ def given_case(number: int) -> Case:
     )  # fmt: skip
     error = ARC_ERROR if kind == 4 else 4.0 * ROUNDING
     basis = bases[(number // 5) % 3]
-    # of arcs three eigenvalues are known, and few bins come near two of them
+    # only three eigenvalues of arcs are known, and coarse bases approximate two of them poorly
     listed = {3: 4, 4: 3 if basis is bases[0] else 2}.get(kind, LISTED)
     return Case(law, _by_modulus(exact), error, basis, min(listed, basis.size))
 
 
 def _as_density(g: float) -> ker.Law:
-    """The scattering as a density that a user wrote."""
+    """The scattering as a user's density."""
     return ker.DensityLaw(ker.henyey_greenstein(g).density)
 
 
@@ -165,7 +168,7 @@ def refused_case(number: int) -> Case:
 
 def _judge(g: float, law: ker.Law, degrees: int, panels: int) -> Floats:
     node, fraction = np.polynomial.legendre.leggauss(NODES)
-    # breakpoints of the law as edges: they make the rule better, not its values others
+    # the law's breakpoints as edges improve the rule without changing its exact values
     edges = np.union1d(np.linspace(0.0, np.pi, panels + 1), law.breakpoints(BREAKPOINTS)[0])
     half = 0.5 * np.diff(edges)[:, None]
     angle = (0.5 * (edges[1:] + edges[:-1])[:, None] + half * node).ravel()
@@ -186,7 +189,7 @@ def _by_modulus(values: Floats) -> Floats:
 
 
 def judged(case: Case, tolerance: float = 1e-8) -> Counter[str]:
-    """How many intervals hold an eigenvalue, and how many indices are right; what is wrong by its name."""
+    """Counts of intervals with and without an eigenvalue, and of right and wrong indices."""
     found: Counter[str] = Counter()
     try:
         items = spec.enclosures(case.law, case.listed, case.basis, tolerance)
@@ -198,7 +201,7 @@ def judged(case: Case, tolerance: float = 1e-8) -> Counter[str]:
         found["without an eigenvalue"] += not inside.any()
         if item.index is not None:
             found["indexed"] += 1
-            # enclosures whose moduli overlap may change places
+            # enclosures whose moduli overlap may be exchanged
             group = [other for other in items if other.index is not None and _overlap(item, other)]
             held = any(inside[other.index] for other in group)
             held &= any(_inside(other, case)[item.index] for other in group)
@@ -211,7 +214,7 @@ def _inside(item: spec.Enclosure, case: Case) -> NDArray[np.bool_]:
 
 
 def _overlap(one: spec.Enclosure, other: spec.Enclosure) -> bool:
-    # of an interval [a, b] the moduli run from max(a, -b, 0) to max(-a, b)
+    # the moduli of an interval [a, b] run from max(a, -b, 0) to max(-a, b)
     least = max(max(item.low, -item.high, 0.0) for item in (one, other))
     return least <= min(max(-item.low, item.high) for item in (one, other))
 

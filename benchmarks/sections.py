@@ -1,4 +1,4 @@
-"""The parts of the whole benchmark: each in a process of its own and within its time, its text kept in a file."""
+"""The parts of the whole benchmark: each runs in its own process and time, and its text is stored in a file."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from asperity.spectral import Machine
 from .peers import peer_tables
 from .speed import speed_and_goals
 
-# Short ladders in any case: there are many random walls, and only the choice is asked for. But enough repeats for a
-# mean of what is random: single nets are off by twice as much, or by half.
+# Short ladders always: there are many random walls, and only the library's choice matters. The repeats suffice for a
+# mean of random errors, because single Sobol sequences differ by a factor of two.
 RANDOM_EFFORT = replace(QUICK, seconds=4.0, row_seconds=12.0, total_seconds=300.0)
-# The sections' processes start and end outside of their own plans.
+# Seconds for the start and the end of a section's processes, outside their own plans.
 MARGIN = 30.0
 
 
@@ -35,9 +35,9 @@ class Section:
     ----------
     name, title : str
     seconds : float
-        After which it is ended: together 40 minutes.
+        Time limit; the limits of all sections sum to 39.5 minutes.
     make : callable
-        ``make(quick, folder)`` gives its text.
+        ``make(quick, folder)`` returns the text.
     """
 
     name: str
@@ -82,7 +82,7 @@ SECTIONS = (
 
 
 def section_text(section: Section, quick: bool, folder: Path) -> str:
-    """The text of a section: from its file if an interrupted run left it, else from a process of its own."""
+    """The text of a section: from the file of an interrupted run, else from a new process."""
     file = folder / f"{section.name}.md"
     if not file.exists():
         _say(f"measuring {section.name}, at most {section.seconds:g} s")
@@ -90,13 +90,13 @@ def section_text(section: Section, quick: bool, folder: Path) -> str:
         command = [sys.executable, "-m", "benchmarks", "--section", section.name, "--out", str(folder), *flags]
         ended = _within(command, section.seconds)
         if ended:
-            # of what was measured until then the rows are kept, but not a half-made table
+            # the rows measured so far are stored, but not an incomplete table
             file.write_text(f"This part {ended}.\n", encoding="utf-8")
     return file.read_text(encoding="utf-8").strip()
 
 
 def write_section(name: str, quick: bool, folder: Path) -> None:
-    """What the process of a section does."""
+    """Write the text of a section; this runs in the section's process."""
     (section,) = (one for one in SECTIONS if one.name == name)
     text = section.make(quick, folder)
     beside = folder / f"{name}.part"
@@ -105,7 +105,7 @@ def write_section(name: str, quick: bool, folder: Path) -> None:
 
 
 def _within(command: list[str], seconds: float) -> str:
-    """Run a command with all that it starts; in words what went wrong, or nothing."""
+    """Run a command and its child processes; return the reason of a failure in words, or an empty string."""
     process = subprocess.Popen(command, start_new_session=True)
     try:
         code = process.wait(seconds)
@@ -119,7 +119,7 @@ def _within(command: list[str], seconds: float) -> str:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """End a process and, where the system has process groups, its children."""
+    """End a process and, if the system has process groups, its children."""
     if hasattr(os, "killpg"):
         os.killpg(process.pid, signal.SIGKILL)
     process.kill()

@@ -1,18 +1,17 @@
-"""Gaps of shallow walls, their verdicts and their essential edges, held against references of other makings.
+"""Gaps of shallow walls, their verdicts and their essential edges, against independent references.
 
-``python -m benchmarks.small_gaps`` prints a row a wall and convention. Two judges, neither of which knows of the
-distribution of slopes, of divided differences or of the form's bounds:
+``python -m benchmarks.small_gaps`` prints a row for each wall and convention. Two judges are used, neither of which
+knows the distribution of slopes, divided differences or the form's bounds:
 
-- *50 digits*: rays are followed in 50 digits, from the entry point to the curve and off it by reflecting a vector, for
-  walls whose rays, but for the grazing ones, meet them once. E (f(theta') - f(theta))^2 / (2 E f^2) of cos(theta) or
-  cos(theta)^2 - 1/3 is at least the gap; its excess over the gap, and the grazing rays left out, are of order s^4 ln s
-  of it for slopes up to s, and 200 s^4 is allowed.
-- *rays*: for steeper walls a quarter of a million rays are followed by the tests' textbook tracer; the least value of
-  the same form on polynomials is an upper bound of the gap but for its sampling error, and close to it.
+- *50 digits*, for walls that all but grazing rays meet once. Rays are followed in 50 digits, from the entry point to
+  the curve and off it by reflecting a vector. E (f(theta') - f(theta))^2 / (2 E f^2) of cos(theta) or cos(theta)^2 -
+  1/3 is at least the gap. For slopes up to s, its excess over the gap and the omitted grazing rays are of relative
+  order s^4 ln s, and 200 s^4 ln s is allowed.
+- *rays*, for steeper walls: the tests' textbook tracer follows a quarter of a million rays. The least value of the same
+  form on polynomials is an upper bound of the gap up to its sampling error, and close to it.
 
-``--random FIRST LAST`` asks the same of random walls: polynomial curves of random heights between random positions,
-depths from 1e-7 to 1e-2, with and without mirror axis and flat tops; every third is a mixture of the laws of two such
-walls.
+``--random FIRST LAST`` tests random walls: polynomial curves of random heights between random positions, depths from
+1e-7 to 1e-2, with and without mirror axis and flat tops. Every third case is a mixture of the laws of two such walls.
 """
 
 from __future__ import annotations
@@ -36,14 +35,14 @@ from asperity.spectral.essential.edge import essential_edge
 from .pages import print_table
 
 DIGITS = 50
-# Of the slope to the fourth: what the precise judge allows, and up to which slope it is asked.
+# Factor of slope^4 in the allowed excess of the precise judge, and the largest slope for which this judge is used.
 ALLOWED, PRECISE = 200.0, 1.1e-2
 # Nodes in the angle and on each curve.
 ANGLES, ENTRIES = 16, 12
-# Of the plain judge: nets of points, for their spread, and polynomials.
+# For the rays: number of Sobol sequences, which gives the spread, points of each, and polynomials.
 NETS, POINTS, DEGREES = 8, 2**15, 24
-# The fraction of the gap that so many polynomials miss where eigenfunctions are not smooth, at grazing and near the
-# half angle of arcs: walls of slopes below 1/2, and others.
+# Relative excess of the polynomials' value where eigenfunctions are not smooth, at grazing and near the half angle of
+# arcs: for walls of slopes below 1/2, and for others.
 MISSED, MISSED_STEEP = 5e-3, 0.1
 SIGMAS = 4.0
 
@@ -51,13 +50,13 @@ CURVATURES = (1e-7, 1e-6, 3e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0)
 HALF_ANGLES = (1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 5e-3, 0.02, 0.05, 0.1, 0.3, 0.8, 1.2, 1.5)
 DEPTHS = (1e-7, 1e-5, 1e-3, 1e-2, 0.1)
 
-# A curve below y = 0 from x = a to x = b: its height and slope at x, in whatever numbers x is.
+# A curve below y = 0 from x = a to x = b, with its height and slope at x; x is a float or a multiprecision number.
 Curve = tuple[float, float, Callable[..., object], Callable[..., object]]
 
 
 @dataclass(frozen=True)
 class Case:
-    """A wall, its curves as functions of x, its steepest slope, and the edge of its essential spectrum by theorem."""
+    """A wall, its curves as functions of x, its steepest slope, and the theoretical edge of its essential spectrum."""
 
     name: str
     wall: geo.Wall
@@ -68,7 +67,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Held:
-    """A reported gap and edge, and the interval in which the gap lies by the judge."""
+    """A reported gap and edge, and the judge's interval for the gap."""
 
     name: str
     frame: str
@@ -81,7 +80,7 @@ class Held:
 
     @property
     def is_confirmed(self) -> bool:
-        """Whether the intervals meet, the gap is positive and isolated, and the edge right."""
+        """Whether the intervals intersect, the gap is positive and isolated, and the edge is right."""
         low, high = self.found.value - self.found.error, self.found.value + self.found.error
         meets = low <= self.high and high >= self.low
         right = all(abs(end - self.true_edge) <= 1e-15 for end in self.edge)
@@ -108,7 +107,7 @@ def _arcs(half_angle: float) -> Case:
         with mp.workdps(DIGITS):
             sine = mp.sin(mp.mpf(half_angle))
         sine = sine if isinstance(x, mp.mpf) else float(sine)
-        # the circle of radius 1/(2 sin) through (0, 0) and (1, 0), as minus a product over a sum
+        # the circle of radius 1/(2 sin) through (0, 0) and (1, 0), written without cancellation
         root = _root(1 - sine**2)
         return -2 * sine * x * (1 - x) / (root + _root(1 - (sine * (2 * x - 1)) ** 2))
 
@@ -136,7 +135,7 @@ def _parabolas(depth: float) -> Case:
 
 
 def _ellipses(depth: float) -> Case:
-    """Parts of ellipses, 2 wide and a half of that times the depth high, that leave y = 0 at a slope."""
+    """Arcs of ellipses with half axes 1 and 10 times the depth, which leave y = 0 at a nonzero slope."""
     # (x - 1/2)^2 + ((y + c)/b)^2 = 1 below, with y = 0 at x = 0 and 1
     b = 10.0 * depth
     wall = geo.Wall(
@@ -165,7 +164,7 @@ def _skew(depth: float) -> Case:
 
 
 def _tops(depth: float) -> Case:
-    """Parabolas below one half of the period, a flat top on the other."""
+    """Parabolas below one half of the period, and a flat top on the other half."""
     wall = geo.Wall([geo.Segment((0, 0), (0.5, 0)), geo.Bezier([(0.5, 0), (0.75, -depth), (1, 0)])], period=1.0)
     below = (0.5, 1.0, lambda x: 8 * depth * (x - 1) * (x - _half(x)), lambda x: 8 * depth * (2 * x - 3 * _half(x)))
     flat = (0.0, 0.5, lambda x: 0 * x, lambda x: 0 * x)
@@ -181,7 +180,7 @@ def _root(x: object) -> object:
 
 
 def cases(small: bool = False) -> Iterator[Case]:
-    """All walls, or a few for the tests."""
+    """All walls, or a few of them for the tests."""
     for curvature in CURVATURES[1:6:4] if small else CURVATURES:
         yield _bumps(curvature)
     for half_angle in HALF_ANGLES[1:6:4] if small else HALF_ANGLES:
@@ -194,7 +193,7 @@ def cases(small: bool = False) -> Iterator[Case]:
 
 
 def random_case(rng: np.random.Generator, name: str, deepest: float) -> Case:
-    """A wall of one to three polynomial curves, once more mirrored in half of the cases, and a flat top in a third."""
+    """A wall of one to three polynomial curves, mirrored in half of the cases, with a flat top in a third of them."""
     depth = 10.0 ** rng.uniform(-7.0, math.log10(deepest))
     mirrored = bool(rng.random() < 0.5)
     end, count = (0.5 if mirrored else 1.0), int(rng.integers(1, 4))
@@ -227,7 +226,7 @@ def random_case(rng: np.random.Generator, name: str, deepest: float) -> Case:
 
 
 def _graph(a: float, b: float, levels: tuple[float, ...]) -> Curve:
-    """The cubic with these ordinates in Bernstein's form, and its slope."""
+    """The height and slope of the cubic with these Bernstein ordinates."""
     p, q, r, s = levels
 
     def height(x: object) -> object:
@@ -242,7 +241,7 @@ def _graph(a: float, b: float, levels: tuple[float, ...]) -> Curve:
 
 
 def random_rows(number: int) -> Iterator[Held]:
-    """Of a random wall, or of a mixture of two whose slopes the precise judge can follow."""
+    """Results for a random wall, or for a mixture of two walls with slopes small enough for the precise judge."""
     rng = np.random.default_rng([20261128, number])
     if number % 3:
         yield from held(random_case(rng, f"random {number}", 1e-2))
@@ -255,7 +254,7 @@ def random_rows(number: int) -> Iterator[Held]:
     for frame, form in (("specular", law.in_specular_frame()), ("paper", law)):
         if not form.reversible:
             continue
-        # the form is linear in the law, and its least function is the same to leading order
+        # the form is linear in the law, and its minimiser is the same to leading order
         value = sum(
             w * _precise_quotient(case, 1 if frame == "specular" else 2) for w, case in zip(weights, cases, strict=True)
         )
@@ -280,7 +279,7 @@ def held(case: Case) -> Iterator[Held]:
 
 
 def judged(case: Case, frame: str) -> tuple[float, float, str]:
-    """Where the gap lies by a judge, and which."""
+    """The judge's interval for the gap, and the name of the judge."""
     if case.steepest <= PRECISE:
         value = _precise_quotient(case, 1 if frame == "specular" else 2)
         slack = _slack(case)
@@ -295,7 +294,7 @@ def _slack(case: Case) -> float:
 
 
 def _precise_quotient(case: Case, degree: int) -> float:
-    """E (f(theta'_F) - f(theta))^2/(2 Var f) over all but grazing rays, of f = P_degree(cos)."""
+    """E (f(theta'_F) - f(theta))^2/(2 Var f) without grazing rays, for f = P_degree(cos)."""
     with mp.workdps(DIGITS):
         low = 4 * mp.mpf(case.steepest)
         nodes = [(mp.mpf(x), mp.mpf(w)) for x, w in _gauss(ANGLES)]
@@ -323,7 +322,7 @@ def _precise_quotient(case: Case, degree: int) -> float:
 
 
 def _hit(entry: mp.mpf, run: mp.mpf, height: Callable[..., object]) -> mp.mpf:
-    """The x where a ray that falls by 1 on the way back by ``run`` meets the curve: a contraction, then secants."""
+    """The x at which the ray x = entry + run y meets the curve y = height(x): by contraction, then by secants."""
     x = entry
     for _ in range(4):
         x = entry + run * height(x)
@@ -337,7 +336,7 @@ def _shape(degree: int, z: mp.mpf) -> mp.mpf:
 
 
 def _gauss(order: int) -> list[tuple[mp.mpf, mp.mpf]]:
-    """Gauss's nodes and weights on (-1, 1) in many digits: Newton's method from the doubles."""
+    """Gauss nodes and weights on (-1, 1) in many digits, by Newton's method from the doubles."""
     found = []
     for start in np.polynomial.legendre.leggauss(order)[0].tolist():
         x = mp.findroot(lambda x: mp.legendre(order, x), mp.mpf(start))
@@ -358,11 +357,11 @@ def _sampled_gap(case: Case, frame: str) -> tuple[float, float]:
             if height(0.5 * (a + b)) == 0.0:
                 top = (x > a) & (x < b)
                 out[top] = np.pi - theta[top]
-        # rays that the judge loses in corners, some in a million, are left out
+        # unresolved rays in corners, some in a million, are omitted
         x, theta, out = x[np.isfinite(out)], theta[np.isfinite(out)], out[np.isfinite(out)]
         change = _legendre(np.pi - out if frame == "specular" else out) - _legendre(theta)
         form = 0.5 * change.T @ change / len(theta)
-        # of mirror-symmetric laws even and odd functions apart
+        # separate even and odd functions of mirror-symmetric laws
         parts = (slice(0, None, 2), slice(1, None, 2)) if case.wall.is_mirror_symmetric else (slice(None),)
         values.append(min(np.linalg.eigvalsh(form[part, part])[0] for part in parts))
     return float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(NETS))

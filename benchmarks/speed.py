@@ -1,4 +1,4 @@
-"""Speed of the tracers, of a fresh process and of transport, with the goals that rest on it: a part of the page."""
+"""Speed of the tracers, of a fresh process and of transport, with the goals that depend on it: one section."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from .robustness import measure_robustness
 from .transport import PAGE_CELLS, PAGE_JOINT, transport_table
 
 RAYS, REPEATS = 2**20, 5
-# Floating-point operations that one bounce needs at least, with every piece of the hollow tested once: about 9 for
-# the side of a joint, 24 for an arc, 30 for the hit, the reflection and the way out.
+# Floating-point operations of one bounce if every piece of the hollow is tested once: about 9 for each side, 24 for an
+# arc, and 30 for the hit, the reflection and the escape.
 LINE_FLOPS, ARC_FLOPS, BOUNCE_FLOPS = 9, 24, 30
 WALLS = {
     "triangular teeth (2 lines)": geo.triangular_teeth(0.7),
@@ -31,8 +31,8 @@ WALLS = {
     "mushroom (6 lines, 1 arc)": geo.mushrooms(0.3, 0.5),
     "Koch 4 (256 lines)": geo.koch(4),
 }
-# Walls, entry points and angles for which very many hits follow each other. On an arc, 10^9 of them would begin and end
-# within 1e-18 of its tips, which are corners: double precision has room for some 10^6.
+# Walls, entry points and angles with very long runs of hits. On an arc, 10^9 hits would need a ray within 1e-18 of a
+# tip, which is a corner; double precision allows about 10^6 hits.
 RUNS = {
     "arc": (geo.focusing_arcs(np.pi / 2), (1e-12, 2e-12), (np.pi / 2 - 1e-6, np.pi / 2 - 0.5e-6)),
     "channel": (geo.rectangular_teeth(1e6), (0.5, 1.0), (1.9e-3, 2.1e-3)),
@@ -51,7 +51,7 @@ SCRIPTS = {
 
 @dataclass(frozen=True)
 class Throughput:
-    """Bounces a ray, and bounces a second on one wall: by one thread, by two, and at the floating-point limit."""
+    """Bounces a ray and bounces a second on one wall: on one thread, on two, and at the floating-point limit."""
 
     wall: str
     bounces_per_ray: float
@@ -88,7 +88,7 @@ def speed_and_goals(quick: bool) -> str:
 
 
 def measure_throughput(rays: int) -> list[Throughput]:
-    """The same rays on every wall with one thread and with two."""
+    """Trace the same rays on every wall with one thread and with two."""
     rng = np.random.default_rng(0)
     x, theta = rng.random(rays), np.arccos(1 - 2 * rng.random(rays))
     peak = _peak_flops()
@@ -104,7 +104,7 @@ def measure_throughput(rays: int) -> list[Throughput]:
 
 
 def measure_runs() -> list[RunTime]:
-    """Rays with very many hits in a row: along an arc, in a channel, in a wedge."""
+    """Trace rays with very many hits in a row: along an arc, in a channel, in a wedge."""
     rng = np.random.default_rng(0)
     rows = []
     for what, (wall, (low, high), (first, last)) in RUNS.items():
@@ -133,7 +133,7 @@ def _multiply_add(values, rounds):  # type: ignore[no-untyped-def]
 
 
 def _peak_flops(rounds: int = 200_000) -> float:
-    """Multiply-adds a second of one core on an array that stays in the first-level cache, times two."""
+    """Twice the multiply-adds a second of one core, on an array in the first-level cache."""
     values = np.ones(512)
     _multiply_add(values, 1)
     _, best = least_time(lambda: _multiply_add(values, rounds), 3)

@@ -1,9 +1,9 @@
 """Make src/asperity/bench/running/standard_references.json: ``python -m benchmarks.standard_references [PROBLEM...]``.
 
-The benchmark's references come from here and not from its own runs. Polygons that resolve into beams are exact, and
-confirmed by a second way; the arcs' numbers come from `exact_rows`; grazing limits are in closed form; all other walls
-are sampled by rays of scrambled Sobol sequences, 16 independent ones, whose spread is the error. About a minute of
-one core a scene. Problems are patterns as for ``asperity bench``; the file keeps the others.
+The benchmark's references come from this script, not from the benchmark's own runs. Polygons that resolve into beams
+are exact and confirmed by a second method. Arcs use `exact_rows`, and grazing limits use closed forms. All other walls
+are sampled by 16 independent scrambled Sobol sequences, whose spread is the error. A scene takes about a minute of one
+core. Problems are patterns as for ``asperity bench``; other problems in the file are unchanged.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from .exact_rows import ArcRow, Atoms, crevice_row, mean_over_angles, tooth_row
 from .reference_eigenvalues import reference_eigenvalue
 from .reference_rays import NETS, Found, mean_and_error, sampled_sums
 
-# Rays of the sampled references: of scenes, and of random walls, which only have a moment.
+# Rays of the sampled references of scenes, and of random walls, for which only a moment is sampled.
 RAYS, RANDOM_RAYS = 2**25, 2**23
 BASES = {"law": LAW_BASIS, "moment": MOMENT_BASIS, "resistance": RESISTANCE_BASIS}
-# Beams that leave more than this are no reference.
+# Beams with a larger unresolved part give no reference.
 RESOLVED = 1e-10
-# Adaptive rows confirm beams to this; where they do not come to the second figure, rays do.
+# Tolerance of the adaptive conditionals that confirm beams; if they do not reach ROWS_CONFIRM, rays confirm the beams.
 ROW_TOLERANCE, MOST_ROW_RAYS, ROWS_CONFIRM = 1e-9, 2_000_000, 1e-6
 ROWS = {
     "triangular-teeth": partial(tooth_row, psi=0.7),
@@ -46,8 +46,8 @@ ROWS = {
     "focusing-arc": partial(ArcRow.of, xi=1.2),
 }
 ROWS_BY_FORMULA = "rows by formula and Gauss-Kronrod in theta"
-# Rows of atoms jump from bin to bin, and those of crevices have kinks without end at grazing: they confirm no further.
-# Two ways to an arc's law that differ by more than this are not of the same law.
+# Two methods for an arc's law must agree to MOST_APART. Conditionals of atoms jump between bins, and those of
+# rectangular teeth have infinitely many breakpoints at grazing, so their tolerances are larger.
 MOST_APART = 1e-8
 ARC_TOLERANCE, TRIANGULAR_TOLERANCE, RECTANGULAR_TOLERANCE = 1e-13, 1e-8, 1e-5
 
@@ -63,7 +63,7 @@ def sampled_matrices(wall: geo.Wall, names: tuple[str, ...], rays: int) -> dict[
 
 
 def beam_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | None:
-    """Matrices of a polygon whose beams resolve; adaptive rows must agree as far as they come."""
+    """Matrices of a polygon whose beams resolve; adaptive conditionals must agree within their accuracy."""
     if not (wall.is_polygonal and wall.closes) or float(ker.PolygonLaw(wall).unresolved) > RESOLVED:
         return None
     found = {}
@@ -79,7 +79,7 @@ def beam_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | 
 
 
 def _confirmed(exact: ker.KernelMatrix, other: Floats, doubt: float, way: str) -> Found:
-    """An exact matrix, if another way agrees; the error is its own bound."""
+    """An exact matrix with its own error bound, if another method agrees; else the script ends."""
     distance = float(np.linalg.norm(exact.symmetric - other))
     if distance > doubt + 10.0 * exact.error.value:
         raise SystemExit(f"{exact!r} and {way} differ by {distance:.2g}, more than {doubt:.2g}")
@@ -87,7 +87,7 @@ def _confirmed(exact: ker.KernelMatrix, other: Floats, doubt: float, way: str) -
 
 
 def _beside(found: Found, matrix: ker.KernelMatrix) -> Found:
-    """Our own rows' matrix, its error no less than its distance from the library's."""
+    """The independent matrix, with an error of at least its distance from the library's matrix."""
     distance = float(np.linalg.norm(found.value - matrix.symmetric))
     if distance > MOST_APART:
         raise SystemExit(f"{matrix!r} and {found.source} differ by {distance:.2g}")
@@ -95,7 +95,7 @@ def _beside(found: Found, matrix: ker.KernelMatrix) -> Found:
 
 
 def law_of_rows(row: Row, tolerance: float) -> Found:
-    """The law in bins of a mirror-symmetric law with rows by formula, by adaptive Gauss-Kronrod in theta."""
+    """The law in bins, from conditionals by formula of a mirror-symmetric law, by adaptive Gauss-Kronrod in theta."""
     bins = LAW_BASIS.size
     edges, half, fluxes, doubts = np.sort(np.arccos(np.linspace(-1.0, 1.0, bins + 1))), bins // 2, [], []
     for low, high in pairwise(edges[: half + 1]):
@@ -103,13 +103,13 @@ def law_of_rows(row: Row, tolerance: float) -> Found:
         fluxes.append(flux)
         doubts.append(doubt)
     law = bins * np.array([*fluxes, *(flux[::-1] for flux in reversed(fluxes))])
-    # every entry of a row may be off by its doubt
+    # every entry of a row may have the error of this row
     error = bins * float(np.linalg.norm(doubts)) * (2.0 * bins) ** 0.5
     return Found(0.5 * (law + law.T), error, ROWS_BY_FORMULA)
 
 
 def plane_of_rows(row: Row, tolerance: float) -> dict[str, Found]:
-    """Its moment and the matrix in 1, cos and sin."""
+    """The moment and the matrix in 1, cos and sin, from conditionals by formula."""
 
     def outer(theta: float) -> Floats:
         mean = row(theta).mean()
@@ -127,7 +127,7 @@ def plane_of_rows(row: Row, tolerance: float) -> dict[str, Found]:
 
 
 def teeth_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | None:
-    """The closed forms of the library for triangular and rectangular teeth, confirmed by rows of our own."""
+    """The library's closed forms for triangular and rectangular teeth, confirmed by independent conditionals."""
     law = ker.WallLaw(wall).closed_form
     if isinstance(law, ker.TriangularTeethLaw):
         row, tolerance = partial(tooth_row, psi=law.angle), TRIANGULAR_TOLERANCE
@@ -145,7 +145,7 @@ def teeth_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] |
 
 
 def best_matrices(wall: geo.Wall, names: tuple[str, ...], rays: int) -> dict[str, Found]:
-    """By formula, by beams, or by sampling."""
+    """Matrices by formula, by beams, or by sampling."""
     return teeth_matrices(wall, names) or beam_matrices(wall, names) or sampled_matrices(wall, names, rays)
 
 
@@ -185,8 +185,8 @@ def resistance_found(scene: str) -> Found:
 
 
 def distance_found(scene: str) -> Found:
-    """W_1 between the rows and Lambert's, averaged, from formulas of the rows."""
-    # slow where breakpoints are many
+    """W_1 between conditional distributions and Lambert's, averaged over angles, from formulas of the conditionals."""
+    # slow if there are many breakpoints
     tolerance = 1e-11 if scene == "triangular-teeth" else 1e-7
     value, error = mean_over_angles(
         lambda theta: np.array([ROWS[scene](theta).distance_to_lambert()]), 0.0, 0.5 * np.pi, tolerance
@@ -195,7 +195,8 @@ def distance_found(scene: str) -> Found:
 
 
 def eta_found(scene: str) -> Found:
-    """Grazing flights by hand: flat tops keep them, vertical ends of a semicircle too, slopes and corners do not."""
+    """The diffusivity from zeta by hand: flat tops and vertical ends of semicircles preserve grazing rays, corners do
+    not."""
     zeta, words = {
         "focusing-arc": (0.0, "no piece at a tip is level or vertical: zeta = 0"),
         "koch": ((2.0 / 3.0) ** 4, "only the flat (2/3)^4 of the period keeps grazing flights"),
@@ -217,7 +218,7 @@ MAKERS = {
 
 
 def main() -> None:
-    """Make what is asked for."""
+    """Make the requested references."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.standard_references", description=__doc__)
     parser.add_argument("problems", nargs="*", help="SCENE, QUANTITY or SCENE/QUANTITY; all by default")
     options = parser.parse_args()
@@ -238,7 +239,7 @@ def main() -> None:
 
 
 def _rounded(found: Found) -> float | list[float]:
-    """A number, or the upper triangle of a symmetric matrix, with no more digits than its error knows."""
+    """A number, or the upper triangle of a symmetric matrix, rounded to the digits that its error permits."""
     digits = 17 if found.error < 1e-12 else 12
     if found.value.ndim == 0:
         return float(f"{float(found.value):.{digits}g}")

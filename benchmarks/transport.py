@@ -1,7 +1,7 @@
 """Optimal transport: ``python -m benchmarks.transport``.
 
-Row-wise distances against a loop of POT's, exact joint distances, bounds of the least resistance, and the false alarms
-of the difference test in 2,000 runs.
+Row-wise distances against a loop of POT's, exact joint distances, bounds of the least resistance, and false alarms of
+the difference test in 2,000 runs.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from asperity.core.tables import table
 from asperity.kernels.distances.transport import grid_wasserstein
 
 BINS, REPEATS = 512, 5
-# Sizes that the page shows.
+# Sizes for the generated page.
 PAGE_JOINT, PAGE_CELLS = (32, 64), (256, 1024)
 ALARM_RUNS, ALARM_PAIRS, ALARM_BINS, LEVEL = 2000, 300, 6, 0.05
-# tests/precise_least_resistance.py
+# computed by tests/precise_least_resistance.py
 LEAST = 0.987823750351585515600495963
 
 
 @dataclass(frozen=True)
 class RowTimes:
-    """Row-wise distances of two matrices: our seconds, POT's, and the largest difference."""
+    """Row-wise distances of two matrices: seconds of asperity and of POT, and the largest difference."""
 
     bins: int
     seconds: float
@@ -35,7 +35,7 @@ class RowTimes:
 
     @property
     def ratio(self) -> float:
-        """How many times faster."""
+        """POT's time over asperity's."""
         return self.pot_seconds / self.seconds
 
 
@@ -54,7 +54,8 @@ def measure_rows() -> RowTimes:
 
 
 def measure_joint(sizes: Iterable[int]) -> list[tuple[int, ker.Distance, float]]:
-    """Joint distances of Henyey-Greenstein matrices: size, distance, seconds; from about 64 bins on they are merged."""
+    """Joint distances of Henyey-Greenstein matrices: size, distance, seconds; from about 64 bins on, bins are
+    merged."""
     rows = []
     for size in sizes:
         pair = [ker.discretise(ker.henyey_greenstein(g), ker.Bins(size)) for g in (0.5, 0.7)]
@@ -72,7 +73,7 @@ def measure_extremes(sizes: Iterable[int]) -> list[tuple[int, float, float, floa
 
 
 def count_false_alarms() -> int:
-    """How often, with seeds 0, 1, 2, ..., the test at 5 % tells two samples of one law apart."""
+    """Number of seeds for which the test at 5 % separates two samples of one law."""
     law, alarms = ker.maxwell(0.4), 0
     for seed in range(ALARM_RUNS):
         rng = np.random.default_rng(seed)
@@ -85,7 +86,7 @@ def count_false_alarms() -> int:
 
 
 def transport_table(joint: Iterable[int], cells: Iterable[int]) -> str:
-    """What it takes to compare laws by transport; the false alarms, which take minutes, are not in it."""
+    """A table of the time for comparing laws by transport, without the false alarms, which take minutes."""
     rows = measure_rows()
     ratio = f"a loop over POT: {rows.pot_seconds:.2g} s, {rows.ratio:.0f} times; same to {rows.difference:.0e}"
     lines = [f"distances of {rows.bins} rows | exact | {rows.seconds:.2g} | {ratio}"]

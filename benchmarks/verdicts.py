@@ -1,13 +1,17 @@
-"""Verdicts and gaps of random walls, and eigenvalues to a tolerance, against references of other formulas.
+"""Verdicts and gaps of random walls, and eigenvalues to a tolerance, against independent references.
 
-``python -m benchmarks.verdicts`` prints three tables. *Theorems*: polygons have no gap, in both conventions; with a
-Lambertian fraction a their gap is a. *Random walls*: segments, arcs, ellipses and Bezier pieces, flat tops and islands,
-as they are, mixed and squared, in both conventions. Their judge follows rays with `tests.textbook_tracer`, which shares
-no formula with the library's tracer; its Galerkin matrices in Legendre polynomials never show too much, so the gap that
-is reported must not be larger than theirs; where the verdict is *isolated* their values at three degrees must lead to
-it; and where it is *essential edge* the edge must lie between two bounds from rays that meet straight pieces only.
-*Tolerances*: `spectrum(law, tolerance=t)` against eigenvalues that are known. ``--first`` and ``--last`` choose a range
-of the random walls; rows are printed as they are found, so that what was stopped goes on where it ended.
+``python -m benchmarks.verdicts`` prints three tables.
+
+- *Theorems*: polygons have no gap, in both conventions; with a Lambertian fraction a their gap is a.
+- *Random walls*: segments, arcs, ellipses and Bezier pieces, flat tops and islands, unchanged, mixed and squared, in
+  both conventions. The judge follows rays with `tests.textbook_tracer`, which shares no formula with the library's
+  tracer. The largest eigenvalues of its Galerkin matrices in Legendre polynomials are lower bounds, so the reported gap
+  must not exceed the gap of these matrices. For the verdict *isolated* the judge's values at three degrees must lead to
+  the gap. For the verdict *essential edge* the edge must lie between two bounds from rays that meet straight pieces
+  only.
+- *Tolerances*: `spectrum(law, tolerance=t)` against known eigenvalues.
+
+``--first`` and ``--last`` choose a range of the random walls. Rows are printed as soon as they are computed.
 """
 
 from __future__ import annotations
@@ -38,15 +42,15 @@ from .pages import print_table
 Floats = NDArray[np.float64]
 
 POLYGONS, WALLS, TOLERANCE, FRACTION = 20, 48, 1e-3, 0.3
-# The judge's rays, in as many blocks, whose spread is its error; the degrees of its matrices.
+# Logarithm of the judge's number of rays, number of blocks whose spread gives the error, and degrees of its matrices.
 LOG_RAYS, BLOCKS, DEGREES = 18, 8, (16, 32, 64)
-# Angles and entry points of its straight rays; a step, and the turn by it that a curved piece gives.
+# Angles, refinement between angles, and entry points of the straight rays; a step, and the rotation that shows a curve.
 ANGLES, BETWEEN, POINTS, STEP, TURN = 512, 3, 256, 1e-5, 1e-12
 EXCESSES = (0.003, 0.006, 0.012, 0.02, 0.03, 0.05, 0.1)
 SIGMAS = 4.0
-# Sampling noise of matrices of 64 functions lifts their largest eigenvalues; the edge's grid and entry points.
+# Increase of the largest eigenvalues of 64 x 64 matrices by sampling noise; error of the edge's grid and entry points.
 NOISE_OF_SIZE, EDGE_NOISE = 3e-3, 6e-3
-# Eigenvalues off the constants: focusing arcs of 1.2 by a second method (10 digits), the others are theorems.
+# Eigenvalues off the constants: for the focusing arc by a second method (10 digits), for the others by theorems.
 KNOWN = {
     "focusing arc, 1.2": (ker.CircularArcLaw(1.2), (0.3670253152,)),
     "focusing arc, 1.2, squared": (ker.CircularArcLaw(1.2) ** 2, (0.3670253152**2,)),
@@ -57,7 +61,7 @@ DIGITS_KNOWN = 3e-10
 
 
 def island_wall(number: int) -> geo.Wall:
-    """A random curved wall with an island in its hollow: polygons and ellipses in turn."""
+    """A random curved wall with an island in its hollow, alternately a polygon and an ellipse."""
     rng = np.random.default_rng([20261122, number])
     while True:
         wall = random_curved_wall(int(rng.integers(COUNT)))
@@ -90,7 +94,7 @@ def mirrored_wall(number: int) -> geo.Wall:
 
 
 def _closed(left: geo.Bezier) -> list[geo.Bezier]:
-    """The curve drawn wider, so that it meets its image."""
+    """The curve stretched to half the period, and its mirror image."""
     scale = 0.5 / left.end[0]
     wide = geo.Bezier([(px * scale, py) for px, py in left.control_points])
     return [wide, geo.Bezier([(1.0 - px, py) for px, py in reversed(wide.control_points)])]
@@ -98,7 +102,7 @@ def _closed(left: geo.Bezier) -> list[geo.Bezier]:
 
 @compiled
 def follow_all(table: Floats, x: Floats, theta: Floats) -> Floats:
-    """Outgoing angles; rays that are lost are sent back."""
+    """Outgoing angles; unresolved rays are retroreflected by convention."""
     out = np.empty(x.shape[0])
     for k in range(x.shape[0]):
         out[k] = follow(table, x[k], theta[k])[0]
@@ -107,12 +111,12 @@ def follow_all(table: Floats, x: Floats, theta: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Judge:
-    """Rays of a wall, by the textbook."""
+    """Rays of a wall, by the textbook tracer."""
 
     wall: geo.Wall
 
     def outgoing(self, fraction: Floats, theta: Floats) -> Floats:
-        """Outgoing angles of rays that enter at fractions of the period; specular on flat tops."""
+        """Outgoing angles for entry points in fractions of the period; specular on flat tops."""
         pieces = [*self.wall.pieces, *(piece for loop in self.wall.islands for piece in loop)]
         x = fraction * self.wall.period
         flat = np.zeros(x.shape, dtype=bool)
@@ -124,7 +128,7 @@ class Judge:
         return out
 
     def matrices(self) -> Floats:
-        """<e_i, P e_j> off the constants from each block of rays, shape (blocks, degree, degree)."""
+        """<e_i, P e_j> off the constants, from each block of rays, shape (blocks, degree, degree)."""
         found = []
         for block in range(BLOCKS):
             fraction, u = np.clip(
@@ -136,10 +140,11 @@ class Judge:
         return np.array(found)
 
     def straight(self) -> tuple[float, float]:
-        """Bounds of the top of Q, the part of the law made by straight pieces.
+        """Bounds of the largest spectral value of Q, the part of the law that straight pieces produce.
 
-        Below: a matrix that interpolates between angles. Above (Collatz and Wielandt): Q is positive, so its top is at
-        most the supremum of Q f / f for any f > 0; f is (1 - Q/s)^-1 1 by the matrix, for the best of some s.
+        The lower bound is from a matrix that interpolates between angles. The upper bound (Collatz and Wielandt) is the
+        supremum of Q f / f, since Q is positive and f > 0; f is (1 - Q/s)^-1 1 by the matrix, for the best of several
+        s.
         """
         theta = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
         out, kept = self._straight_rays(theta)
@@ -164,7 +169,7 @@ class Judge:
         return below, above
 
     def _straight_rays(self, theta: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-        """Outgoing angles, a row each incoming angle, and which are of rays that a step does not turn."""
+        """Outgoing angles, shape (angles, entry points), and a mask of the rays that a step does not rotate."""
         shift = np.random.default_rng(1).random((theta.size, 1))
         fraction = np.clip((np.arange(POINTS) + shift) / POINTS, 1e-9, 1.0 - 2.0 * STEP)
         angle = np.repeat(theta, POINTS)
@@ -173,7 +178,7 @@ class Judge:
 
 
 def _interpolation(angle: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """The position on the grid below every angle, and the fraction of the one above."""
+    """The grid index below every angle, and the weight of the next index."""
     place = np.clip(angle * ANGLES / np.pi - 0.5, 0.0, ANGLES - 1.0)
     low = np.minimum(place.astype(np.intp), ANGLES - 2)
     return low, place - low
@@ -186,20 +191,20 @@ def _polynomials(theta: Floats) -> Floats:
 
 @cache
 def judged(wall: geo.Wall) -> Floats:
-    """The matrices of a wall, made once."""
+    """The matrices of a wall, computed once."""
     return Judge(wall).matrices()
 
 
 @dataclass(frozen=True)
 class Reference:
-    """What the judge has for a top of a spectrum: values at growing degrees, and the error of the last."""
+    """The judge's estimates of a largest spectral value at increasing degrees, and the error of the last."""
 
     tops: tuple[float, ...]
     error: float
 
     @classmethod
     def of(cls, matrices: Floats, norm: bool = False) -> Reference:
-        """Of symmetric parts, or the largest singular values."""
+        """From the symmetric parts, or from the largest singular values."""
 
         def top(matrix: Floats, degree: int) -> float:
             part = matrix[: degree - 1, : degree - 1]
@@ -212,7 +217,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Row:
-    """A law with its gap, and what the judge says."""
+    """A law with its gap and the judge's reference."""
 
     name: str
     gap: spec.SpectralGap
@@ -221,7 +226,7 @@ class Row:
 
     @property
     def refutation(self) -> str:
-        """What is wrong, or nothing."""
+        """The error found by the judge, or an empty string."""
         top, error = 1.0 - self.gap.value, self.gap.error
         tops, noise = self.reference.tops, self.reference.error
         change = abs(tops[-1] - tops[-2])
@@ -240,7 +245,7 @@ class Row:
 
 def random_walls() -> Iterator[tuple[str, geo.Wall]]:
     """Curved and mixed walls, some with islands, some mirror-symmetric."""
-    # three mixed ones, two with islands, one mirror-symmetric, so that a part of the list has all kinds
+    # in this order the first part of the list has all kinds
     for number in range(WALLS // 6):
         for mixed in range(3 * number, 3 * number + 3):
             yield f"mixed {mixed}", random_curved_wall(mixed)
@@ -250,7 +255,7 @@ def random_walls() -> Iterator[tuple[str, geo.Wall]]:
 
 
 def rows_of(name: str, wall: geo.Wall, tolerance: float, more: bool) -> Iterator[Row]:
-    """The gap of the wall's law, in both conventions; of some also of a mixture and of the square."""
+    """The gap of the wall's law in both conventions; with ``more`` also of a mixture and of the square."""
     law, matrices = ker.WallLaw(wall), judged(wall)
     low, high = edge = Judge(wall).straight()
     yield Row(name, spec.spectral_gap(law, tolerance), Reference.of(matrices), edge)
@@ -271,7 +276,7 @@ def rows_of(name: str, wall: geo.Wall, tolerance: float, more: bool) -> Iterator
 
 
 def theorems() -> Iterator[tuple[str, spec.SpectralGap, bool]]:
-    """Polygons and what is made of them: name, gap, whether it is what the theorem says."""
+    """Polygons and laws made from them: name, gap, and whether the theorem holds."""
     for seed in range(POLYGONS):
         law = ker.WallLaw(geo.Wall.from_vertices(wall_with(random_hollow(seed))))
         mixed = FRACTION * ker.lambertian() + (1.0 - FRACTION) * law
@@ -286,7 +291,7 @@ def theorems() -> Iterator[tuple[str, spec.SpectralGap, bool]]:
 
 
 def tolerances() -> Iterator[tuple[str, float, float, float]]:
-    """Name, tolerance asked, error, error reported."""
+    """Name, requested tolerance, error, and reported error."""
     for name, (law, values) in KNOWN.items():
         for tolerance in (1e-3, 1e-5, 1e-7, 1e-9):
             found = spec.spectrum(law, 4, tolerance=tolerance)

@@ -1,4 +1,4 @@
-"""Walls for wanted laws: defect and joint distance against the number of moments and of hollows.
+"""Walls for target laws: defect and joint distance as functions of the numbers of moments and of hollows.
 
 ``python -m benchmarks.walls_for_laws [--write]`` prints the table of docs/theory/from-a-law-to-a-wall.md.
 """
@@ -45,7 +45,7 @@ HEADS = "law | moments | hollows | pieces | defect | could be smaller by | joint
 
 
 def rows() -> Iterator[str]:
-    """One row a law and number of moments."""
+    """One row for each law and number of moments."""
     for name, law in laws().items():
         extreme = name in ("least resistance", "retroreflection")
         for moments in EXTREME_MOMENTS if extreme else MOMENTS:
