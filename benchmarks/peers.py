@@ -32,7 +32,7 @@ INTRODUCTION = (
     "goes into moving particles between cells."
 )
 # Limits of single commands, and of all commands together.
-MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 210.0
+MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 190.0
 # Short timeouts, so that pip fails soon without an index.
 PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
 RAYS, REPEATS, ANGLE = 2**17, 3, 0.7
