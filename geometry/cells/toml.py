@@ -8,7 +8,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import FileExistsRefusal, InputError
+from ...core.errors import InputError
+from ...core.files import regular_file, write_whole
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
@@ -31,28 +32,19 @@ def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) ->
         document["pieces"] = [_table(piece) for piece in wall.pieces]
     if wall.islands:
         document["islands"] = [{"pieces": [_table(piece) for piece in loop]} for loop in wall.islands]
-    text = tomli_w.dumps(document)
-    file = Path(path)
-    # the text is complete before the file is touched
-    try:
-        with file.open("w" if overwrite else "x", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-    except FileExistsError as reason:
-        raise FileExistsRefusal(f"{file} exists; pass overwrite=True to replace it") from reason
-    except OSError as reason:
-        raise InputError(
-            f"{file}: cannot write there ({reason.strerror}); choose a folder that is writable"
-        ) from reason
+    write_whole(Path(path), tomli_w.dumps(document), overwrite=overwrite)
 
 
 def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[Curve]]]:
     """Pieces, period and islands of a wall file, not yet validated as a wall; see ``load_wall``."""
     file = Path(path)
     try:
-        document = tomllib.loads(file.read_text(encoding="utf-8"))
+        document = tomllib.loads(regular_file(file).read_text(encoding="utf-8"))
+    except RecursionError as reason:
+        raise InputError(f"{file}: tables or lists are nested too deeply to be those of a wall") from reason
     except OSError as reason:
         raise InputError(f"{file}: cannot read the file ({reason.strerror})") from reason
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
+    except ValueError as reason:
         raise InputError(f"{file}: not a TOML file ({reason})") from reason
     try:
         return _parts(document)
@@ -160,4 +152,9 @@ def _pair(name: str, value: Any) -> Point:
 def _number(name: str, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(f"key {name!r}: expected a number, got {value!r}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError as reason:
+        raise InputError(
+            f"key {name!r}: expected a number below 1e308, got one of {len(str(value))} digits"
+        ) from reason

@@ -11,6 +11,7 @@ of zero width in the solid: no free space lies on the left of the path, and no r
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.errors import WallError
 from ...core.rounding import EPS
 from .curve import Curve
 from .segment import Segment
@@ -44,7 +46,12 @@ REVERSED = 1e-9
 # Parameters on the shorter of two coinciding pieces at which free space beside them is tested.
 ASKED = np.array([0.125, 0.5, 0.875])
 
-# Edges times faces in one block of winding numbers: the largest temporary array has 32 MB.
+# Copies are tried in these numbers: 3, 9, 27, ...
+FEW = 3
+# Overlapping pairs of edges beyond which the test for crossings would take more than some seconds.
+MOST_PAIRS = 2e8
+
+# Edges times faces in one block of the winding count: 32 MB of booleans.
 WINDING_BLOCK = 4_000_000
 
 
@@ -88,7 +95,8 @@ def find_crossing(
     labels = [f"piece {i}" for i in numbers]
     labels += [f"piece {i} of island {k}" for k, loop in enumerate(islands) for i in range(len(loop))]
     path = _flatten(pieces, size, 0)
-    loops = [_close(path, _copies(path.points))]
+    copies = _copies(path.points)
+    loops = [_close(path, copies)]
     first = len(pieces)
     for island in islands:
         loops.append(_flatten(island, size, first))
@@ -96,6 +104,24 @@ def find_crossing(
     turns = _turns((pieces, *islands), size)
     if len(loops) == 1 and not turns and shapely.LinearRing(_without_repeats(loops[0].points)).is_simple:
         return None
+    straight = np.array([isinstance(p, Segment) for loop in (pieces, *islands) for p in loop])
+    # a crossing among few periods is one among all, and costs less to find: crossings grow like the square of copies
+    for few in [*itertools.takewhile(lambda n: n < copies, (FEW**k for k in itertools.count(1))), copies]:
+        some = [_close(path, few), *loops[1:]]
+        face = _worst_face(some, straight)
+        if face is not None:
+            return _describe(face, some, labels, size)
+    for turn in turns:
+        beside = np.sum([_winding_numbers(loop.points, turn.beside) for loop in loops], axis=0)
+        if np.any(beside.reshape(2, -1).max(axis=0) < 1):
+            return Crossing(turn.place, tuple(labels[k] for k in turn.pieces), True)
+    return None
+
+
+def _worst_face(loops: Sequence[_Loop], straight: NDArray[np.bool_]) -> object | None:
+    """The thickest face with a winding number other than 0 and 1; None if there is none."""
+    import shapely
+
     faces, thickness = _faces(loops)
     if not len(faces):
         return None
@@ -103,14 +129,10 @@ def find_crossing(
     winding = np.sum([_winding_numbers(loop.points, inside) for loop in loops], axis=0)
     bad = (winding < 0) | (winding > 1)
     order = np.argsort(-thickness)
-    straight = np.array([isinstance(p, Segment) for loop in (pieces, *islands) for p in loop])
     for i in order[bad[order]]:
         if thickness[i] > CURVED_THICKNESS or _is_among_segments(faces[i], loops, straight):
-            return _describe(faces[i], loops, labels, size)
-    for turn in turns:
-        beside = np.sum([_winding_numbers(loop.points, turn.beside) for loop in loops], axis=0)
-        if np.any(beside.reshape(2, -1).max(axis=0) < 1):
-            return Crossing(turn.point, tuple(labels[k] for k in turn.pieces), True)
+            face: object = faces[i]
+            return face
     return None
 
 
@@ -184,7 +206,16 @@ def _flatten(pieces: Sequence[Curve], size: tuple[float, float], first_label: in
 def _copies(points: Floats) -> int:
     """Return the number of adjacent periods that contains every pair of pieces that can meet."""
     reach = max(-float(points[:, 0].min()), float(points[:, 0].max()) - 1.0)
-    return 1 + 2 * (math.ceil(reach) if reach > STRAIGHT_THICKNESS else 0)
+    if reach <= STRAIGHT_THICKNESS:
+        return 1
+    # of so many pairs of edges, in all copies, the extents along x overlap
+    pairs = (1.0 + 2.0 * reach) * len(points) * float(np.abs(np.diff(points[:, 0])).sum())
+    if pairs > MOST_PAIRS:
+        raise WallError(
+            f"the pieces reach {reach:.3g} periods beyond the cell, too far to check that none of them cross; "
+            "give the period of the whole wall, or shorten its overhangs"
+        )
+    return 1 + 2 * math.ceil(reach)
 
 
 def _close(path: _Loop, copies: int) -> _Loop:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import json
-import os
-import tempfile
+import math
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+from numpy.lib import format as npy
 
-from ...core.errors import FileExistsRefusal, InputError
+from ...core.errors import InputError
+from ...core.files import regular_file, write_whole
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -23,6 +24,7 @@ FORMAT, VERSION = "asperity kernel matrix", 1
 
 Record = dict[str, Any]
 Arrays = dict[str, np.ndarray[Any, Any]]
+Stored = Mapping[str, np.ndarray[Any, Any]]
 T = TypeVar("T")
 
 
@@ -37,21 +39,16 @@ def write(path: str | Path, record: Record, arrays: Arrays, basis: Basis, *, ove
         If the file cannot be written, the basis is of an unknown kind, or the record is not of plain JSON values.
     """
     target = Path(path)
-    if target.exists() and not overwrite:
-        raise FileExistsRefusal(f"{target} exists; pass overwrite=True to replace it")
     record = {"format": FORMAT, "version": VERSION, **record, "basis": _described(basis, arrays, "basis")}
     try:
         arrays["record"] = np.array(json.dumps(record))
     except TypeError as reason:
         raise InputError(f"metadata: expected numbers, text, lists and dicts of these ({reason})") from reason
-    try:
-        _write_whole(target, arrays)
-    except OSError as reason:
-        raise InputError(f"cannot write {target}: {reason.strerror or reason}") from reason
+    write_whole(target, lambda stream: np.savez_compressed(stream, **arrays), overwrite=overwrite)  # type: ignore[arg-type]
     return target
 
 
-def read(path: str | Path, restored: Callable[[Record, Arrays, Basis], T]) -> T:
+def read(path: str | Path, restored: Callable[[Record, Stored, Basis], T]) -> T:
     """What ``restored`` makes of the record, the arrays and the basis in a file that `write` wrote.
 
     Raises
@@ -61,26 +58,50 @@ def read(path: str | Path, restored: Callable[[Record, Arrays, Basis], T]) -> T:
     """
     source = Path(path)
     try:
-        with source.open("rb") as stream:
-            archive = np.load(stream, allow_pickle=False)
-            # numpy's: an archive has files, a single array has none
-            if not hasattr(archive, "files") or "record" not in archive.files:
+        with regular_file(source).open("rb") as stream, zipfile.ZipFile(stream) as members:
+            arrays = _Members(members)
+            record = json.loads(str(arrays["record"]))
+            if not isinstance(record, dict) or record.get("format") != FORMAT:
                 raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
-            arrays = {name: archive[name] for name in archive.files}
-        record = json.loads(str(arrays["record"]))
-        if not isinstance(record, dict) or record.get("format") != FORMAT:
-            raise InputError(f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save")
-        if record["version"] != VERSION:
-            raise InputError(f"{source} has version {record['version']}, this asperity reads version {VERSION}")
-        return restored(record, arrays, _basis_from(record["basis"], arrays))
-    except InputError:
-        raise
+            if record["version"] != VERSION:
+                raise InputError(f"{source} has version {record['version']}, this asperity reads version {VERSION}")
+            return restored(record, arrays, _basis_from(record["basis"], arrays))
     except FileNotFoundError as reason:
         raise InputError(f"cannot read {source}: {reason.strerror}") from reason
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as reason:
+    # zipfile, zlib, json and numpy fail each in its own way on a damaged file
+    except Exception as reason:
+        if isinstance(reason, InputError) and str(source) in str(reason):
+            raise
         raise InputError(
             f"{source} is not a kernel matrix; expected a file written by KernelMatrix.save ({reason})"
         ) from reason
+
+
+class _Members(Mapping[str, np.ndarray[Any, Any]]):
+    """The arrays in a zip archive, each inflated when it is asked for and not before its header is checked."""
+
+    def __init__(self, members: zipfile.ZipFile) -> None:
+        self._members = members
+
+    def __getitem__(self, name: str) -> np.ndarray[Any, Any]:
+        info = self._members.getinfo(f"{name}.npy")
+        with self._members.open(info) as stream:
+            if npy.read_magic(stream) != (1, 0):
+                raise ValueError(f"{name}: not an array as KernelMatrix.save writes it")
+            shape, _, dtype = npy.read_array_header_1_0(stream)
+            if (
+                dtype.kind not in ("U" if name == "record" else "iuf")
+                or math.prod(shape) * dtype.itemsize != info.file_size - stream.tell()
+            ):
+                raise ValueError(f"{name}: {dtype} of shape {shape} does not have the size of its data")
+        with self._members.open(info) as stream:
+            return np.asarray(npy.read_array(stream, allow_pickle=False))
+
+    def __iter__(self) -> Iterator[str]:
+        return (name.removesuffix(".npy") for name in self._members.namelist())
+
+    def __len__(self) -> int:
+        return len(self._members.namelist())
 
 
 def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
@@ -98,7 +119,7 @@ def _described(basis: Basis, arrays: Arrays, name: str) -> dict[str, Any]:
     raise InputError(f"basis: expected Bins, Legendre, Panels or a TensorBasis of these, got {basis!r}")
 
 
-def _basis_from(described: dict[str, Any], arrays: Arrays) -> Basis:
+def _basis_from(described: dict[str, Any], arrays: Stored) -> Basis:
     kind = described["kind"]
     if kind == "TensorBasis":
         return TensorBasis(tuple(_basis_from(factor, arrays) for factor in described["factors"]))
@@ -122,26 +143,17 @@ def store_array(part: Any, arrays: Arrays, name: str) -> str:
     return "sparse"
 
 
-def load_array(kind: str, arrays: Arrays, name: str) -> Any:
+def load_array(kind: str, arrays: Stored, name: str) -> Any:
     """The array of a kind that `store_array` put there."""
     if kind == "dense":
         return arrays[name]
     from scipy.sparse import csr_array
 
-    parts = tuple(arrays[f"{name}.{field}"] for field in ("data", "indices", "indptr"))
-    return csr_array(parts, shape=tuple(arrays[f"{name}.shape"]))
-
-
-def _write_whole(target: Path, arrays: Arrays) -> None:
-    """Write beside the target and rename, so that a crash leaves no half of a file."""
-    handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, target)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    data, indices, indptr = (arrays[f"{name}.{field}"] for field in ("data", "indices", "indptr"))
+    if indices.dtype.kind != "i" or indptr.dtype.kind != "i" or not data.size == indices.size == indptr[-1]:
+        raise ValueError(f"{name}: expected as many indices as entries, {data.size}, all whole numbers")
+    rows, columns = arrays[f"{name}.shape"].tolist()
+    part = csr_array((data, indices, indptr), shape=(rows, columns))
+    # compiled code trusts the indices
+    part.check_format(full_check=True)
+    return part

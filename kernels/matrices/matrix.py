@@ -8,27 +8,32 @@ errors are normal.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, cast, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, whole_number
+from ...core.checks import Floats, finite_array, finite_number, frozen, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
+from ...core.rounding import EPS
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..bases.tensor import TensorBasis
 from . import archive
-from .archive import Arrays, Record, load_array, store_array
+from .archive import Arrays, Record, Stored, load_array, store_array
 from .defects import STOCHASTIC_NORM, STOCHASTIC_NORM_CELLS, Defect, SymmetryDefect, relative_asymmetry
 from .plot import draw_kernel
 
 # Cells a side when a kernel in polynomials is drawn.
 GRID = 240
+# A file is refused if its entries are wrong by more than this many times the stated error, which is that of 95 of 100
+# matrices, and the rounding of an entry.
+BEYOND_CHANCE, ENTRY_ROUNDING = 10.0, 64.0 * EPS
 # What a file holds as it is.
 PLAIN_FIELDS = (
     "symmetrised", "samples", "method", "law", "reversible", "mirror_symmetric", "frame", "requested_tolerance",
@@ -292,11 +297,25 @@ class KernelMatrix:
         """Number of basis functions."""
         return self.basis.size
 
-    @property
+    @cached_property
     def array(self) -> Floats:
-        """P[i, j] = P(bin i -> bin j) for partitions, <e_i, P e_j> for other bases; shape (n, n)."""
+        """P[i, j] = P(bin i -> bin j) for partitions, <e_i, P e_j> for other bases; shape (n, n), read-only."""
         normalisation = self.basis.normalisation
-        return np.asarray(normalisation[:, None] * self.symmetric / normalisation)
+        array = np.asarray(normalisation[:, None] * self.symmetric / normalisation)
+        array.setflags(write=False)
+        return array
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """``np.asarray(P)`` is ``P.array``."""
+        return np.array(self.array, dtype=dtype, copy=copy)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # ``array`` stays behind: unpickled it would be writable
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self.__post_init__()
 
     @property
     def weights(self) -> Floats:
@@ -467,9 +486,9 @@ def load_matrix(path: str | Path) -> KernelMatrix:
     return archive.read(path, _restored)
 
 
-def _restored(record: Record, arrays: Arrays, basis: Basis) -> KernelMatrix:
+def _restored(record: Record, arrays: Stored, basis: Basis) -> KernelMatrix:
     defect = record["raw_defect"]
-    return KernelMatrix(
+    matrix = KernelMatrix(
         arrays["symmetric"],
         basis,
         Estimate(*record["error"]),
@@ -479,3 +498,40 @@ def _restored(record: Record, arrays: Arrays, basis: Basis) -> KernelMatrix:
         metadata=record["metadata"],
         **{name: record[name] for name in PLAIN_FIELDS},
     )
+    _check_record(matrix)
+    _check_entries(matrix)
+    return matrix
+
+
+def _check_record(matrix: KernelMatrix) -> None:
+    """Refuse fields that no matrix has, so that the entries can be held against them."""
+    if matrix.frame not in ("paper", "specular"):
+        raise InputError(f"frame: expected 'paper' or 'specular', got {matrix.frame!r}")
+    whole_number("samples", matrix.samples, 0)
+    number_between("unresolved", matrix.unresolved, 0.0, 1.0, closed="low high")
+    number_between("norm_bound", matrix.norm_bound, 0.0, np.inf, closed="low")
+    for name in ("symmetrised", "reversible", "mirror_symmetric"):
+        value = getattr(matrix, name)  # names of fields of this class
+        if value not in (True, False) and (value is not None or name == "symmetrised"):
+            raise InputError(f"{name}: expected true or false, got {value!r}")
+    if matrix.counts is not None and matrix.counts.min() < 0:
+        raise InputError(f"counts: expected none below 0, got {matrix.counts.min()}")
+    if any(part.shape != matrix.symmetric.shape for part in matrix.replicates):
+        raise InputError(f"replicates: expected arrays of shape {matrix.symmetric.shape}")
+
+
+def _check_entries(matrix: KernelMatrix) -> None:
+    """Refuse entries that contradict the error and the norm that the file states, by more than any chance."""
+    symmetric, constant = matrix.symmetric, matrix.basis.constant
+    excess = BEYOND_CHANCE * (float(matrix.error) + ENTRY_ROUNDING * matrix.size * (1.0 + matrix.norm_bound))
+    if np.linalg.norm(symmetric @ constant) > matrix.norm_bound * np.linalg.norm(constant) + excess:
+        raise InputError(f"the entries contradict the bound {matrix.norm_bound:g} of the norm")
+    if matrix.reversible and np.linalg.norm(symmetric - symmetric.T) > 2.0 * excess:
+        raise InputError("the entries are not symmetric, although the kernel is stated to be reversible")
+    # differences and multiples of kernels are matrices too
+    if matrix.method == "algebra":
+        return
+    if np.linalg.norm(symmetric @ constant - constant) > excess:
+        raise InputError(f"the rows do not sum to 1 within the stated error {float(matrix.error):g}")
+    if matrix.basis.is_partition and symmetric.min() < -excess:
+        raise InputError(f"entries are negative, down to {symmetric.min():g}, beyond the stated error")

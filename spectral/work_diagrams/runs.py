@@ -13,6 +13,7 @@ import numpy as np
 from ...core.checks import Floats, positive_number, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
+from ...core.files import write_whole
 from ...kernels import KernelMatrix
 from .machine import Machine, on_few_cores
 from .problem import WorkMethod, WorkProblem
@@ -133,7 +134,7 @@ def work_precision(
             for row in _climb(problem, method, ladders[method.name], earlier, (repeats, seconds, warm_up, runner)):
                 report = report.with_row(row)
                 if file is not None:
-                    _write(file, report.to_json())
+                    write_whole(file, report.to_json(), overwrite=True)
     return report
 
 
@@ -170,10 +171,3 @@ def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[
     if missing := [name for name in names if not len(given.get(name, ()))]:
         raise InputError(f"budgets: expected at least one for every method, got none for {', '.join(missing)}")
     return {name: sorted(positive_number("budgets", budget) for budget in given[name]) for name in names}
-
-
-def _write(file: Path, text: str) -> None:
-    """Replace the file in one step, so that an interrupted run leaves a complete file."""
-    beside = file.with_name(file.name + ".part")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(file)

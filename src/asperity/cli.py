@@ -238,7 +238,11 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
 @click.option(
     "--out", default="bench-results", show_default=True, type=click.Path(path_type=Path), help="Folder for results."
 )
-@click.option("--force", is_flag=True, help="Measure again what the folder holds; by default a run goes on.")
+@click.option(
+    "--force",
+    is_flag=True,
+    help="Measure these problems again and replace reports in the folder; by default a run goes on.",
+)
 @click.option(
     "--compare",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
 
+from ..core.errors import FileExistsRefusal
+from ..core.files import write_whole
 from .comparison import compare_runs
-from .run import BenchRun, fresh_folder
+from .run import BenchRun, made_here, prepare_folder
 from .standard_set import FULL, QUICK, problem_names, run_problems
 
 
@@ -18,15 +20,15 @@ def run_bench(
     """Run the requested measurements, print and write the results; return the exit code."""
     names = problem_names(problems)
     earlier = None if compare is None else BenchRun.of_json(compare.read_text(encoding="utf-8"))
-    fresh_folder(out, force)
     if extremes:
         from .extremes.report import run_extremes
 
-        return _show(out / "extremes.md", run_extremes(quick).table())
+        return _show(out / "extremes.md", lambda: run_extremes(quick).table(), force)
     if savings:
         from .savings import savings_table
 
-        return _show(out / "savings.md", savings_table(quick))
+        return _show(out / "savings.md", lambda: savings_table(quick), force)
+    prepare_folder(out, names, force=force)
     effort = QUICK if quick else FULL
     reports = list(run_problems(names, effort, out, lambda line: click.echo(line, err=True)))
     run = BenchRun(tuple(reports))
@@ -40,8 +42,13 @@ def run_bench(
     return 1 if found.is_worse else 0
 
 
-def _show(path: Path, text: str) -> int:
-    path.write_text(text + "\n", encoding="utf-8")
+def _show(path: Path, make: Callable[[], str], force: bool) -> int:
+    """Print and write a report; an existing file is refused before the work."""
+    made_here(path.parent)
+    if path.exists() and not force:
+        raise FileExistsRefusal(f"--out: {path} exists; use another folder or --force to replace it")
+    text = make()
+    write_whole(path, text + "\n", overwrite=True)
     click.echo(text)
     click.echo(f"wrote {path}", err=True)
     return 0

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..core.errors import FileExistsRefusal, InputError
+from ..core.files import moved_when_complete
 from ..core.tables import table
 from ..spectral import WorkReport, WorkRow
 
@@ -93,13 +94,14 @@ class BenchRun:
     def save(self, folder: Path) -> list[Path]:
         """Write summary, tables, data and a figure for each scene; return the written paths."""
         written = [folder / SUMMARY, folder / TABLES, folder / DATA]
-        for path, text in zip(written, (self.summary(), self.tables(), self.to_json()), strict=True):
-            path.write_text(text + "\n", encoding="utf-8")
-        for scene, reports in self.by_scene().items():
-            drawn = [report for report in reports if any(row.is_done for row in report.rows)]
-            if drawn:
-                written.append(folder / f"{scene}.png")
-                draw_scene(drawn).savefig(written[-1], dpi=100)
+        with moved_when_complete(folder) as beside:
+            for path, text in zip(written, (self.summary(), self.tables(), self.to_json()), strict=True):
+                (beside / path.name).write_text(text + "\n", encoding="utf-8")
+            for scene, reports in self.by_scene().items():
+                drawn = [report for report in reports if any(row.is_done for row in report.rows)]
+                if drawn:
+                    written.append(folder / f"{scene}.png")
+                    draw_scene(drawn).savefig(beside / written[-1].name, dpi=100)
         return written
 
     def by_scene(self) -> dict[str, list[WorkReport]]:
@@ -124,14 +126,53 @@ class BenchRun:
             raise InputError(f"JSON: expected what BenchRun.to_json() gives: {reason!r}") from reason
 
 
-def fresh_folder(folder: Path, force: bool) -> None:
-    """Make the folder; with ``force`` remove the rows of an earlier run, so that all rows are measured again."""
+def prepare_folder(folder: Path, names: Sequence[str], *, force: bool) -> None:
+    """Make the folder for a run of these problems; only ``force`` may cost files that are there.
+
+    A run goes on from the rows in the folder, and then its summary replaces that of the same problems or fewer. With
+    ``force`` the rows of these problems are removed, so that they are measured again, and no other file is.
+
+    Raises
+    ------
+    FileExistsRefusal
+        If a file would be replaced that is not of an earlier run of these problems, and ``force`` is False.
+    """
+    made_here(folder)
+    if force:
+        for name in names:
+            (folder / f"{file_stem(name)}.json").unlink(missing_ok=True)
+        return
+    pictures = {f"{name.split('/')[0]}.png" for name in names}
+    found = sorted(name for name in (SUMMARY, TABLES, DATA, *pictures) if (folder / name).exists())
+    if found and not _is_earlier(folder / DATA, names):
+        raise FileExistsRefusal(
+            f"--out: {', '.join(found)} in {folder} are not of an earlier run of these problems; "
+            "use another folder or --force to replace them"
+        )
+
+
+def made_here(folder: Path) -> None:
+    """Make the folder if it is missing; raise a FileExistsRefusal if it is a file, an InputError if it cannot be."""
     if folder.exists() and not folder.is_dir():
         raise FileExistsRefusal(f"--out: {folder} is a file; name a folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    if force:
-        for path in folder.glob("*.json"):
-            path.unlink()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as reason:
+        raise InputError(f"--out: cannot make {folder} ({reason.strerror}); choose another folder") from reason
+
+
+def file_stem(name: str) -> str:
+    """What the files of a problem are called."""
+    return name.replace("/", "-")
+
+
+def _is_earlier(data: Path, names: Sequence[str]) -> bool:
+    """Whether this is the file of a run of some of these problems and no others."""
+    try:
+        run = BenchRun.of_json(data.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return {report.problem for report in run.reports} <= set(names)
 
 
 def _chosen(report: WorkReport) -> list[WorkRow]:

@@ -18,6 +18,7 @@ from ..spectral.work_diagrams.runs import measure
 from .quantities.collision import DISK, by_true_disks
 from .quantities.standard import QUANTITIES
 from .quantities.walls import scenes, standard_names, wall_of
+from .run import file_stem
 from .running.processes import ChildCrashed, ChildProcess, OutOfTime, TimePlan
 from .running.references import known_reference
 
@@ -141,11 +142,6 @@ def _run(problem: WorkProblem, effort: Effort, folder: Path | None, child: Child
         problem, methods, ladders, repeats=effort.repeats, seconds=effort.seconds, warm_up=False,
         path=None if folder is None else folder / f"{file_stem(problem.name)}.json", runner=runner,
     )  # fmt: skip
-
-
-def file_stem(name: str) -> str:
-    """File name, without extension, of a problem's files."""
-    return name.replace("/", "-")
 
 
 def prepare(scene: str) -> None:

@@ -1,5 +1,9 @@
 """The exceptions of asperity: each message says what was expected, what came, and what to do."""
 
+from __future__ import annotations
+
+from typing import Any
+
 
 class AsperityError(Exception):
     """Base class of every exception that asperity raises on purpose."""
@@ -29,6 +33,10 @@ class AccuracyError(AsperityError, ArithmeticError):
     def __init__(self, message: str, defect: float) -> None:
         super().__init__(message)
         self.defect = defect
+
+    def __reduce__(self) -> tuple[type[AccuracyError], tuple[str, float], dict[str, Any]]:
+        # exceptions are made again from their message alone, and come out of process pools so
+        return type(self), (str(self), self.defect), self.__dict__
 
 
 # users catch them, and read them in messages, by this name

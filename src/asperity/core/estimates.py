@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from .errors import InputError
+
 ErrorKind = Literal["bound", "estimate"]
 
 # The fraction of intervals of estimated width that hold the true value.
@@ -54,14 +56,27 @@ class Estimate:
     method: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "value", float(self.value))
-        object.__setattr__(self, "error", float(self.error))
+        object.__setattr__(self, "value", _number("value", self.value))
+        object.__setattr__(self, "error", _number("error", self.error))
+        if not self.error >= 0.0:
+            raise InputError(f"error: expected a half width of at least 0, got {self.error!r}; inf if it is not known")
+        if self.kind not in ("bound", "estimate"):
+            raise InputError(f"kind: expected 'bound' or 'estimate', got {self.kind!r}")
+        if not isinstance(self.method, str):
+            raise InputError(f"method: expected words, got {self.method!r}")
 
     def __float__(self) -> float:
         return float(self.value)
 
     def __str__(self) -> str:
         return f"{self.value:.10g} +- {self.error:.2g} ({self.kind}: {self.method})"
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError) as reason:
+        raise InputError(f"{name}: expected a number, got {value!r}") from reason
 
 
 def rounded(number: Estimate) -> str:

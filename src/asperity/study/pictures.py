@@ -11,6 +11,7 @@ import numpy as np
 
 from ..core.checks import Floats
 from ..core.errors import FileExistsRefusal, InputError
+from ..core.files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -156,15 +157,13 @@ def draw_gallery(path: Path, *, overwrite: bool) -> None:
     InputError
         If it cannot be written.
     """
+    if path.exists() and not overwrite:
+        raise FileExistsRefusal(f"{path} exists; use another name or --force to replace it")
+    figure, kind = gallery(), path.suffix[1:] or "png"
     try:
-        if path.exists() and not overwrite:
-            raise FileExistsRefusal(f"{path} exists; use another name or --force to replace it")
-        gallery().savefig(path, dpi=RESOLUTION)
-    except FileExistsRefusal:
-        raise
-    except OSError as reason:
-        why = reason.strerror or reason
-        raise InputError(f"{path}: cannot write the picture ({why}); choose a folder that exists") from reason
+        write_whole(path, lambda stream: figure.savefig(stream, dpi=RESOLUTION, format=kind), overwrite=True)
+    except InputError as reason:
+        raise InputError(f"cannot write the picture: {reason}") from reason
     except ValueError as reason:
         raise InputError(f"{path}: cannot write the picture ({reason}); use a .png, .pdf or .svg name") from reason
 

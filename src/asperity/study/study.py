@@ -15,6 +15,7 @@ import numpy as np
 from ..core.checks import positive_number
 from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 from ..core.estimates import NORMAL_95, Estimate
+from ..core.files import moved_when_complete
 from ..geometry import Disk, Wall, trace
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
 from ..kernels.bases.measure import SINE
@@ -74,9 +75,10 @@ class Study(StudyResult):
         """
         target = prepare_folder(folder, overwrite=overwrite)
         try:
-            save_pictures(self, [target / name for name in PICTURES])
-            self.matrix.save(target / DATA[0], overwrite=True)
-            (target / DATA[1]).write_text(self.to_json() + "\n", encoding="utf-8")
+            with moved_when_complete(target) as beside:
+                save_pictures(self, [beside / name for name in PICTURES])
+                self.matrix.save(beside / DATA[0])
+                (beside / DATA[1]).write_text(self.to_json() + "\n", encoding="utf-8")
         except OSError as reason:
             raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
         return [target / name for name in (*PICTURES, *DATA)]

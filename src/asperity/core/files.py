@@ -1,0 +1,79 @@
+"""Files that appear whole: written beside their name and moved there when complete."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import IO
+
+from .errors import FileExistsRefusal, InputError
+
+
+@contextmanager
+def moved_when_complete(folder: Path) -> Iterator[Path]:
+    """A folder beside the files of ``folder``: what is written there replaces those, but only if nothing fails.
+
+    Examples
+    --------
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = (Path(folder) / "a.txt").write_text("old")
+    ...     with moved_when_complete(Path(folder)) as beside:
+    ...         _ = (beside / "a.txt").write_text("new")
+    ...         before = (Path(folder) / "a.txt").read_text()
+    ...     before, (Path(folder) / "a.txt").read_text()
+    ('old', 'new')
+    """
+    with TemporaryDirectory(dir=folder, prefix=".asperity-", ignore_cleanup_errors=True) as beside:
+        yield Path(beside)
+        files = sorted(Path(beside).iterdir())
+        for file in files:
+            with file.open("rb") as stream:
+                os.fsync(stream.fileno())
+        for file in files:
+            os.replace(file, folder / file.name)
+
+
+def write_whole(path: Path, content: str | Callable[[IO[bytes]], object], *, overwrite: bool) -> None:
+    """Write a text, or what a function writes, in one step: if that fails, an old file stays as it is.
+
+    Raises
+    ------
+    FileExistsRefusal
+        If the file exists and ``overwrite`` is False.
+    InputError
+        If it cannot be written.
+    """
+    write = content if callable(content) else lambda stream: stream.write(content.encode())
+    try:
+        if path.exists() and not overwrite:
+            raise FileExistsRefusal(f"{path} exists; pass overwrite=True to replace it")
+        # of a link the file that it names is replaced
+        target = path.resolve()
+        if target.exists() and not target.is_file():
+            # a device or a pipe cannot be replaced, and a folder is refused here
+            whole = BytesIO()
+            write(whole)
+            target.write_bytes(whole.getvalue())
+            return
+        with moved_when_complete(target.parent) as beside:
+            with (beside / target.name).open("xb") as stream:
+                write(stream)
+            if target.exists():
+                (beside / target.name).chmod(target.stat().st_mode)
+    except FileExistsRefusal:
+        raise
+    except OSError as reason:
+        why = reason.strerror or reason
+        raise InputError(f"{path}: cannot write there ({why}); choose a folder that is writable") from reason
+
+
+def regular_file(path: Path) -> Path:
+    """The path, or an InputError if it names a pipe or a device, where reading may never end."""
+    if path.exists() and not path.is_file():
+        kind = "a folder" if path.is_dir() else "a pipe or a device"
+        raise InputError(f"{path}: cannot read {kind}; expected a file")
+    return path
