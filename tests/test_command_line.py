@@ -114,7 +114,7 @@ def test_an_open_wall_with_islands_has_no_check_by_kac(tmp_path):
     post = [(0.4, -0.4), (0.4, -0.2), (0.6, -0.2), (0.6, -0.4), (0.4, -0.4)]
     island = [geo.Segment(p, q) for p, q in pairwise(post)]
     geo.Wall([geo.Segment((0, -0.5), (1, -0.5))], 1.0, [island]).save(tmp_path / "open.toml")
-    result = run("study", tmp_path / "open.toml", "--bins", 8, "--out", tmp_path / "out")
+    result = run("study", tmp_path / "open.toml", "--bins", 8, "--verbose", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
     assert "open: rays may pass from cell to cell, 1 island" in result.stdout and "Kac" not in result.stdout
 
@@ -249,3 +249,30 @@ def test_a_wall_is_realised_for_a_law_and_written(tmp_path):
     assert "expected lambertian" in run("realise", "lambert").output
     assert "a number after" in run("realise", "maxwell:half").output
     assert run("realise", "lambertian", "--mass", "1").exit_code == 2
+
+
+def test_quiet_prints_nothing_and_writes_the_files(tmp_path):
+    result = run("study", "flat", "--bins", 8, "--quiet", "--out", tmp_path, "--format", "svg")
+    assert (result.exit_code, result.output) == (0, "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        [*(name.replace(".png", ".svg") for name in PICTURES), *DATA]
+    )
+    assert run("study", "flat", "--quiet", "--json").exit_code == 2
+
+
+def test_an_interrupted_study_leaves_no_folder_and_ends_with_130(tmp_path, monkeypatch):
+    def interrupt(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("asperity.study.study_wall", interrupt)
+    result = run("study", "flat", "--out", tmp_path / "deep" / "new")
+    assert result.exit_code == 130 and result.stderr == "asperity: interrupted\n"
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "old").mkdir()
+    run("study", "flat", "--out", tmp_path / "old")
+    assert [path.name for path in tmp_path.iterdir()] == ["old"]
+
+
+def test_a_study_that_is_refused_leaves_no_folder(tmp_path):
+    refused("study", "flat", "--bins", 0, "--out", tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []

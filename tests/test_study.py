@@ -60,7 +60,7 @@ def test_the_spectrum_has_ten_eigenvalues_of_which_the_references_are_two(arcs):
 def test_the_disk_feels_the_foreshortened_wall(arcs):
     deeper = geo.focusing_arcs(1.2).foreshorten(geo.Disk(1.0, 0.5))
     assert arcs.collision.law == ker.WallLaw(deeper)
-    assert "1.73205 times as deep" in arcs.summary()  # (1 + m/J)^(1/2)
+    assert "1.73205 times as deep" in arcs.summary(verbose=True)  # (1 + m/J)^(1/2)
 
 
 def test_collisions_keep_energy_and_rolling_momentum(arcs):
@@ -73,30 +73,32 @@ def test_mean_collisions_agree_with_kac(arcs, teeth):
     assert teeth.tracer.expected_collisions == pytest.approx(5.0, rel=1e-14)  # two sides of height 1, a floor of 1/2
     for report in (arcs, teeth):
         assert abs(report.tracer.z_score) < 4.5
-        assert "out of reach" not in report.summary() and "Kac's formula presumes" not in report.summary()
+        assert "out of reach" not in report.summary(verbose=True) and "Kac's formula presumes" not in report.summary(
+            verbose=True
+        )
         assert sum(report.tracer.counts.values()) == report.tracer.counts["escaped"] == 2**16
 
 
 def test_unreachable_rays_of_a_cap_are_no_defect_of_the_tracer(teeth):
     check = check_tracer(geo.mushrooms(0.2, 0.5), np.random.default_rng(0))
     assert check.z_score < -100.0
-    text = replace(teeth, tracer=check).summary()
+    text = replace(teeth, tracer=check).summary(verbose=True)
     assert "Kac's formula presumes that every ray inside can come from the opening" in text
 
 
 def test_too_many_collisions_are_called_a_defect(teeth):
     check = replace(teeth.tracer, expected_collisions=0.5 * teeth.tracer.expected_collisions)
-    assert "do not trust" in replace(teeth, tracer=check).summary()
+    assert "do not trust" in replace(teeth, tracer=check).summary(verbose=True)
 
 
 def test_a_polygon_has_no_gap_and_the_summary_says_so(teeth):
     assert teeth.gap.verdict == teeth.specular_gap.verdict == teeth.collision_gap.verdict == "no gap"
-    text = teeth.summary()
+    text = teeth.summary(verbose=True)
     assert text.count("none (no gap)") == 3 and "they belong to the grid" in text
 
 
 def test_the_summary_names_method_error_tolerance_and_both_conventions(arcs):
-    text = arcs.summary()
+    text = arcs.summary(verbose=True)
     assert "Bins(32) by quadrature: Frobenius error" in text and f"tolerance {0.01 * math.sqrt(32):g} met" in text
     # the foreshortened arc is elliptic and has no closed form
     assert f"{arcs.collision_matrix.samples} rays" in text and "against the sampling noise" in text
@@ -110,14 +112,14 @@ def test_the_consequences_are_those_of_the_library(arcs, teeth):
     assert abs(float(found.relaxation_time) + 1 / math.log(0.3670253152)) <= found.relaxation_time.error
     # a grazing ray leaves an arc at a finite angle: D is that of diffuse walls
     assert found.diffusion.eta == pytest.approx(1.0, abs=1e-5)
-    assert "relaxation time" in arcs.summary() and "D = 1.27" in arcs.summary()
+    assert "relaxation time" in arcs.summary(verbose=True) and "D = 1.27" in arcs.summary(verbose=True)
     assert not math.isfinite(teeth.consequences.relaxation_time.error)
-    assert "no relaxation time" in teeth.summary()
+    assert "no relaxation time" in teeth.summary(verbose=True)
 
 
 def test_the_eigenvalues_and_enclosures_can_be_quoted(arcs, teeth):
     """Value, error, kind, method and convention of each, in the text and in JSON; 0.3670253152 is the reference."""
-    text, read = arcs.summary(), arcs.as_dict()
+    text, read = arcs.summary(verbose=True), arcs.as_dict()
     assert "paper convention, estimate: Panels(" in text and "completeness: the rest of the spectrum is within" in text
     listed = read["eigenvalues"]
     assert {"convention", "kind", "method", "values", "errors", "parity", "completeness"} <= set(listed)
@@ -132,18 +134,18 @@ def test_the_eigenvalues_and_enclosures_can_be_quoted(arcs, teeth):
     assert (enclosed[1]["convention"], enclosed[1]["kind"], enclosed[1]["parity"]) == ("paper", "estimate", "odd")
     assert all(str(item) in text for item in arcs.enclosures)
     assert teeth.enclosures is None and teeth.as_dict()["enclosures"] is None
-    assert "no eigenvalue next to it is isolated" in teeth.summary()
+    assert "no eigenvalue next to it is isolated" in teeth.summary(verbose=True)
 
 
 def test_a_tolerance_that_was_not_met_is_said_loudly(teeth):
     missed = replace(teeth.matrix, error=replace(teeth.matrix.error, value=0.5, error=0.5))
     # 1e-3 for each of 16 bins
-    assert "Frobenius error 0.5 (bound), tolerance 0.004 NOT met" in replace(teeth, matrix=missed).summary()
+    assert "Frobenius error 0.5 (bound), tolerance 0.004 NOT met" in replace(teeth, matrix=missed).summary(verbose=True)
 
 
 def test_a_gap_that_was_not_decided_is_not_rounded_away(arcs):
     open_question = replace(arcs.gap, value=0.71234, error=0.71234, verdict="undecided")
-    text = replace(arcs, gap=open_question).summary()
+    text = replace(arcs, gap=open_question).summary(verbose=True)
     assert "paper convention: not decided; 0.7123 at the finest basis, error up to 0.71" in text
 
 
@@ -152,16 +154,18 @@ def test_a_law_without_mirror_axis_is_said_not_to_be_self_adjoint_and_contracts_
     report = study_wall(wall, bins=8, tolerance=0.1)
     gap = report.as_dict()["gap"]["specular"]
     assert (gap["self_adjoint"], gap["value"], gap["verdict"]) == (False, 0.0, "no gap")
-    assert "P_F is not known to be self-adjoint" in report.summary() and "mean 0 is 1 (no gap)" in report.summary()
+    assert "P_F is not known to be self-adjoint" in report.summary(
+        verbose=True
+    ) and "mean 0 is 1 (no gap)" in report.summary(verbose=True)
     curved = geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])])
     report = study_wall(curved, bins=8, tolerance=0.05)
     assert report.consequences.slem.value == 1.0 - report.specular_gap.value
-    assert "a step shrinks functions of mean 0 by the factor 0.62" in report.summary()
+    assert "a step shrinks functions of mean 0 by the factor 0.62" in report.summary(verbose=True)
 
 
 def test_the_summary_lists_all_eigenvalues_by_modulus(arcs):
     """The second largest modulus is that of the most negative one: facts 10."""
-    line = next(line for line in arcs.summary().splitlines() if line.startswith("spectrum"))
+    line = next(line for line in arcs.summary(verbose=True).splitlines() if line.startswith("spectrum"))
     numbers = [float(part.split(" +- ")[0]) for part in line.split("modulus: ")[1].split(" (")[0].split(", ")]
     assert len(numbers) == 10 and "the 10 of largest modulus" in line
     assert np.all(np.diff(np.abs(numbers)) <= 0.0) and numbers[2] == pytest.approx(-0.311346443, abs=1e-3)
@@ -177,7 +181,7 @@ def test_a_refused_gap_is_reported_and_the_rest_stands(monkeypatch, tmp_path):
     monkeypatch.setattr("asperity.study.study.enclosures", refuse)
     report = study_wall(geo.rectangular_teeth(1.0), bins=8)
     assert set(report.refusals) == {"gap", "specular_gap", "collision_gap", "spectrum", "enclosures"}
-    assert report.summary().count("refused: the counts speak against symmetry") == 5
+    assert report.summary(verbose=True).count("refused: the counts speak against symmetry") == 5
     assert json.loads(report.to_json())["gap"] == {"paper": None, "specular": None}
     assert len(report.save(tmp_path)) == len(PICTURES) + len(DATA)
 
@@ -228,3 +232,33 @@ def test_a_study_does_not_accept_nonsense():
     for keywords in ({"tolerance": -1.0}, {"bins": 0}):
         with pytest.raises(InputError):
             study_wall(geo.flat(), **keywords)
+
+
+@pytest.mark.parametrize("which", ["arcs", "teeth"])
+def test_the_summary_is_ten_short_lines_with_errors_in_brackets(which, request):
+    report = request.getfixturevalue(which)
+    lines = report.summary().splitlines()
+    assert len(lines) == 10 and max(map(len, lines)) <= 130
+    assert lines[3].startswith("gap        0.63297(5) isolated" if which == "arcs" else "gap        0 no gap")
+    assert repr(report) == f"<Study\n{report.summary()}>"
+
+
+def test_a_refusal_is_in_the_short_summary_too(arcs):
+    text = replace(arcs, gap=None, refusals={"gap": "the counts speak against symmetry"}).summary()
+    assert "gap        refused: the counts speak against symmetry" in text
+
+
+@pytest.mark.parametrize(("kind", "start"), [("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_pictures_are_written_in_the_format_that_is_asked_for(teeth, tmp_path, kind, start):
+    paths = teeth.save(tmp_path, picture_format=kind, dpi=50)
+    assert [path.name for path in paths[:4]] == [name.replace("png", kind) for name in PICTURES]
+    assert all(path.read_bytes().startswith(start) for path in paths[:4])
+    with pytest.raises(FileExistsRefusal, match=f"wall.{kind}"):
+        teeth.save(tmp_path, picture_format=kind)
+
+
+def test_an_unknown_format_and_resolution_are_refused_before_the_folder_is_made(teeth, tmp_path):
+    for options in ({"picture_format": "gif"}, {"dpi": 0}):
+        with pytest.raises(InputError, match=next(iter(options))):
+            teeth.save(tmp_path / "new", **options)
+    assert not (tmp_path / "new").exists()

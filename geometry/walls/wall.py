@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, positive_number
 from ...core.errors import InputError, WallError
+from ...core.html import html_table
 from ..cells.cell import Cell
+from ..cells.miniature import wall_miniature
 from ..cells.mirror_symmetry import has_mirror_axis
 from ..cells.profile import Seam, vertices_of_profile
 from ..cells.toml import read_wall, save_wall
@@ -190,6 +192,14 @@ class Wall(Cell):
     def unforeshorten(self, disk: Disk) -> Self:
         """Return the wall whose foreshortened wall is this one: y multiplied by ``disk.foreshortening``."""
         return self._image(1.0, _checked(disk).foreshortening, self.period)
+
+    def _repr_html_(self) -> str:
+        """The wall with a small picture, in a notebook."""
+        lines = {
+            "period": f"{self.period:g}", "depth": f"{self.depth:.6g}", "length": f"{self.arc_length:.6g}",
+            "mirror-symmetric": "yes" if self.is_mirror_symmetric else "no",
+        }  # fmt: skip
+        return html_table(repr(self), lines, wall_miniature(self))
 
     def outline(self, tolerance: float) -> Floats:
         """Return the path of one period, without islands, as a polyline within ``tolerance``, shape (n, 2)."""

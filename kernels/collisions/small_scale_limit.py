@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, finite_array, frozen, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
+from ...core.frames import data_frame
 from ...core.rounding import EPS
 
 if TYPE_CHECKING:
@@ -73,6 +74,14 @@ class LimitStudy:
     errors: dict[str, Floats]
     seconds: Floats
     collisions: int
+
+    def to_frame(self) -> Any:
+        """One row a scale; every measured column is followed by its standard error (extra ``studies``)."""
+        columns = {"scale": self.scales, "spacing": self.spacings, "gap_share": self.gap_share}
+        for name in COLUMNS:
+            # names of fields of this class
+            columns |= {name: getattr(self, name), f"{name}_error": self.errors[name]}
+        return data_frame({**columns, "seconds": self.seconds})
 
     def order(self, column: str, against: str = "scales") -> Estimate:
         """The exponent p of column ~ against^p, by weighted least squares.

@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ...core.frames import data_frame
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.wall_law import WallLaw
@@ -64,6 +65,13 @@ class Convergence:
         return np.asarray(
             np.divide(values[1:], values[:-1], out=np.full(values.size - 1, np.nan), where=values[:-1] > 0.0)
         )
+
+    def to_frame(self) -> Any:
+        """One row a member, with distance, error and seconds, as a pandas.DataFrame (extra ``studies``)."""
+        steps = self.steps
+        columns = {"name": [step.name for step in steps], "distance": self.distances}
+        more = {"error": [step.distance.error for step in steps], "seconds": [step.seconds for step in steps]}
+        return data_frame({**columns, **more})
 
     def __str__(self) -> str:
         width = max(len(step.name) for step in self.steps)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_array, generator, whole_number
 from ...core.errors import InputError
+from ...core.html import html_table
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.mirror import is_mirror_symmetric
@@ -101,7 +102,15 @@ class Law(ABC):
     def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
         """`apply` for checked arguments."""
 
-    # ---- optional properties, each with a default -------------------------------------------------------------
+    def _repr_html_(self) -> str:
+        known = {True: "yes", False: "no", None: "not known"}
+        lines = {
+            "convention": self.frame, "reversible": known[self.reversible],
+            "mirror-symmetric": known[self.mirror_symmetric], "closed form": self.closed_form,
+        }  # fmt: skip
+        return html_table(f"Law {self!r}", lines)
+
+    # ---- what a law may know besides; each has a default ------------------------------------------------------
     @property
     def closed_form(self) -> Law | None:
         """The same law as an object with closed formulas; None if there is none or if this object is it.

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from ...core.checks import Floats, finite_array, finite_number, frozen, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
+from ...core.html import html_table
 from ...core.rounding import EPS
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
@@ -447,6 +448,14 @@ class KernelMatrix:
         edges = np.linspace(0.0, np.pi, GRID + 1)
         values = basis.evaluate(0.5 * (edges[1:] + edges[:-1]))
         return edges, values @ self.symmetric @ values.T
+
+    def _repr_html_(self) -> str:
+        lines = {
+            "law": self.law, "method": self.method, "Frobenius error": f"{float(self.error):.2g} ({self.error.kind})",
+            "tolerance": self.requested_tolerance and f"{self.requested_tolerance:g}", "samples": self.samples or "",
+            "convention": self.frame,
+        }  # fmt: skip
+        return html_table(f"KernelMatrix in {self.basis!r}", lines)
 
     def __repr__(self) -> str:
         error = f"error {float(self.error):.2g} ({self.error.kind})"

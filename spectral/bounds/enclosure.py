@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind
+from ...core.frames import data_frame
+from ...core.html import html_table
 from ...core.rounding import EPS
 from ...kernels import Basis, Bins, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
 from ...kernels.bases.measure import SINE
@@ -120,6 +122,15 @@ class Enclosures:
 
     def __str__(self) -> str:
         return "\n".join([f"{self.convention} convention, {self.method}", *map(str, self.items)])
+
+    def to_frame(self) -> Any:
+        """One row an enclosure, one column a field, as a pandas.DataFrame (extra ``studies``)."""
+        names = [field.name for field in fields(Enclosure)]
+        return data_frame({name: [getattr(item, name) for item in self.items] for name in names})
+
+    def _repr_html_(self) -> str:
+        numbers = {f"{k} {item.label}": f"[{item.low:.12g}, {item.high:.12g}]" for k, item in enumerate(self.items)}
+        return html_table(f"Enclosures, {self.convention} convention", {**numbers, "method": self.method})
 
 
 def enclosures(

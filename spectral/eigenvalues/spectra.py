@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, frozen
 from ...core.errors import AccuracyError
 from ...core.estimates import NORMAL_95, Estimate
+from ...core.frames import data_frame
+from ...core.html import html_table
 from ...core.rounding import EPS
 from ...kernels import Basis, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
@@ -206,6 +208,20 @@ class Spectrum:
         """Draw the eigenvalues with their intervals."""
         gap = self.gap, f"1 - second eigenvalue of this matrix: {self.gap:.4g}"
         return draw_eigenvalues(self.values, self.errors.total(), self.convention, EIGENVALUE, gap, ax)
+
+    def to_frame(self) -> Any:
+        """One row an eigenvalue, with its errors and its parity, as a pandas.DataFrame (extra ``studies``)."""
+        errors = self.errors
+        parts = {part: getattr(errors, part) for part in ("algebraic", "discretisation", "sampling")}  # its fields
+        parity = self.parity or ("none",) * len(self.values)
+        return data_frame({"value": self.values, "error": errors.total(), "parity": parity, **parts})
+
+    def _repr_html_(self) -> str:
+        names = [f"{k} {parity}" if parity != "none" else str(k) for k, parity in enumerate(self.parity)]
+        names = names or [str(k) for k in range(len(self.values))]
+        numbers = dict(zip(names, map(str, self.estimates()), strict=True))
+        lines = {"verdict": self.verdict, "basis": repr(self.basis), "completeness": self.completeness}
+        return html_table(f"Eigenvalues, {self.convention} convention", {**numbers, **lines})
 
     def __repr__(self) -> str:
         numbers = f"k={len(self.values)}, gap={self.gap:.10g}, slem={self.slem:.10g}"

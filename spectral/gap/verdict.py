@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.estimates import Estimate, rounded
+from ...core.html import html_table
 from ..eigenvalues.spectra import EIGENVALUE, Spectrum, Verdict
 from ..essential.edge import EssentialEdge
 from ..plotting import draw_eigenvalues
@@ -50,9 +51,13 @@ class SpectralGap(Estimate):
         cut = f"a gap is never negative: the interval {self.value:.6g} +- {self.error:.2g} is cut at 0"
         return replace(self, value=0.5 * high, error=0.5 * high, evidence=(*self.evidence, cut))
 
-    def __str__(self) -> str:
-        words = "" if self.self_adjoint else ", not known to be self-adjoint"
-        return f"{super().__str__()}, {self.verdict}, {self.convention} convention{words}"
+    def _repr_html_(self) -> str:
+        title = "Spectral gap" if self.self_adjoint else "1 - norm on functions of mean 0"
+        lines = {
+            "verdict": self.verdict, "convention": self.convention, "error": f"{self.error:.2g} ({self.kind})",
+            "method": self.method, "evidence": "; ".join(self.evidence),
+        }  # fmt: skip
+        return html_table(f"{title} {self}", lines)
 
 
 def made_from(found: Spectrum, how: str) -> str:

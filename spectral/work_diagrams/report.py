@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from ...core.errors import InputError
+from ...core.frames import data_frame
 from ...core.tables import table
 from .machine import Machine
 from .order import FittedOrder, fit_order
@@ -259,6 +260,13 @@ class WorkReport:
             if times:
                 ratios.append(row.least / min(times))
         return max(ratios, default=None)
+
+    def to_frame(self) -> Any:
+        """One row a measurement, as a pandas.DataFrame (extra ``studies``); errors have a column a norm."""
+        names = ("method", "budget", "status", "reported", "note", "least", "spread")
+        columns = {name: [getattr(row, name) for row in self.rows] for name in names}  # names of fields of a row
+        errors = {f"{norm} error": [row.errors.get(norm, np.nan) for row in self.rows] for norm in self.norms}
+        return data_frame({**columns, **errors})
 
     def table(self) -> str:
         """A Markdown table, followed by references, orders, choice and machine."""

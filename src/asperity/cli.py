@@ -11,6 +11,7 @@ import click
 
 from . import __version__
 from .core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
+from .core.estimates import described
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile (mirrored to make it periodic, or profile.txt:seam=step)."""
@@ -22,6 +23,10 @@ class OneLineErrors(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("asperity: interrupted", err=True)
+            # what shells give a command that the signal ended
+            sys.exit(130)
         except AsperityError as reason:
             click.echo(f"asperity: {' '.join(str(reason).split())}", err=True)
             sys.exit(1)
@@ -61,9 +66,26 @@ def main() -> None:
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random generator.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON instead of the summary.")
 @click.option("--force", is_flag=True, help="Replace the files of an earlier study in the folder.")
+@click.option("-v", "--verbose", is_flag=True, help="Print methods, spectrum, enclosures and evidence too.")
+@click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option(
+    "--format",
+    "picture_format",
+    type=click.Choice(["png", "svg", "pdf"]),
+    default="png",
+    show_default=True,
+    help="Format of the pictures.",
+)
+@click.option(
+    "--dpi",
+    type=click.FloatRange(min=10, max=2400),
+    default=100,
+    show_default=True,
+    help="Dots per inch of the pictures.",
+)
 def study(
-    wall: str, mass: float, inertia: float, out: Path | None, tolerance: float, bins: int, seed: int, as_json: bool,
-    force: bool,
+    wall: str, mass: float, inertia: float, tolerance: float, bins: int, seed: int, out: Path | None, force: bool,
+    picture_format: str, dpi: float, **printing: bool,
 ) -> None:  # fmt: skip
     """Study WALL: law, symmetry, spectrum, gap, and the collision law of a disk.
 
@@ -74,21 +96,29 @@ def study(
     """
     import numpy as np
 
+    from .core.files import removed_on_failure
     from .geometry import Disk, wall_from_text
     from .study import prepare_folder, study_wall
 
+    as_json, verbose, quiet = (printing[name] for name in ("as_json", "verbose", "quiet"))
+    if quiet and (as_json or verbose):
+        raise click.UsageError("--quiet prints nothing; leave --json and --verbose out")
     disk = Disk(mass, inertia)
     found_wall = wall_from_text(wall)
-    if out is not None:
-        # refuse before the work, not after it
-        prepare_folder(out, overwrite=force)
-    report = study_wall(
-        found_wall, Path(wall).name, disk, tolerance=tolerance, bins=bins, rng=np.random.default_rng(seed)
-    )
-    click.echo(report.to_json() if as_json else report.summary())
-    if out is not None:
-        for path in report.save(out, overwrite=force):
-            click.echo(f"wrote      {path}", err=as_json)
+    with removed_on_failure(out):
+        if out is not None:
+            # refuse before the work, not after it
+            prepare_folder(out, overwrite=force, picture_format=picture_format)
+        rng = np.random.default_rng(seed)
+        report = study_wall(
+            found_wall, Path(wall).name, disk, tolerance=tolerance, bins=bins, rng=rng, progress=not quiet
+        )
+        if not quiet:
+            click.echo(report.to_json() if as_json else report.summary(verbose=verbose))
+        if out is not None:
+            for path in report.save(out, overwrite=force, picture_format=picture_format, dpi=dpi):
+                if not quiet:
+                    click.echo(f"wrote      {path}", err=as_json)
 
 
 @main.command(epilog=WALL_HELP)
@@ -189,9 +219,11 @@ def realise(
     found = wall_for(law_from_text(law), moments, tolerance, rng=np.random.default_rng(seed), most_hollows=hollows)
     wall = found.wall if disk is None else found.wall.unforeshorten(disk)
     click.echo(f"wall       {len(found.hollows)} hollows, {len(wall.pieces)} pieces, depth {wall.depth:.6g}")
-    click.echo(f"defect     {found.defect} in {found.moments} moments; at most {float(found.bound):.2g} too much")
+    click.echo(
+        f"defect     {described(found.defect)} in {found.moments} moments; at most {float(found.bound):.2g} too much"
+    )
     if found.law is not None:
-        click.echo(f"distance   {found.distance} (joint)")
+        click.echo(f"distance   {described(found.distance)} (joint)")
     if out is not None:
         wall.save(out, overwrite=force)
         click.echo(f"wrote      {out}")

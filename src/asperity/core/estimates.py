@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any, Literal
 
 from .errors import InputError
+from .html import html_table
 
 ErrorKind = Literal["bound", "estimate"]
 
@@ -16,6 +18,9 @@ LEVEL = 0.95
 NORMAL_95 = 1.959963984540054
 # A number without error is printed to this many decimals.
 DECIMALS = 12
+# A printed error has two digits if the first is smaller than this, of a double's significant digits at most so many;
+# powers of ten between these are written without exponent.
+TWO_DIGITS, SIGNIFICANT, PLAIN = 3, 17, (-4, 8)
 
 
 @dataclass(frozen=True)
@@ -46,8 +51,16 @@ class Estimate:
     >>> gap = Estimate(0.25, 0.0, "bound", "closed form")
     >>> float(gap)
     0.25
-    >>> print(gap)
-    0.25 +- 0 (bound: closed form)
+    >>> print(gap, Estimate(0.0373214, 0.00004, "estimate", "two resolutions"))
+    0.25 0.03732(5)
+    >>> f"{gap:.3f}"
+    '0.250'
+
+    It has no arithmetic: how errors add depends on what the numbers have in common. Where they are independent, the
+    package uncertainties does it::
+
+        from uncertainties import ufloat
+        half = ufloat(gap.value, gap.error / 1.96) / 2
     """
 
     value: float
@@ -69,7 +82,14 @@ class Estimate:
         return float(self.value)
 
     def __str__(self) -> str:
-        return f"{self.value:.10g} +- {self.error:.2g} ({self.kind}: {self.method})"
+        return compact(self)
+
+    def __format__(self, spec: str) -> str:
+        return format(self.value, spec) if spec else str(self)
+
+    def _repr_html_(self) -> str:
+        lines = {"error": f"{self.error:.2g} ({self.kind})", "method": self.method}
+        return html_table(f"{type(self).__name__} {self}", lines)
 
 
 def _number(name: str, value: Any) -> float:
@@ -77,6 +97,44 @@ def _number(name: str, value: Any) -> float:
         return float(value)
     except (TypeError, ValueError, OverflowError) as reason:
         raise InputError(f"{name}: expected a number, got {value!r}") from reason
+
+
+def compact(number: Estimate) -> str:
+    """The value with the error in units of its last digit; both roundings are inside the error that is printed.
+
+    Examples
+    --------
+    >>> compact(Estimate(0.63297743, 0.00022, "estimate", "")), compact(Estimate(1.5e-9, 4e-11, "bound", ""))
+    ('0.63298(23)', '1.50(4)e-09')
+    >>> compact(Estimate(123456, 400.0, "bound", "")), compact(Estimate(0.5, math.inf, "bound", ""))
+    ('123500(500)', '0.5(inf)')
+    """
+    value, error = number.value, number.error
+    if error == 0.0 or not (math.isfinite(value) and math.isfinite(error)):
+        return f"{value:.{DECIMALS}g}" + (f"({error:g})" if error else "")
+    size = math.floor(math.log10(max(abs(value), error)))
+    first = math.floor(math.log10(error))
+    decimals = -first + (error < TWO_DIGITS * 10.0**first)
+    # beyond the last digit of a double there is none
+    decimals = min(decimals, SIGNIFICANT - 1 - size)
+    # the shortest decimals that are these doubles
+    exact, width = Decimal(repr(value)), Decimal(repr(error))
+    shown = round(exact, decimals) + 0
+    units = math.ceil((width + abs(exact - shown)).scaleb(decimals)) * 10 ** max(-decimals, 0)
+    if PLAIN[0] <= size <= PLAIN[1]:
+        return f"{shown:f}({units})"
+    return f"{shown.scaleb(-size):f}({units})e{size:+03d}"
+
+
+def described(number: Estimate) -> str:
+    """Value, error, kind and method in one line.
+
+    Examples
+    --------
+    >>> described(Estimate(0.25, 0.0, "bound", "closed form"))
+    '0.25 +- 0 (bound: closed form)'
+    """
+    return f"{number.value:.10g} +- {number.error:.2g} ({number.kind}: {number.method})"
 
 
 def rounded(number: Estimate) -> str:

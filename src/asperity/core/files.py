@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -77,3 +77,29 @@ def regular_file(path: Path) -> Path:
         kind = "a folder" if path.is_dir() else "a pipe or a device"
         raise InputError(f"{path}: cannot read {kind}; expected a file")
     return path
+
+
+@contextmanager
+def removed_on_failure(folder: Path | None) -> Iterator[None]:
+    """Remove the folder, and those above it that were missing too, if the work in it fails and left no file there.
+
+    Examples
+    --------
+    >>> with TemporaryDirectory() as parent:
+    ...     try:
+    ...         with removed_on_failure(Path(parent) / "a" / "b"):
+    ...             (Path(parent) / "a" / "b").mkdir(parents=True)
+    ...             raise KeyboardInterrupt
+    ...     except KeyboardInterrupt:
+    ...         list(Path(parent).iterdir())
+    []
+    """
+    missing = [] if folder is None else [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        yield
+    except BaseException:
+        for path in missing:
+            # a folder that holds something stays
+            with suppress(OSError):
+                path.rmdir()
+        raise

@@ -34,7 +34,7 @@ GALLERY_COLUMNS = 3
 SMOOTH, NO_SLIP = "#0072B2", "#D55E00"
 
 
-def save_pictures(study: StudyResult, paths: Sequence[Path]) -> None:
+def save_pictures(study: StudyResult, paths: Sequence[Path], dpi: float = RESOLUTION) -> None:
     """Write wall, kernel, spectrum and collision, in this order."""
     from matplotlib.figure import Figure
 
@@ -42,10 +42,10 @@ def save_pictures(study: StudyResult, paths: Sequence[Path]) -> None:
     for path, (draw, size) in zip(paths, drawings, strict=False):
         figure = Figure(figsize=size, layout="constrained")
         draw(study, figure.subplots())
-        figure.savefig(path, dpi=RESOLUTION, bbox_inches="tight")
+        figure.savefig(path, dpi=dpi, bbox_inches="tight")
     figure = Figure(figsize=(7.0, 6.0), layout="constrained")
     draw_outgoing_velocities(study.collision, figure)
-    figure.savefig(paths[-1], dpi=RESOLUTION)
+    figure.savefig(paths[-1], dpi=dpi)
 
 
 def draw_study_wall(study: StudyResult, ax: Axes) -> None:

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 KAC_Z = 4.5
 
 
-def summary_of(study: StudyResult) -> str:
-    """The study as text, one fact a line."""
+def details_of(study: StudyResult) -> str:
+    """The study as text, with methods, errors and evidence."""
     wall, disk = study.wall, study.disk
     symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
     lines = [
         f"wall       {study.name}: period {wall.period:g}, depth {wall.depth:.6g}, length {wall.arc_length:.6g}, "
-        f"{_counted(len(wall.pieces), 'piece')}, "
-        + (_counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell")
-        + (f", {_counted(len(wall.islands), 'island')}" if wall.islands else "")
+        f"{counted(len(wall.pieces), 'piece')}, "
+        + (counted(len(wall.hollows), "hollow") if wall.closes else "open: rays may pass from cell to cell")
+        + (f", {counted(len(wall.islands), 'island')}" if wall.islands else "")
         + f", {symmetry}"
     ]
     if study.tracer is not None:
@@ -160,7 +160,8 @@ def _met(met: bool | None, tolerance: float | None) -> str:
     return f"tolerance {tolerance:g} {'met' if met else 'NOT met'}"
 
 
-def _counted(number: int, word: str) -> str:
+def counted(number: int, word: str) -> str:
+    """A number of things."""
     return f"{number} {word}{'' if number == 1 else 's'}"
 
 

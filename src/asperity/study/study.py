@@ -16,16 +16,19 @@ from ..core.checks import positive_number
 from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 from ..core.estimates import NORMAL_95, Estimate
 from ..core.files import moved_when_complete
+from ..core.html import html_table
 from ..geometry import Disk, Wall, trace
+from ..geometry.cells.miniature import wall_miniature
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
 from ..kernels.bases.measure import SINE
 from ..spectral import Enclosures, SpectralGap, Spectrum, enclosures, gaps_in_both_conventions, spectral_gap, spectrum
 from ..spectral.gap.law_spectrum import with_gap
 from ..spectral.gap.methods import law_eigenvalues
 from .consequences import consequences_of
-from .pictures import save_pictures
-from .report import study_as_dict, summary_of
+from .pictures import RESOLUTION, save_pictures
+from .report import details_of, study_as_dict
 from .result import StudyResult, TracerCheck
+from .summary import summary_of
 
 BINS = 128
 TOLERANCE = 1e-3
@@ -38,13 +41,14 @@ ENCLOSED = 3
 # Rays of a sampled matrix: enough to see how many more it takes, and as many as a few seconds allow.
 FIRST_SAMPLES, MOST_SAMPLES = 2**20, 2**24
 PICTURES = ("wall.png", "kernel.png", "spectrum.png", "collision.png")
+FORMATS = ("png", "svg", "pdf")
 DATA = ("kernel.npz", "study.json")
 
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Study(StudyResult):
     """Everything that `study_wall` found; ``summary()`` is text, ``to_json()`` a string, ``save`` writes files.
 
@@ -59,29 +63,50 @@ class Study(StudyResult):
         """The study as JSON."""
         return json.dumps(self.as_dict(), indent=2, allow_nan=False)
 
-    def summary(self) -> str:
-        """The study as text, one fact a line."""
-        return summary_of(self)
+    def summary(self, *, verbose: bool = False) -> str:
+        """The study as ten short lines; with ``verbose`` also methods, spectrum, enclosures and evidence."""
+        return details_of(self) if verbose else summary_of(self)
 
-    def save(self, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
+    def __repr__(self) -> str:
+        return f"<Study\n{self.summary()}>"
+
+    def _repr_html_(self) -> str:
+        lines = {line[:11].strip() or "gap, specular": line[11:] for line in self.summary().splitlines()}
+        return html_table(f"Study of {self.name}", lines, wall_miniature(self.wall))
+
+    def save(
+        self, folder: str | Path, *, overwrite: bool = False, picture_format: str = "png", dpi: float = RESOLUTION
+    ) -> list[Path]:
         """Write the pictures, the matrix with its metadata, and the study as JSON; returns the paths.
+
+        Parameters
+        ----------
+        folder : path
+            Made if missing.
+        overwrite : bool
+            Whether files of an earlier study are replaced.
+        picture_format : {"png", "svg", "pdf"}
+        dpi : float
+            Dots per inch of pictures in pixels.
 
         Raises
         ------
         FileExistsRefusal
             If one of the files exists and ``overwrite`` is False; nothing is written then.
         InputError
-            If the folder cannot be made or written.
+            If the folder cannot be made or written, or the format or the resolution is unsuitable.
         """
-        target = prepare_folder(folder, overwrite=overwrite)
+        positive_number("dpi", dpi)
+        target = prepare_folder(folder, overwrite=overwrite, picture_format=picture_format)
+        pictures = picture_names(picture_format)
         try:
             with moved_when_complete(target) as beside:
-                save_pictures(self, [beside / name for name in PICTURES])
+                save_pictures(self, [beside / name for name in pictures], dpi)
                 self.matrix.save(beside / DATA[0])
                 (beside / DATA[1]).write_text(self.to_json() + "\n", encoding="utf-8")
         except OSError as reason:
             raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
-        return [target / name for name in (*PICTURES, *DATA)]
+        return [target / name for name in (*pictures, *DATA)]
 
 
 def study_wall(
@@ -92,6 +117,7 @@ def study_wall(
     tolerance: float = TOLERANCE,
     bins: int = BINS,
     rng: np.random.Generator | None = None,
+    progress: bool = True,
 ) -> Study:
     """Study a wall: trace it, make its law and matrix, test the symmetry, find the gap, collide a disk with it.
 
@@ -108,6 +134,8 @@ def study_wall(
         Size of the matrix.
     rng : numpy.random.Generator, optional
         ``np.random.default_rng(0)`` by default, so that a study repeats.
+    progress : bool
+        Whether a bar is shown on a terminal after two seconds.
 
     Returns
     -------
@@ -137,23 +165,23 @@ def study_wall(
     disk = disk or Disk()
     refusals: dict[str, str] = {}
     # silent where standard error is not a terminal, and in the first two seconds
-    with tqdm(total=8, desc=name, delay=2, disable=None, leave=False) as progress:
+    with tqdm(total=8, desc=name, delay=2, disable=None if progress else True, leave=False) as bar:
         tracer = check_tracer(wall, rng) if wall.hollows else None
-        progress.update()
+        bar.update()
         law = WallLaw(wall)
         matrix = _matrix(law, basis, tolerance, rng)
-        progress.update()
+        bar.update()
         gap, specular_gap = _gaps(law, tolerance, rng, refusals)
-        progress.update(2)
+        bar.update(2)
         found = _or_refusal(lambda: _spectrum(law, matrix, gap, tolerance, rng), refusals, "spectrum")
-        progress.update()
+        bar.update()
         enclosed = _or_refusal(lambda: _enclosures(law, gap, tolerance), refusals, "enclosures", reason=AsperityError)
-        progress.update()
+        bar.update()
         collision = CollisionLaw.from_wall(wall, disk)
         collision_matrix = _matrix(collision.law, basis, tolerance, rng)
-        progress.update()
+        bar.update()
         collision_gap = _or_refusal(lambda: spectral_gap(collision.law, tolerance, rng), refusals, "collision_gap")
-        progress.update()
+        bar.update()
         consequences = consequences_of(wall, law, gap, specular_gap, found)
     return Study(
         name, wall, disk, float(tolerance), tracer, matrix, gap, specular_gap, found, enclosed, collision,
@@ -162,11 +190,18 @@ def study_wall(
     )  # fmt: skip
 
 
-def prepare_folder(folder: str | Path, *, overwrite: bool) -> Path:
+def picture_names(picture_format: str) -> tuple[str, ...]:
+    """The names of the pictures of a study in a format, which is checked."""
+    if picture_format not in FORMATS:
+        raise InputError(f"picture_format: expected one of {', '.join(FORMATS)}, got {picture_format!r}")
+    return tuple(f"{Path(name).stem}.{picture_format}" for name in PICTURES)
+
+
+def prepare_folder(folder: str | Path, *, overwrite: bool, picture_format: str = "png") -> Path:
     """Make the output folder, and refuse it where a file of an earlier study would be lost."""
-    target = Path(folder)
+    target, names = Path(folder), (*picture_names(picture_format), *DATA)
     try:
-        existing = [name for name in (*PICTURES, *DATA) if (target / name).exists()]
+        existing = [name for name in names if (target / name).exists()]
         if existing and not overwrite:
             raise FileExistsRefusal(
                 f"{target}: {', '.join(existing)} exist; use another folder or --force to replace them"

@@ -1,0 +1,152 @@
+"""Results in notebooks, in format strings and as data frames."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from decimal import Decimal
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError
+from asperity.estimates import Estimate
+from asperity.study import study_wall
+
+LAW = ker.henyey_greenstein(0.5)
+ISLAND = geo.Wall([geo.Segment((0, -1), (1, -1))], islands=[[geo.Arc((0.3, -0.4), (0.1, 0.2), 0, 2 * math.pi)]])
+GAP = Estimate(0.0373214, 0.00004, "estimate", "two <resolutions>")
+
+
+class Balanced(HTMLParser):
+    """Every tag is closed in its turn."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        pass
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def text_of(value) -> str:
+    parser = Balanced()
+    parser.feed(value._repr_html_())
+    assert parser.open == []
+    return parser.text
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: LAW, ["henyey_greenstein(0.5)", "reversible"]),
+        (lambda: ker.WallLaw(geo.flat()), ["WallLaw", "closed form"]),
+        (lambda: ker.discretise(LAW, ker.Bins(4)), ["Bins(4)", "Frobenius error"]),
+        (lambda: spec.spectrum(LAW, k=3), ["Eigenvalues", "0.25"]),
+        (lambda: spec.spectral_gap(LAW), ["Spectral gap 0.5", "isolated"]),
+        (lambda: spec.enclosures(LAW, 2), ["indexed", "0.5"]),
+        (lambda: GAP, ["0.03732(5)", "two <resolutions>"]),
+        (lambda: study_wall(geo.flat(), "a & b", bins=4), ["Study of a & b", "diffusion"]),
+    ],
+    ids=["law", "wall law", "matrix", "spectrum", "gap", "enclosures", "estimate", "study"],
+)
+def test_a_notebook_shows_a_table_of_what_matters(make, words):
+    text = text_of(make())
+    assert all(word in text for word in words), text
+
+
+@pytest.mark.parametrize("name", geo.WALLS)
+def test_a_notebook_shows_a_small_picture_of_every_wall(name):
+    wall = geo.WALLS[name].build()
+    for one in (wall, wall.scaled(1e-6), geo.Wall.mirrored(wall)):
+        page = one._repr_html_()
+        assert page.count("<path") == 2 and len(page) < 60_000 and "nan" not in page
+        assert "period" in text_of(one)
+
+
+def test_the_picture_has_every_island():
+    assert ISLAND._repr_html_().count("<path") == 4
+
+
+def test_an_estimate_prints_its_error_in_units_of_the_last_digit():
+    assert str(GAP) == f"{GAP}" == "0.03732(5)" and f"{GAP:.3f}" == "0.037"
+    assert str(Estimate(0.03732, 0.00004, "bound", "")) == "0.03732(4)"
+    assert str(spec.spectral_gap(LAW)).startswith("0.5")
+
+
+@given(
+    st.floats(-1e12, 1e12, allow_nan=False), st.floats(1e-14, 1e6, allow_nan=False, exclude_min=True),
+)  # fmt: skip
+def test_the_printed_interval_holds_the_interval_and_is_hardly_wider(value, error):
+    text = str(Estimate(value, error, "bound", ""))
+    mantissa, rest = text.split("(")
+    units, exponent = rest.split(")")
+    power = int(exponent[1:]) if exponent else 0
+    decimals = len(mantissa.partition(".")[2])
+    middle = Decimal(mantissa).scaleb(power)
+    half = Decimal(units).scaleb(power - decimals)
+    assert abs(Decimal(repr(value)) - middle) + Decimal(repr(error)) <= half
+    least = max(Decimal(error), Decimal(abs(value)) * Decimal(2) ** -53)
+    assert half <= Decimal("1.9") * least + Decimal(10) ** (power - decimals)
+
+
+def test_an_estimate_has_no_arithmetic():
+    for work in (lambda: GAP + GAP, lambda: 2 * GAP, lambda: -GAP, lambda: GAP / 2):
+        with pytest.raises(TypeError):
+            work()
+
+
+@pytest.mark.parametrize(
+    ("make", "columns", "rows"),
+    [
+        (lambda: spec.spectrum(LAW, k=3), ["value", "error", "parity", "algebraic", "discretisation", "sampling"], 3),
+        (lambda: spec.enclosures(LAW, 2), ["value", "low", "high", "label", "index"], 2),
+        (lambda: ker.study_convergence([LAW, ker.lambertian()]), ["name", "distance", "error", "seconds"], 1),
+        (
+            lambda: spec.work_precision(
+                spec.WorkProblem("a", spec.ReferenceValue(0.0, 0.0, "by hand")), [spec.WorkMethod("b", float)], [1, 2],
+                repeats=1,
+            ),
+            ["method", "budget", "status", "least", "absolute error"], 2,
+        ),
+        (
+            lambda: ker.limit_study(
+                geo.Disk(), geo.triangular_teeth(1.0), [0.1, 0.05, 0.02], np.random.default_rng(0), samples=(4, 4, 4)
+            ),
+            ["scale", "spacing", "distance", "distance_error", "seconds"], 3,
+        ),
+    ],
+    ids=["spectrum", "enclosures", "convergence", "work", "limit"],
+)  # fmt: skip
+def test_a_table_of_results_is_a_data_frame(make, columns, rows):
+    pytest.importorskip("pandas")
+    frame = make().to_frame()
+    assert set(columns) <= set(frame.columns) and len(frame) == rows
+
+
+def test_without_pandas_the_message_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(InputError, match=r"asperity\[studies\]"):
+        spec.spectrum(LAW, k=2).to_frame()
+
+
+def test_pandas_is_loaded_by_to_frame_alone():
+    code = "import sys, asperity.spectral as s; s.Spectrum; assert 'pandas' not in sys.modules"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
