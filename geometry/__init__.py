@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..verification.identity import verify
 from .cells.hollow import Hollow
+from .cells.measured import Profile
 from .cells.profile import read_profile
 from .collisions.configuration_space import ConfigurationSpace
 from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
@@ -51,6 +52,7 @@ __all__ = [
     "Hollow",
     "ModifiedCollision",
     "NamedWall",
+    "Profile",
     "RigidCollision",
     "RollingCharts",
     "Segment",

@@ -10,7 +10,12 @@ from hypothesis import strategies as st
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.cells.profile import vertices_of_profile
+from asperity.geometry.cells import profile as profiles
+
+
+def vertices_of_profile(x, height, seam="mirror"):
+    return profiles.vertices_of_profile(geo.Profile(x, height), seam)
+
 
 # ---- from positions and heights to vertices ----------------------------------------------------------------------
 EXACT = {
@@ -152,10 +157,12 @@ def test_line_scans_of_instruments_are_read_from_files_that_are_no_columns(instr
         x, height = geo.read_profile(tmp_path / name)
         assert x.tolist() == [0.0, 0.5, 2.0] and height.tolist() == [1.0, 3.0, 2.0]
         assert x.dtype == height.dtype == np.float64
-    # a file that says it is text is not given away
-    (tmp_path / "scan.TXT").write_text("1 2 3")
-    with pytest.raises(InputError, match=r"scan\.TXT, line 1"):
-        geo.read_profile(tmp_path / "scan.TXT")
+    # whatever its suffix says, a file of columns with a fault is not given away
+    (tmp_path / "scan.xyz").write_text("0 1\n1 2\n3")
+    with pytest.raises(InputError, match=r"scan\.xyz, line 3"):
+        geo.read_profile(tmp_path / "scan.xyz")
+    (tmp_path / "map.TXT").write_text("1 2 3\n4 5 6\n")
+    assert geo.read_profile(tmp_path / "map.TXT").height.tolist() == [1.0, 3.0, 2.0]
 
 
 def test_of_a_map_one_row_along_x_is_taken(instrument, tmp_path):
@@ -172,11 +179,17 @@ def test_of_a_map_one_row_along_x_is_taken(instrument, tmp_path):
             geo.read_profile(tmp_path / "map.opd", row=row)
 
 
-def test_undefined_heights_are_counted_and_refused(instrument, tmp_path):
+def test_undefined_heights_are_counted_refused_and_interpolated(instrument, tmp_path):
     instrument(np.ma.array([1.0, np.inf, 2.0, 4.0], mask=[True, False, False, False]), np.arange(4.0))
     (tmp_path / "scan.opd").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(InputError, match=r"scan\.opd: 2 of 4 heights are undefined"):
-        geo.read_profile(tmp_path / "scan.opd")
+    profile = geo.read_profile(tmp_path / "scan.opd")
+    assert profile.undefined == 2
+    with pytest.raises(InputError, match=r"2 of 4 .* the first at index \(0,\); use Profile\.interpolated"):
+        geo.Wall.from_profile(profile)
+    with pytest.raises(InputError, match=r"scan\.opd: height: 2 of 4 heights are undefined.*interpolate=yes"):
+        geo.wall_from_text(str(tmp_path / "scan.opd"))
+    assert profile.interpolated().height.tolist() == [2.0, 2.0, 2.0, 4.0]
+    assert geo.wall_from_text(f"{tmp_path / 'scan.opd'}:interpolate=yes").depth == 2.0
 
 
 @pytest.mark.parametrize(
@@ -222,3 +235,152 @@ def test_instrument_files_are_read_with_the_extra(tmp_path):
     (tmp_path / "broken.opd").write_bytes(b"\xff\xfe\x00\x01" * 20)
     with pytest.raises(InputError, match="SurfaceTopography cannot read it"):
         geo.read_profile(tmp_path / "broken.opd")
+
+
+# ---- units -------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    "head",
+    [
+        "x [um], height [nm]", "x (µm); z (nm)", "# position [um]  height [nm]", "# a scan (of 2024)\nx [um] z [nm]",
+        "# x [um]\tz [nm]\nx, z",
+    ],
+)  # fmt: skip
+def test_units_in_the_header_are_honoured(head, tmp_path):
+    (tmp_path / "scan.txt").write_text(f"{head}\n0 1000\n1 2000\n3 0\n", encoding="utf-8")
+    profile = geo.read_profile(tmp_path / "scan.txt")
+    assert profile.x.tolist() == [0, 1, 3] and profile.height.tolist() == [1, 2, 0]
+    assert profile.unit in ("um", "µm")
+
+
+@pytest.mark.parametrize("head", ["x [um], height", "x [um], height [V]", "x, height [nm]"])
+def test_a_header_with_one_length_is_not_guessed_at(head, tmp_path):
+    (tmp_path / "scan.txt").write_text(f"{head}\n0 1\n1 2\n")
+    with pytest.raises(InputError, match=r"scan\.txt, header: expected two units"):
+        geo.read_profile(tmp_path / "scan.txt")
+
+
+def test_units_that_are_given_count_more_than_the_header(tmp_path):
+    (tmp_path / "scan.txt").write_text("x [um], height [nm]\n0 1\n1 2\n")
+    profile = geo.read_profile(tmp_path / "scan.txt", units=("mm", "um"))
+    assert profile.unit == "mm" and profile.height == pytest.approx([1e-3, 2e-3], rel=1e-12)
+    assert geo.read_profile(tmp_path / "scan.txt", units="um").height.tolist() == [1.0, 2.0]
+    assert profile.in_unit("um").x.tolist() == [0.0, 1000.0]
+    for units in (("um", "V"), ("um",), 3):
+        with pytest.raises(InputError, match="units: expected"):
+            geo.read_profile(tmp_path / "scan.txt", units=units)
+
+
+def test_the_unit_reaches_the_axes_and_the_file_of_the_wall(tmp_path):
+    (tmp_path / "scan.txt").write_text("x [um], height [nm]\n0 0\n1 -500\n2 0\n", encoding="utf-8")
+    wall = geo.wall_from_text(str(tmp_path / "scan.txt"))
+    disk = geo.Disk()
+    for one in (wall, wall.scaled(2.0), wall.mirrored(), wall.foreshorten(disk), wall.cell):
+        assert one.unit == "um"
+    ax = geo.draw_wall(wall)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (um)", "y (um)")
+    wall.save(tmp_path / "wall.toml")
+    again = geo.load_wall(tmp_path / "wall.toml")
+    assert again.unit == "um" and again == wall == geo.Wall.from_vertices(wall.vertices)
+
+
+def test_a_slope_of_a_thousand_is_taken_for_mixed_units():
+    x, height = np.arange(5.0), 1000.0 * np.array([0, 1, 0, 1, 0])
+    with pytest.warns(UserWarning, match="mean slope is 1e\\+03: are the heights in a smaller unit"):
+        geo.Wall.from_profile(x, height)
+    geo.Wall.from_profile(x, height / 1000.0)
+
+
+# ---- how columns are written -------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("0,0;1,5\n1,0;2,5\n", {"decimal": ","}),
+        ("0,0 1,5\n1,0 2,5\n", {"decimal": ","}),
+        ("0|1.5\n1|2.5\n", {"delimiter": "|"}),
+        ("7 0 9 1.5\n7 1 9 2.5\n", {"usecols": (1, 3)}),
+        ("7 1.5 9 0\n7 2.5 9 1\n", {"usecols": (3, 1)}),
+        ("12 words\nof 3 metadata\n0 1.5\n1 2.5\n", {"skiprows": 2}),
+        ("0\t1.5\n1\t2.5\n", {"delimiter": "\t"}),
+    ],
+)
+def test_columns_are_read_as_the_options_say(text, options, tmp_path):
+    (tmp_path / "scan.txt").write_text(text)
+    x, height = geo.read_profile(tmp_path / "scan.txt", **options)
+    assert x.tolist() == [0, 1] and height.tolist() == [1.5, 2.5]
+
+
+def test_a_text_in_another_encoding_is_read_as_told(tmp_path):
+    (tmp_path / "scan.txt").write_bytes("# Höhe\nx [µm], z [µm]\n0 1\n1 2\n".encode("latin-1"))
+    assert geo.read_profile(tmp_path / "scan.txt", encoding="latin-1").unit == "µm"
+
+
+def test_an_empty_field_is_an_undefined_height(tmp_path):
+    (tmp_path / "scan.csv").write_text("0;1\n1;\n2;nan\n3;4\n")
+    assert geo.read_profile(tmp_path / "scan.csv", delimiter=";").undefined == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        ({"decimal": ";"}, "decimal"), ({"delimiter": ""}, "delimiter"), ({"delimiter": ","}, None),
+        ({"delimiter": ",", "decimal": ","}, "delimiter"), ({"usecols": 3}, "usecols"),
+        ({"usecols": (0, -1)}, "usecols"), ({"skiprows": -1}, "skiprows"), ({"encoding": "klingon"}, "encoding"),
+        ({"encoding": 3}, "encoding"),
+    ],
+)  # fmt: skip
+def test_unsuitable_options_are_refused_by_name(options, name, tmp_path):
+    (tmp_path / "scan.txt").write_text("0,1\n1,2\n")
+    if name is None:
+        assert len(geo.read_profile(tmp_path / "scan.txt", **options).x) == 2
+        return
+    with pytest.raises(InputError, match=f"^{name}: expected"):
+        geo.read_profile(tmp_path / "scan.txt", **options)
+
+
+def test_every_option_has_its_word_in_the_text_of_a_wall(tmp_path):
+    file = tmp_path / "scan.txt"
+    file.write_bytes("Höhe 1 2\n2,0;0;3,0\n0,0;0;1,0\n1,0;0;\n".encode("latin-1"))
+    words = "skiprows=1,encoding=latin-1,delimiter=semicolon,decimal=comma,usecols=0/2,units=um/um,sort=yes"
+    wall = geo.wall_from_text(f"{file}:{words},interpolate=yes,seam=step")
+    assert wall.vertices.tolist() == [[0, 0], [0, -2], [1, -1], [2, 0]] and wall.unit == "um"
+    assert geo.wall_from_text(f"{file}:{words},interpolate=yes,detrend=1").depth == 0.0
+    for bad, message in (("sort=maybe", "parameter sort: cannot read 'maybe'"), ("glue=1", "unknown parameter 'glue'")):
+        with pytest.raises(InputError, match=message):
+            geo.wall_from_text(f"{file}:{bad}")
+
+
+# ---- before it is a wall -----------------------------------------------------------------------------------------
+def test_sorting_averages_at_one_position_and_leaves_undefined_heights_out():
+    found = geo.Profile([2, 0, 2, 1, 0], [3, 1, 5, 9, np.nan]).sorted()
+    assert found.x.tolist() == [0, 1, 2] and found.height.tolist() == [1, 9, 4]
+
+
+@given(st.integers(0, 3), st.lists(st.floats(-1, 1), min_size=6, max_size=12))
+def test_what_is_left_of_a_fit_is_orthogonal_to_all_polynomials_of_the_degree(degree, heights):
+    x = np.linspace(0.0, 1.0, len(heights))
+    rest = geo.Profile(x, heights).detrended(degree).height
+    for power in range(degree + 1):
+        assert abs(rest @ x**power) < 1e-11
+
+
+def test_masked_points_of_an_array_are_undefined():
+    assert geo.Profile([0, 1, 2], np.ma.array([1.0, 7.0, 2.0], mask=[False, True, False])).undefined == 1
+    with pytest.raises(InputError, match="1 of 3 heights are undefined"):
+        geo.Wall.from_profile([0, 1, 2], np.ma.array([1.0, 7.0, 2.0], mask=[False, True, False]))
+
+
+def test_a_map_in_a_text_is_given_to_the_package_that_reads_it(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    heights = np.array([[0.0, 1.0, 2.0, 1.5], [3.0, 1.0, 0.0, 1.0], [2.0, 5.0, 1.0, 0.5]])
+    head = "# Channel: Main\n# Width: 2.0 µm\n# Height: 1.5 µm\n# Value units: nm\n"
+    (tmp_path / "map.txt").write_text(head + "\n".join(" ".join(map(str, row)) for row in heights), encoding="utf-8")
+    profile = geo.read_profile(tmp_path / "map.txt")
+    # heights in nm, so that the positions become nm
+    assert profile.unit == "nm" and profile.x == pytest.approx([0.0, 500.0, 1000.0, 1500.0])
+    assert profile.height.tolist() == heights[1].tolist()
+
+
+def test_a_profile_refuses_what_is_none():
+    for x, height in (([0], [1]), ([0, np.nan], [1, 2]), ([0, 1], [1]), ([0, 1], ["a", "b"])):
+        with pytest.raises(InputError):
+            geo.Profile(x, height)

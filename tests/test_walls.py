@@ -359,6 +359,7 @@ def test_a_level_profile_is_a_flat_wall():
     st.sampled_from(["mirror", "step"]),
     st.sampled_from([1e-9, 1.0, 1e4]),
 )
+@pytest.mark.filterwarnings("ignore:the profile.s mean slope")
 def test_every_profile_makes_a_closed_wall(rows, seam, unit):
     x = np.cumsum([dx for dx, _ in rows])
     height = unit * np.array([h for _, h in rows], dtype=float)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Self
 
@@ -25,13 +25,19 @@ class Cell:
         Each piece starts exactly at the end of the piece before.
     period : float
     islands : tuple of tuples of Curve
+    unit : str
+        Of lengths, for the axes of pictures; empty where none was given. It does not count when walls are compared.
     """
 
     pieces: tuple[Curve, ...]
     period: float = 1.0
     islands: tuple[tuple[Curve, ...], ...] = ()
+    unit: str = field(default="", compare=False)
 
-    def _fill(self, pieces: tuple[Curve, ...], period: float, islands: tuple[tuple[Curve, ...], ...]) -> None:
+    def _fill(
+        self, pieces: tuple[Curve, ...], period: float, islands: tuple[tuple[Curve, ...], ...], unit: str = ""
+    ) -> None:
+        object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "pieces", pieces)
         object.__setattr__(self, "period", period)
         object.__setattr__(self, "islands", islands)
@@ -40,7 +46,7 @@ class Cell:
         """Return the image under scaling of x and y, which needs no new validation."""
         image = object.__new__(type(self))
         paths = [tuple(p.stretched(x_factor, y_factor) for p in path) for path in (self.pieces, *self.islands)]
-        image._fill(paths[0], period, tuple(paths[1:]))
+        image._fill(paths[0], period, tuple(paths[1:]), self.unit)
         return image
 
     @cached_property
@@ -103,7 +109,7 @@ class Cell:
         if self._highest is None or self._highest.pieces is self.pieces:
             return self
         cell = object.__new__(type(self))
-        cell._fill(self._highest.pieces, self.period, ())
+        cell._fill(self._highest.pieces, self.period, (), self.unit)
         return cell
 
     @property
@@ -154,7 +160,7 @@ class Cell:
             tuple(p.moved(self.period, 0.0).reversed() for p in reversed(path))
             for path in (image.pieces, *image.islands)
         ]
-        image._fill(paths[0], self.period, tuple(paths[1:]))
+        image._fill(paths[0], self.period, tuple(paths[1:]), self.unit)
         return image
 
     def __repr__(self) -> str:
@@ -166,8 +172,8 @@ class Cell:
         return f"{type(self).__name__}({', '.join(counts)}, period {self.period:g}, depth {self.depth:.6g}, {state})"
 
     def __getstate__(self) -> dict[str, Any]:
-        # without the cached arrays, because unpickling makes arrays writable
-        return {"pieces": self.pieces, "period": self.period, "islands": self.islands}
+        # cached arrays stay behind: an unpickled array would be writable
+        return {"pieces": self.pieces, "period": self.period, "islands": self.islands, "unit": self.unit}
 
 
 def _vertices(path: Sequence[Curve]) -> Floats:

@@ -3,31 +3,49 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array
+from ...core.checks import Floats, whole_number
 from ...core.errors import InputError
+from ...core.files import regular_file
+from .columns import Columns, NotPairs
+from .measured import Profile, heights_of, unit_ratio
 
 Seam = Literal["mirror", "step"]
 
 
-def vertices_of_profile(x: ArrayLike, height: ArrayLike, seam: Seam = "mirror") -> Floats:
+# A profile that climbs so much for its length has heights in a smaller unit than its positions, or is no surface.
+STEEPEST = 100.0
+# Words for separators in texts that describe a wall, where the characters have another meaning.
+SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+
+
+def vertices_of_profile(profile: Profile, seam: Seam = "mirror") -> Floats:
     """Return the vertices of ``Wall.from_profile``: one period, rolled to start at the highest point, at (0, 0)."""
-    x, height = finite_array("x", x), finite_array("height", height)
-    if x.ndim != 1 or x.shape != height.shape or len(x) < 2:
+    x, height = profile
+    if profile.undefined:
         raise InputError(
-            f"x and height: expected two arrays of the same length, at least 2, got shapes {x.shape} and {height.shape}"
+            f"height: {profile.undefined} of {len(x)} heights are undefined, the first at index "
+            f"({int(np.argmax(np.isnan(height)))},); use Profile.interpolated() "
+            "(interpolate=yes) or leave out those points"
         )
     worst = int(np.argmin(np.diff(x)))
     if not x[worst + 1] > x[worst]:
         raise InputError(
             f"x: expected strictly increasing positions, got {x[worst]:.10g} at row {worst} and {x[worst + 1]:.10g} "
-            f"at row {worst + 1}; sort the rows or average those at the same position"
+            f"at row {worst + 1}; use Profile.sorted() (sort=yes), which also averages heights at one position"
+        )
+    slope = float(np.abs(np.diff(height)).sum() / (x[-1] - x[0]))
+    if slope > STEEPEST:
+        warnings.warn(
+            f"the profile's mean slope is {slope:.3g}: are the heights in a smaller unit than the positions? "
+            "Give units, for example units=('mm', 'nm')",
+            stacklevel=4,
         )
     if seam == "mirror":
         x = np.concatenate([x, 2.0 * x[-1] - x[-2::-1]])
@@ -54,22 +72,45 @@ def _rolled(x: Floats, height: Floats) -> Floats:
     return np.asarray(np.column_stack([along, down])[keep] + 0.0)
 
 
-def read_profile(path: str | PathLike[str], row: int | None = None) -> tuple[Floats, Floats]:
+def read_profile(
+    path: str | PathLike[str],
+    row: int | None = None,
+    units: str | Sequence[str] | None = None,
+    *,
+    delimiter: str | None = None,
+    decimal: str = ".",
+    usecols: Sequence[int] | None = None,
+    skiprows: int = 0,
+    encoding: str = "utf-8-sig",
+) -> Profile:
     """Read a profile from a two-column text file or, with the extra ``profiles``, from an instrument's file.
 
     Parameters
     ----------
     path : path
         Text: one "x height" pair a line, separated by blanks, tabs, commas or semicolons; lines that start with #
-        are comments and a first line of column names is skipped. Any other file is given to the SurfaceTopography
-        package.
+        are comments and a first line of column names is skipped. Units in brackets there, ``x [um], height [nm]``, are
+        honoured: heights are converted to the unit of x. Any other file, also a text that is not mostly pairs, is given
+        to the SurfaceTopography package.
     row : int, optional
         Of a map z(x, y) take this row along x; the middle one by default. Line scans have no rows.
+    units : str or (str, str), optional
+        Of positions and heights, or of both, where the file does not say it or says it wrong.
+    delimiter : str, optional
+        The one separator of columns; two in a row have an undefined height between them.
+    decimal : str
+        The decimal sign, ``"."`` or ``","``.
+    usecols : (int, int), optional
+        The columns of x and height, counted from 0.
+    skiprows : int
+        So many lines are left out at the beginning.
+    encoding : str
+        Of the text.
 
     Returns
     -------
-    x, height : ndarray, shape (n,)
-        In one unit: the file's own.
+    Profile
+        ``x, height = read_profile(...)`` unpacks it. Undefined heights, such as masked points, are nan.
 
     Raises
     ------
@@ -81,57 +122,62 @@ def read_profile(path: str | PathLike[str], row: int | None = None) -> tuple[Flo
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
     ...     file = Path(folder) / "profile.txt"
-    ...     _ = file.write_text("x, height\\n0, 2\\n1, 5\\n3, 4")
-    ...     x, height = read_profile(file)
-    >>> x.tolist(), height.tolist()
-    ([0.0, 1.0, 3.0], [2.0, 5.0, 4.0])
+    ...     _ = file.write_text("x [um], height [nm]\\n0, 2000\\n1, 5000\\n3, 4000")
+    ...     profile = read_profile(file)
+    >>> profile.x.tolist(), profile.height.tolist(), profile.unit
+    ([0.0, 1.0, 3.0], [2.0, 5.0, 4.0], 'um')
     """
-    file = Path(path)
-    if not file.is_file():
-        raise InputError(f"{file}: expected a file with a profile, there is none")
+    file = _existing(path)
+    columns = Columns(delimiter, decimal, usecols, skiprows)
+    given = _pair_of_units(units)
     try:
-        text = file.read_text(encoding="utf-8-sig")
+        text = file.read_text(encoding=encoding)
+    except (LookupError, TypeError) as reason:
+        raise InputError(f"encoding: expected the name of one such as 'latin-1', got {encoding!r}") from reason
     except UnicodeDecodeError:
-        return _read_instrument(file, row, "it is not text")
+        return _read_instrument(file, row, given, "it is not text")
     try:
-        return _parse_columns(text)
-    except InputError as reason:
-        if file.suffix.lower() in (".txt", ".csv", ".tsv", ".dat", ""):
-            raise InputError(f"{file}, {reason}") from None
-        return _read_instrument(file, row, str(reason))
-
-
-def _parse_columns(text: str) -> tuple[Floats, Floats]:
-    rows: list[tuple[float, float]] = []
-    names_allowed = True
-    for number, line in enumerate(text.splitlines(), start=1):
-        words = line.split("#")[0].replace(",", " ").replace(";", " ").split()
-        if not words:
-            continue
+        return _profile(*columns.parsed(text), given)
+    except NotPairs as reason:
         try:
-            x, height = (float(word) for word in words)
-        except ValueError:
-            if names_allowed and not any(_is_number(word) for word in words):
-                names_allowed = False
-                continue
-            raise InputError(f"line {number}: expected two numbers, x and height, got {line.strip()!r}") from None
-        names_allowed = False
-        rows.append((x, height))
-    if len(rows) < 2:
-        raise InputError(f"all lines: expected at least two rows of x and height, got {len(rows)}")
-    table = np.array(rows)
-    return table[:, 0], table[:, 1]
+            return _read_instrument(file, row, given, str(reason))
+        except InputError as other:
+            raise InputError(f"{file}, {reason}; {str(other).removeprefix(f'{file}: ')}") from other
+    except InputError as reason:
+        raise InputError(f"{file}, {reason}") from None
 
 
-def _is_number(word: str) -> bool:
+def _existing(path: str | PathLike[str]) -> Path:
     try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+        file = Path(path)
+    except TypeError as reason:
+        raise InputError(f"path: expected the path of a file, got {path!r}") from reason
+    if not file.exists():
+        raise InputError(f"{file}: expected a file with a profile, there is none")
+    return regular_file(file)
 
 
-def _read_instrument(file: Path, row: int | None, why: str) -> tuple[Floats, Floats]:
+def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:
+    if units is None:
+        return None
+    pair = (units, units) if isinstance(units, str) else units
+    try:
+        first, second = pair
+        unit_ratio(second, first)
+    except (TypeError, ValueError) as reason:
+        raise InputError(f"units: expected two units of length such as ('um', 'nm'), got {units!r}") from reason
+    return first, second
+
+
+def _profile(x: Floats, height: Floats, written: tuple[str, str] | None, given: tuple[str, str] | None) -> Profile:
+    """In the unit of x."""
+    units = given or written
+    if units is None:
+        return Profile(x, height)
+    return Profile(x, height * unit_ratio(units[1], units[0]), units[0])
+
+
+def _read_instrument(file: Path, row: int | None, given: tuple[str, str] | None, why: str) -> Profile:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -145,18 +191,15 @@ def _read_instrument(file: Path, row: int | None, why: str) -> tuple[Floats, Flo
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             scan = read_topography(str(file))
-            heights = np.ma.filled(np.ma.asarray(scan.heights(), dtype=np.float64), np.nan)
+            heights = heights_of("height", scan.heights())
             positions = scan.positions()
+            # that package converts heights to the unit of lengths
+            unit = str(getattr(scan, "unit", None) or "")
     except Exception as reason:  # every reader of that package fails in its own way on a file it cannot read
         first = (str(reason).splitlines() or [type(reason).__name__])[0]
         raise InputError(f"{file}: SurfaceTopography cannot read it ({first})") from reason
     if heights.ndim == 2:
         count = heights.shape[1]
-        chosen = count // 2 if row is None else row
-        if not 0 <= chosen < count:
-            raise InputError(f"row: expected a whole number from 0 to {count - 1}, got {row!r}")
+        chosen = count // 2 if row is None else whole_number("row", row, 0, most=count - 1)
         heights, positions = heights[:, chosen], positions[0][:, chosen]
-    missing = int(np.sum(~np.isfinite(heights)))
-    if missing:
-        raise InputError(f"{file}: {missing} of {heights.size} heights are undefined; fill or leave out those points")
-    return np.asarray(positions, dtype=np.float64), np.asarray(heights, dtype=np.float64)
+    return _profile(np.asarray(positions, dtype=np.float64), heights, (unit, unit) if unit else None, given)

@@ -26,6 +26,8 @@ def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) ->
     import tomli_w
 
     document: Table = {"format": FORMAT, "period": wall.period}
+    if wall.unit:
+        document["unit"] = wall.unit
     if all(isinstance(piece, Segment) for piece in wall.pieces):
         document["vertices"] = wall.vertices.tolist()
     else:
@@ -35,8 +37,8 @@ def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) ->
     write_whole(Path(path), tomli_w.dumps(document), overwrite=overwrite)
 
 
-def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[Curve]]]:
-    """Pieces, period and islands of a wall file, not yet validated as a wall; see ``load_wall``."""
+def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[Curve]], str]:
+    """Pieces, period, islands and unit of a wall file, not yet validated as a wall; see ``load_wall``."""
     file = Path(path)
     try:
         document = tomllib.loads(regular_file(file).read_text(encoding="utf-8"))
@@ -69,8 +71,8 @@ def _table(piece: Curve) -> Table:
     raise InputError(f"save: expected a Segment, an Arc or a Bezier, got {piece!r}")
 
 
-def _parts(document: Table) -> tuple[list[Curve], float, list[list[Curve]]]:
-    _check_keys(document, {"period"}, {"format", "vertices", "pieces", "islands"})
+def _parts(document: Table) -> tuple[list[Curve], float, list[list[Curve]], str]:
+    _check_keys(document, {"period"}, {"format", "vertices", "pieces", "islands", "unit"})
     if document.get("format", FORMAT) != FORMAT:
         raise InputError(f"key 'format': expected {FORMAT!r}, got {document['format']!r}")
     if ("vertices" in document) == ("pieces" in document):
@@ -88,7 +90,10 @@ def _parts(document: Table) -> tuple[list[Curve], float, list[list[Curve]]]:
             islands.append(_pieces("pieces", table["pieces"]))
         except InputError as reason:
             raise type(reason)(f"islands[{k}]: {reason}") from reason
-    return pieces, _number("period", document["period"]), islands
+    unit = document.get("unit", "")
+    if not isinstance(unit, str):
+        raise InputError(f"key 'unit': expected the name of a unit such as \"µm\", got {unit!r}")
+    return pieces, _number("period", document["period"]), islands, unit
 
 
 def _pieces(name: str, value: Any) -> list[Curve]:

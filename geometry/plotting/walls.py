@@ -84,10 +84,13 @@ def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | N
     left, right = (first - MARGIN) * wall.period, (last + MARGIN) * wall.period
     ax.set_xlim(left, right)
     ax.set_ylim(floor, free)
-    ax.set_xlabel("x (length units of the wall)")
+    unit = wall.unit
+    ax.set_xlabel(f"x ({unit or 'length units of the wall'})")
     factor = vertical_stretch(wall)
     words = f"stretched {factor:.3g} times" if factor >= 1.0 else f"compressed {1.0 / factor:.3g} times"
-    ax.set_ylabel("y" if factor == 1.0 else f"y ({words} against x)")
+    remarks = [unit] if unit else []
+    remarks += [] if factor == 1.0 else [f"{words} against x"]
+    ax.set_ylabel(f"y ({', '.join(remarks)})" if remarks else "y")
     ax.set_aspect(factor)
     ax.locator_params(axis="both", nbins=6)
     return ax

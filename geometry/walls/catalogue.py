@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import cast
+from typing import Any
 
 from ...core.errors import InputError
-from ..cells.profile import Seam, read_profile
+from ..cells.profile import SEPARATORS, read_profile
 from ..disk.disk import Disk
 from .mushroom import mushrooms
 from .named import (
@@ -83,9 +83,11 @@ def wall_from_text(text: str) -> Wall:
     Parameters
     ----------
     text : str
-        ``"name"`` or ``"name:parameter=value,parameter=value"`` with a name from ``WALLS``, or the path of a file.
-        ``load_wall`` reads files that end in ``.toml``, ``read_profile`` all others. The path of a profile may be
-        followed by ``:seam=step`` or ``:seam=mirror`` (see ``Wall.from_profile``).
+        ``"name"`` or ``"name:parameter=value,parameter=value"`` with a name from ``WALLS``; or the path of a file:
+        one that ends in ``.toml`` is read by ``load_wall``, any other by ``read_profile``. The path of a profile may
+        be followed by parameters: ``seam=step`` (see ``Wall.from_profile``), those of ``read_profile``
+        (``units=um/nm``, ``delimiter=semicolon``, ``decimal=comma``, ``usecols=0/2``, ``skiprows=3``,
+        ``encoding=latin-1``, ``row=5``), and ``sort=yes``, ``interpolate=yes``, ``detrend=1`` (see `Profile`).
 
     Raises
     ------
@@ -139,15 +141,43 @@ def _value(entry: NamedWall, key: str, value: str) -> float | int:
 
 
 def _wall_from_file(file: Path, parameters: Mapping[str, str]) -> Wall:
-    is_toml = file.suffix.lower() == ".toml"
-    unknown = [key for key in parameters if is_toml or key != "seam"]
-    if unknown:
-        raise InputError(f"{file}: unknown parameter {unknown[0]!r}; a profile takes seam=mirror or seam=step")
-    if is_toml:
+    if file.suffix.lower() == ".toml":
+        if parameters:
+            raise InputError(f"{file}: unknown parameter {next(iter(parameters))!r}; a wall file takes none")
         return load_wall(file)
-    x, height = read_profile(file)
-    seam = parameters.get("seam", "mirror")
+    chosen = {key: _profile_value(file, key, value) for key, value in parameters.items()}
+    seam, sort, interpolate, detrend = (chosen.pop(key, None) for key in PREPARATIONS)
+    profile = read_profile(file, **chosen)
     try:
-        return Wall.from_profile(x, height, cast(Seam, seam))
+        profile = profile.sorted() if sort else profile
+        profile = profile.interpolated() if interpolate else profile
+        profile = profile if detrend is None else profile.detrended(detrend)
+        return Wall.from_profile(profile, seam=seam or "mirror")
     except InputError as reason:
         raise type(reason)(f"{file}: {reason}") from reason
+
+
+def _profile_value(file: Path, key: str, value: str) -> Any:
+    """The value of a parameter of a profile, from its text."""
+    reader = PROFILE_PARAMETERS.get(key)
+    if reader is None:
+        known = ", ".join(PROFILE_PARAMETERS)
+        raise InputError(f"{file}: unknown parameter {key!r}; a profile takes {known}")
+    try:
+        return reader(value)
+    except (ValueError, KeyError) as reason:
+        raise InputError(f"{file}, parameter {key}: cannot read {value!r}") from reason
+
+
+def _flag(text: str) -> bool:
+    return {"yes": True, "no": False}[text.lower()]
+
+
+PREPARATIONS = ("seam", "sort", "interpolate", "detrend")
+PROFILE_PARAMETERS: Mapping[str, Callable[[str], Any]] = MappingProxyType({
+    "seam": str, "sort": _flag, "interpolate": _flag, "detrend": int, "row": int, "skiprows": int, "encoding": str,
+    "units": lambda text: tuple(text.split("/")) if "/" in text else text,
+    "usecols": lambda text: tuple(int(part) for part in text.split("/")),
+    "delimiter": lambda text: SEPARATORS.get(text, text),
+    "decimal": lambda text: SEPARATORS.get(text, text),
+})  # fmt: skip

@@ -13,10 +13,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, positive_number
+from ...core.checks import Floats, instance, positive_number
 from ...core.errors import InputError, WallError
 from ...core.html import html_table
 from ..cells.cell import Cell
+from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature
 from ..cells.mirror_symmetry import has_mirror_axis
 from ..cells.profile import Seam, vertices_of_profile
@@ -41,7 +42,9 @@ class Wall(Cell):
     period : float
         Greater than 0.
     islands : sequence of sequences of pieces
-        Closed loops in the free space above the path; counterclockwise loops are reversed.
+        Closed loops that float above the path; loops that run counterclockwise are turned round.
+    unit : str
+        Of lengths, for the axes of pictures.
 
     Attributes
     ----------
@@ -74,12 +77,15 @@ class Wall(Cell):
     (Hollow(left=0.0, right=1.0, first=0, last=2),)
     """
 
-    def __init__(self, pieces: Sequence[Curve], period: float = 1.0, islands: Sequence[Sequence[Curve]] = ()) -> None:
+    def __init__(
+        self, pieces: Sequence[Curve], period: float = 1.0, islands: Sequence[Sequence[Curve]] = (), unit: str = ""
+    ) -> None:
         width = positive_number("period", period)
         path = canonical_path(pieces, width)
         size = wall_size(path, width)
         loops = tuple(canonical_island(loop, width, size, k) for k, loop in enumerate(islands))
-        self._fill(path, width, loops)
+        instance("unit", unit, str, "'µm'")
+        self._fill(path, width, loops, unit)
         if loops:
             check_open_wall(path, loops, width, size)
         numbers = range(len(path)) if self._highest is None else self._highest.numbers
@@ -88,13 +94,15 @@ class Wall(Cell):
             check_open_wall(path, loops, width, size)
 
     @classmethod
-    def from_vertices(cls, vertices: ArrayLike) -> Self:
+    def from_vertices(cls, vertices: ArrayLike, unit: str = "") -> Self:
         """Return the polygonal wall through the given points; its period is the last x.
 
         Parameters
         ----------
         vertices : array_like, shape (n, 2)
             From (0, y0) to (period, y0).
+        unit : str
+            Of lengths, for the axes of pictures.
 
         Raises
         ------
@@ -124,21 +132,25 @@ class Wall(Cell):
             raise WallError(f"vertices: expected the last x, the period, to be greater than 0, got {points[-1, 0]:g}")
         corners = [(x, y) for x, y in points.tolist()]
         pieces = [Segment(p, q) for p, q in pairwise(corners)]
-        return cls(pieces, period=corners[-1][0])
+        return cls(pieces, corners[-1][0], unit=unit)
 
     @classmethod
-    def from_profile(cls, x: ArrayLike, height: ArrayLike, seam: Seam = "mirror") -> Self:
+    def from_profile(
+        cls, x: ArrayLike | Profile, height: ArrayLike | None = None, seam: Seam = "mirror", unit: str = ""
+    ) -> Self:
         """Return the wall of a measured profile, in the profile's units.
 
         Parameters
         ----------
-        x : array_like, shape (n,)
-            Positions, strictly increasing, n >= 2.
+        x : array_like, shape (n,), or Profile
+            Positions, strictly increasing, n >= 2; or a whole profile, as `read_profile` returns it.
         height : array_like, shape (n,)
-            Heights above any level, in the same unit as ``x``.
+            Heights above any level, in the same unit as ``x``; not given with a `Profile`.
         seam : {"mirror", "step"}
-            The periodic continuation: "mirror" appends the mirror image (twice the length), "step" repeats the profile
-            with a vertical step between its last and first height.
+            How the profile becomes periodic: followed by its mirror image (twice its length), or repeated as it is
+            with a vertical step between its last and its first height.
+        unit : str
+            Of lengths, for the axes of pictures; a `Profile` has its own.
 
         Returns
         -------
@@ -148,14 +160,26 @@ class Wall(Cell):
         Raises
         ------
         InputError
-            If the arrays do not match, a number is not finite or the positions do not increase.
+            If the arrays do not match, a height is undefined (masked, infinite or nan) or the positions do not
+            increase; `Profile` has methods that mend the latter two.
+
+        Warns
+        -----
+        UserWarning
+            If the mean slope is above 100, as where heights are in nanometres and positions in millimetres.
 
         Examples
         --------
         >>> Wall.from_profile([0, 1, 3], [2, 5, 4]).vertices.tolist()
         [[0.0, 0.0], [2.0, -1.0], [4.0, 0.0], [5.0, -3.0], [6.0, 0.0]]
         """
-        return cls.from_vertices(vertices_of_profile(x, height, seam))
+        if not isinstance(x, Profile):
+            if height is None:
+                raise InputError("height: expected heights, one for every position, got None")
+            x = Profile(x, height, unit)  # type: ignore[arg-type]
+        elif height is not None:
+            raise InputError("height: a Profile has its heights; leave it out")
+        return cls.from_vertices(vertices_of_profile(x, seam), x.unit)
 
     @cached_property
     def is_mirror_symmetric(self) -> bool:
@@ -196,7 +220,8 @@ class Wall(Cell):
     def _repr_html_(self) -> str:
         """The wall with a small picture, in a notebook."""
         lines = {
-            "period": f"{self.period:g}", "depth": f"{self.depth:.6g}", "length": f"{self.arc_length:.6g}",
+            "unit": self.unit, "period": f"{self.period:g}", "depth": f"{self.depth:.6g}",
+            "length": f"{self.arc_length:.6g}",
             "mirror-symmetric": "yes" if self.is_mirror_symmetric else "no",
         }  # fmt: skip
         return html_table(repr(self), lines, wall_miniature(self))
@@ -231,10 +256,10 @@ def load_wall(path: str | PathLike[str]) -> Wall:
     Parameters
     ----------
     path : path
-        A file written by ``Wall.save`` or by hand: ``period``, then either ``vertices`` (a list of points) or
-        ``[[pieces]]`` tables of ``kind`` "segment" (``start``, ``end``), "arc" (``center``, ``semi_axes``, ``angles``
-        and, if known exactly, ``start`` and ``end``) or "bezier" (``control_points``). Islands are ``[[islands]]``
-        tables with ``pieces``.
+        A file that ``Wall.save`` wrote, or one written by hand: ``period``, then either ``vertices`` (a list of
+        points) or ``[[pieces]]`` tables of ``kind`` "segment" (``start``, ``end``), "arc" (``center``,
+        ``semi_axes``, ``angles`` and, where known exactly, ``start`` and ``end``) or "bezier" (``control_points``);
+        islands are ``[[islands]]`` tables with ``pieces``. ``unit`` names the unit of lengths.
 
     Returns
     -------
@@ -258,8 +283,8 @@ def load_wall(path: str | PathLike[str]) -> Wall:
     ...     load_wall(file) == Wall.from_vertices([(0, 0), (0.2, -0.4), (1, 0)])
     True
     """
-    pieces, period, islands = read_wall(path)
+    pieces, period, islands, unit = read_wall(path)
     try:
-        return Wall(pieces, period, islands)
+        return Wall(pieces, period, islands, unit)
     except InputError as reason:
         raise type(reason)(f"{Path(path)}: {reason}") from reason

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from .core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputE
 from .core.estimates import described
 
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
-with the two columns x and height of a measured profile (mirrored to make it periodic, or profile.txt:seam=step)."""
+with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
+profile.txt:seam=step; more of its parameters, joined by commas: units=um/nm, delimiter=semicolon, decimal=comma,
+usecols=0/2, skiprows=3, encoding=latin-1, row=5, sort=yes, interpolate=yes, detrend=1."""
 
 
 class OneLineErrors(click.Group):
@@ -22,7 +25,9 @@ class OneLineErrors(click.Group):
 
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
+            with warnings.catch_warnings():
+                warnings.showwarning = lambda message, *_, **__: click.echo(f"asperity: note: {message}", err=True)
+                return super().invoke(ctx)
         except KeyboardInterrupt:
             click.echo("asperity: interrupted", err=True)
             # what shells give a command that the signal ended

@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InputError
 
 Floats = NDArray[np.float64]
+# Characters of a value that a message repeats.
+SHOWN = 80
 
 
 def finite_array(name: str, value: ArrayLike) -> Floats:
@@ -67,11 +69,28 @@ def number_between(name: str, value: Any, low: float, high: float, *, closed: st
     return number
 
 
-def whole_number(name: str, value: Any, low: int) -> int:
-    """Return ``value`` as an int of at least ``low``."""
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < low:
-        raise InputError(f"{name}: expected a whole number of at least {low}, got {value!r}")
+def whole_number(name: str, value: Any, low: int, *, most: int | None = None) -> int:
+    """Return ``value`` as an int of at least ``low``, and at most ``most``."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or value < low or (most is not None and value > most):
+        allowed = f"of at least {low}" if most is None else f"from {low} to {most}"
+        raise InputError(f"{name}: expected a whole number {allowed}, got {shortened(value)}")
     return int(value)
+
+
+def shortened(value: object) -> str:
+    """The repr of a value, or its beginning where it is long.
+
+    Examples
+    --------
+    >>> shortened([1.0, 2.0]), len(shortened(10**400)), shortened(10**9999)
+    ('[1.0, 2.0]', 83, 'a value of type int')
+    """
+    try:
+        text = repr(value)
+    except Exception:  # of foreign objects, and of integers with thousands of digits
+        return f"a value of type {type(value).__name__}"
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 def angles(name: str, value: ArrayLike) -> Floats:

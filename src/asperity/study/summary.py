@@ -19,9 +19,9 @@ def summary_of(study: StudyResult) -> str:
     """What was found, one fact a line; an error in brackets belongs to the last digits."""
     wall, disk, found = study.wall, study.disk, study.consequences
     symmetry = "mirror-symmetric" if wall.is_mirror_symmetric else "not mirror-symmetric"
-    refused = study.refusals.get
+    refused, unit = study.refusals.get, f" {wall.unit}" if wall.unit else ""
     lines = {
-        "wall": f"{study.name}: period {wall.period:g}, depth {wall.depth:.6g}, "
+        "wall": f"{study.name}: period {wall.period:g}{unit}, depth {wall.depth:.6g}{unit}, "
         f"{counted(len(wall.pieces), 'piece')}, {symmetry}",
         "rays": _rays(study.tracer),
         "law": _law(study.matrix),

@@ -1,0 +1,143 @@
+"""A measured profile as a value: positions, heights and their unit; sorted, interpolated and detrended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.checks import Floats, finite_array, finite_number, frozen, whole_number
+from ...core.errors import InputError
+
+# Metres of the units that headers of profiles have; micro is written in three ways.
+METRES = {
+    "pm": 1e-12, "Å": 1e-10, "A": 1e-10, "angstrom": 1e-10, "nm": 1e-9, "um": 1e-6, "µm": 1e-6, "μm": 1e-6,
+    "micron": 1e-6, "microns": 1e-6, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "m": 1.0, "km": 1e3, "in": 0.0254,
+    "mil": 2.54e-5, "ft": 0.3048,
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """Heights above positions along a line, in one unit; ``x, height = profile`` unpacks it.
+
+    Parameters
+    ----------
+    x : array_like, shape (n,)
+        Positions; finite.
+    height : array_like, shape (n,)
+        Heights in the same unit; masked, infinite and nan ones are undefined.
+    unit : str
+        Of both, such as ``"µm"``; empty where it is not known.
+
+    Examples
+    --------
+    >>> raw = Profile([2, 0, 1, 3], [3.0, 1.0, np.nan, 4.0], "mm")
+    >>> filled = raw.sorted().interpolated()
+    >>> raw.undefined, filled.height.tolist(), filled.detrended().height.tolist()
+    (1, [1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 0.0, 0.0])
+    """
+
+    x: Floats
+    height: Floats
+    unit: str = ""
+
+    def __post_init__(self) -> None:
+        x, height = finite_array("x", self.x), heights_of("height", self.height)
+        if x.ndim != 1 or x.shape != height.shape or len(x) < 2:
+            raise InputError(
+                f"x and height: expected two arrays of the same length, at least 2, got shapes {x.shape} and "
+                f"{height.shape}"
+            )
+        if not isinstance(self.unit, str):
+            raise InputError(f"unit: expected the name of a unit such as 'µm', got {self.unit!r}")
+        object.__setattr__(self, "x", frozen(x))
+        object.__setattr__(self, "height", frozen(height))
+
+    def __iter__(self) -> Iterator[Floats]:
+        return iter((self.x, self.height))
+
+    def __getitem__(self, place: int) -> Floats:
+        return (self.x, self.height)[place]
+
+    def __len__(self) -> int:
+        return 2
+
+    @property
+    def undefined(self) -> int:
+        """The number of undefined heights, which are nan."""
+        return int(np.isnan(self.height).sum())
+
+    def sorted(self) -> Profile:
+        """The points in the order of their positions; of those at one position the mean of the defined heights."""
+        order = np.argsort(self.x, kind="stable")
+        x, height = self.x[order], self.height[order]
+        positions, owner = np.unique(x, return_inverse=True)
+        defined = ~np.isnan(height)
+        count = np.bincount(owner, defined, len(positions))
+        total = np.bincount(owner, np.where(defined, height, 0.0), len(positions))
+        means = np.divide(total, count, out=np.full(len(positions), np.nan), where=count > 0.0)
+        return Profile(positions, means, self.unit)
+
+    def interpolated(self) -> Profile:
+        """Undefined heights between two defined ones on the straight line between them; at the ends the nearest one.
+
+        Raises
+        ------
+        InputError
+            If fewer than two heights are defined.
+        """
+        defined = ~np.isnan(self.height)
+        if defined.sum() < 2:
+            raise InputError(f"height: expected at least two defined heights, got {int(defined.sum())}")
+        order = np.argsort(self.x[defined])
+        known, heights = self.x[defined][order], self.height[defined][order]
+        return Profile(self.x, np.where(defined, self.height, np.interp(self.x, known, heights)), self.unit)
+
+    def detrended(self, degree: int = 1) -> Profile:
+        """Less the polynomial that fits best: degree 0 the mean, 1 the tilt too, 2 a bow too."""
+        degree = whole_number("degree", degree, 0)
+        defined = ~np.isnan(self.height)
+        if defined.sum() <= degree:
+            raise InputError(f"degree: expected less than the number of defined heights, {int(defined.sum())}")
+        trend = np.polynomial.Polynomial.fit(self.x[defined], self.height[defined], degree)
+        rest = np.asarray(self.height - trend(self.x))
+        # what is left of an exact fit is rounding
+        size = np.abs(self.height[defined]).max()
+        return Profile(self.x, np.where(np.abs(rest) <= FIT_ROUNDING * size, 0.0, rest), self.unit)
+
+    def in_unit(self, unit: str) -> Profile:
+        """Converted to another unit of length."""
+        factor = unit_ratio(self.unit, unit)
+        return Profile(self.x * factor, self.height * factor, unit)
+
+
+# Of the best fit, relative to the heights.
+FIT_ROUNDING = 1e-14
+
+
+def heights_of(name: str, value: ArrayLike) -> Floats:
+    """Numbers of which some may be undefined: masked and infinite ones become nan."""
+    try:
+        array = np.ma.filled(np.ma.asarray(value).astype(np.float64), np.nan)
+    except (TypeError, ValueError, OverflowError) as reason:
+        raise InputError(f"{name}: expected numbers, got {value!r}") from reason
+    return np.where(np.isfinite(array), array, np.nan)
+
+
+def unit_ratio(given: str, wanted: str) -> float:
+    """How many of the wanted unit one of the given is.
+
+    Examples
+    --------
+    >>> unit_ratio("nm", "µm"), unit_ratio("px", "px")
+    (0.001, 1.0)
+    """
+    if given == wanted:
+        return 1.0
+    for unit in (given, wanted):
+        if unit not in METRES:
+            raise InputError(f"units: expected units of length such as {', '.join(list(METRES)[:8])}, got {unit!r}")
+    return finite_number("units", float(f"{METRES[given] / METRES[wanted]:.12g}"))
