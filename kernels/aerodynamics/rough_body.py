@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, finite_number, frozen, generator, positive_number, whole_number
+from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ..bases.measure import SINE
@@ -154,8 +154,8 @@ class RoughBody:
         flux = self.lengths[lit] * SINE_MASS * SINE.density(incoming)
         return np.array([flux @ along, flux @ across])
 
-    def sample(self, n: int, rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-        """Directions u, u' and normals in [0, 2 pi) of ``n`` independent triples drawn from the normalised nu."""
+    def sample(self, n: int, rng: Rng = None) -> tuple[Floats, Floats, Floats]:
+        """Directions u, u' and n of ``n`` independent triples drawn from nu, divided by its mass, in [0, 2 pi)."""
         whole_number("n", n, 1)
         source = generator(rng)
         normal = self.normals[source.choice(self.normals.size, size=n, p=self.lengths / self.perimeter)]
@@ -165,8 +165,8 @@ class RoughBody:
         u, v = (np.mod(tangent + angle, 2.0 * np.pi) for angle in (incoming, outgoing))
         return u, v, np.mod(normal, 2.0 * np.pi)
 
-    def symmetry_defect(self, n: int, rng: np.random.Generator) -> SymmetryDefect:
-        """The asymmetry of nu in u and u' from ``n`` samples, with the z-score of the difference."""
+    def symmetry_defect(self, n: int, rng: Rng = None) -> SymmetryDefect:
+        """How far nu is from symmetric in u and u', from ``n`` samples, with the z-score of the difference."""
         u, v, _ = self.sample(n, rng)
         scale = DIRECTION_BINS / (2.0 * np.pi)
         row, column = (np.minimum((angle * scale).astype(np.int64), DIRECTION_BINS - 1) for angle in (u, v))

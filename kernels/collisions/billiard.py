@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, generator, whole_number
+from ...core.checks import Floats, Rng, finite_array, generator, whole_number
 from ...core.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ class Reflector(Protocol):
     @property
     def disk(self) -> Disk: ...
 
-    def sample(self, velocity: ArrayLike, rng: np.random.Generator) -> Floats:
-        """Outgoing (v1, v2, omega) for incoming ones with v2 < 0; the wall is below the disk."""
+    def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
+        """Outgoing (v1, v2, omega) for incoming ones with v2 < 0, the wall being below the disk."""
         ...
 
 
@@ -79,7 +79,7 @@ def play(
     position: ArrayLike,
     velocity: ArrayLike,
     collisions: int,
-    rng: np.random.Generator,
+    rng: Rng = None,
 ) -> BilliardRecord:
     """Simulate disks that move in a container and collide with its walls.
 
@@ -96,8 +96,8 @@ def play(
     velocity : array_like, shape (n, 3)
         Initial (v1, v2, omega).
     collisions : int
-        Number of collisions per disk.
-    rng : numpy.random.Generator
+        How many to follow.
+    rng : None, int or numpy.random.Generator
 
     Returns
     -------
@@ -119,7 +119,7 @@ def play(
     >>> record.position[:, 0, 0].round(12).tolist()
     [0.0, 1.0, 1.0, 0.0, 0.0]
     """
-    generator(rng)
+    rng = generator(rng)
     whole_number("collisions", collisions, 1)
     walls = len(container.normals)
     each = list(laws) if isinstance(laws, Sequence) else [laws] * walls

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, finite_array, generator, instance
+from ...core.checks import Floats, Rng, angles, finite_array, generator, instance
 from ...core.errors import InputError
 from ...geometry import Disk, Wall
 from ..bases.basis import Basis
@@ -80,14 +80,14 @@ class CollisionLaw:
         instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
         return cls(WallLaw(wall.foreshorten(disk)), disk)
 
-    def sample(self, velocity: ArrayLike, rng: np.random.Generator) -> Floats:
+    def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity for every incoming one.
 
         Parameters
         ----------
         velocity : array_like of shape (..., 3)
             Incoming (v1, v2, omega) with v2 < 0.
-        rng : numpy.random.Generator
+        rng : None, int or numpy.random.Generator
 
         Returns
         -------
@@ -105,7 +105,7 @@ class CollisionLaw:
         if not np.all(incoming[..., 1] < 0.0):
             worst = np.argwhere(~(incoming[..., 1] < 0.0))[0].tolist()
             raise InputError(f"velocity: expected incoming velocities with v2 < 0, got v2 >= 0 at row {worst}")
-        generator(rng)
+        rng = generator(rng)
         frame = np.asarray(self.disk.frame)
         along, up, roll = (self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame)
         # angle and length of minus the incoming velocity in the plane of chi_perp and e2^; K leaves ``roll`` unchanged

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import finite_array, generator, whole_number
+from ...core.checks import Rng, finite_array, generator, whole_number
 from ...core.errors import InputError
 from .satellite_law import SatelliteLaw
 
@@ -27,7 +27,7 @@ def draw_limit(
     wall: Wall,
     scales: ArrayLike,
     angles: tuple[float, float],
-    rng: np.random.Generator,
+    rng: Rng = None,
     samples: int = 20_000,
     ax: Axes | None = None,
 ) -> Axes:
@@ -42,7 +42,7 @@ def draw_limit(
         Values of eps, at most four.
     angles : (float, float)
         Incoming (theta, psi), radians.
-    rng : numpy.random.Generator
+    rng : None, int or numpy.random.Generator
     samples : int
         Collisions at each scale.
     ax : matplotlib Axes, optional
@@ -67,7 +67,7 @@ def draw_limit(
     """
     from ...geometry import trace
 
-    generator(rng)
+    rng = generator(rng)
     whole_number("samples", samples, 1)
     eps = np.atleast_1d(finite_array("scales", scales))
     if eps.ndim > 1 or eps.size > len(COLOURS):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, generator
+from ...core.checks import Floats, Rng, finite_array, generator
 from ...core.errors import AccuracyError
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class SatelliteLaw:
 
         object.__setattr__(self, "spacing", ConfigurationSpace(self.wall, self.disk, self.scale, self.spacing).spacing)
 
-    def sample(self, velocity: ArrayLike, rng: np.random.Generator) -> Floats:
+    def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity (n, 3) for every incoming one with v2 < 0.
 
         Raises
@@ -68,7 +68,7 @@ class SatelliteLaw:
 
         assert self.spacing is not None
         moving = finite_array("velocity", velocity)
-        generator(rng)
+        rng = generator(rng)
         out, rest = np.empty(moving.shape), np.arange(len(moving))
         for _ in range(MOST_DRAWS):
             position = rng.random((len(rest), 2)) * [self.scale * self.wall.period, self.spacing]

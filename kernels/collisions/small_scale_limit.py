@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, frozen, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, finite_array, frozen, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
@@ -128,7 +128,7 @@ def limit_study(
     disk: Disk,
     wall: Wall,
     scales: ArrayLike,
-    rng: np.random.Generator,
+    rng: Rng = None,
     *,
     psi: float = 1.2,
     spacing: Callable[[float], float] | None = None,
@@ -144,8 +144,8 @@ def limit_study(
     wall : Wall
         A wall of segments and arcs.
     scales : array_like, shape (n,)
-        Values of eps > 0.
-    rng : numpy.random.Generator
+        eps, each greater than 0.
+    rng : None, int or numpy.random.Generator
     psi : float
         Incoming psi in (0, pi), radians.
     spacing : callable, optional
@@ -180,7 +180,7 @@ def limit_study(
     """
     from ...geometry.collisions.configuration_space import ConfigurationSpace
 
-    generator(rng)
+    rng = generator(rng)
     eps = np.atleast_1d(finite_array("scales", scales))
     number_between("psi", psi, 0.0, math.pi)
     for name, number in zip(("angles", "rotations", "positions"), samples, strict=True):

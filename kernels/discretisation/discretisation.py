@@ -7,7 +7,7 @@ from typing import get_args
 
 import numpy as np
 
-from ...core.checks import finite_number, generator, whole_number
+from ...core.checks import Rng, finite_number, generator, whole_number
 from ...core.errors import InputError
 from ..bases.basis import Basis
 from ..bases.measure import SINE
@@ -25,7 +25,7 @@ def discretise(
     method: MethodName = "auto",
     tolerance: float = 1e-8,
     samples: int | None = None,
-    rng: np.random.Generator | None = None,
+    rng: Rng = None,
     *,
     symmetrise: bool = False,
 ) -> KernelMatrix:
@@ -49,10 +49,10 @@ def discretise(
     tolerance : float
         Wanted Frobenius error of ``symmetric``. The ``error`` and the repr of the matrix show if it was not met.
     samples : int, optional
-        Number of sampled rays, for ``"auto"`` the largest number; 2**20 by default. ``"qmc"`` rounds it up to 8 times
-        a power of two. For the quadrature of other driven laws it is the number of nodes.
-    rng : numpy.random.Generator, optional
-        Source of randomness. The default has a fixed seed, so that results are reproducible.
+        Number of rays where rays are sampled, of ``"auto"`` the largest; 2**20 by default. ``"qmc"`` rounds up to 8
+        times a power of two, for the quadrature of other driven laws it is the number of nodes.
+    rng : None, int or numpy.random.Generator
+        Source of randomness; by default a fixed one, so that results are reproducible.
     symmetrise : bool
         Whether each ray counts in both directions, for sampled matrices of reversible laws. The flux is then symmetric,
         and rows of ``array`` sum to 1 only within the sampling error.
@@ -117,7 +117,7 @@ def discretise(
     if finite_number("tolerance", tolerance) < 0.0:
         raise InputError(f"tolerance: expected a number of at least 0, got {tolerance!r}")
     number = DEFAULT_SAMPLES if samples is None else whole_number("samples", samples, 2 * PARTS)
-    source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
+    source = generator(rng, SEED_WITHOUT_RNG)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
     # Quadrature requested by name may take some seconds.

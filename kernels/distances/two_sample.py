@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.checks import Floats, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, generator, number_between, whole_number
 from ...core.errors import InputError
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
@@ -56,7 +56,7 @@ def difference_test(
     order: float = 1,
     kind: str = "rows",
     permutations: int = 999,
-    rng: np.random.Generator | None = None,
+    rng: Rng = None,
 ) -> DifferenceTest:
     r"""Test whether two laws are the same, from two empirical matrices or from an empirical and an exact matrix.
 
@@ -68,9 +68,9 @@ def difference_test(
     order, kind
         As in `distance`; kind is ``"rows"`` or ``"sup"``.
     permutations : int
-        Number of permutations, at least 19.
-    rng : numpy.random.Generator, optional
-        Source of the permutations; by default a generator with a fixed seed.
+        At least 19.
+    rng : None, int or numpy.random.Generator
+        Source of the permutations; by default a fixed one.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def difference_test(
     if kind not in ("rows", "sup"):
         raise InputError(f"kind: expected 'rows' or 'sup' for a test, got {kind!r}")
     number = whole_number("permutations", permutations, 19)
-    source = np.random.default_rng(0) if rng is None else generator(rng)
+    source = generator(rng, 0)
     if first.counts is None and second.counts is None:
         raise InputError("difference_test: expected counts in one matrix at least; of exact laws take the distance")
     common, measured = pooled_rows(first, second), (wasserstein_order(order), kind == "sup")

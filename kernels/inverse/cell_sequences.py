@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ...core.checks import Floats, finite_array, frozen, generator, positive_number
+from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95
 from ..collisions.small_scale_limit import limit_study
@@ -58,7 +58,7 @@ def dichotomy(
     tolerance: float = 1e-3,
     *,
     scales: Sequence[float] = SCALES,
-    rng: np.random.Generator | None = None,
+    rng: Rng = None,
 ) -> Dichotomy:
     r"""Whether the collision laws of a disk with a sequence of cells converge, as the scale tends to 0 fast enough.
 
@@ -72,7 +72,7 @@ def dichotomy(
         Laws closer than this count as one.
     scales : sequence of float
         At least 3, at which each cell is compared with its limit law.
-    rng : numpy.random.Generator, optional
+    rng : None, int or numpy.random.Generator
         For the true disk's place; ``np.random.default_rng(0)`` by default.
 
     Returns
@@ -105,7 +105,7 @@ def dichotomy(
     if eps.size < 3 or eps[-1] <= 0.0:
         raise InputError(f"scales: expected at least 3 numbers greater than 0, got {scales!r}")
     disk = disk or Disk()
-    rng = np.random.default_rng(0) if rng is None else generator(rng)
+    rng = generator(rng, 0)
     laws = [WallLaw(cell.foreshorten(disk)) for cell in cells]
     count = len(laws)
     values, errors = np.zeros((count, count)), np.zeros((count, count))

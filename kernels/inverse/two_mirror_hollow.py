@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...core.checks import Floats, generator, number_between, positive_number, whole_number
+from ...core.checks import Floats, Rng, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import LEVEL, Estimate
 from ..bases.measure import SINE
@@ -45,7 +45,7 @@ class TwoMirrorHollow:
     opening: tuple[float, float]
     windows: tuple[tuple[float, float], tuple[float, float]]
 
-    def loss(self, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> Estimate:
+    def loss(self, samples: int = SAMPLES, rng: Rng = None) -> Estimate:
         """The fraction of the flux through the opening in the two windows that does not leave in the other window.
 
         By tracing ``samples`` rays in each window; the error is the half width of an interval of at least 95 %, from
@@ -54,7 +54,7 @@ class TwoMirrorHollow:
         from ...geometry import trace
 
         number = whole_number("samples", samples, 2)
-        source = np.random.default_rng(0) if rng is None else generator(rng)
+        source = generator(rng, 0)
         lost, flux, square = 0.0, 0.0, 0.0
         for window, other in (self.windows, self.windows[::-1]):
             low, high = SINE.cdf(window[0]), SINE.cdf(window[1])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.checks import Floats, frozen, generator, number_between, positive_number, whole_number
+from ...core.checks import Floats, Rng, frozen, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.rounding import EPS
@@ -129,7 +129,7 @@ def wall_for(
     moments: int = 10,
     tolerance: float = 1e-10,
     hollows: Sequence[Wall] | None = None,
-    rng: np.random.Generator | None = None,
+    rng: Rng = None,
     *,
     most_hollows: int | None = None,
     smallest_opening: float = SMALLEST_OPENING,
@@ -147,7 +147,7 @@ def wall_for(
         Wanted defect.
     hollows : sequence of Wall, optional
         Walls of which a mixture is wanted, instead of a search. Each is taken with its mirror image.
-    rng : numpy.random.Generator, optional
+    rng : None, int or numpy.random.Generator
         For the search; ``np.random.default_rng(0)`` by default, so that the same call gives the same wall.
     most_hollows : int, optional
         The wall has at most this many hollows, and a larger defect.
@@ -185,7 +185,7 @@ def wall_for(
     number_between("smallest_opening", smallest_opening, 0.0, 1.0, closed="low")
     if most_hollows is not None:
         whole_number("most_hollows", most_hollows, 1)
-    rng = np.random.default_rng(0) if rng is None else generator(rng)
+    rng = generator(rng, 0)
     wanted, target, target_error = _target(law, moments, tolerance)
     basis = Legendre(len(target))
     search = _Search(basis, target, tolerance)

@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, finite_array, generator, whole_number
+from ...core.checks import Floats, Rng, angles, finite_array, generator, whole_number
 from ...core.errors import InputError
 from ...core.html import html_table
 from ..bases.angles import mirrored_angle
@@ -75,9 +75,9 @@ class Law(ABC):
     # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * law`` to this class.
     __array_ufunc__ = None
 
-    # ---- sampling and expectations ---------------------------------------------------------------------------
-    def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
-        """Draw one outgoing angle for every incoming angle ``theta``; the same shape, radians in (0, pi)."""
+    # ---- what a law does -------------------------------------------------------------------------------------
+    def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
+        """Draw one outgoing angle for every incoming angle ``theta``; same shape, radians in (0, pi)."""
         return self._sample(angles("theta", theta), generator(rng))
 
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, instance
+from ...core.checks import Floats, Rng, angles, instance
 from ...core.errors import AccuracyError
 from ...core.rounding import EPS
 from ...geometry import Wall
@@ -190,7 +190,7 @@ class WallLaw(DrivenLaw):
             return ByApply(basis, self.apply, self.evaluations, traced=True)
         return TracedExpectations(basis, self.wall)
 
-    def sample(self, theta: ArrayLike, rng: np.random.Generator) -> Floats:
+    def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
         return super().sample(theta, rng) if self.closed_form is None else self.closed_form.sample(theta, rng)
 
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:

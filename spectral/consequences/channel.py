@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, finite_array, frozen, generator, positive_number, whole_number
+from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...kernels import Law
@@ -76,7 +76,7 @@ def exit_times(
     law: Law,
     lengths: ArrayLike,
     particles: int,
-    rng: np.random.Generator,
+    rng: Rng = None,
     radius: float = 1.0,
     speed: float = 1.0,
     arrangement: Arrangement = "mirror",
@@ -90,8 +90,7 @@ def exit_times(
     lengths : array_like
         At least three increasing values of L at which exits are timed.
     particles : int
-        Number of particles, at least 2.
-    rng : numpy.random.Generator
+    rng : None, int or numpy.random.Generator
     radius, speed : float
         Half the width of the channel, and the speed of the particles.
     arrangement : {"mirror", "half-turn"}
@@ -121,7 +120,7 @@ def exit_times(
     check_arrangement(arrangement)
     whole_number("particles", particles, 2)
     width, pace = 2.0 * positive_number("radius", radius), positive_number("speed", speed)
-    generator(rng)
+    rng = generator(rng)
     paper = law.in_specular_frame() if law.frame == "specular" else law
     times = np.full((particles, levels.size), np.nan)
     inside = np.arange(particles)

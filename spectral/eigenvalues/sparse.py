@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.checks import Floats, finite_array, frozen, whole_number
+from ...core.checks import Floats, Rng, finite_array, frozen, generator, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ...kernels import KernelMatrix
@@ -70,7 +70,7 @@ class LeadingEigenvalues:
 
 
 def leading_eigenvalues(
-    matrix: KernelMatrix | Floats | LinearOperator | Any, k: int, rng: np.random.Generator | None = None
+    matrix: KernelMatrix | Floats | LinearOperator | Any, k: int, rng: Rng = None
 ) -> LeadingEigenvalues:
     r"""The k largest eigenvalues of a symmetric matrix of norm about 1, with a proof of completeness.
 
@@ -80,9 +80,9 @@ def leading_eigenvalues(
         A symmetric matrix in an orthonormal basis; for a reversible stochastic P with the invariant weights w it is
         W^(1/2) P W^(-1/2).
     k : int
-        Number of eigenvalues. A cluster at the end is not cut, so there may be a few more.
-    rng : numpy.random.Generator, optional
-        Source of the initial vectors.
+        How many; a cluster that k would cut is taken in whole, so that there may be a few more.
+    rng : None, int or numpy.random.Generator
+        For the vectors to start from.
 
     Returns
     -------
@@ -115,7 +115,7 @@ def leading_eigenvalues(
     from scipy.sparse.linalg import LinearOperator
 
     whole_number("k", k, 1)
-    source = np.random.default_rng(0) if rng is None else rng
+    source = generator(rng, 0)
     if isinstance(matrix, KernelMatrix):
         found, parity = extremal_by_parity(matrix.symmetric, parity_basis(matrix.basis, matrix), None, k, "largest")
         return _listed(found, parity if "none" not in parity else ())

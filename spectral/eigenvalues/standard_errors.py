@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.checks import Floats, number_between, whole_number
+from ...core.checks import Floats, Rng, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, student_95
 
@@ -59,7 +59,7 @@ def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
 
 
 def bootstrap_intervals(
-    matrix: KernelMatrix, k: int, rng: np.random.Generator, resamples: int = 200, level: float = 0.95
+    matrix: KernelMatrix, k: int, rng: Rng = None, resamples: int = 200, level: float = 0.95
 ) -> Floats:
     """Basic bootstrap intervals of the k largest eigenvalues off the constants, shape (k, 2), largest first.
 
@@ -69,7 +69,7 @@ def bootstrap_intervals(
         A sampled matrix on bins with counts, which are resampled pair by pair.
     k : int
         Number of eigenvalues.
-    rng : numpy.random.Generator
+    rng : None, int or numpy.random.Generator
     resamples : int
     level : float
         Nominal coverage.
@@ -99,7 +99,7 @@ def bootstrap_intervals(
     level = number_between("level", level, 0.0, 1.0)
     counts = np.asarray(matrix.counts)
     number = int(counts.sum())
-    drawn = rng.multinomial(number, (counts / number).ravel(), size=resamples).reshape(-1, *counts.shape)
+    drawn = generator(rng).multinomial(number, (counts / number).ravel(), size=resamples).reshape(-1, *counts.shape)
     everything = np.concatenate([counts[None], drawn])
     values = _leading_values(everything, np.asarray(matrix.weights), k, symmetrised=matrix.symmetrised)
     tail = 0.5 * (1.0 - level)

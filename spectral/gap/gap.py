@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.checks import positive_number
+from ...core.checks import Rng, generator, positive_number
 from ...core.errors import AccuracyError, InputError
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
@@ -93,9 +93,7 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
     return int(found[0]) + 2 if found.size else None
 
 
-def spectral_gap(
-    law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: np.random.Generator | None = None
-) -> SpectralGap:
+def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: Rng = None) -> SpectralGap:
     """The gap 1 - sup(spectrum off the constants) of a reversible law.
 
     Parameters
@@ -103,9 +101,10 @@ def spectral_gap(
     law : Law, CollisionLaw or KernelMatrix
         A law in its own convention; for a collision law its P~. A matrix is not refined.
     tolerance : float
-        Wanted error. If it is not reached with the largest basis and number of rays, ``error`` is larger.
-    rng : numpy.random.Generator, optional
-        Source of rays for traced laws; by default ``np.random.default_rng(0)``.
+        The basis grows, and the number of rays with it, until the reported error is below this or the largest basis
+        and number of rays are reached; the error says which.
+    rng : None, int or numpy.random.Generator
+        For laws that are traced; ``np.random.default_rng(0)`` by default, so that results repeat.
 
     Returns
     -------
@@ -149,18 +148,16 @@ def spectral_gap(
         raise InputError(f"law: expected a Law, a CollisionLaw or a KernelMatrix, got {law!r}")
     other = self_adjoint_elsewhere(law)
     if other is not None:
-        return _contraction(law, other, tolerance, rng or np.random.default_rng(0))
+        return _contraction(law, other, tolerance, generator(rng, 0))
     refuse_unless_self_adjoint(law)
     power = as_power(law)
     if power is not None:
-        return _of_power(law, *power, tolerance, rng or np.random.default_rng(0))
-    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(rng or np.random.default_rng(0)))
+        return _of_power(law, *power, tolerance, generator(rng, 0))
+    return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(generator(rng, 0)))
 
 
-def gaps_in_both_conventions(
-    law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None
-) -> tuple[SpectralGap, SpectralGap]:
-    """The gaps of a mirror-symmetric law in its own and in the other convention, from the same matrices.
+def gaps_in_both_conventions(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> tuple[SpectralGap, SpectralGap]:
+    """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
 
     Raises
     ------
@@ -176,7 +173,7 @@ def gaps_in_both_conventions(
     positive_number("tolerance", tolerance)
     if not law.reversible or not law.mirror_symmetric:
         raise InputError(f"law: expected a reversible and mirror-symmetric one, got {law!r}")
-    matrices = SharedMatrices(rng or np.random.default_rng(0))
+    matrices = SharedMatrices(generator(rng, 0))
     other = law.in_specular_frame()
     first, second = (gap_by_theorem(each) or _by_refinement(each, tolerance, matrices) for each in (law, other))
     return first, second
@@ -199,8 +196,8 @@ def _of_power(law: Law, base: Law, exponent: int, tolerance: float, rng: np.rand
     return SpectralGap(value, error, found.kind, method, found.verdict, evidence, law.frame)
 
 
-def modulus_gap(law: Law, tolerance: float = 1e-6, rng: np.random.Generator | None = None) -> SpectralGap:
-    """The gap 1 - slem, where slem is the largest modulus in the spectrum off the constants.
+def modulus_gap(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> SpectralGap:
+    """1 - slem, the distance from 1 of the largest modulus in the spectrum off the constants, as `spectral_gap` is.
 
     Examples
     --------

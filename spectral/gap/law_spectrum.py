@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import frozen, positive_number, whole_number
+from ...core.checks import Rng, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ..bounds.contraction import refuse_unless_self_adjoint
@@ -26,7 +26,7 @@ def spectrum(
     k: int = 10,
     *,
     tolerance: float | None = None,
-    rng: np.random.Generator | None = None,
+    rng: Rng = None,
     **discretisation: Any,
 ) -> Spectrum:
     """The k eigenvalues of largest modulus of a reversible kernel, sorted descending.
@@ -38,10 +38,10 @@ def spectrum(
     k : int
         Number of eigenvalues; a matrix with fewer rows has fewer.
     tolerance : float, optional
-        Wanted error of every eigenvalue of a law, 1e-4 by default; ``errors`` are the errors reached. If a basis is
-        given, it is the wanted error of the matrix.
-    rng : numpy.random.Generator, optional
-        Source of rays for traced laws.
+        Error wanted of every eigenvalue of a law, 1e-4 by default; ``errors`` says what was reached. Where a basis is
+        given it is the wanted error of the matrix.
+    rng : None, int or numpy.random.Generator
+        For laws that are traced.
     **discretisation
         ``basis=`` and further keywords of `asperity.kernels.discretise`. The law is then replaced by its matrix in this
         basis (by default Legendre polynomials of degree below 48), without refinement.
@@ -83,7 +83,7 @@ def spectrum(
     if tolerance is not None:
         how["tolerance"] = positive_number("tolerance", tolerance)
     if rng is not None:
-        how["rng"] = rng
+        how["rng"] = generator(rng)
     if isinstance(kernel, CollisionLaw):
         return _both_signs(spectrum(kernel.law, max(1, (k + 1) // 2), **how), k)
     if isinstance(kernel, KernelMatrix):
@@ -100,8 +100,8 @@ def spectrum(
     return _with_verdict(kernel, law_eigenvalues(kernel, k, wanted, rng), wanted, rng)
 
 
-def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
-    """Add the gap of the law and its verdict; eigenvalues below the essential edge do not determine the gap."""
+def _with_verdict(law: Law, found: Spectrum, tolerance: float, rng: Rng) -> Spectrum:
+    """With the law's gap and its verdict: what a matrix shows short of the essential spectrum's edge is not the gap."""
     known = gap_by_theorem(law)
     if known is None:
         edge = essential_edge(law)

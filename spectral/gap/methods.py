@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core.checks import Floats, frozen
+from ...core.checks import Floats, Rng, frozen
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, Law, Legendre, MatrixLaw, discretise
 from ...kernels.bases.panels import ONE_PANEL
@@ -26,8 +26,8 @@ FIRST, ATTEMPTS, SMALLEST_STEP, WORTHWHILE = 0.4, 3, 1e-3, 0.5
 MOST_ENCLOSED = 24
 
 
-def law_eigenvalues(law: Law, k: int, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
-    """The k eigenvalues of largest modulus of a law, without a verdict on its gap; see `spectrum`."""
+def law_eigenvalues(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
+    """The k eigenvalues of largest modulus of a law, without a word on its gap: see `spectrum`."""
     power = as_power(law)
     if power is not None:
         base, exponent = power
@@ -43,7 +43,7 @@ def law_eigenvalues(law: Law, k: int, tolerance: float, rng: np.random.Generator
     return _by_matrices(law, k, tolerance, rng)
 
 
-def _by_matrices(law: Law, k: int, tolerance: float, rng: np.random.Generator | None) -> Spectrum:
+def _by_matrices(law: Law, k: int, tolerance: float, rng: Rng) -> Spectrum:
     best = None
     for degree in DEGREES:
         found = matrix_spectrum(discretise(law, Legendre(degree), tolerance=MATRIX_FRACTION * tolerance, rng=rng), k)

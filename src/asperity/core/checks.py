@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from .errors import InputError
 
 Floats = NDArray[np.float64]
+# What numpy.random.default_rng takes.
+Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSequence | int | None
 # Characters of a value that a message repeats.
 SHOWN = 80
 
@@ -108,11 +110,31 @@ def angles(name: str, value: ArrayLike) -> Floats:
     return array
 
 
-def generator(rng: Any) -> np.random.Generator:
-    """Return ``rng`` if it is a numpy Generator, or raise an InputError that says how to make one."""
-    if not isinstance(rng, np.random.Generator):
-        raise InputError(f"rng: expected a numpy.random.Generator such as np.random.default_rng(0), got {rng!r}")
-    return rng
+def generator(rng: Rng, default: int | None = None) -> np.random.Generator:
+    """The source of random numbers that ``rng`` means: a Generator as it is, or a new one.
+
+    Parameters
+    ----------
+    rng : None, int or Generator
+        What numpy.random.default_rng takes (SPEC 7).
+    default : int, optional
+        The seed that None stands for, where results repeat by default; else None is a fresh seed.
+
+    Examples
+    --------
+    >>> generator(3).random() == np.random.default_rng(3).random() == generator(None, 3).random()
+    True
+    """
+    if isinstance(rng, np.random.Generator):
+        return rng
+    try:
+        if isinstance(rng, (bool, np.random.RandomState)):
+            raise TypeError("it is of another kind")
+        return np.random.default_rng(default if rng is None else rng)
+    except (TypeError, ValueError) as reason:
+        raise InputError(
+            f"rng: expected None, a whole number of at least 0 or a numpy.random.Generator, got {shortened(rng)}"
+        ) from reason
 
 
 def frozen(array: ArrayLike) -> Floats:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..core.checks import positive_number
+from ..core.checks import Rng, generator, positive_number
 from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 from ..core.estimates import NORMAL_95, Estimate
 from ..core.files import moved_when_complete
@@ -116,7 +116,7 @@ def study_wall(
     *,
     tolerance: float = TOLERANCE,
     bins: int = BINS,
-    rng: np.random.Generator | None = None,
+    rng: Rng = None,
     progress: bool = True,
 ) -> Study:
     """Study a wall: trace it, make its law and matrix, test the symmetry, find the gap, collide a disk with it.
@@ -132,7 +132,7 @@ def study_wall(
         Error asked of the gaps and of the matrices; what was reached is reported.
     bins : int
         Size of the matrix.
-    rng : numpy.random.Generator, optional
+    rng : None, int or numpy.random.Generator
         ``np.random.default_rng(0)`` by default, so that a study repeats.
     progress : bool
         Whether a bar is shown on a terminal after two seconds.
@@ -161,7 +161,7 @@ def study_wall(
 
     positive_number("tolerance", tolerance)
     basis = Bins(bins)
-    rng = rng or np.random.default_rng(0)
+    rng = generator(rng, 0)
     disk = disk or Disk()
     refusals: dict[str, str] = {}
     # silent where standard error is not a terminal, and in the first two seconds
