@@ -347,3 +347,43 @@ def test_a_matrix_from_a_pickle_is_read_only_too():
 def test_an_estimate_refuses_what_is_no_error(given, name):
     with pytest.raises(InputError, match=f"^{name}: expected"):
         Estimate(*given)
+
+
+# what does not fit
+
+
+@pytest.mark.parametrize("basis", [ker.Bins(10**6), ker.Legendre(10**6)], ids=repr)
+def test_a_matrix_that_no_memory_holds_is_refused_with_its_size(basis):
+    for make in (
+        lambda: ker.discretise(ker.lambertian(), basis),
+        lambda: ker.estimate([1.0] * 100, [1.0] * 100, basis),
+    ):
+        with pytest.raises(InputError, match=r"1000000\) takes 8e\+03 GB of memory"):
+            make()
+
+
+def test_a_basis_that_no_memory_holds_is_refused():
+    for make in (lambda: ker.Bins(10**15), lambda: ker.Panels([0.0, np.pi], 10**9)):
+        with pytest.raises(InputError, match="GB of memory"):
+            make()
+
+
+# random numbers
+
+SAMPLERS = {
+    "Law.sample": lambda rng: ker.lambertian().sample(np.full(4, 1.0), rng),
+    "CollisionLaw.sample": lambda rng: ker.CollisionLaw(ker.lambertian(), geo.Disk()).sample([[0.1, -1.0, 0.2]], rng),
+    "discretise": lambda rng: ker.discretise(ker.lambertian(), ker.Bins(2), "monte-carlo", samples=64, rng=rng).array,
+    "exit_times": lambda rng: spec.exit_times(ker.lambertian(), [1.0, 2.0, 4.0], 8, rng).times,
+}
+
+
+@pytest.mark.parametrize("name", SAMPLERS)
+def test_a_seed_and_its_generator_give_the_same_numbers(name):
+    sample = SAMPLERS[name]
+    assert np.array_equal(sample(5), sample(np.random.default_rng(5)))
+    assert not np.array_equal(sample(5), sample(6))
+    assert np.array_equal(sample(None), sample(None)) == (name == "discretise")
+    for wrong in (-1, 0.5, "seed", True, np.random.RandomState(0)):
+        with pytest.raises(InputError, match="rng: expected None, a whole number"):
+            sample(wrong)

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, Self
 
 from ...core.checks import Floats, frozen, positive_number
+from ...core.kinds import explained
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between
@@ -148,6 +149,7 @@ class Cell:
             return tuple(replace(h, left=h.left + x, right=h.right + x) for h in self.cell.hollows)
         return hollows_between(flat_tops(self.pieces, self.vertices), self.vertices) if self.closes else ()
 
+    @explained
     def scaled(self, factor: float) -> Self:
         """Return the wall enlarged by ``factor`` > 0, its period included."""
         c = positive_number("factor", factor)

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, frozen, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained, explained_class
 
 # Metres of the units that headers of profiles have; micro is written in three ways.
 METRES = {
@@ -19,6 +20,7 @@ METRES = {
 }  # fmt: skip
 
 
+@explained_class
 @dataclass(frozen=True, eq=False)
 class Profile:
     """Heights above positions along a line, in one unit; ``x, height = profile`` unpacks it.
@@ -96,6 +98,7 @@ class Profile:
         known, heights = self.x[defined][order], self.height[defined][order]
         return Profile(self.x, np.where(defined, self.height, np.interp(self.x, known, heights)), self.unit)
 
+    @explained
     def detrended(self, degree: int = 1) -> Profile:
         """Less the polynomial that fits best: degree 0 the mean, 1 the tilt too, 2 a bow too."""
         degree = whole_number("degree", degree, 0)
@@ -108,6 +111,7 @@ class Profile:
         size = np.abs(self.height[defined]).max()
         return Profile(self.x, np.where(np.abs(rest) <= FIT_ROUNDING * size, 0.0, rest), self.unit)
 
+    @explained
     def in_unit(self, unit: str) -> Profile:
         """Converted to another unit of length."""
         factor = unit_ratio(self.unit, unit)

@@ -13,6 +13,7 @@ import numpy as np
 from ...core.checks import Floats, whole_number
 from ...core.errors import InputError
 from ...core.files import regular_file
+from ...core.kinds import explained
 from .columns import Columns, NotPairs
 from .measured import Profile, heights_of, unit_ratio
 
@@ -72,6 +73,7 @@ def _rolled(x: Floats, height: Floats) -> Floats:
     return np.asarray(np.column_stack([along, down])[keep] + 0.0)
 
 
+@explained
 def read_profile(
     path: str | PathLike[str],
     row: int | None = None,

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, positive_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal
@@ -59,6 +60,7 @@ class ConfigurationSpace:
     scale: float
     spacing: float
 
+    @explained
     def __init__(self, wall: Wall, disk: Disk, scale: float, spacing: float | None = None) -> None:
         if not isinstance(wall, Wall) or not isinstance(disk, Disk):
             raise InputError(f"wall, disk: expected a Wall and a Disk, got {wall!r} and {disk!r}")

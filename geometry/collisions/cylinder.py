@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, positive_number, whole_number
+from ...core.kinds import explained
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk
@@ -46,6 +47,7 @@ class CylinderCollision(StatusCounts):
     status: NDArray[np.uint8]
 
 
+@explained
 def collide_cylinder(
     disk: Disk,
     wall: Wall,
@@ -148,6 +150,7 @@ class ModifiedCollision(StatusCounts):
     status: NDArray[np.uint8]
 
 
+@explained
 def collide_modified(
     disk: Disk,
     wall: Wall,

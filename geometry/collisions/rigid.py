@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, instance, positive_number, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..curves.bezier import Bezier
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
@@ -47,6 +48,7 @@ class RigidCollision(StatusCounts):
     status: NDArray[np.uint8]
 
 
+@explained
 def collide(
     disk: Disk,
     wall: Wall,

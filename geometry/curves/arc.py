@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import WallError
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
@@ -79,7 +79,8 @@ class Arc(Curve):
     end: Point
     rounding: float = field(compare=False)
 
-    def __init__(self, center: Any, semi_axes: Any, start: float, end: float) -> None:
+    @explained
+    def __init__(self, center: ArrayLike, semi_axes: ArrayLike, start: float, end: float) -> None:
         middle = as_point("Arc center", center)
         axes = as_point("Arc semi_axes", (semi_axes, semi_axes) if np.ndim(semi_axes) == 0 else semi_axes)
         angles = as_point("Arc start and end", (start, end))

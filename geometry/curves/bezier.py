@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import WallError
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
@@ -48,7 +50,8 @@ class Bezier(Curve):
     end: Point = field(init=False, repr=False, compare=False)
     rounding: float = field(default=0.0, init=False, repr=False, compare=False)
 
-    def __init__(self, control_points: Any) -> None:
+    @explained
+    def __init__(self, control_points: Sequence[ArrayLike]) -> None:
         given = list(control_points)
         if len(given) not in (3, 4):
             raise WallError(f"Bezier control_points: expected 3 or 4 points, got {len(given)}")

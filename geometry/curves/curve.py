@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats
+from ...core.checks import Floats, shortened
 from ...core.errors import WallError
 
 Point = tuple[float, float]
@@ -95,8 +95,8 @@ def as_point(name: str, value: Any) -> Point:
     try:
         x, y = value
         point = float(x), float(y)
-    except (TypeError, ValueError) as reason:
-        raise WallError(f"{name}: expected a point (x, y), got {value!r}") from reason
+    except (TypeError, ValueError, OverflowError) as reason:
+        raise WallError(f"{name}: expected a point (x, y), got {shortened(value)}") from reason
     if not (math.isfinite(point[0]) and math.isfinite(point[1])):
         raise WallError(f"{name}: expected finite coordinates, got {point}")
     return point

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, number_between, positive_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..collisions.configuration_space import ConfigurationSpace
 from ..collisions.rigid import collide
 from ..disk.disk import Disk
@@ -28,6 +29,7 @@ SECTION = 500
 MOST_CONTACTS = 200
 
 
+@explained
 def collision_path(
     disk: Disk, wall: Wall, scale: float, position: ArrayLike, velocity: ArrayLike, spacing: float | None = None
 ) -> Floats:
@@ -98,6 +100,7 @@ def _first_time(
     return float(-(change @ reached) / (change @ change))
 
 
+@explained
 def draw_collision(
     disk: Disk,
     wall: Wall,
@@ -175,6 +178,7 @@ def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Float
             ax.plot(*dot, "o", color=RAY_COLOURS[j % len(RAY_COLOURS)], markersize=4.5, zorder=4)
 
 
+@explained
 def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | None = None) -> Axes:
     """Draw the section of the configuration space at one ``height`` of the lowest satellite.
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, angles, finite_array
+from ...core.kinds import explained
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,6 +39,7 @@ FLATTEST = 0.2
 MOST_CELLS = 2
 
 
+@explained
 def draw_wall(wall: Wall, x: ArrayLike = (), theta: ArrayLike = (), ax: Axes | None = None) -> Axes:
     """Draw one period of a wall, with the trajectories of the rays that enter at ``x`` with the angles ``theta``.
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_array, finite_number, instance, number_between, whole_number
+from ...core.kinds import explained
 from ..scene.columns import LEFT, RIGHT
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
@@ -103,6 +104,7 @@ class Trace(StatusCounts):
         return np.asarray((self.status == Status.CORNER) | (self.status == Status.GRAZING))
 
 
+@explained
 def trace(
     wall: Wall,
     x: ArrayLike,
@@ -215,6 +217,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) ->
     return follow if scene.closed is None else close
 
 
+@explained
 def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_000) -> Floats:
     """Return the points of one ray: its entry at y = 0, every hit, and its exit.
 

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..cells.profile import SEPARATORS, read_profile
 from ..disk.disk import Disk
 from .mushroom import mushrooms
@@ -35,6 +36,7 @@ class NamedWall:
     defaults: Mapping[str, float | int]
     summary: str
 
+    @explained
     def build(self, **parameters: float | int) -> Wall:
         """Return the wall with the given parameters and the defaults for the others."""
         return self.constructor(**{**self.defaults, **parameters})
@@ -77,6 +79,7 @@ _ENTRIES = (
 WALLS: Mapping[str, NamedWall] = MappingProxyType({entry.name: entry for entry in _ENTRIES})
 
 
+@explained
 def wall_from_text(text: str) -> Wall:
     """Return the wall given by a name with parameters, a TOML file, or a file with a profile.
 

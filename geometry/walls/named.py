@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.checks import number_between, positive_number, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.segment import Segment
@@ -30,6 +31,7 @@ def flat() -> Wall:
     return Wall([Segment((0.0, 0.0), (1.0, 0.0))])
 
 
+@explained
 def triangular_teeth(angle: float) -> Wall:
     """Return triangular teeth with tips at the integers.
 
@@ -56,6 +58,7 @@ def triangular_teeth(angle: float) -> Wall:
     return Wall.from_vertices([(0.0, 0.0), (0.5, -0.5 / math.tan(0.5 * psi)), (1.0, 0.0)])
 
 
+@explained
 def rectangular_teeth(height_to_width: float) -> Wall:
     """Return rectangular teeth: a flat top on [0, 1/2] and a crevice on [1/2, 1].
 
@@ -82,6 +85,7 @@ def rectangular_teeth(height_to_width: float) -> Wall:
     return Wall.from_vertices([(0.0, 0.0), (0.5, 0.0), (0.5, floor), (1.0, floor), (1.0, 0.0)])
 
 
+@explained
 def focusing_arcs(half_angle: float) -> Wall:
     """Return the wall of one circular arc per period, below its chord [0, 1].
 
@@ -110,6 +114,7 @@ def focusing_arcs(half_angle: float) -> Wall:
     return Wall([arc.pinned((0.0, 0.0), (1.0, 0.0))])
 
 
+@explained
 def dispersing_arcs(curvature: float) -> Wall:
     """Return circular bumps with tops at the integers and a corner at x = 1/2.
 
@@ -138,6 +143,7 @@ def dispersing_arcs(curvature: float) -> Wall:
     return Wall([fall, rise])
 
 
+@explained
 def elliptical_arcs(half_angle: float, disk: Disk) -> Wall:
     """Return the wall of elliptical arcs whose foreshortened wall is ``focusing_arcs(half_angle)``.
 
@@ -182,6 +188,7 @@ def double_parabola() -> Wall:
     return Wall([Bezier(left), Bezier(right)])
 
 
+@explained
 def koch(generations: int) -> Wall:
     """Return the Koch curve pointing downwards, a wall of 4^generations segments.
 

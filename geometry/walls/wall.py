@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, instance, positive_number
 from ...core.errors import InputError, WallError
 from ...core.html import html_table
+from ...core.kinds import explained
 from ..cells.cell import Cell
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature
@@ -77,6 +78,7 @@ class Wall(Cell):
     (Hollow(left=0.0, right=1.0, first=0, last=2),)
     """
 
+    @explained
     def __init__(
         self, pieces: Sequence[Curve], period: float = 1.0, islands: Sequence[Sequence[Curve]] = (), unit: str = ""
     ) -> None:
@@ -94,6 +96,7 @@ class Wall(Cell):
             check_open_wall(path, loops, width, size)
 
     @classmethod
+    @explained
     def from_vertices(cls, vertices: ArrayLike, unit: str = "") -> Self:
         """Return the polygonal wall through the given points; its period is the last x.
 
@@ -135,6 +138,7 @@ class Wall(Cell):
         return cls(pieces, corners[-1][0], unit=unit)
 
     @classmethod
+    @explained
     def from_profile(
         cls, x: ArrayLike | Profile, height: ArrayLike | None = None, seam: Seam = "mirror", unit: str = ""
     ) -> Self:
@@ -201,6 +205,7 @@ class Wall(Cell):
         """
         return plan_of(self.cell, self.cell.scene, self.is_mirror_symmetric)
 
+    @explained
     def foreshorten(self, disk: Disk) -> Self:
         """Return the foreshortened wall of the disk: y divided by ``disk.foreshortening``, same period.
 
@@ -213,6 +218,7 @@ class Wall(Cell):
         """
         return self._image(1.0, 1.0 / _checked(disk).foreshortening, self.period)
 
+    @explained
     def unforeshorten(self, disk: Disk) -> Self:
         """Return the wall whose foreshortened wall is this one: y multiplied by ``disk.foreshortening``."""
         return self._image(1.0, _checked(disk).foreshortening, self.period)
@@ -226,6 +232,7 @@ class Wall(Cell):
         }  # fmt: skip
         return html_table(repr(self), lines, wall_miniature(self))
 
+    @explained
     def outline(self, tolerance: float) -> Floats:
         """Return the path of one period, without islands, as a polyline within ``tolerance``, shape (n, 2)."""
         chunks = [p.flattened(tolerance)[:-1] for p in self.pieces]
@@ -250,6 +257,7 @@ def _checked(disk: Disk) -> Disk:
     return disk
 
 
+@explained
 def load_wall(path: str | PathLike[str]) -> Wall:
     """Read a wall from a TOML file.
 

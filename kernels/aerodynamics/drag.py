@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, finite_array, positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
+from ...core.kinds import explained
 from ..bases.basis import AngleFunction, Basis
 from ..bases.measure import SINE, gauss_rule
 from ..bases.momentum import Directions
@@ -48,6 +49,7 @@ def air_resistance(theta: Floats, outgoing: Floats) -> Floats:
     return np.asarray(0.75 * (1.0 + np.cos(outgoing - theta)))
 
 
+@explained
 def resistance(
     law: Law,
     tolerance: float = 1e-10,

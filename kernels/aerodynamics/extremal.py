@@ -10,6 +10,7 @@ import numpy as np
 from ...core.checks import Floats, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ...core.kinds import explained
 from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.interval_exchange import IntervalExchangeLaw
@@ -58,6 +59,7 @@ class ExtremalResistance:
         return IntervalExchangeLaw(self.plan)
 
 
+@explained
 def extremal_resistance(
     n: int = 1024,
     which: Literal["min", "max"] = "min",

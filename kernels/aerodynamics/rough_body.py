@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ...core.kinds import explained_class
 from ..bases.measure import SINE
 from ..laws.law import Law
 from ..matrices.defects import SymmetryDefect, relative_asymmetry, reversibility_z_score
@@ -27,6 +28,7 @@ SINE_MASS = 2.0
 DirectionCost = Callable[[Floats, Floats], Floats]
 
 
+@explained_class
 @dataclass(frozen=True, eq=False)
 class RoughBody:
     r"""A convex body in the plane with a rough boundary, given by boundary elements and their reflection law.

@@ -8,8 +8,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, finite_array, frozen, whole_number
+from ...core.checks import Floats, check_memory, finite_array, frozen, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from .basis import Basis
 from .intervals import cell_among
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
@@ -54,9 +55,12 @@ class Bins(Basis):
     _measure: AngularMeasure
     _equal: bool
 
+    @explained
     def __init__(self, divisions: int | ArrayLike, weight: WeightName = "sin") -> None:
         measure = measure_by_name(weight)
         equal = np.ndim(divisions) == 0
+        if equal:
+            check_memory("bins", "the edges", whole_number("bins", divisions, 1))
         edges = _equal_edges(whole_number("bins", divisions, 1), measure) if equal else _checked_edges(divisions)
         object.__setattr__(self, "_edges", frozen(edges))
         object.__setattr__(self, "_weights", frozen(measure.mass(edges[:-1], edges[1:])))
@@ -111,6 +115,7 @@ class Bins(Basis):
         guess -= angle < self._edges[guess]
         return np.maximum(guess, 0)
 
+    @explained
     def evaluate(self, angle: ArrayLike) -> Floats:
         index = self.index(angle)
         values = np.zeros((*index.shape, self.size))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, whole_number
+from ...core.kinds import explained
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
@@ -47,6 +48,7 @@ class Legendre(Basis):
     n: int
     weight: WeightName
 
+    @explained
     def __init__(self, n: int, weight: WeightName = "sin") -> None:
         object.__setattr__(self, "n", whole_number("n", n, 1))
         object.__setattr__(self, "weight", measure_by_name(weight).name)

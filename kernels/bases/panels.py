@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, frozen, number_between, whole_number
+from ...core.checks import Floats, check_memory, frozen, number_between, whole_number
+from ...core.kinds import explained
 from .basis import Basis
 from .bins import Bins
 from .measure import SINE, AngularMeasure, WeightName
@@ -61,13 +62,16 @@ class Panels(Basis):
     degree: int
     _coefficients: Floats
 
+    @explained
     def __init__(self, edges: ArrayLike, degree: int, weight: WeightName = "sin") -> None:
         cells = Bins(np.atleast_1d(edges), weight)
         object.__setattr__(self, "_cells", cells)
         object.__setattr__(self, "degree", whole_number("degree", degree, 0))
+        check_memory("degree", "the basis", cells.size * (self.degree + 1) ** 2)
         object.__setattr__(self, "_coefficients", frozen(self._orthonormalise()))
 
     @classmethod
+    @explained
     def for_wall(cls, wall: Wall, degree: int = 6, smallest: float = SMALLEST) -> Panels:
         """Panels for the law of a wall: graded towards grazing and, for one circular arc, its critical angles.
 

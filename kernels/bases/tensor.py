@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ...core.kinds import explained
 from .basis import Basis
 from .measure import AngularMeasure
 
@@ -46,6 +47,7 @@ class TensorBasis(Basis):
 
     factors: tuple[Basis, ...]
 
+    @explained
     def __init__(self, factors: tuple[Basis, ...]) -> None:
         flat = tuple(
             part for factor in factors for part in (factor.factors if isinstance(factor, TensorBasis) else (factor,))

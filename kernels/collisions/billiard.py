@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, Rng, finite_array, generator, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 
 if TYPE_CHECKING:
     from ...geometry import Container, Disk
 
 
+@runtime_checkable
 class Reflector(Protocol):
     """Protocol for the collision law of one wall of a container, met by `CollisionLaw` and `SatelliteLaw`."""
 
@@ -73,6 +75,7 @@ class BilliardRecord:
         return np.asarray(np.ptp(along, axis=0))
 
 
+@explained
 def play(
     container: Container,
     laws: Reflector | Sequence[Reflector],
@@ -121,8 +124,11 @@ def play(
     """
     rng = generator(rng)
     whole_number("collisions", collisions, 1)
+    check_memory("collisions", "the record", 8 * collisions)
     walls = len(container.normals)
     each = list(laws) if isinstance(laws, Sequence) else [laws] * walls
+    if not all(isinstance(law, Reflector) for law in each):
+        raise InputError(f"laws: expected collision laws such as ker.CollisionLaw(law, disk), got {shortened(laws)}")
     if len(each) != walls:
         raise InputError(f"laws: expected one law or one for each of the {walls} walls, got {len(each)}")
     disk = each[0].disk

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, angles, finite_array, generator, instance
 from ...core.errors import InputError
+from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
@@ -30,6 +31,7 @@ DEFECT_SIZES = (32, 8)
 VelocityFunction = Callable[[Floats, Floats], Floats]
 
 
+@explained_class
 @dataclass(frozen=True)
 class CollisionLaw:
     r"""The collision law K of a rough disk with a rough wall, in the limit of small roughness.
@@ -70,6 +72,7 @@ class CollisionLaw:
             raise InputError("law: expected a law in the paper's convention, got one in the specular frame")
 
     @classmethod
+    @explained
     def from_wall(cls, wall: Wall, disk: Disk) -> CollisionLaw:
         """The collision law of a disk with a wall: P~ is the law of ``wall.foreshorten(disk)``.
 
@@ -80,6 +83,7 @@ class CollisionLaw:
         instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
         return cls(WallLaw(wall.foreshorten(disk)), disk)
 
+    @explained
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
         """Draw an outgoing velocity for every incoming one.
 
@@ -161,6 +165,7 @@ class CollisionLaw:
             if np.any(probability[..., slot] > 0.0)
         ]
 
+    @explained
     def operator(self, theta_basis: Basis, psi_basis: Basis, **discretisation: object) -> CollisionOperator:
         """The matrix of K on a product of two bases, as a linear operator that never forms the product.
 

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, generator
 from ...core.errors import AccuracyError
+from ...core.kinds import explained_class
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 MOST_DRAWS = 20
 
 
+@explained_class
 @dataclass(frozen=True)
 class SatelliteLaw:
     """The collision law K^{Sigma, eps} of the true disk, with x1 uniform in a cell and alpha in one spacing.

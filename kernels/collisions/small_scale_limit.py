@@ -15,6 +15,7 @@ from ...core.checks import Floats, Rng, finite_array, frozen, generator, number_
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
+from ...core.kinds import explained
 from ...core.rounding import EPS
 
 if TYPE_CHECKING:
@@ -124,6 +125,7 @@ class LimitStudy:
         return Estimate(float(slope), error, "estimate", f"slope of {len(x)} scales")
 
 
+@explained
 def limit_study(
     disk: Disk,
     wall: Wall,
@@ -182,6 +184,8 @@ def limit_study(
 
     rng = generator(rng)
     eps = np.atleast_1d(finite_array("scales", scales))
+    if eps.ndim != 1:
+        raise InputError(f"scales: expected a list of numbers, got an array of shape {eps.shape}")
     number_between("psi", psi, 0.0, math.pi)
     for name, number in zip(("angles", "rotations", "positions"), samples, strict=True):
         whole_number(f"samples ({name})", number, 1)

@@ -7,8 +7,9 @@ from typing import get_args
 
 import numpy as np
 
-from ...core.checks import Rng, finite_number, generator, whole_number
+from ...core.checks import Rng, check_memory, finite_number, generator, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import Law
@@ -19,6 +20,7 @@ from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SEED_WITHOUT_RNG, Budget, Met
 from .methods import recipe
 
 
+@explained
 def discretise(
     law: Law,
     basis: Basis,
@@ -112,6 +114,7 @@ def discretise(
         raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for theta, with weight 'sin', got {basis!r}")
+    check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
     if method not in get_args(MethodName):
         raise InputError(f"method: expected one of {', '.join(get_args(MethodName))}, got {method!r}")
     if finite_number("tolerance", tolerance) < 0.0:

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from ...core.checks import positive_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ...core.kinds import explained
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
@@ -39,6 +40,7 @@ class Distance(Estimate):
         return super().__str__() + floor
 
 
+@explained
 def distance(
     first: Law | KernelMatrix,
     second: Law | KernelMatrix,

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, check_memory, generator, number_between, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
 from .resampling import (
@@ -50,6 +51,7 @@ class DifferenceTest:
         return self.p_value <= number_between("level", level, 0.0, 1.0)
 
 
+@explained
 def difference_test(
     first: KernelMatrix,
     second: KernelMatrix,
@@ -102,6 +104,7 @@ def difference_test(
     if kind not in ("rows", "sup"):
         raise InputError(f"kind: expected 'rows' or 'sup' for a test, got {kind!r}")
     number = whole_number("permutations", permutations, 19)
+    check_memory("permutations", "the distribution", number)
     source = generator(rng, 0)
     if first.counts is None and second.counts is None:
         raise InputError("difference_test: expected counts in one matrix at least; of exact laws take the distance")

@@ -11,6 +11,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95
+from ...core.kinds import explained
 from ..collisions.small_scale_limit import limit_study
 from ..distances.distances import distance
 from ..walls.wall_law import WallLaw
@@ -52,6 +53,7 @@ class Dichotomy:
     diameters: Floats
 
 
+@explained
 def dichotomy(
     cells: Sequence[Wall],
     disk: Disk | None = None,

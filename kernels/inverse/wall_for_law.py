@@ -12,6 +12,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, frozen, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -124,6 +125,7 @@ class WallForLaw:
         )
 
 
+@explained
 def wall_for(
     law: Law | KernelMatrix,
     moments: int = 10,
@@ -219,6 +221,7 @@ def wall_for(
     )
 
 
+@explained
 def collision_for(
     collision: CollisionLaw, disk: Disk | None = None, moments: int = 10, tolerance: float = 1e-10, **search: Any
 ) -> WallForLaw:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
@@ -87,6 +88,7 @@ class DensityLaw(Law):
     _function: DensityFunction
     _panel_count: int = PANEL_COUNTS[0]
 
+    @explained
     def __init__(self, density: DensityFunction, breakpoints: ArrayLike = ()) -> None:
         if not callable(density):
             raise InputError(f"density: expected a function of (theta, theta_out), got {density!r}")

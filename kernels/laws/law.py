@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, angles, finite_array, generator, whole_number
 from ...core.errors import InputError
 from ...core.html import html_table
+from ...core.kinds import explained, explained_class
 from ..bases.angles import mirrored_angle
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.mirror import is_mirror_symmetric
@@ -76,10 +77,12 @@ class Law(ABC):
     __array_ufunc__ = None
 
     # ---- what a law does -------------------------------------------------------------------------------------
+    @explained
     def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
         """Draw one outgoing angle for every incoming angle ``theta``; same shape, radians in (0, pi)."""
         return self._sample(angles("theta", theta), generator(rng))
 
+    @explained
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
         """The expectation E[f(Theta') | theta] of a vectorised f, whose values have shape ``theta.shape + extra``."""
         return self._apply(function, angles("theta", theta))
@@ -312,6 +315,7 @@ def entry_points(x: ArrayLike) -> Floats:
     return array
 
 
+@explained_class
 @dataclass(frozen=True, repr=False)
 class Combination(Law):
     """A weighted sum of laws, ``0.3 * law + 0.7 * other``.
@@ -440,6 +444,7 @@ class Combination(Law):
         return " + ".join(f"{weight:.12g}*{as_factor(law)}" for weight, law in self.terms)
 
 
+@explained
 def mixture(laws: Sequence[Law], weights: ArrayLike) -> Combination:
     """The law that follows ``laws[k]`` with probability ``weights[k]``.
 
@@ -484,6 +489,7 @@ def as_factor(law: Law) -> str:
     return f"({law!r})" if isinstance(law, (Combination, Composition)) else repr(law)
 
 
+@explained_class
 @dataclass(frozen=True, repr=False)
 class Composition(Law):
     """Laws applied one after the other, ``first @ second``; as an operator, f -> P_first P_second f.
@@ -563,6 +569,7 @@ class Composition(Law):
         return " @ ".join(as_factor(law) for law in self.laws)
 
 
+@explained_class
 @dataclass(frozen=True, repr=False)
 class Power(Law):
     """A law applied n times, ``law ** n``; n = 0 is the identity f -> f.
@@ -653,6 +660,7 @@ def _pulled_back(law: Law, function: AngleFunction) -> AngleFunction:
     return lambda angle: law.apply(function, angle)
 
 
+@explained_class
 @dataclass(frozen=True, repr=False)
 class SpecularFrame(Law):
     """P J, f -> P(J f) with J f(theta) = f(pi - theta): the law in the other frame.
@@ -760,6 +768,7 @@ class IsometryLaw(BranchLaw):
     mirror_symmetric = True
     evaluations = 1
 
+    @explained
     def branches(self, theta: ArrayLike) -> tuple[Floats, Floats]:
         """One branch, of probability 1."""
         theta = angles("theta", theta)

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
@@ -57,6 +58,7 @@ class MatrixLaw(DensityLaw):
     edges: Floats
     _masses: Floats
 
+    @explained
     def __init__(self, matrix: KernelMatrix | ArrayLike) -> None:
         basis = matrix.basis if isinstance(matrix, KernelMatrix) else None
         array = finite_array("matrix", matrix.array if isinstance(matrix, KernelMatrix) else matrix)

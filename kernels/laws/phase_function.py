@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, number_between, whole_number
+from ...core.kinds import explained
 from ..bases.angles import clipped_inside, mirrored_angle
 from ..bases.measure import SINE
 from .density import GAUSS_NODES, DensityLaw
@@ -119,6 +120,7 @@ class HenyeyGreensteinLaw(DensityLaw):
         return f"henyey_greenstein({self.g!r})"
 
 
+@explained
 def henyey_greenstein(g: float) -> HenyeyGreensteinLaw:
     """The Henyey-Greenstein law with mean cosine ``g``, -1 < g < 1; see `HenyeyGreensteinLaw`.
 

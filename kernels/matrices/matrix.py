@@ -20,6 +20,7 @@ from ...core.checks import Floats, finite_array, finite_number, frozen, number_b
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.html import html_table
+from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
@@ -200,6 +201,7 @@ if TYPE_CHECKING:
     Replicate: TypeAlias = "Floats | csr_array[Any, tuple[int, int]]"
 
 
+@explained_class
 @dataclass(frozen=True, eq=False, repr=False)
 class KernelMatrix:
     r"""The matrix of a Markov kernel P in a basis of L^2 of the invariant measure.
@@ -399,6 +401,7 @@ class KernelMatrix:
             law=self.law if self.reversible else f"adjoint of {self.law or self.method}",
         )
 
+    @explained
     def tensor(self, other: KernelMatrix) -> KernelMatrix:
         """The kernel that applies this one to the first angle and the other to the second, independently."""
         return tensor_product(self, other)
@@ -419,6 +422,7 @@ class KernelMatrix:
         return aslinearoperator(self.array)
 
     # ---- files and pictures ----------------------------------------------------------------------------------
+    @explained
     def save(self, path: str | Path, overwrite: bool = False) -> Path:
         """Write everything to an .npz file that `load_matrix` reads; an existing file only with ``overwrite``."""
         arrays: Arrays = {"symmetric": self.symmetric}
@@ -478,6 +482,7 @@ class KernelMatrix:
         return values
 
 
+@explained
 def load_matrix(path: str | Path) -> KernelMatrix:
     """Read a matrix that `KernelMatrix.save` wrote: every field, to the last bit.
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles
+from ...core.checks import Floats, angles, check_memory
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.measure import SINE
@@ -22,6 +23,7 @@ TEST_BINS = 32
 WEIGHTED_BATCHES = 8
 
 
+@explained
 def estimate(
     theta_in: ArrayLike,
     theta_out: ArrayLike,
@@ -75,6 +77,7 @@ def estimate(
         )
     if not isinstance(basis, Basis):
         raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
+    check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
     if basis.measure != SINE:
         raise InputError(f"basis: expected one for sin(theta), got {basis!r}")
     incoming, outgoing = incoming.ravel(), outgoing.ravel()

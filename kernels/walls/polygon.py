@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import Estimate
+from ...core.kinds import explained_class
 from ...geometry import Wall
 from ..laws.isometry_table import IsometryTable
 from ..laws.law import BranchLaw
@@ -28,6 +29,7 @@ BEAM_TOLERANCE, MOST_BEAMS = 1e-13, 200_000
 MOST_PROBES = 512
 
 
+@explained_class
 @dataclass(frozen=True)
 class PolygonLaw(BranchLaw):
     r"""The exact law P~ of a wall made of segments: a finite list of isometries with their probabilities.

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, angles, instance
 from ...core.errors import AccuracyError
+from ...core.kinds import explained_class
 from ...core.rounding import EPS
 from ...geometry import Wall
 from ..bases.basis import AngleFunction, Basis
@@ -47,6 +48,7 @@ APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 CELL_TOLERANCE = 1e-9
 
 
+@explained_class
 @dataclass(frozen=True)
 class WallLaw(DrivenLaw):
     """The law P~ of a wall, for rays that enter at a uniform point of the period.

@@ -14,6 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind
 from ...core.frames import data_frame
 from ...core.html import html_table
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import Basis, Bins, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
 from ...kernels.bases.measure import SINE
@@ -133,6 +134,7 @@ class Enclosures:
         return html_table(f"Enclosures, {self.convention} convention", {**numbers, "method": self.method})
 
 
+@explained
 def enclosures(
     law: Law | CollisionLaw, k: int = 4, basis: Basis | None = None, tolerance: float = MATRIX_TOLERANCE
 ) -> Enclosures:

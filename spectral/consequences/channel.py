@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
+from ...core.kinds import explained
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .diffusion import Arrangement, check_arrangement
@@ -72,6 +73,7 @@ def _slope_weights(log: Floats) -> Floats:
     return np.asarray(deviation / np.sum(deviation**2))
 
 
+@explained
 def exit_times(
     law: Law,
     lengths: ArrayLike,

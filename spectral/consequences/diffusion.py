@@ -10,6 +10,7 @@ import numpy as np
 from ...core.checks import Floats, positive_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import Law
 from ..essential.edge import grazing_symbol
@@ -50,6 +51,7 @@ class Diffusivity(Estimate):
     arrangement: Arrangement
 
 
+@explained
 def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: Arrangement = "mirror") -> Diffusivity:
     r"""The diffusivity D of a channel, from the law's action on grazing rays.
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...core.checks import Floats, frozen, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ...kernels import Law, Legendre, discretise
 
-# Chords per piece of a wall on the coarser of two levels.
+if TYPE_CHECKING:
+    from ...geometry import Wall
+
+# Chords of a wall's pieces and twice as many, whose difference tells the error of the mean squared slope.
 CHORDS = 4096
 # Ratio of the steepest slopes of the two levels that indicates a vertical tangent. There the steepest slope grows like
 # the root of the number of chords.
@@ -46,6 +50,7 @@ class LaplacianComparison:
     error: float
 
 
+@explained
 def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) -> LaplacianComparison:
     """Compare the diagonal of a law in Legendre polynomials with the eigenvalues of the billiard Laplacian.
 
@@ -89,8 +94,9 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
     )
 
 
-def mean_squared_slope(wall: Any) -> float:
-    """The mean squared slope h of a wall over a period; ``inf`` if a piece is vertical or overhangs.
+@explained
+def mean_squared_slope(wall: Wall) -> float:
+    """h of a wall: the mean over a period of the squared slope; ``inf`` where a piece is vertical or overhangs.
 
     Examples
     --------

@@ -11,6 +11,7 @@ import numpy as np
 from ...core.checks import Floats, finite_number, number_between
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import DensityLaw, KernelMatrix, Law
 from ...kernels.bases.measure import SINE
@@ -60,6 +61,7 @@ class MixingTime:
         return float(self.steps)
 
 
+@explained
 def mixing_time(
     kernel: Law | KernelMatrix | Spectrum,
     within: float = 0.25,

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.checks import Floats, Rng, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, check_memory, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, student_95
+from ...core.kinds import explained
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -58,6 +59,7 @@ def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
     return np.asarray(((weights[:, None] * phi) ** 2 * spread / totals[:, None]).sum(axis=0))
 
 
+@explained
 def bootstrap_intervals(
     matrix: KernelMatrix, k: int, rng: Rng = None, resamples: int = 200, level: float = 0.95
 ) -> Floats:
@@ -96,6 +98,8 @@ def bootstrap_intervals(
     if matrix.counts is None or not matrix.basis.is_partition:
         raise InputError("matrix: expected a matrix sampled in bins, with counts; use sampling_errors for others")
     whole_number("k", k, 1)
+    whole_number("resamples", resamples, 2)
+    check_memory("resamples", "the table of draws", resamples * matrix.size**2)
     level = number_between("level", level, 0.0, 1.0)
     counts = np.asarray(matrix.counts)
     number = int(counts.sum())

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.checks import Rng, generator, positive_number
 from ...core.errors import AccuracyError, InputError
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import CollisionLaw, DensityLaw, KernelMatrix, Law, Legendre
 from ...kernels.bases.panels import ONE_PANEL
@@ -93,6 +94,7 @@ def _number_to_enclose(law: Law, edge: EssentialEdge) -> int | None:
     return int(found[0]) + 2 if found.size else None
 
 
+@explained
 def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6, rng: Rng = None) -> SpectralGap:
     """The gap 1 - sup(spectrum off the constants) of a reversible law.
 
@@ -156,6 +158,7 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
     return gap_by_theorem(law) or _by_refinement(law, tolerance, SharedMatrices(generator(rng, 0)))
 
 
+@explained
 def gaps_in_both_conventions(law: Law, tolerance: float = 1e-6, rng: Rng = None) -> tuple[SpectralGap, SpectralGap]:
     """The gaps of a mirror-symmetric law in the convention that it carries and in the other, from the same matrices.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.checks import Rng, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained
 from ...kernels import CollisionLaw, KernelMatrix, Law, Legendre, discretise
 from ..bounds.contraction import refuse_unless_self_adjoint
 from ..eigenvalues.spectra import Spectrum, SpectrumErrors, matrix_spectrum
@@ -21,6 +22,7 @@ from .verdict import SpectralGap
 TOLERANCE = 1e-4
 
 
+@explained
 def spectrum(
     kernel: KernelMatrix | Law | CollisionLaw,
     k: int = 10,

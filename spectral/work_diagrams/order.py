@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
+from ...core.kinds import explained
 
 # Least number of points of a fit with a confidence interval.
 FEWEST_POINTS = 3
@@ -58,6 +59,7 @@ class FittedOrder:
         return f"{self.order:.2f} [{self.low:.2f}, {self.high:.2f}]"
 
 
+@explained
 def fit_order(size: ArrayLike, error: ArrayLike, repeats: ArrayLike | None = None) -> FittedOrder | None:
     """Fit the order by least squares of log(error) on log(size); None for fewer than three different sizes.
 

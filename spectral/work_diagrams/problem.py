@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, finite_number, frozen
 from ...core.errors import InputError
+from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 
 # Relative error of a value that counts as exact: rounding of a few thousand operations.
@@ -50,6 +51,7 @@ class ReferenceValue:
     source: str
     made_by: tuple[str, ...] = ()
 
+    @explained
     def __init__(self, value: ArrayLike, error: float, source: str, made_by: tuple[str, ...] = ()) -> None:
         object.__setattr__(self, "value", frozen(finite_array("value", value)))
         object.__setattr__(self, "error", finite_number("error", error))
@@ -86,6 +88,7 @@ ARRAY_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({"Frobenius": frobenius,
 MATRIX_NORMS: Mapping[str, ErrorNorm] = MappingProxyType({**ARRAY_NORMS, "operator": operator_norm})
 
 
+@explained_class
 @dataclass(frozen=True, eq=False)
 class WorkProblem:
     """A quantity with its reference values and error norms.
@@ -146,6 +149,7 @@ class WorkProblem:
         return {name: norm(found - reference) for name, norm in self.norms.items()}
 
 
+@explained_class
 @dataclass(frozen=True, eq=False)
 class WorkMethod:
     """A method that computes the quantity of a problem.

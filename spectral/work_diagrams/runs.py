@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ...core.checks import Floats, positive_number, whole_number
+from ...core.checks import Floats, positive_number, shortened, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
 from ...core.files import write_whole
+from ...core.kinds import explained
 from ...kernels import KernelMatrix
 from .machine import Machine, on_few_cores
 from .problem import WorkMethod, WorkProblem
@@ -65,6 +66,7 @@ def _number(error: float) -> float | None:
     return float(error) if np.isfinite(error) else None
 
 
+@explained
 def work_precision(
     problem: WorkProblem,
     methods: Sequence[WorkMethod],
@@ -166,6 +168,8 @@ def _ladders(methods: Sequence[WorkMethod], budgets: Budgets) -> dict[str, list[
     names = [method.name for method in methods]
     if not names or len(set(names)) < len(names):
         raise InputError(f"methods: expected at least one, with different names, got {names}")
+    if not isinstance(budgets, (Mapping, Sequence, np.ndarray)):
+        raise InputError(f"budgets: expected numbers, for all methods or by name, got {shortened(budgets)}")
     shared = {} if isinstance(budgets, Mapping) else dict.fromkeys(names, budgets)
     given = budgets if isinstance(budgets, Mapping) else shared
     if missing := [name for name in names if not len(given.get(name, ()))]:

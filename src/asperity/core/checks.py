@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -14,14 +15,19 @@ Floats = NDArray[np.float64]
 Rng: TypeAlias = np.random.Generator | np.random.BitGenerator | np.random.SeedSequence | int | None
 # Characters of a value that a message repeats.
 SHOWN = 80
+# Bytes of a double.
+DOUBLE = 8
 
 
 def finite_array(name: str, value: ArrayLike) -> Floats:
     """Return ``value`` as float64, or raise an InputError that names the worst entry."""
     try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as reason:
-        raise InputError(f"{name}: expected numbers, got {value!r}") from reason
+        array = np.asarray(value)
+        if array.dtype.kind in "cSU":
+            raise TypeError("of another kind")
+        array = array.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError) as reason:
+        raise InputError(f"{name}: expected numbers, got {shortened(value)}") from reason
     bad = ~np.isfinite(array)
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
@@ -93,6 +99,20 @@ def shortened(value: object) -> str:
     except Exception:  # of foreign objects, and of integers with thousands of digits
         return f"a value of type {type(value).__name__}"
     return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
+
+
+def check_memory(name: str, what: str, numbers: int) -> None:
+    """Refuse an array of more doubles than this machine's memory holds, before it is asked for.
+
+    Examples
+    --------
+    >>> check_memory("basis", "its matrix", 10**15)
+    Traceback (most recent call last):
+    asperity.errors.InputError: basis: its matrix takes 8e+06 GB of memory, more than there is; take a smaller one
+    """
+    if DOUBLE * numbers > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
+        size = f"{DOUBLE * numbers / 1e9:.2g}" if numbers < 10**30 else "too many"
+        raise InputError(f"{name}: {what} takes {size} GB of memory, more than there is; take a smaller one")
 
 
 def angles(name: str, value: ArrayLike) -> Floats:

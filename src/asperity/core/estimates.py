@@ -73,7 +73,7 @@ class Estimate:
         object.__setattr__(self, "error", _number("error", self.error))
         if not self.error >= 0.0:
             raise InputError(f"error: expected a half width of at least 0, got {self.error!r}; inf if it is not known")
-        if self.kind not in ("bound", "estimate"):
+        if not isinstance(self.kind, str) or self.kind not in ("bound", "estimate"):
             raise InputError(f"kind: expected 'bound' or 'estimate', got {self.kind!r}")
         if not isinstance(self.method, str):
             raise InputError(f"method: expected words, got {self.method!r}")

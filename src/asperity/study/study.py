@@ -17,6 +17,7 @@ from ..core.errors import AccuracyError, AsperityError, FileExistsRefusal, Input
 from ..core.estimates import NORMAL_95, Estimate
 from ..core.files import moved_when_complete
 from ..core.html import html_table
+from ..core.kinds import explained
 from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
@@ -109,6 +110,7 @@ class Study(StudyResult):
         return [target / name for name in (*pictures, *DATA)]
 
 
+@explained
 def study_wall(
     wall: Wall,
     name: str = "wall",
