@@ -144,7 +144,7 @@ def instrument(monkeypatch):
     monkeypatch.setitem(sys.modules, "SurfaceTopography", package)
 
     def gives(heights, positions):
-        scan = SimpleNamespace(heights=lambda: heights, positions=lambda: positions)
+        scan = SimpleNamespace(heights=lambda: heights, positions=lambda: positions, unit=None)
         package.read_topography = lambda path: scan
 
     return gives
@@ -215,7 +215,7 @@ def test_warnings_of_an_instruments_package_are_not_passed_on(monkeypatch, tmp_p
 
     def read_topography(path):
         warnings.warn("old format", DeprecationWarning, stacklevel=1)
-        return SimpleNamespace(heights=lambda: np.arange(3.0), positions=lambda: np.arange(3.0))
+        return SimpleNamespace(heights=lambda: np.arange(3.0), positions=lambda: np.arange(3.0), unit=None)
 
     package.read_topography = read_topography
     monkeypatch.setitem(sys.modules, "SurfaceTopography", package)

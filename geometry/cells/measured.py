@@ -61,8 +61,8 @@ class Profile:
     def __iter__(self) -> Iterator[Floats]:
         return iter((self.x, self.height))
 
-    def __getitem__(self, place: int) -> Floats:
-        return (self.x, self.height)[place]
+    def __getitem__(self, index: int) -> Floats:
+        return (self.x, self.height)[index]
 
     def __len__(self) -> int:
         return 2

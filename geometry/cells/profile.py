@@ -196,7 +196,7 @@ def _read_instrument(file: Path, row: int | None, given: tuple[str, str] | None,
             heights = heights_of("height", scan.heights())
             positions = scan.positions()
             # that package converts heights to the unit of lengths
-            unit = str(getattr(scan, "unit", None) or "")
+            unit = str(scan.unit or "")
     except Exception as reason:  # every reader of that package fails in its own way on a file it cannot read
         first = (str(reason).splitlines() or [type(reason).__name__])[0]
         raise InputError(f"{file}: SurfaceTopography cannot read it ({first})") from reason

@@ -114,7 +114,7 @@ def find_crossing(
     for turn in turns:
         beside = np.sum([_winding_numbers(loop.points, turn.beside) for loop in loops], axis=0)
         if np.any(beside.reshape(2, -1).max(axis=0) < 1):
-            return Crossing(turn.place, tuple(labels[k] for k in turn.pieces), True)
+            return Crossing(turn.point, tuple(labels[k] for k in turn.pieces), True)
     return None
 
 

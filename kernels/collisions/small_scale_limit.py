@@ -45,10 +45,10 @@ class LimitStudy:
     psi_defect : array
         Mean absolute difference of psi' from pi - psi.
     two_satellites : array
-        Fraction of collisions in which two satellites touch the wall.
+        Share of collisions in which two satellites touch the wall.
     outliers : array
-        Fraction of collisions in which the modified law K~ (the true collision in the coordinates of the cylinder)
-        differs from the cylinder law by more than 0.1 in a unit velocity.
+        Share of collisions in which the modified law K~, the true collision in the coordinates of the cylinder, differs
+        from the cylinder's law by more than 0.1 in a unit velocity.
     drift : array
         Mean of the larger displacement of x1 and alpha between the two times at height 0.
     shift : array
@@ -78,7 +78,7 @@ class LimitStudy:
 
     def to_frame(self) -> Any:
         """One row a scale; every measured column is followed by its standard error (extra ``studies``)."""
-        columns = {"scale": self.scales, "spacing": self.spacings, "gap_share": self.gap_share}
+        columns = {"scale": self.scales, "spacing": self.spacings, "gap_fraction": self.gap_fraction}
         for name in COLUMNS:
             # names of fields of this class
             columns |= {name: getattr(self, name), f"{name}_error": self.errors[name]}

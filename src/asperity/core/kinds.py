@@ -149,11 +149,11 @@ def _class_names(value: object) -> set[str]:
 def _split(kind: str, separator: str) -> list[str]:
     """Split where no bracket is open."""
     parts, depth, start = [], 0, 0
-    for place, character in enumerate(kind):
+    for position, character in enumerate(kind):
         depth += (character in "[(") - (character in "])")
         if character == separator and depth == 0:
-            parts.append(kind[start:place])
-            start = place + 1
+            parts.append(kind[start:position])
+            start = position + 1
     return [*parts, kind[start:]]
 
 
