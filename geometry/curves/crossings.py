@@ -51,7 +51,7 @@ FEW = 3
 # Overlapping pairs of edges beyond which the test for crossings would take more than some seconds.
 MOST_PAIRS = 2e8
 
-# Edges times faces in one block of the winding count: 32 MB of booleans.
+# Edges times faces in one block of winding numbers: the largest temporary array has 32 MB.
 WINDING_BLOCK = 4_000_000
 
 

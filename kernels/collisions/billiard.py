@@ -25,7 +25,7 @@ class Reflector(Protocol):
     def disk(self) -> Disk: ...
 
     def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
-        """Outgoing (v1, v2, omega) for incoming ones with v2 < 0, the wall being below the disk."""
+        """Outgoing (v1, v2, omega) for incoming ones with v2 < 0; the wall is below the disk."""
         ...
 
 
@@ -99,7 +99,7 @@ def play(
     velocity : array_like, shape (n, 3)
         Initial (v1, v2, omega).
     collisions : int
-        How many to follow.
+        Number of collisions per disk.
     rng : None, int or numpy.random.Generator
 
     Returns

@@ -45,10 +45,10 @@ class LimitStudy:
     psi_defect : array
         Mean absolute difference of psi' from pi - psi.
     two_satellites : array
-        Share of collisions in which two satellites touch the wall.
+        Fraction of collisions in which two satellites touch the wall.
     outliers : array
-        Share of collisions in which the modified law K~, the true collision in the coordinates of the cylinder, differs
-        from the cylinder's law by more than 0.1 in a unit velocity.
+        Fraction of collisions in which the modified law K~ (the true collision in the coordinates of the cylinder)
+        differs from the cylinder law by more than 0.1 in a unit velocity.
     drift : array
         Mean of the larger displacement of x1 and alpha between the two times at height 0.
     shift : array
@@ -146,7 +146,7 @@ def limit_study(
     wall : Wall
         A wall of segments and arcs.
     scales : array_like, shape (n,)
-        eps, each greater than 0.
+        Values of eps > 0.
     rng : None, int or numpy.random.Generator
     psi : float
         Incoming psi in (0, pi), radians.

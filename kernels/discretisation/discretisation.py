@@ -51,10 +51,10 @@ def discretise(
     tolerance : float
         Wanted Frobenius error of ``symmetric``. The ``error`` and the repr of the matrix show if it was not met.
     samples : int, optional
-        Number of rays where rays are sampled, of ``"auto"`` the largest; 2**20 by default. ``"qmc"`` rounds up to 8
-        times a power of two, for the quadrature of other driven laws it is the number of nodes.
+        Number of sampled rays, for ``"auto"`` the largest number; 2**20 by default. ``"qmc"`` rounds it up to 8 times
+        a power of two. For the quadrature of other driven laws it is the number of nodes.
     rng : None, int or numpy.random.Generator
-        Source of randomness; by default a fixed one, so that results are reproducible.
+        Source of randomness. The default has a fixed seed, so that results are reproducible.
     symmetrise : bool
         Whether each ray counts in both directions, for sampled matrices of reversible laws. The flux is then symmetric,
         and rows of ``array`` sum to 1 only within the sampling error.

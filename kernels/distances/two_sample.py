@@ -70,9 +70,9 @@ def difference_test(
     order, kind
         As in `distance`; kind is ``"rows"`` or ``"sup"``.
     permutations : int
-        At least 19.
+        Number of permutations, at least 19.
     rng : None, int or numpy.random.Generator
-        Source of the permutations; by default a fixed one.
+        Source of the permutations; by default a generator with a fixed seed.
 
     Returns
     -------

@@ -76,10 +76,10 @@ class Law(ABC):
     # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * law`` to this class.
     __array_ufunc__ = None
 
-    # ---- what a law does -------------------------------------------------------------------------------------
+    # ---- sampling and expectations ---------------------------------------------------------------------------
     @explained
     def sample(self, theta: ArrayLike, rng: Rng = None) -> Floats:
-        """Draw one outgoing angle for every incoming angle ``theta``; same shape, radians in (0, pi)."""
+        """Draw one outgoing angle for every incoming angle ``theta``; the same shape, radians in (0, pi)."""
         return self._sample(angles("theta", theta), generator(rng))
 
     @explained
@@ -113,7 +113,7 @@ class Law(ABC):
         }  # fmt: skip
         return html_table(f"Law {self!r}", lines)
 
-    # ---- what a law may know besides; each has a default ------------------------------------------------------
+    # ---- optional properties, each with a default -------------------------------------------------------------
     @property
     def closed_form(self) -> Law | None:
         """The same law as an object with closed formulas; None if there is none or if this object is it.

@@ -92,6 +92,7 @@ def exit_times(
     lengths : array_like
         At least three increasing values of L at which exits are timed.
     particles : int
+        Number of particles, at least 2.
     rng : None, int or numpy.random.Generator
     radius, speed : float
         Half the width of the channel, and the speed of the particles.

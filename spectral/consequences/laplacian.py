@@ -96,7 +96,7 @@ def laplacian_comparison(law: Law, degrees: int = 6, tolerance: float = 1e-8) ->
 
 @explained
 def mean_squared_slope(wall: Wall) -> float:
-    """h of a wall: the mean over a period of the squared slope; ``inf`` where a piece is vertical or overhangs.
+    """The mean squared slope h of a wall over a period; ``inf`` if a piece is vertical or overhangs.
 
     Examples
     --------

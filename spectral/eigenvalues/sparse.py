@@ -82,9 +82,9 @@ def leading_eigenvalues(
         A symmetric matrix in an orthonormal basis; for a reversible stochastic P with the invariant weights w it is
         W^(1/2) P W^(-1/2).
     k : int
-        How many; a cluster that k would cut is taken in whole, so that there may be a few more.
+        Number of eigenvalues. A cluster at the end is not cut, so there may be a few more.
     rng : None, int or numpy.random.Generator
-        For the vectors to start from.
+        Source of the initial vectors.
 
     Returns
     -------

@@ -103,10 +103,9 @@ def spectral_gap(law: Law | KernelMatrix | CollisionLaw, tolerance: float = 1e-6
     law : Law, CollisionLaw or KernelMatrix
         A law in its own convention; for a collision law its P~. A matrix is not refined.
     tolerance : float
-        The basis grows, and the number of rays with it, until the reported error is below this or the largest basis
-        and number of rays are reached; the error says which.
+        Wanted error. If it is not reached with the largest basis and number of rays, ``error`` is larger.
     rng : None, int or numpy.random.Generator
-        For laws that are traced; ``np.random.default_rng(0)`` by default, so that results repeat.
+        Source of rays for traced laws; by default ``np.random.default_rng(0)``.
 
     Returns
     -------

@@ -40,10 +40,10 @@ def spectrum(
     k : int
         Number of eigenvalues; a matrix with fewer rows has fewer.
     tolerance : float, optional
-        Error wanted of every eigenvalue of a law, 1e-4 by default; ``errors`` says what was reached. Where a basis is
-        given it is the wanted error of the matrix.
+        Wanted error of every eigenvalue of a law, 1e-4 by default; ``errors`` are the errors reached. If a basis is
+        given, it is the wanted error of the matrix.
     rng : None, int or numpy.random.Generator
-        For laws that are traced.
+        Source of rays for traced laws.
     **discretisation
         ``basis=`` and further keywords of `asperity.kernels.discretise`. The law is then replaced by its matrix in this
         basis (by default Legendre polynomials of degree below 48), without refinement.

@@ -95,7 +95,7 @@ class Study(StudyResult):
         FileExistsRefusal
             If one of the files exists and ``overwrite`` is False; nothing is written then.
         InputError
-            If the folder cannot be made or written, or the format or the resolution is unsuitable.
+            If the folder cannot be made or written.
         """
         positive_number("dpi", dpi)
         target = prepare_folder(folder, overwrite=overwrite, picture_format=picture_format)
