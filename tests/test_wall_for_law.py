@@ -6,6 +6,7 @@ import pytest
 from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.estimates import Estimate
 from asperity.kernels.inverse.hull import few_weights, nearest_weights, possible_gain
 
 MOMENTS = 5
@@ -18,6 +19,11 @@ def lambert():
 
 def moments_of(law, number=MOMENTS):
     return ker.discretise(law, ker.Legendre(number), tolerance=1e-12).symmetric
+
+
+def moment_matrix(entries, weight="sin"):
+    array = np.array(entries)
+    return ker.KernelMatrix(array, ker.Legendre(len(array), weight), Estimate(0.0, 0.0, "bound", "given"))
 
 
 def test_the_wall_for_lamberts_law_has_its_moments_to_rounding(lambert):
@@ -89,6 +95,16 @@ def test_few_hollows_have_a_larger_defect_that_is_reported():
     assert float(found.defect) == pytest.approx(np.linalg.norm(difference), rel=1e-9)
 
 
+def test_the_bound_of_few_hollows_counts_all_mixtures_of_the_given_ones():
+    given = [geo.flat(), *(geo.triangular_teeth(angle) for angle in (0.7, 1.0, 1.4))]
+    best = ker.wall_for(ker.lambertian(), moments=MOMENTS, hollows=given)
+    few = ker.wall_for(ker.lambertian(), moments=MOMENTS, hollows=given, most_hollows=2)
+    assert len(few.hollows) <= 2 and few.bound.kind == "bound"
+    excess = float(few.defect) - float(best.defect)
+    assert 1e-3 < excess == pytest.approx(float(few.bound), rel=1e-9)
+    assert float(best.defect) > 1e-3
+
+
 def test_a_law_outside_the_hull_of_given_hollows_ends_with_its_distance_and_a_bound_of_rounding():
     found = ker.wall_for(ker.lambertian(), moments=MOMENTS, hollows=[geo.flat(), geo.triangular_teeth(1.0)])
     assert float(found.defect) > 0.5
@@ -129,6 +145,10 @@ def test_the_picture_says_how_many_hollows(lambert):
         ({"law": ker.lambertian(), "hollows": ["flat"]}, r"hollows\[0\]: expected a Wall"),
         ({"law": ker.lambertian(), "most_hollows": 0}, "most_hollows"),
         ({"law": ker.TriangularTeethLaw(1.0) @ ker.henyey_greenstein(0.5)}, "symmetric"),
+        ({"law": moment_matrix([[1.0, 0.0, 0.0], [0.0, 0.3, 0.2], [0.0, 0.1, 0.2]])}, "from their transpose by 0.14"),
+        ({"law": moment_matrix([[1.0, 0.1], [0.1, 0.3]])}, "miss those of a law by 0.1"),
+        ({"law": moment_matrix(np.eye(3), "sin2")}, "weight sin"),
+        ({"law": moment_matrix([[1.0]])}, "at least 2 moments"),
     ],
 )
 def test_unsuitable_arguments_are_refused(arguments, message):

@@ -83,7 +83,7 @@ def possible_gain(points: Floats, target: Floats, weights: Floats) -> float:
     """By how much the distance to the target could be smaller, at most, for any other weights of the same points.
 
     With r = w @ points - target and g = max over k of <r, w @ points - point_k>, the duality gap of the conditional
-    gradient, every distance d satisfies d^2 >= ||r||^2 - 2 g.
+    gradient, all points of the hull lie beyond a plane at the distance ||r|| - g/||r|| from the target.
 
     Examples
     --------
@@ -94,4 +94,4 @@ def possible_gain(points: Floats, target: Floats, weights: Floats) -> float:
     residual = mean - target
     distance = float(np.linalg.norm(residual))
     gap = max(float(residual @ mean - np.min(points @ residual)), 0.0)
-    return distance - float(np.sqrt(max(distance * distance - 2.0 * gap, 0.0)))
+    return gap / distance if gap < distance * distance else distance

@@ -16,6 +16,7 @@ from ...core.kinds import explained
 from ...core.rounding import EPS
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
+from ..bases.measure import SINE
 from ..collisions.collision_law import CollisionLaw
 from ..discretisation.discretisation import discretise
 from ..distances.distances import Distance, distance
@@ -195,20 +196,22 @@ def wall_for(
         search.run(rng)
     else:
         search.add(_given(hollows))
+    # no mixture is nearer, of the given hollows, or of those that the last step of the search could see
+    gain = (
+        float(search.history[-1][2]) if hollows is None else possible_gain(search.points, search.target, search.weights)
+    )
+    least = search.defect - gain
     chosen, weights = search.result(most_hollows, smallest_opening)
     wall = side_by_side(chosen, weights)
     finished = discretise(WallLaw(wall), basis, tolerance=0.1 * tolerance)
     value = float(np.linalg.norm(finished.symmetric - target))
     kind: ErrorKind = "bound" if {finished.error.kind, target_error.kind} == {"bound"} else "estimate"
     defect = Estimate(value, float(finished.error) + float(target_error), kind, "moments of the finished wall")
+    excess = min(max(value - least, 0.0), value)
     if hollows is not None:
-        gain = possible_gain(search.points, search.target, search.weights) if most_hollows is None else value
-        bound = Estimate(
-            min(gain, value), ROUNDED * moments, "bound", f"duality gap over {len(search.hollows)} hollows"
-        )
+        bound = Estimate(excess, ROUNDED * moments, "bound", f"duality gap over {len(search.hollows)} hollows")
     else:
-        gain = float(search.history[-1][2]) if search.weights_are_best else value
-        bound = Estimate(min(gain, value), 0.0, "estimate", "duality gap over the hollows of the last step")
+        bound = Estimate(excess, 0.0, "estimate", "duality gap over the hollows of the last step")
     return WallForLaw(
         wall,
         tuple(chosen),
@@ -272,12 +275,37 @@ def side_by_side(hollows: Sequence[UnitHollow], weights: Floats) -> Wall:
 
 
 def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[Law | None, Floats, Estimate]:
-    """The wanted law, if there is one, its moments and their error."""
+    """The wanted law, if there is one, its moments and their error; refused unless they can be those of a wall."""
+    wanted: Law | None = None
+    if isinstance(law, KernelMatrix) and isinstance(law.basis, Legendre):
+        matrix = law if law.frame == "paper" else law.in_specular_frame()
+        if law.basis.measure != SINE or law.size < 2:
+            raise InputError(
+                f"law: expected at least 2 moments for the weight sin(theta), got a matrix in {law.basis!r}"
+            )
+    else:
+        wanted = _wanted_law(law)
+        matrix = discretise(wanted, Legendre(moments), tolerance=TARGET_FRACTION * tolerance)
+    symmetric = matrix.symmetric[:moments, :moments]
+    allowed = 4.0 * float(matrix.error) + ROUNDED * len(symmetric)
+    defect = float(np.linalg.norm(symmetric - symmetric.T))
+    if defect > allowed:
+        raise InputError(
+            f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}; "
+            f"its moments differ from their transpose by {defect:.2g}"
+        )
+    missing = float(np.linalg.norm(symmetric[0] - np.eye(len(symmetric))[0]))
+    if missing > allowed:
+        raise InputError(
+            f"law: expected probabilities, got {law!r}; its moments with the constant miss those of a law by "
+            f"{missing:.2g}"
+        )
+    return wanted, 0.5 * (symmetric + symmetric.T), matrix.error
+
+
+def _wanted_law(law: Law | KernelMatrix) -> Law:
+    """The law in the paper's convention; a matrix in bins stands for its `MatrixLaw`."""
     if isinstance(law, KernelMatrix):
-        if isinstance(law.basis, Legendre):
-            count = min(moments, law.basis.n)
-            matrix = law if law.frame == "paper" else law.in_specular_frame()
-            return None, matrix.symmetric[:count, :count], matrix.error
         if not isinstance(law.basis, Bins):
             raise InputError(
                 f"law: expected a Law, or a matrix in Bins or Legendre polynomials, got one in {law.basis!r}"
@@ -285,19 +313,10 @@ def _target(law: Law | KernelMatrix, moments: int, tolerance: float) -> tuple[La
         law = MatrixLaw(law)
     if not isinstance(law, Law):
         raise InputError(f"law: expected a Law such as ker.lambertian() or a KernelMatrix, got {law!r}")
-    if law.frame != "paper":
-        # the change is its own inverse
-        law = law.in_specular_frame()
     if law.reversible is False:
         raise InputError(f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}")
-    matrix = discretise(law, Legendre(moments), tolerance=TARGET_FRACTION * tolerance)
-    defect = float(np.linalg.norm(matrix.symmetric - matrix.symmetric.T))
-    if defect > 4.0 * float(matrix.error) + ROUNDED * moments:
-        raise InputError(
-            f"law: expected one that is symmetric for sin(theta) d theta, as every wall's is, got {law!r}; "
-            f"its moments differ from their transpose by {defect:.2g}"
-        )
-    return law, 0.5 * (matrix.symmetric + matrix.symmetric.T), matrix.error
+    # the change is its own inverse
+    return law if law.frame == "paper" else law.in_specular_frame()
 
 
 def _given(walls: Sequence[Wall]) -> list[UnitHollow]:
@@ -332,7 +351,6 @@ class _Search:
         self.points = np.empty((0, len(self.target)))
         self.weights = np.empty(0)
         self.history: list[tuple[float, float, float]] = []
-        self.weights_are_best = True
 
     def point(self, hollow: UnitHollow) -> Floats | None:
         """The moments that count, of the hollow with its mirror image beside it where the target is symmetric."""
@@ -411,7 +429,6 @@ class _Search:
         doubled = np.array([1.0 if not self.is_symmetric or h.is_symmetric else 2.0 for h in self.hollows])
         if most is not None and np.sum(doubled[self.weights > 0.0]) > most:
             self.weights = few_weights(self.points, self.target, doubled, float(most))
-            self.weights_are_best = False
         usable = np.ones(len(self.hollows), dtype=bool)
         while True:
             narrow = (self.weights > 0.0) & (self.weights < smallest * doubled)
