@@ -35,6 +35,9 @@ from .inverse.cell_sequences import Dichotomy as Dichotomy
 from .inverse.cell_sequences import dichotomy as dichotomy
 from .inverse.design import WallDesign as WallDesign
 from .inverse.design import design_wall as design_wall
+from .inverse.exchange_wall import ExchangeHollow as ExchangeHollow
+from .inverse.exchange_wall import Generations as Generations
+from .inverse.exchange_wall import exchange_hollow as exchange_hollow
 from .inverse.two_mirror_hollow import TwoMirrorHollow as TwoMirrorHollow
 from .inverse.two_mirror_hollow import two_mirrors as two_mirrors
 from .inverse.wall_for_law import WallForLaw as WallForLaw

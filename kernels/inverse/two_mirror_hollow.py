@@ -63,14 +63,14 @@ class TwoMirrorHollow:
             x = self.opening[0] + (self.opening[1] - self.opening[0]) * source.random(number)
             traced = trace(self.wall, x, theta)
             missed = ~(traced.escaped & (traced.theta > other[0]) & (traced.theta < other[1]))
-            fraction, mass = float(np.mean(missed)), float(high - low)
-            lost, flux = lost + mass * fraction, flux + mass
-            square += (mass * _fraction_half_width(int(np.count_nonzero(missed)), number)) ** 2
+            share, mass = float(np.mean(missed)), float(high - low)
+            lost, flux = lost + mass * share, flux + mass
+            square += (mass * fraction_half_width(int(np.count_nonzero(missed)), number)) ** 2
         return Estimate(lost / flux, float(np.sqrt(square)) / flux, "estimate", f"{2 * number} traced rays")
 
 
-def _fraction_half_width(count: int, number: int) -> float:
-    """The longer half of Clopper and Pearson's interval of 95 % of a fraction, ``count`` of ``number``."""
+def fraction_half_width(count: int, number: int) -> float:
+    """The longer half of Clopper and Pearson's interval of 95 % of a share, ``count`` of ``number``."""
     from scipy.special import betaincinv
 
     tail, fraction = 0.5 * (1.0 - LEVEL), count / number
