@@ -11,13 +11,14 @@ from asperity.core.tables import table_lines
 
 DOCS = Path(__file__).parents[1] / "docs"
 BENCHMARKS, STABILITY, PICTURES = DOCS / "benchmarks.md", DOCS / "stability.md", DOCS / "benchmark-pictures"
-BEGIN, END = "<!-- measured -->", "<!-- end -->"
+END = "<!-- end -->"
 
 
-def write_between_marks(page: Path, text: str) -> None:
-    """Replace the text between the page's marks."""
-    head, rest = page.read_text(encoding="utf-8").split(BEGIN)
-    page.write_text(f"{head}{BEGIN}\n{text}\n{END}{rest.split(END)[1]}", encoding="utf-8")
+def write_between_marks(page: Path, text: str, name: str = "measured") -> None:
+    """Put the text where the page's marks of this name are."""
+    begin = f"<!-- {name} -->"
+    head, rest = page.read_text(encoding="utf-8").split(begin)
+    page.write_text(f"{head}{begin}\n{text}\n{END}{rest.split(END, 1)[1]}", encoding="utf-8")
 
 
 def print_table(heads: str, rows: Iterable[str | Iterable[object]]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ def load(name):
 def test_every_example_has_a_test():
     tested = {
         "disk_in_a_strip",
+        "exchange_hollow",
         "gallery",
         "least_resistance",
         "maxwell_or_rough",
@@ -34,6 +36,7 @@ def test_every_example_has_a_test():
         "true_disk",
         "true_disk_pictures",
         "wall_for_a_law",
+        "walls_converge",
     }
     assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
 
@@ -95,14 +98,23 @@ def test_the_gallery_draws_what_its_page_shows(tmp_path, monkeypatch):
     monkeypatch.setattr(gallery, "study_wall", lambda *_, **__: quick)
     monkeypatch.setattr(gallery.measured_profile, "main", lambda **_: quick)
     monkeypatch.setattr(gallery.least_resistance, "main", lambda picture: picture.touch())
-    monkeypatch.setattr(gallery.wall_for_a_law, "main", lambda picture: picture.touch())
+    for example in (gallery.wall_for_a_law, gallery.walls_converge, gallery.exchange_hollow):
+        monkeypatch.setattr(example, "main", lambda picture: picture.touch())
     assert list(gallery.main(tmp_path / "gallery")) == ["focusing-arcs", "measured-profile"]
     sys.modules.pop("measured_profile", None)
     sys.modules.pop("least_resistance", None)
-    sys.modules.pop("wall_for_a_law", None)
+    for name in ("wall_for_a_law", "walls_converge", "exchange_hollow"):
+        sys.modules.pop(name, None)
     drawn = {path.name for path in (tmp_path / "gallery").iterdir()}
     named = {f"{study}-{name}" for study in ("focusing-arcs", "measured-profile") for name in PICTURES}
-    assert drawn == {"walls.png", "least-resistance.png", "wall-for-a-law.png", *named}
+    assert drawn == {
+        "walls.png",
+        "least-resistance.png",
+        "wall-for-a-law.png",
+        "walls-converge.png",
+        "exchange-hollow.png",
+        *named,
+    }
     page = EXAMPLES.parent / "gallery.md"
     committed = EXAMPLES.parent / "gallery"
     assert {path.name for path in committed.iterdir()} == drawn
@@ -115,6 +127,21 @@ def test_walls_are_found_for_laws(tmp_path):
     found = load("wall_for_a_law").main(moments=4, picture=tmp_path / "walls.png")
     assert len(found) == 3 and (tmp_path / "walls.png").stat().st_size > 10_000
     assert all(float(one.defect) < 1e-10 for one in found.values())
+
+
+def test_the_joint_distance_falls_with_moments_and_hollows(tmp_path):
+    found = load("walls_converge").main(tmp_path / "converge.png")
+    assert (tmp_path / "converge.png").stat().st_size > 10_000
+    diffuse = [found[name] for name in ("Lambert", "Maxwell, 1/2", "Henyey-Greenstein, 1/2", "Henyey-Greenstein, -1/2")]
+    for rows in diffuse:
+        assert [row[0] for row in rows] == [4, 6, 8, 10, 12, 14] and rows[-1][2] < 0.02 < rows[0][2]
+        assert all(after[2] < before[2] for before, after in pairwise(rows))
+
+
+def test_chambers_perform_exchanges(tmp_path):
+    found = load("exchange_hollow").main(picture=tmp_path / "chambers.png")
+    assert (tmp_path / "chambers.png").stat().st_size > 10_000
+    assert all(float(hollow.loss(2**13)) < 0.06 for hollow in found.values())
 
 
 def test_a_true_disk_finds_the_foreshortened_wall_and_both_cases_of_the_dichotomy():

@@ -93,9 +93,7 @@ def test_no_beam_meets_a_third_mirror():
     assert beams > 20
 
 
-@pytest.mark.parametrize(
-    ("law", "cells"), [(ker.lambertian(), 2), (ker.henyey_greenstein(0.5), 3)]
-)
+@pytest.mark.parametrize(("law", "cells"), [(ker.lambertian(), 2), (ker.henyey_greenstein(0.5), 3)])
 def test_the_loss_falls_in_proportion_to_the_opening(law, cells):
     exchange = exchange_of(law, cells)
     openings = np.array([1e-2, 1e-3, 1e-4])
@@ -125,6 +123,22 @@ def test_rays_leave_where_the_exchange_sends_them():
     cells = np.digitize(np.cos(theta), [-0.5, 0.0, 0.5]) * 4 + np.digitize(np.cos(traced.theta), [-0.5, 0.0, 0.5])
     counts = np.bincount(cells, minlength=16)
     assert np.sum((counts - 125.0) ** 2 / 125.0) < 40.0
+
+
+def test_a_chamber_for_the_least_resistance_has_one_below_0_990():
+    exchange = exchange_of(ker.LeastResistanceLaw(), 16)
+    hollow = ker.exchange_hollow(exchange, 1e-4)
+    found = hollow.mean(ker.air_resistance, 1.5, 2**16)
+    assert float(ker.resistance(exchange)) < float(found)
+    # also with the flat necks of many generations, whose resistance is 1
+    limit = hollow.generations(1, neck=1e-3, samples=2).limit
+    assert limit * (float(found) + found.error) + 1.0 - limit < 0.9895
+
+
+def test_the_mean_over_an_exchange_is_that_of_its_law():
+    exchange = exchange_of(ker.henyey_greenstein(0.5), 3)
+    found = ker.exchange_hollow(exchange, 1e-4).mean(ker.air_resistance, 1.5, 2**12, np.random.default_rng(5))
+    assert abs(float(found) - float(ker.resistance(exchange))) < 2.0 * found.error < 1e-2
 
 
 def test_the_wall_is_saved_and_loaded(tmp_path):

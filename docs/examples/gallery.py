@@ -5,9 +5,11 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+import exchange_hollow
 import least_resistance
 import measured_profile
 import wall_for_a_law
+import walls_converge
 
 from asperity import geometry as geo
 from asperity.study import PICTURES, Study, study_wall
@@ -20,6 +22,8 @@ def main(folder: Path, tolerance: float = 1e-3) -> dict[str, Study]:
     draw_gallery(folder / "walls.png", overwrite=True)
     least_resistance.main(picture=folder / "least-resistance.png")
     wall_for_a_law.main(picture=folder / "wall-for-a-law.png")
+    walls_converge.main(picture=folder / "walls-converge.png")
+    exchange_hollow.main(picture=folder / "exchange-hollow.png")
     studies = {
         "focusing-arcs": study_wall(geo.focusing_arcs(1.2), "focusing-arcs", tolerance=tolerance),
         "measured-profile": measured_profile.main(tolerance=tolerance),

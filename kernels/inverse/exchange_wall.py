@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -33,6 +34,8 @@ LARGEST_OPENING = 0.1
 # Rays by way of the mirrors have one collision or two; others are not followed for longer.
 MOST_COLLISIONS = 8
 SAMPLES = 2**17
+# Gauss nodes of a piece of the exchange, for a mean and its error.
+PIECE_NODES = 32, 128
 # Flat tops beside the openings of many generations, over the width of an opening.
 NECK = 0.01
 
@@ -114,6 +117,51 @@ class ExchangeHollow:
         away = self._away(traced, self.exchange.image(theta))
         half = NORMAL_95 * float(np.std(away)) / np.sqrt(theta.size)
         return Estimate(float(np.mean(away)), half, "estimate", f"{theta.size} traced rays")
+
+    def mean(
+        self,
+        function: Callable[[Floats, Floats], Floats],
+        unfollowed: float,
+        samples: int = SAMPLES,
+        rng: np.random.Generator | None = None,
+    ) -> Estimate:
+        """The mean of a function of the incoming and the outgoing angle over the flux through the opening.
+
+        The mean over the exchange by quadrature, and the difference from it by tracing, with a half width of 95 %.
+
+        Parameters
+        ----------
+        function : callable
+            Of two arrays, radians, such as `air_resistance`; smooth.
+        unfollowed : float
+            The value for rays that are followed no longer: with the largest one the mean is an upper bound.
+        samples : int
+            Rays.
+        rng : numpy.random.Generator, optional
+            ``np.random.default_rng(0)`` by default.
+
+        Examples
+        --------
+        With 16 cells the resistance comes near to the least one, 0.98782.
+
+        >>> from asperity import kernels as ker
+        >>> least = ker.discretise(ker.LeastResistanceLaw(), ker.Bins(16))
+        >>> found = exchange_hollow(ker.IntervalExchangeLaw(least), 1e-4).mean(ker.air_resistance, 1.5)
+        >>> round(found.value, 3), found.error < 1e-4
+        (0.989, True)
+        """
+        ends = np.append(self.exchange.starts, 1.0)
+        rough, fine = (self._mean_over_pieces(function, SINE.quantile(ends), order) for order in PIECE_NODES)
+        theta, traced = self._traced(samples, rng)
+        value = np.where(traced.escaped, function(theta, traced.theta), unfollowed)
+        away = value - function(theta, self.exchange.image(theta))
+        half = NORMAL_95 * float(np.std(away)) / np.sqrt(theta.size)
+        total = fine + float(np.mean(away))
+        return Estimate(total, half + abs(fine - rough), "estimate", f"{theta.size} traced rays")
+
+    def _mean_over_pieces(self, function: Callable[[Floats, Floats], Floats], ends: Floats, order: int) -> float:
+        theta, weights = SINE.quadrature(ends, order)
+        return float(np.sum(weights * function(theta, self.exchange.image(theta))))
 
     def _traced(self, samples: int, rng: np.random.Generator | None) -> tuple[Floats, Trace]:
         from ...geometry import trace
