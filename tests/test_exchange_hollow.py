@@ -6,6 +6,7 @@ import pytest
 from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.estimates import Estimate
 from asperity.kernels.inverse.aplanats import MirrorPair
 from asperity.kernels.inverse.mirror_layout import CLEARANCE, arranged, mirror_groups
 
@@ -123,6 +124,30 @@ def test_rays_leave_where_the_exchange_sends_them():
     cells = np.digitize(np.cos(theta), [-0.5, 0.0, 0.5]) * 4 + np.digitize(np.cos(traced.theta), [-0.5, 0.0, 0.5])
     counts = np.bincount(cells, minlength=16)
     assert np.sum((counts - 125.0) ** 2 / 125.0) < 40.0
+
+
+def random_exchanges():
+    """Exchanges of neighbours by different fractions of cells, and mixtures of permutations and their inverses."""
+    rng = np.random.default_rng(3)
+    for cells in (3, 5):
+        matrix = np.diag(rng.uniform(0.1, 0.45, cells - 1), 1)
+        matrix += matrix.T
+        yield matrix + np.diag(1.0 - matrix.sum(axis=1))
+    for cells in (4, 8):
+        matrix = np.mean([np.eye(cells)[rng.permutation(cells)] for _ in range(2)], axis=0)
+        yield 0.5 * (matrix + matrix.T)
+    yield np.eye(6)[[1, 0, 3, 2, 5, 4]]
+
+
+@pytest.mark.parametrize("matrix", list(random_exchanges()), ids=lambda matrix: f"{len(matrix)} cells")
+def test_every_symmetric_matrix_has_its_chamber(matrix):
+    nothing = Estimate(0.0, 0.0, "bound", "given")
+    exchange = ker.IntervalExchangeLaw(ker.KernelMatrix(matrix, ker.Bins(len(matrix)), nothing))
+    hollow = ker.exchange_hollow(exchange, 1e-3)
+    assert hollow.mirrors >= exchange.starts.size
+    assert float(hollow.loss(2**14)) < 2e-4 * hollow.mirrors + 1e-3
+    distances = [np.hypot(x - 0.5 * sum(hollow.opening), y) for loop in hollow.wall.island_vertices for x, y in loop]
+    assert min(distances) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_a_chamber_for_the_least_resistance_has_one_below_0_990():

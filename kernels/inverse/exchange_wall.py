@@ -258,9 +258,9 @@ def exchange_hollow(exchange: IntervalExchangeLaw, opening: float = 1e-3) -> Exc
     Two intervals that change places get two mirrors that solve for the prescribed map (`MirrorPair`), an interval that
     does not an arc about the middle of the opening. Each mirror occupies exactly its interval of directions, so that
     no mirror stands between another and the opening. Their distances are chosen so that no beam between the two mirrors
-    of a pair meets a third one; two intervals side by side that change places, and pairs whose mirrors shade
-    themselves, are halved. The magnification is -1 by Abbe's sine condition: the images of the opening cover it but for
-    the second order, and the loss is of the order of the opening.
+    of a pair meets a third one. Two intervals side by side that change places are halved, because their mirrors would
+    have to meet in a corner, and so are pairs whose mirrors shade themselves. The magnification is -1 by Abbe's sine
+    condition: the images of the opening cover it but for the second order, and the loss is of the order of the opening.
 
     Examples
     --------
