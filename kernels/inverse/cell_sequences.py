@@ -24,7 +24,7 @@ FEWEST_CELLS = 4
 SCALES, SAMPLES = (1e-3, 1e-4, 1e-5), (12, 16, 16)
 # The diameter of the last laws has fallen to this fraction of that of all where they converge, and has kept this one
 # where they do not.
-FALLEN, KEPT = 0.25, 0.5
+FALLEN, STANDING = 0.25, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,9 +131,9 @@ def _verdict(
     diameters: Floats, widths: Floats, tolerance: float
 ) -> Literal["converges", "does not converge", "undecided"]:
     first, last, middle = diameters[0], diameters[-1], diameters[len(diameters) // 2]
-    if last + widths[-1] <= tolerance or (last + widths[-1] <= FALLEN * middle and middle <= KEPT * first):
+    if last + widths[-1] <= tolerance or (last + widths[-1] <= FALLEN * middle and middle <= STANDING * first):
         return "converges"
-    if last - widths[-1] >= KEPT * first and last - widths[-1] > tolerance:
+    if last - widths[-1] >= STANDING * first and last - widths[-1] > tolerance:
         return "does not converge"
     return "undecided"
 

@@ -161,9 +161,9 @@ def _radius(piece: Curve) -> float:
     if isinstance(piece, Arc) and piece.is_circular:
         return piece.semi_axes[0] if piece.direction > 0 else math.inf
     s = np.linspace(0.0, 1.0, RADIUS_POINTS)
-    places, tangents = piece.point(s), piece.tangent(s)
+    outline_points, tangents = piece.point(s), piece.tangent(s)
     turn = tangents[:-1, 0] * tangents[1:, 1] - tangents[:-1, 1] * tangents[1:, 0]
-    steps = np.hypot(*np.diff(places, axis=0).T)
+    steps = np.hypot(*np.diff(outline_points, axis=0).T)
     left = turn > CORNER
     return float(np.min(steps[left] / np.arcsin(np.minimum(turn[left], 1.0)))) if left.any() else math.inf
 

@@ -91,7 +91,7 @@ class ExchangeHollow:
     def loss(self, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> Estimate:
         """The fraction of the flux through the opening that does not leave where the exchange sends it.
 
-        A ray is counted as lost unless it leaves, after at most 8 collisions, in the interval with which that of its
+        A ray is counted as missed unless it leaves, after at most 8 collisions, in the interval with which that of its
         incoming angle changes places. By tracing; the error is the longer half of the interval of Clopper and Pearson.
 
         Parameters
@@ -102,9 +102,9 @@ class ExchangeHollow:
             ``np.random.default_rng(0)`` by default.
         """
         theta, traced = self._traced(samples, rng)
-        lost = int(np.count_nonzero(~self._arrives(theta, traced)))
-        half = fraction_half_width(lost, theta.size)
-        return Estimate(lost / theta.size, half, "estimate", f"{theta.size} traced rays")
+        missed = int(np.count_nonzero(~self._arrives(theta, traced)))
+        half = fraction_half_width(missed, theta.size)
+        return Estimate(missed / theta.size, half, "estimate", f"{theta.size} traced rays")
 
     def displacement(self, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> Estimate:
         """Mean distance, radians, of the outgoing angles from those of the exchange; pi for rays that are followed no

@@ -63,8 +63,8 @@ def few_weights(points: Floats, target: Floats, cost: Floats, most: float) -> Fl
     improved = True
     while improved:
         improved = False
-        for place in range(len(chosen)):
-            others = chosen[:place] + chosen[place + 1 :]
+        for index in range(len(chosen)):
+            others = chosen[:index] + chosen[index + 1 :]
             without = fitted(others)[1] if others else np.zeros(len(points))
             room = most - sum(cost[k] for k in others)
             steepest = np.argsort(points @ (without @ points - target)).tolist()

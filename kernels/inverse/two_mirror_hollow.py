@@ -56,21 +56,21 @@ class TwoMirrorHollow:
 
         number = whole_number("samples", samples, 2)
         source = generator(rng, 0)
-        lost, flux, square = 0.0, 0.0, 0.0
+        missed_flux, flux, square = 0.0, 0.0, 0.0
         for window, other in (self.windows, self.windows[::-1]):
             low, high = SINE.cdf(window[0]), SINE.cdf(window[1])
             theta = SINE.quantile(low + (high - low) * source.random(number))
             x = self.opening[0] + (self.opening[1] - self.opening[0]) * source.random(number)
             traced = trace(self.wall, x, theta)
             missed = ~(traced.escaped & (traced.theta > other[0]) & (traced.theta < other[1]))
-            share, mass = float(np.mean(missed)), float(high - low)
-            lost, flux = lost + mass * share, flux + mass
+            fraction, mass = float(np.mean(missed)), float(high - low)
+            missed_flux, flux = missed_flux + mass * fraction, flux + mass
             square += (mass * fraction_half_width(int(np.count_nonzero(missed)), number)) ** 2
-        return Estimate(lost / flux, float(np.sqrt(square)) / flux, "estimate", f"{2 * number} traced rays")
+        return Estimate(missed_flux / flux, float(np.sqrt(square)) / flux, "estimate", f"{2 * number} traced rays")
 
 
 def fraction_half_width(count: int, number: int) -> float:
-    """The longer half of Clopper and Pearson's interval of 95 % of a share, ``count`` of ``number``."""
+    """The longer half of Clopper and Pearson's interval of 95 % of a fraction, ``count`` of ``number``."""
     from scipy.special import betaincinv
 
     tail, fraction = 0.5 * (1.0 - LEVEL), count / number

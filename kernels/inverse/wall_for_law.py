@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # The search draws this many polygons at a time, with one vertex more every second time up to the most, ...
 DRAWN, MOST_VERTICES, ROUNDS = 60, 6, 14
 # ... and then moves the vertices of the best ones, this many at a time, each by so many trials.
-DESCENTS, MOVED, TRIALS = 16, 3, 80
+DESCENTS, MOVED, EVALUATIONS = 16, 3, 80
 # Openings narrower than this fraction of the period are left out where the moments can be met without them.
 SMALLEST_OPENING = 1e-5
 # Moments of a law that is mirror-symmetric have no more than this between even and odd functions.
@@ -416,12 +416,12 @@ class _Search:
         residual = self.weights @ self.points - self.target
         start = hollow.wall.vertices[1:-1]
 
-        def slope(places: Floats) -> float:
-            candidate = UnitHollow.polygon(places.reshape(-1, 2))
+        def slope(corners: Floats) -> float:
+            candidate = UnitHollow.polygon(corners.reshape(-1, 2))
             point = None if candidate is None else self.point(candidate)
             return OUTSIDE if point is None else float(point @ residual)
 
-        found = minimize(slope, start.ravel(), method="Nelder-Mead", options={"maxfev": TRIALS})
+        found = minimize(slope, start.ravel(), method="Nelder-Mead", options={"maxfev": EVALUATIONS})
         return UnitHollow.polygon(found.x.reshape(-1, 2)) or hollow
 
     def result(self, most: int | None, smallest: float) -> tuple[list[UnitHollow], Floats]:
