@@ -1,6 +1,8 @@
 from .bounds.enclosure import Enclosure as Enclosure
 from .bounds.enclosure import Enclosures as Enclosures
 from .bounds.enclosure import enclosures as enclosures
+from .consequences.accommodation import Accommodation as Accommodation
+from .consequences.accommodation import accommodation as accommodation
 from .consequences.channel import ExitTimes as ExitTimes
 from .consequences.channel import exit_times as exit_times
 from .consequences.cheeger import Conductance as Conductance
