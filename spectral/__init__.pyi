@@ -25,6 +25,11 @@ from .gap.gap import gaps_in_both_conventions as gaps_in_both_conventions
 from .gap.gap import spectral_gap as spectral_gap
 from .gap.law_spectrum import spectrum as spectrum
 from .gap.verdict import SpectralGap as SpectralGap
+from .sweeps.extremum import Extremum as Extremum
+from .sweeps.points import Between as Between
+from .sweeps.running import sweep as sweep
+from .sweeps.table import SweepRow as SweepRow
+from .sweeps.table import SweepTable as SweepTable
 from .work_diagrams.machine import Machine as Machine
 from .work_diagrams.order import FittedOrder as FittedOrder
 from .work_diagrams.order import fit_order as fit_order
