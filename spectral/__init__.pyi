@@ -1,8 +1,6 @@
 from .bounds.enclosure import Enclosure as Enclosure
 from .bounds.enclosure import Enclosures as Enclosures
 from .bounds.enclosure import enclosures as enclosures
-from .consequences.accommodation import Accommodation as Accommodation
-from .consequences.accommodation import accommodation as accommodation
 from .consequences.channel import ExitTimes as ExitTimes
 from .consequences.channel import exit_times as exit_times
 from .consequences.cheeger import Conductance as Conductance
@@ -14,6 +12,8 @@ from .consequences.laplacian import laplacian_comparison as laplacian_comparison
 from .consequences.laplacian import mean_squared_slope as mean_squared_slope
 from .consequences.mixing import MixingTime as MixingTime
 from .consequences.mixing import mixing_time as mixing_time
+from .consequences.momentum_accommodation import Accommodation as Accommodation
+from .consequences.momentum_accommodation import accommodation as accommodation
 from .eigenvalues.sparse import LeadingEigenvalues as LeadingEigenvalues
 from .eigenvalues.sparse import leading_eigenvalues as leading_eigenvalues
 from .eigenvalues.spectra import Spectrum as Spectrum
@@ -27,8 +27,8 @@ from .gap.law_spectrum import spectrum as spectrum
 from .gap.verdict import SpectralGap as SpectralGap
 from .sweeps.extremum import Extremum as Extremum
 from .sweeps.points import Between as Between
+from .sweeps.row import SweepRow as SweepRow
 from .sweeps.running import sweep as sweep
-from .sweeps.table import SweepRow as SweepRow
 from .sweeps.table import SweepTable as SweepTable
 from .work_diagrams.machine import Machine as Machine
 from .work_diagrams.order import FittedOrder as FittedOrder

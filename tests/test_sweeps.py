@@ -92,12 +92,17 @@ def test_refusals_are_rows_and_stop_no_other_point():
     def careless(law):
         return 0.5
 
-    table = spec.sweep(ker.maxwell, {"diffuse_fraction": [2.0, 0.0, 0.5]}, ["gap", "eta", fragile, careless])
+    def unknown(law):
+        return Estimate(np.nan, 1.0, "estimate", "made up")
+
+    asked = ["gap", "eta", fragile, careless, unknown]
+    table = spec.sweep(ker.maxwell, {"diffuse_fraction": [2.0, 0.0, 0.5]}, asked)
     found = {(row.point["diffuse_fraction"], row.quantity): row for row in table.rows}
-    assert len(found) == 12
+    assert len(found) == 15
     assert "expected a number in [0, 1]" in found[2.0, "gap"].message and found[2.0, "gap"].value is None
     assert "the diffusivity is infinite" in found[0.0, "eta"].message and found[0.0, "gap"].verdict == "no gap"
     assert found[0.5, "fragile"].message == "ZeroDivisionError: a fault of the user's"
+    assert "unknown: expected finite numbers, got nan" in found[0.5, "unknown"].message
     assert "expected an Estimate" in found[0.5, "careless"].message
     assert found[0.5, "eta"].value == pytest.approx(3.0) and found[0.5, "eta"].message == ""
 

@@ -13,7 +13,7 @@ from ...core.rounding import EPS
 
 if TYPE_CHECKING:
     from .points import Point
-    from .table import SweepRow
+    from .row import SweepRow
 
 # The best point is sought to this fraction of the interval between its neighbours, with half of the evaluations.
 CLOSE, SEARCH_SHARE = 1e-4, 0.5

@@ -13,7 +13,7 @@ from ...core.errors import InputError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .table import SweepRow
+    from .row import SweepRow
 
 MARKERS = {"isolated": "o", "essential edge": "s", "no gap": "x", "undecided": "^", "": "."}
 NO_GAP = "0.9"

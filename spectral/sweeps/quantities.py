@@ -10,9 +10,9 @@ from ...core.checks import instance
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...kernels import Law, resistance
-from ..consequences.accommodation import accommodation
 from ..consequences.diffusion import diffusivity
 from ..consequences.mixing import relaxation_time, slem_from_gap
+from ..consequences.momentum_accommodation import accommodation
 from ..gap.gap import modulus_gap, spectral_gap
 from ..gap.verdict import SpectralGap
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from ...core.checkpoints import Checkpoint
-from ...core.checks import positive_number
+from ...core.checks import finite_number, positive_number
 from ...core.errors import AsperityError, InputError
 from ...core.version import __version__
 from ...core.workers import connected, results
@@ -21,7 +21,8 @@ from ...geometry import Wall
 from ...kernels import CollisionLaw, Law, WallLaw
 from .points import Grid, Point, key_of
 from .quantities import Quantity, UserQuantity, name_of, quantities_from
-from .table import SweepRow, SweepTable
+from .row import SweepRow
+from .table import SweepTable
 
 # Walls of a sweep, evenly spread over its points, by which a checkpoint tells it from others.
 TOLD_APART = 1000
@@ -52,6 +53,8 @@ class _Study:
         start = time.perf_counter()
         try:
             numbers, verdict = quantity.find(law, self.tolerance)
+            for name, number in zip(quantity.names, numbers, strict=True):
+                finite_number(name, number.value)
         except Exception as reason:  # a quantity must not stop the others
             seconds = time.perf_counter() - start
             return [_refused(point, name, reason, seconds) for name in quantity.names]
@@ -152,7 +155,15 @@ class _Run:
         self.found: dict[str, list[SweepRow]] = {}
 
     def all_rows(self, checkpoint: str | Path | None, client: Any, progress: bool) -> tuple[SweepRow, ...]:
-        """The rows of all points, in the order of the plan."""
+        """The rows of all points, in the order of the grid."""
+        try:
+            points = self._points(checkpoint, client, progress)
+        except KeyboardInterrupt as stop:
+            raise KeyboardInterrupt(self._where_to_go_on(checkpoint)) from stop
+        return tuple(row for point in self.grid.in_order(points) for row in self.found[key_of(point)])
+
+    def _points(self, checkpoint: str | Path | None, client: Any, progress: bool) -> list[Point]:
+        """All points of the plan, whose rows are then found."""
         from tqdm import tqdm
 
         points: list[Point] = []
@@ -162,17 +173,15 @@ class _Run:
             workers = stack.enter_context(connected(client))
             bar = stack.enter_context(tqdm(total=self.grid.size, unit="point", disable=None if progress else True))
             plan = self.grid.plan()
-            try:
-                portion = next(plan, [])
-                while portion:
-                    points += portion
-                    self._compute(portion, known, store, workers, bar)
+            portion = next(plan, [])
+            while portion:
+                points += portion
+                self._compute(portion, known, store, workers, bar)
+                try:
                     portion = plan.send([self._leading_value(point) for point in portion])
-            except StopIteration:
-                pass
-            except KeyboardInterrupt as stop:
-                raise KeyboardInterrupt(self._where_to_go_on(checkpoint)) from stop
-        return tuple(row for point in self.grid.in_order(points) for row in self.found[key_of(point)])
+                except StopIteration:
+                    break
+        return points
 
     def _compute(
         self, portion: Sequence[Point], known: Mapping[str, Any], store: Checkpoint | None, workers: Any, bar: Any

@@ -5,91 +5,28 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import FileExistsRefusal, InputError
-from ...core.estimates import Estimate, finite
 from ...core.whole_files import write_whole
-from .points import Point, Value, key_of
+from .extremum import Extremum, refined_extremum
+from .picture import draw_curves
+from .points import Point, key_of
+from .row import COLUMNS, SweepRow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pandas import DataFrame
     from xarray import Dataset
 
-    from .extremum import Extremum
-
 FORMAT = 1
-COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
 # What the quantities are measured in; all others are pure numbers.
 UNITS = {"relaxation_time": "collisions"}
 FILES = ("table.csv", "table.json")
-
-
-@dataclass(frozen=True)
-class SweepRow:
-    """One quantity at one point.
-
-    Attributes
-    ----------
-    point : mapping of str to number or text
-        The parameters.
-    quantity : str
-    value, error : float or None
-        None where the quantity was refused; an error that is not known is ``inf``.
-    kind : {"bound", "estimate", ""}
-    verdict : str
-        On the gap behind the quantity; empty where there is none.
-    method : str
-    seconds : float
-        Of the computation; for several numbers of one computation, of all.
-    version : str
-        Of asperity.
-    message : str
-        Why there is no value, or empty.
-    """
-
-    point: Mapping[str, Value]
-    quantity: str
-    value: float | None
-    error: float | None
-    kind: str
-    verdict: str
-    method: str
-    seconds: float
-    version: str
-    message: str
-
-    @staticmethod
-    def of(point: Point, quantity: str, found: Estimate, verdict: str, seconds: float, version: str) -> SweepRow:
-        """The row of an estimate."""
-        return SweepRow(
-            point, quantity, found.value, found.error, found.kind, verdict, found.method, seconds, version, ""
-        )
-
-    def cells(self) -> list[Any]:
-        """What is in the columns ``quantity`` to ``message``."""
-        return [getattr(self, name) for name in COLUMNS]
-
-    def as_list(self) -> list[Any]:
-        """The point and the columns as plain JSON values; an infinite error is None beside a value."""
-        return [list(self.point.values()), *map(_plain, self.cells())]
-
-    @staticmethod
-    def of_list(names: Sequence[str], cells: Sequence[Any]) -> SweepRow:
-        """The row that `as_list` gave."""
-        values, quantity, value, error, *rest = cells
-        known = math.inf if value is not None and error is None else error
-        return SweepRow(dict(zip(names, values, strict=True)), quantity, value, known, *rest)
-
-
-def _plain(cell: Any) -> Any:
-    return finite(cell) if isinstance(cell, float) else cell
 
 
 @dataclass(frozen=True)
@@ -265,8 +202,6 @@ class SweepTable:
         The error is a band, the verdict a marker, and where there is no gap the ground is shaded. Each combination of
         the other parameters is a curve.
         """
-        from .picture import draw_curves
-
         name = self.quantities[0] if quantity is None else quantity
         return draw_curves(self.of(name), self.parameters, name, ax)
 
@@ -281,8 +216,6 @@ class SweepTable:
             If the table has several parameters, or one that is no number; if it was read from a file, so that nothing
             more can be computed; if no point has a value.
         """
-        from .extremum import refined_extremum
-
         name = self.quantities[0] if quantity is None else quantity
         return refined_extremum(self.of(name), self.parameters, self.solve, largest, evaluations)
 
