@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
+from typing import Unpack, get_args
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
+from ..sampling.chunks import Engine
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
 from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SEED_WITHOUT_RNG, Budget, MethodName
@@ -28,6 +29,7 @@ def discretise(
     rng: np.random.Generator | None = None,
     *,
     symmetrise: bool = False,
+    **engine: Unpack[Engine],
 ) -> KernelMatrix:
     r"""The Galerkin matrix <e_i, P e_j> of a law P in a basis of L^2(sin theta d theta).
 
@@ -56,6 +58,13 @@ def discretise(
     symmetrise : bool
         For sampled matrices of reversible laws: count each ray both ways. The flux is then symmetric, and rows of
         ``array`` sum to 1 within the sampling error only.
+    checkpoint : path, optional
+        For ``"monte-carlo"`` in a basis of cells: a file in which the counts are stored every few seconds. The same
+        call with the same file goes on where it was; the file of other rays is refused with the difference.
+    client : int, str or distributed.Client, optional
+        For the same: so many workers on this machine, the address of a scheduler, or a client of dask.distributed.
+        The matrix is the same to the last bit without checkpoint and workers, for any number of workers, and however
+        often it was stopped: counts are whole numbers, and a chunk of rays depends on its number alone.
 
     Returns
     -------
@@ -120,9 +129,11 @@ def discretise(
     source = np.random.default_rng(SEED_WITHOUT_RNG) if rng is None else generator(rng)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
+    if engine and method != "monte-carlo":
+        raise InputError(f"method: checkpoint and client need 'monte-carlo', got {method!r}")
     # asked for by name, quadrature may take some seconds
     segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
-    budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise)
+    budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
     return replace(
         recipe(law, method)(basis, budget),
         law=repr(law),

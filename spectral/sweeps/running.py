@@ -19,6 +19,7 @@ from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
 from ...kernels import CollisionLaw, Law, WallLaw
+from ...kernels.walls.identity import law_digest
 from .points import Grid, Point, key_of
 from .quantities import Quantity, UserQuantity, name_of, quantities_from
 from .row import SweepRow
@@ -262,14 +263,11 @@ def _check_names(family: Family, point: Point) -> None:
 
 
 def _fingerprint(family: Family, point: Point) -> str:
-    """A short text that tells walls from each other, and laws as far as they are printed."""
+    """A short text that tells what a family makes from what others make."""
     try:
-        law = _law(family(**point))
+        return law_digest(_law(family(**point)))
     except Exception as reason:  # a refused wall is a row of the table
         return f"refused: {reason}"
-    wall = law.wall if isinstance(law, WallLaw) else None
-    told = law if wall is None else (wall.period, wall.pieces, wall.islands)
-    return _digest(told)
 
 
 def _digest(told: object) -> str:
