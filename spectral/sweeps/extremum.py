@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 CLOSE, SEARCH_SHARE = 1e-4, 0.5
 # An end of the interval of the parameter is known well enough when it is known to this fraction of its distance.
 SHARP = 0.1
+# What a parabola rises above the best point is doubled: the quantity is none.
+SAFETY = 2.0
 
 
 @dataclass(frozen=True)
@@ -30,8 +32,8 @@ class Extremum:
     parameter : Estimate
         Where it is: the middle of the interval in which it can lie, with its half width.
     value : Estimate
-        The value at the best point that was computed. Its error is that of this point, plus what the parabola through
-        it and the two ends of the interval rises above it.
+        The value at the best point that was computed. Its error is that of this point and of the ends of the interval,
+        plus twice what the parabola through the three rises above it.
     largest : bool
     at_end : bool
         Whether it lies at an end of the sweep, beyond which it may go on.
@@ -154,9 +156,8 @@ class _Search:
                 self.sharpen(direction, (evaluations - self.made) // 2 if direction < 0 else evaluations - self.made)
         (left, _), best, (right, _) = self.side(-1), self.best, self.side(1)
         rise = _rise(left, best, right)
-        value = Estimate(
-            sign * best.value, best.error + rise, "estimate", f"best of {self.made} points beside it; {best.method}"
-        )
+        error = best.error + max(left.error, right.error) + SAFETY * rise
+        value = Estimate(sign * best.value, error, "estimate", f"best of {self.made} points beside it; {best.method}")
         middle = 0.5 * (left.x + right.x)
         half = 0.5 * (right.x - left.x) + EPS * abs(middle)
         parameter = Estimate(middle, half, "estimate", "between values that are surely less extreme")
