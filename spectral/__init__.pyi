@@ -12,6 +12,8 @@ from .consequences.laplacian import laplacian_comparison as laplacian_comparison
 from .consequences.laplacian import mean_squared_slope as mean_squared_slope
 from .consequences.mixing import MixingTime as MixingTime
 from .consequences.mixing import mixing_time as mixing_time
+from .consequences.momentum_accommodation import Accommodation as Accommodation
+from .consequences.momentum_accommodation import accommodation as accommodation
 from .eigenvalues.sparse import LeadingEigenvalues as LeadingEigenvalues
 from .eigenvalues.sparse import leading_eigenvalues as leading_eigenvalues
 from .eigenvalues.spectra import Spectrum as Spectrum
@@ -23,6 +25,11 @@ from .gap.gap import gaps_in_both_conventions as gaps_in_both_conventions
 from .gap.gap import spectral_gap as spectral_gap
 from .gap.law_spectrum import spectrum as spectrum
 from .gap.verdict import SpectralGap as SpectralGap
+from .sweeps.extremum import Extremum as Extremum
+from .sweeps.points import Between as Between
+from .sweeps.row import SweepRow as SweepRow
+from .sweeps.running import sweep as sweep
+from .sweeps.table import SweepTable as SweepTable
 from .work_diagrams.machine import Machine as Machine
 from .work_diagrams.order import FittedOrder as FittedOrder
 from .work_diagrams.order import fit_order as fit_order

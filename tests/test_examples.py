@@ -28,6 +28,7 @@ def test_every_example_has_a_test():
         "disk_in_a_strip",
         "exchange_hollow",
         "gallery",
+        "gap_study",
         "least_resistance",
         "maxwell_or_rough",
         "measured_profile",
@@ -58,6 +59,17 @@ def test_the_published_gap_is_found():
     found = load("published_gap").main(half_angles=(0.2,))
     assert found["dispersing"] == pytest.approx(0.0373, abs=5e-5)
     assert found["focusing 0.2, gap/(4h)"] == pytest.approx(0.9876, abs=2e-4)
+
+
+def test_the_gap_study_finds_what_is_published_and_goes_on(tmp_path):
+    study = load("gap_study")
+    found = study.main((0.1,), (0.1, 1 / 3), 1e-4, tmp_path)
+    assert found == study.main((0.1,), (0.1, 1 / 3), 1e-4, tmp_path)
+    ((_, gap, error, ratio),) = found["focusing"]
+    assert ratio == pytest.approx(1.0, abs=4e-3) and 0.0 < error < 1e-4 and gap == pytest.approx(0.0133, abs=1e-4)
+    shallow, published = found["dispersing"]
+    assert shallow[3] == pytest.approx(1.0, abs=2e-3)
+    assert abs(published[1] - 0.0373) < 5e-5 + published[2]
 
 
 def test_deep_teeth_toss_a_coin_between_smooth_and_no_slip():

@@ -16,7 +16,7 @@ import pytest
 import asperity
 
 ROOT = Path(__file__).resolve().parent.parent
-HEAVY = {"numba", "sympy", "ot", "matplotlib", "shapely", "dask", "distributed"}
+HEAVY = {"numba", "sympy", "ot", "matplotlib", "shapely", "dask", "distributed", "pandas", "xarray", "adaptive"}
 PAGES = ["README.md", "docs/quickstart.md", "docs/verifying.md", "docs/errors.md", "docs/theory/configurations.md"]
 
 
@@ -75,7 +75,8 @@ def test_the_version_is_the_same_wherever_it_stands():
 def test_the_lower_bounds_are_the_versions_that_the_tests_are_run_with():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     bounds = [bound.replace(">=", "==") for bound in project["dependencies"]]
-    bounds += [bound.replace(">=", "==") for bound in project["optional-dependencies"]["profiles"]]
+    for extra in ("profiles", "distributed", "studies"):
+        bounds += [bound.replace(">=", "==") for bound in project["optional-dependencies"][extra]]
     lines = (ROOT / "constraints/lowest.txt").read_text().splitlines()
     assert [line for line in lines if "==" in line] == bounds
 

@@ -27,7 +27,7 @@ FLOORS = [
     *("kernels.discretisation", "kernels.distances", "kernels.collisions", "kernels.inverse", "kernels.aerodynamics"),
     "kernels",
     *("spectral.eigenvalues", "spectral.essential", "spectral.bounds", "spectral.gap", "spectral.consequences"),
-    *("spectral.work_diagrams", "spectral"),
+    *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
     # the ledger's index finds the files of its folders without naming them
     *("ledger", "ledger.plane", "ledger.disk", "ledger.proof"),
     *("study", "bench.running", "bench.quantities", "bench.extremes", "bench"),

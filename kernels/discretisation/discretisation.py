@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
+from typing import Unpack, get_args
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
+from ..sampling.chunks import Engine
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
 from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SEED_WITHOUT_RNG, Budget, MethodName
@@ -30,6 +31,7 @@ def discretise(
     rng: Rng = None,
     *,
     symmetrise: bool = False,
+    **engine: Unpack[Engine],
 ) -> KernelMatrix:
     r"""The Galerkin matrix <e_i, P e_j> of a law P in a basis of L^2(sin theta d theta).
 
@@ -58,6 +60,14 @@ def discretise(
     symmetrise : bool
         Whether each ray counts in both directions, for sampled matrices of reversible laws. The flux is then symmetric,
         and rows of ``array`` sum to 1 only within the sampling error.
+    checkpoint : path, optional
+        A file in which the counts are stored every few seconds, for ``"monte-carlo"`` in a basis of cells. The same
+        call with the same file continues the run; the file of other rays is refused, and the
+        message names the difference.
+    client : int, str or distributed.Client, optional
+        For the same: a number of workers on this machine, the address of a scheduler, or a client of dask.distributed.
+        The matrix is the same to the last bit without checkpoint and workers, for any number of workers and any number
+        of restarts: counts are integers, and a chunk of rays depends only on its number.
 
     Returns
     -------
@@ -123,9 +133,11 @@ def discretise(
     source = generator(rng, SEED_WITHOUT_RNG)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
+    if engine and method != "monte-carlo":
+        raise InputError(f"method: checkpoint and client need 'monte-carlo', got {method!r}")
     # Quadrature requested by name may take some seconds.
     segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
-    budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise)
+    budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)
     return replace(
         recipe(law, method)(basis, budget),
         law=repr(law),

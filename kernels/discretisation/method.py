@@ -15,6 +15,7 @@ from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
+from ..sampling.chunks import Engine
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
@@ -55,6 +56,8 @@ class Budget:
     rng : numpy.random.Generator
     symmetrise : bool
         Whether sampled rays count in both directions.
+    engine : Engine, optional
+        Checkpoint and workers of a long run.
     """
 
     tolerance: float
@@ -63,6 +66,7 @@ class Budget:
     fallback: float = math.inf
     rng: np.random.Generator = field(default_factory=_fixed_source)
     symmetrise: bool = False
+    engine: Engine | None = None
 
     def predicted(self, error: float, spent: int) -> float:
         """The predicted error after all segments, from the error after ``spent`` segments."""

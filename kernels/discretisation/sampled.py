@@ -32,7 +32,7 @@ class MonteCarlo:
         return True
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        found = independent_rays(law, basis, budget.rays, budget.rng, budget.symmetrise)
+        found = independent_rays(law, basis, budget.rays, budget.rng, budget.symmetrise, budget.engine)
         spread = "variance of multinomial counts" if basis.is_partition else "spread of parts"
         return _sampled(self.name, found, basis, budget, spread)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from collections.abc import Callable
@@ -14,6 +15,8 @@ from . import __version__
 from .core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
 from .core.estimates import described
 
+# what shells report of a process that Ctrl-C ended
+INTERRUPTED = 130
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
 profile.txt:seam=step; more of its parameters, joined by commas: units=um/nm, delimiter=semicolon, decimal=comma,
@@ -57,6 +60,7 @@ def main() -> None:
       asperity study triangular-teeth:angle=0.7 --mass 2 --inertia 1 --json
       asperity study my-wall.toml --out my-study
       asperity gap dispersing-arcs:curvature=0.333333 --specular
+      asperity sweep focusing-arcs --over half_angle=0.2:1.5:50 --out arcs
     """
 
 
@@ -184,6 +188,50 @@ def walls(out: Path | None, force: bool) -> None:
         click.echo(f"{entry.name:20s} {entry.summary}" + (f" [{parameters}]" if parameters else ""))
     if out is not None:
         click.echo(f"wrote {out}")
+
+
+@main.command(name="sweep", epilog=WALL_HELP)
+@click.argument("walls", nargs=-1, required=True, metavar="WALL...")
+@click.option("--over", multiple=True, help="NAME=LOW:HIGH:POINTS or NAME=VALUE,VALUE; several are multiplied.")
+@click.option("--zip", "zipped", is_flag=True, help="Take the k-th values of all --over together instead.")
+@click.option("--adaptive", is_flag=True, help="Put the points of LOW:HIGH:POINTS where the first quantity bends.")
+@click.option("--quantity", default="gap", show_default=True, help="gap, gap_specular, slem, ..., joined by commas.")
+@click.option("--tolerance", default=1e-6, show_default=True, help="Error asked of each quantity.")
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder for the tables.")
+@click.option("--workers", type=click.IntRange(min=1), help="So many processes on this machine.")
+@click.option("--scheduler", help="Address of a dask scheduler, whose workers are used.")
+@click.option("--force", is_flag=True, help="Replace another sweep in the folder; by default a sweep goes on.")
+def sweep_walls(walls: tuple[str, ...], workers: int | None, scheduler: str | None, out: Path, **asked: Any) -> None:
+    """Compute quantities of a family of walls: of one named WALL over values of its parameters, or of several WALLs.
+
+    The folder gets table.csv, table.json, a picture, and with asperity[studies] table.parquet. A sweep that was
+    stopped, by Ctrl-C or otherwise, goes on when the same command is given again.
+
+    \b
+    Examples:
+      asperity sweep focusing-arcs --over half_angle=0.2:1.5:50 --quantity gap,resistance --out arcs --workers 2
+      asperity sweep first.toml second.toml koch --quantity gap_specular,accommodation --out walls
+    """
+    from .spectral import sweep
+    from .spectral.sweeps.folder import checkpoint_in, family_and_grid, in_words, save_all
+
+    if workers is not None and scheduler is not None:
+        raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
+    family, grid = family_and_grid(walls, asked["over"], asked["adaptive"])
+    checkpoint = checkpoint_in(out, overwrite=asked["force"])
+    names = [name.strip() for name in asked["quantity"].split(",")]
+    try:
+        table = sweep(
+            family, grid, names, asked["tolerance"], checkpoint=checkpoint, client=scheduler or workers, progress=True,
+            zipped=asked["zipped"],
+        )  # fmt: skip
+    except KeyboardInterrupt as stop:
+        click.echo(f"asperity: {stop}", err=True)
+        # at once: libraries would wait for their threads
+        os._exit(INTERRUPTED)
+    click.echo(in_words(table))
+    for path in save_all(table, out):
+        click.echo(f"wrote {path}")
 
 
 @main.command()

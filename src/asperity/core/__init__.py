@@ -1,1 +1,1 @@
-"""The ground floor: checks of arguments, errors, estimates, rounding and the version."""
+"""The ground floor: checks of arguments, errors, estimates, rounding, checkpoints, workers and the version."""

@@ -1,0 +1,179 @@
+"""Independent rays in chunks that depend on their number alone, counted by any workers and stored on the way."""
+
+from __future__ import annotations
+
+import io
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.checkpoints import Checkpoint
+from ...core.checks import Floats
+from ...core.errors import InputError
+from ...core.version import __version__
+from ...core.workers import connected, results
+from ..bases.basis import Basis
+from ..bases.measure import SINE
+from ..laws.law import DrivenLaw, Law, entry_inside
+from ..walls.identity import law_digest
+from .rays import RaySums, progress_bar
+
+# Rays of a task for a worker, a second of work or a few; the counts do not depend on it.
+RAYS_A_TASK = 2**22
+# Seconds between two states of a checkpoint, of n^2 counts each.
+STORED_EVERY = 5.0
+STATE = "state"
+
+
+class Engine(TypedDict, total=False):
+    """Where a long run stores what it has, and who computes.
+
+    Attributes
+    ----------
+    checkpoint : path
+        A file to which the counts are added; the same call goes on with it.
+    client : int, str or distributed.Client
+        As of `asperity.spectral.sweep`.
+    """
+
+    checkpoint: str | Path | None
+    client: Any
+
+
+@dataclass(frozen=True)
+class RayChunks:
+    """The rays of a law with incoming angles from the invariant measure, chunk by chunk.
+
+    Attributes
+    ----------
+    law : Law
+    root : tuple of int
+        The seed.
+    chunk : int
+        Rays of each chunk but the last.
+    """
+
+    law: Law
+    root: tuple[int, ...]
+    chunk: int
+
+    def rays(self, part: int, index: int, number: int) -> tuple[Floats, Floats, NDArray[np.bool_] | None]:
+        """Incoming and outgoing angles of so many rays, and which of them escaped, if the law tells."""
+        own = np.random.default_rng([*self.root, part, index])
+        theta = SINE.sample(number, own)
+        # the map of a driven law tells besides which rays escaped
+        driven = isinstance(self.law, DrivenLaw) and self.law.closed_form is None
+        reflect = self.law.random_map() if driven else None
+        if reflect is None:
+            return theta, self.law.sample(theta, own), None
+        outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta)
+        return theta, outgoing, escaped
+
+
+@dataclass(frozen=True)
+class _Counting:
+    """What a worker is sent: it counts the rays of some chunks in cells."""
+
+    chunks: RayChunks
+    basis: Basis
+    samples: int
+    chunks_a_task: int
+
+    @property
+    def tasks(self) -> int:
+        """Their number."""
+        return math.ceil(self.samples / (self.chunks.chunk * self.chunks_a_task))
+
+    def rays_of(self, task: int) -> int:
+        """Rays of one task."""
+        whole = self.chunks.chunk * self.chunks_a_task
+        return min(whole, self.samples - task * whole)
+
+    def counted(self, task: int) -> tuple[NDArray[np.int64], int]:
+        """Counts in cells, and the rays that did not escape."""
+        sums = RaySums(self.chunks.law, self.basis, 1)
+        chunk, rays = self.chunks.chunk, self.rays_of(task)
+        for number, start in enumerate(range(0, rays, chunk)):
+            index = task * self.chunks_a_task + number
+            theta, outgoing, escaped = self.chunks.rays(0, index, min(chunk, rays - start))
+            sums.add(0, theta, outgoing)
+            sums.count_unresolved(escaped)
+        return sums.tables[0], sums.unresolved
+
+
+def count_long(sums: RaySums, chunks: RayChunks, engine: Engine) -> None:
+    """Count ``sums.each`` rays into the one table of ``sums``: exact integers, whoever counts them in which order.
+
+    Raises
+    ------
+    InputError
+        If the basis has no cells, or the checkpoint is of other rays or cannot be written.
+    """
+    if not sums.basis.is_partition:
+        raise InputError(f"basis: checkpoints and workers need one of cells, such as Bins(64), got {sums.basis!r}")
+    job = _Counting(chunks, sums.basis, sums.each, max(RAYS_A_TASK // chunks.chunk, 1))
+    path = engine.get("checkpoint")
+    if path is None:
+        _run(job, sums, None, engine.get("client"))
+        return
+    with Checkpoint(path, _identity(job)) as store:
+        _run(job, sums, store, engine.get("client"))
+
+
+def _identity(job: _Counting) -> dict[str, Any]:
+    # task by task the checkpoint says what is done: so their size belongs to it
+    return {
+        "computation": "independent rays", "version": __version__, "law": law_digest(job.chunks.law),
+        "basis": repr(job.basis), "rays": job.samples, "seed": list(job.chunks.root), "chunk": job.chunks.chunk,
+        "chunks a task": job.chunks_a_task,
+    }  # fmt: skip
+
+
+class _State(NamedTuple):
+    """What is counted so far: replaced as a whole, so that an interrupt leaves counts and tasks in agreement."""
+
+    done: NDArray[np.bool_]
+    counts: NDArray[np.int64]
+    unresolved: int
+
+    def after(self, task: int, counts: NDArray[np.int64], unresolved: int) -> _State:
+        """With the result of a task."""
+        done = self.done.copy()
+        done[task] = True
+        return _State(done, self.counts + counts, self.unresolved + unresolved)
+
+    def packed(self) -> bytes:
+        """As a file of numpy's, without pickle."""
+        file = io.BytesIO()
+        np.savez(file, **self._asdict())
+        return file.getvalue()
+
+    @staticmethod
+    def unpacked(content: bytes) -> _State:
+        """The state that `packed` gave."""
+        with np.load(io.BytesIO(content), allow_pickle=False) as known:
+            return _State(known["done"], known["counts"], int(known["unresolved"]))
+
+
+def _run(job: _Counting, sums: RaySums, store: Checkpoint | None, client: Any) -> None:
+    known = [] if store is None else [_State.unpacked(content) for _, content in store.parts()]
+    state = known[0] if known else _State(np.zeros(job.tasks, dtype=bool), sums.tables[0], 0)
+    stored = time.monotonic()
+    try:
+        with connected(client) as workers, progress_bar(job.samples) as bar:
+            bar.update(sum(job.rays_of(task) for task in np.flatnonzero(state.done).tolist()))
+            for task, found in results(job.counted, np.flatnonzero(~state.done).tolist(), workers):
+                state = state.after(task, *found)
+                bar.update(job.rays_of(task))
+                if store is not None and time.monotonic() - stored > STORED_EVERY:
+                    store.put(STATE, state.packed(), now=True)
+                    stored = time.monotonic()
+    finally:
+        if store is not None:
+            store.put(STATE, state.packed(), now=True)
+    sums.tables[0], sums.unresolved = state.counts, state.unresolved

@@ -1,0 +1,175 @@
+"""The largest or smallest value along a sweep, refined between its points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ...core.checks import whole_number
+from ...core.errors import InputError
+from ...core.estimates import Estimate
+from ...core.rounding import EPS
+
+if TYPE_CHECKING:
+    from .points import Point
+    from .row import SweepRow
+
+# The best point is sought to this fraction of the interval between its neighbours, with half of the evaluations.
+CLOSE, SEARCH_SHARE = 1e-4, 0.5
+# An end of the interval of the parameter is known well enough when it is known to this fraction of its distance.
+SHARP = 0.1
+# What a parabola rises above the best point is doubled: the quantity is none.
+SAFETY = 2.0
+
+
+@dataclass(frozen=True)
+class Extremum:
+    """The largest or smallest value of a quantity in the interval that a sweep covers.
+
+    Attributes
+    ----------
+    parameter : Estimate
+        Where it is: the middle of the interval in which it can lie, with its half width.
+    value : Estimate
+        The value at the best point that was computed. Its error is that of this point and of the ends of the interval,
+        plus twice what the parabola through the three rises above it.
+    largest : bool
+    at_end : bool
+        Whether it lies at an end of the sweep, beyond which it may go on.
+    evaluations : int
+        Points that were computed besides those of the sweep.
+
+    Notes
+    -----
+    The points of the sweep must be so dense that the extremum is beside the best of them, and that the quantity has
+    no other extremum there. Then a point whose value is worse than the best one by more than both errors lies on one
+    side of the extremum, and the two nearest such points are the ends of the interval. It cannot become arbitrarily
+    short: near an extremum values are equal within their errors. The best point is sought by Brent's method.
+    """
+
+    parameter: Estimate
+    value: Estimate
+    largest: bool
+    at_end: bool
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class _Value:
+    """A value with the sign that makes the extremum a maximum, its error, and where it is."""
+
+    x: float
+    value: float
+    error: float
+    method: str
+
+    def is_below(self, other: _Value) -> bool:
+        """Whether it is surely less."""
+        return self.value + self.error < other.value - other.error
+
+
+def refined_extremum(
+    rows: Sequence[SweepRow],
+    parameters: Sequence[str],
+    solve: Callable[[Point], Sequence[SweepRow]] | None,
+    largest: bool,
+    evaluations: int,
+) -> Extremum:
+    """See `SweepTable.extremum`."""
+    whole_number("evaluations", evaluations, 0)
+    if solve is None:
+        raise InputError("extremum: this table was read, so that no point can be computed; call sweep again")
+    if len(parameters) != 1 or any(isinstance(row.point[parameters[0]], str) for row in rows):
+        raise InputError(f"extremum: expected one parameter that is a number, got {', '.join(parameters)}")
+    (name,), quantity, sign = parameters, rows[0].quantity, 1.0 if largest else -1.0
+
+    def signed(row: SweepRow) -> _Value | None:
+        if row.value is None or row.error is None:
+            return None
+        return _Value(float(row.point[name]), sign * row.value, row.error, row.method)
+
+    def computed(x: float) -> _Value:
+        row = next(row for row in solve({name: x}) if row.quantity == quantity)
+        found = signed(row)
+        if found is None:
+            raise InputError(f"extremum: {quantity} was refused at {name} = {x!r}: {row.message}")
+        return found
+
+    swept = sorted(filter(None, map(signed, rows)), key=lambda one: one.x)
+    if not swept:
+        raise InputError(f"extremum: no point of the sweep has a value of {quantity}")
+    return _Search(swept, computed).extremum(evaluations, sign)
+
+
+class _Search:
+    """The points beside the best one of a sweep, to which others are added."""
+
+    def __init__(self, swept: Sequence[_Value], computed: Callable[[float], _Value]) -> None:
+        top = max(range(len(swept)), key=lambda k: swept[k].value)
+        self.low, self.high = swept[0].x, swept[-1].x
+        self.points = list(swept[max(top - 1, 0) : top + 2])
+        self.computed, self.made = computed, 0
+
+    @property
+    def best(self) -> _Value:
+        """The greatest value."""
+        return max(self.points, key=lambda one: one.value)
+
+    def value_at(self, x: float) -> float:
+        """Minus the value at a further point, which is stored."""
+        self.points.append(self.computed(float(x)))
+        self.made += 1
+        return -self.points[-1].value
+
+    def side(self, direction: int) -> tuple[_Value, _Value]:
+        """On one side of the best point the nearest value that is surely less, and its neighbour on the way there.
+
+        Where there is none, the outermost point twice.
+        """
+        best, nearer = self.best, self.best
+        for one in sorted(self.points, key=lambda one: direction * one.x):
+            if direction * (one.x - best.x) > 0.0:
+                if one.is_below(best):
+                    return one, nearer
+                nearer = one
+        return nearer, nearer
+
+    def sharpen(self, direction: int, evaluations: int) -> None:
+        """Halve the distance in which values become surely less than the best one."""
+        for _ in range(evaluations):
+            end, nearer = self.side(direction)
+            if abs(end.x - nearer.x) <= SHARP * abs(end.x - self.best.x):
+                return
+            self.value_at(0.5 * (end.x + nearer.x))
+
+    def extremum(self, evaluations: int, sign: float) -> Extremum:
+        """Search, and say what was found."""
+        from scipy.optimize import minimize_scalar
+
+        ends = min(one.x for one in self.points), max(one.x for one in self.points)
+        search = int(SEARCH_SHARE * evaluations)
+        if search and ends[0] < ends[1]:
+            close = CLOSE * (ends[1] - ends[0])
+            minimize_scalar(self.value_at, bounds=ends, method="bounded", options={"maxiter": search, "xatol": close})
+            for direction in (-1, 1):
+                self.sharpen(direction, (evaluations - self.made) // 2 if direction < 0 else evaluations - self.made)
+        (left, _), best, (right, _) = self.side(-1), self.best, self.side(1)
+        rise = _rise(left, best, right)
+        error = best.error + max(left.error, right.error) + SAFETY * rise
+        value = Estimate(sign * best.value, error, "estimate", f"best of {self.made} points beside it; {best.method}")
+        middle = 0.5 * (left.x + right.x)
+        half = 0.5 * (right.x - left.x) + EPS * abs(middle)
+        parameter = Estimate(middle, half, "estimate", "between values that are surely less extreme")
+        return Extremum(parameter, value, sign > 0.0, best.x in (self.low, self.high), self.made)
+
+
+def _rise(left: _Value, best: _Value, right: _Value) -> float:
+    """How far the parabola through three points rises above the middle one."""
+    if not left.x < best.x < right.x:
+        return 0.0
+    first = (best.value - left.value) / (best.x - left.x)
+    second = (right.value - best.value) / (right.x - best.x)
+    curvature = (second - first) / (right.x - left.x)
+    slope = first + curvature * (best.x - left.x)
+    return 0.25 * slope * slope / -curvature if curvature < 0.0 else 0.0

@@ -1,0 +1,225 @@
+"""The long table of a sweep: a row for each point and quantity, and its forms in other libraries and in files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...core.errors import FileExistsRefusal, InputError
+from ...core.files import write_whole
+from ...core.frames import data_frame
+from .extremum import Extremum, refined_extremum
+from .picture import draw_curves
+from .points import Point, key_of
+from .row import COLUMNS, SweepRow
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
+    from xarray import Dataset
+
+FORMAT = 1
+# What the quantities are measured in; all others are pure numbers.
+UNITS = {"relaxation_time": "collisions"}
+FILES = ("table.csv", "table.json")
+
+
+@dataclass(frozen=True)
+class SweepTable:
+    """What a sweep found.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+    rows : tuple of SweepRow
+        By points in the order of the grid, then by quantities.
+    zipped : bool
+        Whether the points are no product of values.
+    solve : callable or None
+        Computes the rows of further points; None for a table that was read.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker, spectral as spec
+    >>> table = spec.sweep(ker.maxwell, {"diffuse_fraction": [0.25, 0.5]}, ["gap", "eta"])
+    >>> [(row.point["diffuse_fraction"], row.quantity, round(row.value, 12)) for row in table.rows]
+    [(0.25, 'gap', 0.25), (0.25, 'eta', 7.0), (0.5, 'gap', 0.5), (0.5, 'eta', 3.0)]
+    """
+
+    parameters: tuple[str, ...]
+    rows: tuple[SweepRow, ...]
+    zipped: bool = False
+    solve: Callable[[Point], Sequence[SweepRow]] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The names of the quantities."""
+        return tuple(dict.fromkeys(row.quantity for row in self.rows))
+
+    def of(self, quantity: str) -> tuple[SweepRow, ...]:
+        """The rows of one quantity.
+
+        Raises
+        ------
+        InputError
+            If the table has no such quantity.
+        """
+        found = tuple(row for row in self.rows if row.quantity == quantity)
+        if not found:
+            raise InputError(f"quantity: expected one of {', '.join(self.quantities)}, got {quantity!r}")
+        return found
+
+    def to_frame(self) -> DataFrame:
+        """A pandas frame with a column for each parameter and the columns of the rows; refused values are NaN.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+        """
+        rows = [[*row.point.values(), *row.cells()] for row in self.rows]
+        names = [*self.parameters, *COLUMNS]
+        frame: DataFrame = data_frame({name: [row[k] for row in rows] for k, name in enumerate(names)})
+        return frame.astype({"value": "float64", "error": "float64", "seconds": "float64"})
+
+    def to_xarray(self) -> Dataset:
+        """An xarray data set with the variables ``Q``, ``Q_error`` and ``Q_verdict`` of each quantity Q.
+
+        Its dimensions are the parameters, or ``point`` where the points are no product. Every variable has its unit
+        and its method in its attributes.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError as reason:
+            raise _needs("xarray", "to_xarray") from reason
+        frame = self.to_frame()
+        if self.zipped:
+            numbers = {key_of(dict(row.point)): number for number, row in enumerate(self.of(self.quantities[0]))}
+            frame["point"] = [numbers[key_of(dict(row.point))] for row in self.rows]
+        dimensions = ["point"] if self.zipped else list(self.parameters)
+        found = xarray.Dataset()
+        for quantity in self.quantities:
+            own = frame[frame["quantity"] == quantity].set_index(dimensions)
+            for suffix, column in (("", "value"), ("_error", "error"), ("_verdict", "verdict")):
+                variable = own[column].to_xarray()
+                variable.attrs = {"long_name": f"{quantity.replace('_', ' ')}{suffix.replace('_', ', ')}"}
+                if column != "verdict":
+                    variable.attrs["units"] = UNITS.get(quantity, "1")
+                found[f"{quantity}{suffix}"] = variable
+            if self.zipped:
+                found = found.assign_coords({name: ("point", own[name].to_numpy()) for name in self.parameters})
+        return found
+
+    def to_csv(self) -> str:
+        """The table as CSV: numbers with all their digits, refused values empty."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow([*self.parameters, *COLUMNS])
+        for row in self.rows:
+            writer.writerow([_cell(cell) for cell in (*row.point.values(), *row.cells())])
+        return text.getvalue()
+
+    def to_json(self) -> str:
+        """The table as JSON, which `of_json` reads."""
+        data = {
+            "format": FORMAT, "parameters": self.parameters, "zipped": self.zipped, "columns": ["point", *COLUMNS],
+            "rows": [row.as_list() for row in self.rows],
+        }  # fmt: skip
+        return json.dumps(data, indent=1, allow_nan=False)
+
+    @staticmethod
+    def of_json(text: str) -> SweepTable:
+        """The table that `to_json` gave.
+
+        Raises
+        ------
+        InputError
+            If the text is something else.
+        """
+        try:
+            data = json.loads(text)
+            if data["format"] != FORMAT or data["columns"] != ["point", *COLUMNS]:
+                raise InputError(f"JSON: expected a table of format {FORMAT}, got {data['format']}")
+            rows = tuple(SweepRow.of_list(data["parameters"], cells) for cells in data["rows"])
+            return SweepTable(tuple(data["parameters"]), rows, bool(data["zipped"]))
+        except (ValueError, KeyError, TypeError) as reason:
+            raise InputError(f"JSON: expected what SweepTable.to_json() gives: {reason}") from reason
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Write the frame into a Parquet file, in place of an earlier one.
+
+        Raises
+        ------
+        InputError
+            If pandas or pyarrow is not installed, or the file cannot be written.
+        """
+        frame = self.to_frame()
+        try:
+            import pyarrow  # noqa: F401 - pandas loads it by its name
+        except ImportError as reason:
+            raise _needs("pyarrow", "to_parquet") from reason
+        write_whole(Path(path), lambda stream: frame.to_parquet(stream, engine="pyarrow", index=False), overwrite=True)
+
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
+        """Write ``table.csv`` and ``table.json``; returns their paths.
+
+        Raises
+        ------
+        FileExistsRefusal
+            If one of them exists and ``overwrite`` is False; nothing is written then.
+        InputError
+            If they cannot be written.
+        """
+        target = Path(folder)
+        existing = [name for name in FILES if (target / name).exists()]
+        if existing and not overwrite:
+            raise FileExistsRefusal(f"{target}: {', '.join(existing)} exist; pass overwrite=True to replace them")
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+        except OSError as reason:
+            raise InputError(f"{target}: cannot write there ({reason}); choose another folder") from reason
+        texts = dict(zip(FILES, (self.to_csv(), self.to_json() + "\n"), strict=True))
+        for name, text in texts.items():
+            write_whole(target / name, text, overwrite=overwrite)
+        return [target / name for name in FILES]
+
+    def plot(self, quantity: str | None = None, ax: Axes | None = None) -> Axes:
+        """Draw a quantity, by default the first, against the first parameter that is a number.
+
+        The error is a band, the verdict a marker, and where there is no gap the ground is shaded. Each combination of
+        the other parameters is a curve.
+        """
+        name = self.quantities[0] if quantity is None else quantity
+        return draw_curves(self.of(name), self.parameters, name, ax)
+
+    def extremum(self, quantity: str | None = None, *, largest: bool = True, evaluations: int = 40) -> Extremum:
+        """The largest or smallest value, by default of the first quantity, refined between the points of the sweep.
+
+        See `Extremum` for what it says and what it presumes.
+
+        Raises
+        ------
+        InputError
+            If the table has several parameters, or one that is no number; if it was read from a file, so that nothing
+            more can be computed; if no point has a value.
+        """
+        name = self.quantities[0] if quantity is None else quantity
+        return refined_extremum(self.of(name), self.parameters, self.solve, largest, evaluations)
+
+
+def _cell(cell: Any) -> str:
+    return "" if cell is None else repr(cell) if isinstance(cell, float) else str(cell)
+
+
+def _needs(library: str, method: str) -> InputError:
+    return InputError(f"{method}: needs {library}; pip install 'asperity[studies]', or use to_csv and to_json")

@@ -1,0 +1,147 @@
+"""Independent tasks in this process or on the workers of dask.distributed."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import islice
+from typing import Any, TypeVar
+
+from .checks import whole_number
+from .errors import AsperityError, InputError
+
+# Tasks that the scheduler knows at a time: two for each of a thousand workers.
+BACKLOG = 2000
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+
+@contextmanager
+def connected(client: Any) -> Iterator[Any]:
+    """A client of dask.distributed, or None for this process.
+
+    Parameters
+    ----------
+    client : None, int, str or distributed.Client
+        None for this process, a number of workers that are started here, a scheduler's address, or a client, which is
+        used as it is.
+    """
+    if client is None:
+        yield None
+        return
+    try:
+        from distributed import Client, LocalCluster
+    except ImportError as reason:
+        raise InputError("client: workers need dask; pip install 'asperity[distributed]'") from reason
+    if isinstance(client, Client):
+        yield client
+        return
+    with ExitStack() as stack:
+        if isinstance(client, str):
+            try:
+                found = stack.enter_context(Client(client))
+            except (OSError, ValueError) as reason:
+                raise InputError(f"client: no scheduler answers at {client!r} ({reason})") from reason
+        else:
+            number = whole_number("client", client, 1)
+            cluster = stack.enter_context(
+                LocalCluster(n_workers=number, threads_per_worker=1, processes=True, dashboard_address=None)
+            )
+            found = stack.enter_context(Client(cluster))
+            _pin(found)
+            # what they still compute is not wanted any more; asked to end they would finish it first
+            stack.callback(_kill, cluster)
+        yield found
+
+
+def results(function: Callable[[Task], Result], tasks: Iterable[Task], client: Any) -> Iterator[tuple[Task, Result]]:
+    """Every task with its result, in the order in which they end.
+
+    Parameters
+    ----------
+    function : callable
+        Of one task. It must not raise.
+    tasks : iterable
+    client : distributed.Client or None
+        From `connected`.
+
+    Raises
+    ------
+    AsperityError
+        If the scheduler is gone before the last result, or a task has ended several workers. A worker that is lost
+        alone is replaced, and its tasks are computed again.
+
+    Examples
+    --------
+    >>> list(results(abs, [-1, 2], None))
+    [(-1, 1), (2, 2)]
+    """
+    if client is None:
+        yield from ((task, function(task)) for task in tasks)
+        return
+    rest = iter(tasks)
+    # one task on each machine first: it compiles the loops, which the other workers then find on the disk
+    workers = _one_worker_a_machine(client)
+    first = {
+        client.submit(function, task, pure=False, workers=[address], allow_other_workers=True): task
+        for address, task in zip(workers, islice(rest, len(workers)), strict=False)
+    }
+    yield from _collected(first, lambda: {})
+
+    def submitted(number: int) -> dict[Any, Task]:
+        return {client.submit(function, task, pure=False): task for task in islice(rest, number)}
+
+    yield from _collected(submitted(BACKLOG), lambda: submitted(1))
+
+
+def _collected(waiting: dict[Any, Task], more: Callable[[], dict[Any, Task]]) -> Iterator[tuple[Task, Any]]:
+    """The results of futures as they come; after each of them ``more`` are added."""
+    from distributed import KilledWorker, as_completed
+
+    done = as_completed(list(waiting))
+    # futures that are cancelled, because the scheduler is gone, do not come
+    for future in done:
+        if future.status == "error":
+            reason = future.exception()
+            if isinstance(reason, KilledWorker):
+                raise AsperityError(f"a task ended every worker that tried it; perhaps it needs more memory ({reason})")
+            raise AsperityError(
+                f"the workers could not run a task; they need the same environment as this process, and the modules of "
+                f"your own functions ({reason!r})"
+            )
+        if future.status != "finished":
+            break
+        yield waiting.pop(future), future.result()
+        following = more()
+        waiting |= following
+        done.update(following)
+    if waiting:
+        raise AsperityError("the scheduler is gone, and with it the tasks that it had; start one, and this again")
+
+
+def _one_worker_a_machine(client: Any) -> list[str]:
+    machines: dict[str, str] = {}
+    for address in client.nthreads():
+        machines.setdefault(address.rpartition(":")[0], address)
+    return list(machines.values())
+
+
+def _kill(cluster: Any) -> None:
+    for worker in cluster.workers.values():
+        if worker.pid is not None:
+            with suppress(ProcessLookupError):
+                os.kill(worker.pid, signal.SIGKILL)
+
+
+def _pin(client: Any) -> None:
+    """Give each worker processors of its own, so that its compiled loops start no more threads than it has of them."""
+    # only some systems have it
+    if not hasattr(os, "sched_setaffinity"):
+        return
+    processors, workers = sorted(os.sched_getaffinity(0)), list(client.nthreads())
+    for index, address in enumerate(workers):
+        own = processors[index :: len(workers)] or [processors[index % len(processors)]]
+        client.run(os.sched_setaffinity, 0, own, workers=[address])
