@@ -23,7 +23,7 @@ from tests.precise_tracer import trace_precisely
 from asperity import geometry as geo
 from asperity.errors import WallError
 from asperity.geometry.tracing.double_double.arithmetic import EPS_DOUBLE_DOUBLE
-from asperity.geometry.tracing.double_double.rays import LOST
+from asperity.geometry.tracing.double_double.rays import UNRESOLVED
 from asperity.geometry.tracing.refinement import RefinedTrace, refined_trace
 
 from .pages import print_table
@@ -306,7 +306,7 @@ def judge(wall: geo.Wall, x: Floats, theta: Floats, follow: Follow = twin_trace)
     same, distance = _agree(wall, traced, twin)
     other = np.flatnonzero(~same)
     # unresolved: the tracer ends a ray that the twin follows to its end, or the twin itself meets nothing
-    lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == LOST)
+    lost = (flagged & (twin.status == geo.Status.ESCAPED)) | (twin.status == UNRESOLVED)
     explained = _explained(wall, _part(traced, other), x[other], theta[other], follow)
     # the twin flags a ray if half an ulp of its angle meets a corner; a tracer that passes this corner is not wrong
     for k in np.flatnonzero(~explained & (twin.status[other] != geo.Status.ESCAPED)):

@@ -18,7 +18,7 @@ EQUIVALENT = {
     ("S1.08", "formula: (u - 0.5) % 1.0"): "the same map, by the periodicity of the remainder",
     ("S1.08", "formula: (u + 1.5) % 1.0"): "the same map, by the periodicity of the remainder",
     ("S1.08", "formula: (u + -0.5) % 1.0"): "the same map, by the periodicity of the remainder",
-    ("S2.04", "triangular.outcomes: even = hits % -2 == 0"): _EVEN_MODULUS,
+    ("S2.04", "triangular.outgoing_angles: even = hits % -2 == 0"): _EVEN_MODULUS,
     (
         "S2.09",
         "formula: eps / (2 * xp.tan(xi)) - xp.sqrt((eps / (-2 * xp.sin(xi))) ** 2 - (x - eps / 2) ** 2)",

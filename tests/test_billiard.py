@@ -163,4 +163,4 @@ def test_the_example_finds_the_strip_bounded_and_the_wedge_periodic_until_the_wa
     assert found["focusing arcs, median width/bound"] > 1.0
     assert found["no-slip wedge, fraction that stays"] > 0.05
     assert found["no-slip wedge, displacement in ten collisions"] < 1e-10
-    assert found["rough wedge, fraction that stays"] < found["no-slip wedge, share that stays"]
+    assert found["rough wedge, fraction that stays"] < found["no-slip wedge, fraction that stays"]

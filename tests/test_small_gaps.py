@@ -137,7 +137,7 @@ def test_a_limit_above_the_norm_is_no_limit(monkeypatch):
     def growing(law, angle, end, parts):
         return np.array([1.0 + 0.1 * end, 0.2]), 1e-9
 
-    monkeypatch.setattr(grazing, "_row", growing)
+    monkeypatch.setattr(grazing, "_at_angle", growing)
     law = ker.InvolutionLaw(lambda theta: np.pi - theta)
     limit = grazing.grazing_limit(law)
     assert not limit.resolved and limit.error == 1.0
@@ -146,7 +146,7 @@ def test_a_limit_above_the_norm_is_no_limit(monkeypatch):
 def test_what_cannot_be_told_is_undecided(monkeypatch):
     from asperity.spectral.essential import grazing
 
-    monkeypatch.setattr(grazing, "_row", lambda law, angle, end, parts: (np.array([2.0, 0.0]), 1e-9))
+    monkeypatch.setattr(grazing, "_at_angle", lambda law, angle, end, parts: (np.array([2.0, 0.0]), 1e-9))
     wall = geo.Wall([geo.Arc((0.5, 0), (0.5, 0.35), np.pi, 2 * np.pi)])
     gap = spec.spectral_gap(ker.WallLaw(wall), tolerance=0.5)
     assert gap.verdict == "undecided" and gap.error >= gap.value - 1e-12
