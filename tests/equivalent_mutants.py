@@ -54,7 +54,7 @@ EQUIVALENT_IN_THE_LIBRARY = {
     f"{_UNFOLDED} {_CLIPPED}maximum(most - 2.0, 1.0), most))": _GUARD,
     f"{_UNFOLDED} {_CLIPPED}maximum(most - 1.0, -1.0), most))": _GUARD,
     "triangular.TriangularTeethLaw._most_hits: return np.maximum(np.ceil(2.0 * theta / self.angle), -1.0)": _GUARD,
-    "triangular.TriangularTeethLaw._turned: return np.where(np.mod(count, -2.0) == 0.0, np.pi + theta - turn, "
+    "triangular.TriangularTeethLaw._reflected: return np.where(np.mod(count, -2.0) == 0.0, np.pi + theta - turn, "
     "turn - theta)": _EVEN_MODULUS,
     "circular_arc.CircularArcLaw._rotation: return (right, base, chord, np.maximum(np.ceil((self.half_angle + base "
     "- chord) / (2.0 * chord)), -1.0))": _GUARD,

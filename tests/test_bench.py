@@ -37,7 +37,7 @@ from asperity.bench.standard_set import FULL, QUICK, Effort, problem_names, run_
 from asperity.cli import main
 from asperity.errors import InputError
 from asperity.estimates import student_95
-from asperity.kernels.bases.momentum import Directions
+from asperity.kernels.bases.directions import Directions
 from asperity.kernels.sampling.sobol import PARTS
 
 RAYS = 2**12

@@ -12,7 +12,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.kernels.walls.repeated_teeth import RepeatedTeethLaw
-from asperity.kernels.walls.words import law_of, words_of
+from asperity.kernels.walls.simplification import law_of, words_of
 
 TEETH, CREVICES = ker.TriangularTeethLaw(0.7), ker.RectangularTeethLaw(0.8)
 HG = ker.henyey_greenstein

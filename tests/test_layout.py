@@ -97,6 +97,14 @@ def test_every_folder_has_a_floor_and_at_most_fourteen_modules():
         assert len(inside) <= MOST_MODULES, folder
 
 
+def test_no_file_has_the_name_of_a_function_or_class_in_it():
+    # a name imported from the file would take the file's place in its package
+    for name, path in MODULES.items():
+        defined = (ast.FunctionDef, ast.ClassDef)
+        own = {node.name for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, defined)}
+        assert name.rpartition(".")[2] not in own, name
+
+
 def test_inner_folders_begin_with_their_docstring_and_nothing_else():
     for name, path in MODULES.items():
         if is_package(name) and name.count("."):

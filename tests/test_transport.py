@@ -13,8 +13,8 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
 from asperity.kernels.aerodynamics.dual_bounds import dual_bound, hat_masses
+from asperity.kernels.bases.directions import Directions
 from asperity.kernels.bases.measure import gauss_rule
-from asperity.kernels.bases.momentum import Directions
 
 # tests/precise_least_resistance.py
 LEAST = 0.987823750351585515600495963

@@ -15,8 +15,8 @@ from asperity.kernels.bases import assembly as products_module
 from asperity.kernels.bases import measure as weights_module
 from asperity.kernels.bases.assembly import add_products, largest_square_sum, one_blas_thread, overlaps
 from asperity.kernels.bases.basis import Basis
+from asperity.kernels.bases.directions import Directions
 from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
-from asperity.kernels.bases.momentum import Directions
 
 UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]
 

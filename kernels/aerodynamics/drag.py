@@ -14,8 +14,8 @@ from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
 from ...core.kinds import explained
 from ..bases.basis import AngleFunction, Basis
+from ..bases.directions import Directions
 from ..bases.measure import SINE, gauss_rule
-from ..bases.momentum import Directions
 from ..bases.panels import Panels
 from ..discretisation.method import Budget
 from ..discretisation.methods import recipe

@@ -1,1 +1,1 @@
-"""Matrices of laws: the methods that compute them, one in each file, and the choice between the methods."""
+"""Matrices of laws: the methods that compute them, and the order in which they are tried."""

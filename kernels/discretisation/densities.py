@@ -13,10 +13,10 @@ from ...core.rounding import EPS
 from ..bases.assembly import add_products
 from ..bases.basis import Basis
 from ..bases.bins import Bins
+from ..bases.directions import Directions
 from ..bases.intervals import bisected
 from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
-from ..bases.momentum import Directions
 from ..laws.density import DensityLaw, cut_by_edges
 from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.law import Law

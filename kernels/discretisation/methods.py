@@ -15,7 +15,7 @@ from ..laws.law import Law, retroreflection, specular
 from ..laws.structure import Rules, fold, has_chain
 from ..matrices.defects import SymmetryDefect
 from ..matrices.matrix import KernelMatrix
-from ..walls.words import law_of, words_of
+from ..walls.simplification import law_of, words_of
 from .actions import Actions
 from .arcs import Arcs
 from .auto_wall import AutoWall

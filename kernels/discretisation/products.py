@@ -21,7 +21,7 @@ from ..laws.law import Law
 from ..laws.phase_function import HenyeyGreensteinLaw
 from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
-from ..walls.words import law_of
+from ..walls.simplification import law_of
 from .isometries import Isometries, isometric_matrix
 from .method import Budget, MethodName, Recipe, computed, isometric_rounding
 from .scattering import degrees_used, is_scattered, local_values, scattered_matrix, split

@@ -22,7 +22,7 @@ from ...kernels.laws.ideal import LambertianLaw
 from ...kernels.laws.law import specular
 from ...kernels.laws.phase_function import HenyeyGreensteinLaw
 from ...kernels.laws.structure import holds_of_all
-from ...kernels.walls.words import Sum, Word, words_of
+from ...kernels.walls.simplification import Sum, Word, words_of
 from ..eigenvalues.parity import Parity
 from ..eigenvalues.spectra import check_reversible
 

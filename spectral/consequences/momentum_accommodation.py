@@ -13,7 +13,7 @@ from ...core.estimates import NORMAL_95, ErrorKind, Estimate
 from ...core.rounding import EPS
 from ...kernels import SINE, KernelMatrix, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
-from ...kernels.bases.momentum import MEAN_SINE, SINE_NORM, Directions
+from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...kernels.laws.structure import has_chain
 from ..bounds.operator_residuals import image_rule
 

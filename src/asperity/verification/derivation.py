@@ -21,7 +21,7 @@ from .polyhedron import Inequality
 from .resolution import Nowhere, Resolution
 from .signs import NOT_NEGATIVE, POSITIVE, Part, is_continuous, is_infinite, is_muddled
 from .verdict import Verdict
-from .zeros import zeros
+from .zeros import zeros_in
 
 # Limits on the number of parts and on the depth of their subdivision.
 PARTS = 400
@@ -202,7 +202,7 @@ class Derivation:
                 (symbol,) = symbols
                 low, high, *_ = domain.interval(symbol)
                 try:
-                    cuts = zeros(e, symbol, low, high)
+                    cuts = zeros_in(e, symbol, low, high)
                 except (Undefined, Unclear):
                     continue
                 if cuts:

@@ -14,7 +14,7 @@ from .balls import Unclear, Undefined, evaluate, interval
 from .domain import Domain
 from .normal_form import Parameters
 from .polyhedron import Inequality, sign_of
-from .zeros import zeros
+from .zeros import zeros_in
 
 Signs = frozenset[int]
 POSITIVE, NOT_NEGATIVE, ZERO = frozenset({1}), frozenset({0, 1}), frozenset({0})
@@ -182,7 +182,7 @@ class Part:
         if symbol not in self.domain.symbols:
             return ANY
         low, high = self.domain.interval(symbol)[:2]
-        if zeros(e, symbol, low, high) != []:
+        if zeros_in(e, symbol, low, high) != []:
             return ANY
         for point in self.domain_points():
             try:

@@ -15,7 +15,7 @@ MOST = 60
 LARGEST = 300
 
 
-def zeros(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
+def zeros_in(e: Any, symbol: Any, low: Any, high: Any) -> list[Any] | None:
     """The points of the open interval at which e is 0 or infinite, ascending; None if they are not known.
 
     They are not known for an expression that is 0 everywhere.

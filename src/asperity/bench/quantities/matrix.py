@@ -10,7 +10,7 @@ import numpy as np
 from ...core.checks import Floats
 from ...core.estimates import Estimate
 from ...kernels import Bins, KernelMatrix, Legendre
-from ...kernels.bases.momentum import MEAN_SINE, SINE_NORM, Directions
+from ...kernels.bases.directions import MEAN_SINE, SINE_NORM, Directions
 from ...spectral import WorkMethod
 from .methods import RANDOM_ORDER, MatrixMethod, declared_order, methods_for
 from .quantity import Methods, Quantity
