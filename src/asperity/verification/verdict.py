@@ -93,11 +93,11 @@ def agreement(found: ArrayLike, expected: ArrayLike, allowed: float, **where: Ar
     Parameters
     ----------
     found, expected : array_like
-            Values of the formula, and of an independent computation; they broadcast.
-        allowed : float
-            The largest difference that rounding, sampling or the order of an approximation explains.
-        **where : array_like
-            The points, by name, broadcast with the values; the worst point is the counterexample.
+        Values of the formula, and of an independent computation; they broadcast.
+    allowed : float
+        The largest difference that rounding, sampling or the order of an approximation explains.
+    **where : array_like
+        The points, by name, broadcast with the values; the worst point is the counterexample.
 
     Examples
     --------
