@@ -343,5 +343,7 @@ def test_the_command_writes_and_compares(tmp_path, monkeypatch):
     result = CliRunner().invoke(main, ["bench", "--quick", "--out", str(out), "--compare", str(old)])
     assert result.exit_code == 1, result.output
     assert "worse" in result.stdout and (out / "bench.json").exists()
-    same = CliRunner().invoke(main, ["bench", "--quick", "--out", str(out), "--compare", str(out / "bench.json")])
+    same = CliRunner().invoke(
+        main, ["bench", "--quick", "--force", "--out", str(out), "--compare", str(out / "bench.json")]
+    )
     assert same.exit_code == 0

@@ -175,7 +175,7 @@ def test_velocities_that_point_away_are_refused():
     with pytest.raises(InputError, match="shape"):
         K.sample([0.0, -1.0], rng)
     with pytest.raises(InputError, match="Generator"):
-        K.sample([0.0, -1.0, 0.0], 7)
+        K.sample([0.0, -1.0, 0.0], "seven")
     with pytest.raises(InputError, match="disk"):
         ker.CollisionLaw(ker.specular(), 3)
     with pytest.raises(InputError, match="wall"):

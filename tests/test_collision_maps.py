@@ -40,7 +40,7 @@ def test_velocities_along_the_wall_or_away_from_it_are_refused(up: float) -> Non
         with pytest.raises(InputError, match="shape"):
             K.sample(wrong, np.random.default_rng(0))
     with pytest.raises(InputError, match="Generator"):
-        K.sample([0.0, -1.0, 0.0], 7)
+        K.sample([0.0, -1.0, 0.0], "seven")
 
 
 def test_only_laws_in_the_papers_frame_and_disks_and_walls_are_taken() -> None:

@@ -45,7 +45,9 @@ def test_the_command_ends_with_one_where_a_row_is_worse_and_says_which(tmp_path,
         for row in data["reports"][0]["rows"]:
             row["seconds"] = [factor * seconds for seconds in row["seconds"]]
         old.write_text(json.dumps(data))
-        result = CliRunner().invoke(main, ["bench", "--quick", "--out", str(tmp_path / "new"), "--compare", str(old)])
+        result = CliRunner().invoke(
+            main, ["bench", "--quick", "--force", "--out", str(tmp_path / "new"), "--compare", str(old)]
+        )
         assert result.exit_code == code, result.output
         assert ("| teeth/law | auto | 1 | 2.00 | 0.014 | 1 | worse |" in result.stdout) == bool(code)
         assert ("faster" in result.stdout) == (factor == 2.0)
