@@ -10,7 +10,8 @@ from asperity import spectral as spec
 from asperity.errors import InputError
 from asperity.spectral.bounds import enclosure
 from asperity.spectral.bounds.enclosure import Enclosure, Enclosures
-from asperity.spectral.bounds.operator_residuals import Residuals
+from asperity.spectral.bounds.operator_residuals import Residuals, residuals
+from asperity.spectral.bounds.scattered import ScatteredSpectrum
 from asperity.spectral.bounds.separation import Separation
 
 EPS = float(np.finfo(float).eps)
@@ -185,6 +186,7 @@ RANK = ker.MatrixLaw([[0.7, 0.3], [0.3, 0.7]])  # .4 beyond the constants, and n
         (FRACTION, [1, 0.76], [0, 0.02], 0.1, (1, 0.75, "bound")),
         (FRACTION, [1, 0.98], [0, 0.1], 0.9, (1, 0.75, "bound")),
         (FRACTION, [1, 0.9], [0.5, 0.001], 0.1, (0, 0.75, "bound")),
+        (FRACTION, [1, 0.9], [0.5, 0.001], 0.8, (0, 0.75, "bound")),
         (RANK, [1, 0.5], [0, 0.125], 0.25, (2, 0.0, "bound")),
         (RANK, [1, 0.5], [0, 0.125], 0.375, (1, 0.4, "bound")),
         (RANK, [1, 0.5], [0, 0.125], 0.45, (1, 0.4, "bound")),
@@ -287,13 +289,19 @@ def test_what_comes_next_is_the_largest_that_is_not_listed(k, following):
 def test_a_poor_trial_function_counts_where_it_reaches_to(monkeypatch):
     """Of two that come next, of .25 and of .125, the second may stand for a value of .325 if its residual is .2."""
 
+    tried = []
+
     def poor(law, basis, vectors, values, **options):
+        tried.append(len(values))
         return measured(values, np.where(np.abs(values) < 0.2, 0.2, 0.0))
 
     monkeypatch.setattr(enclosure, "residuals", poor)
     law = ring()
     next_value = enclosure._trial(law, ker.Bins(law.edges), 2, 1e-8)[3]
     assert next_value == pytest.approx(0.325, rel=0.0, abs=1e-13)
+    # no more than two are tried where there are more
+    enclosure._trial(law, ker.Bins(law.edges), 1, 1e-8)
+    assert tried == [2, 2]
 
 
 def test_the_focusing_arc_has_the_published_eigenvalues_on_panels_that_adapt():
@@ -308,6 +316,45 @@ def test_the_focusing_arc_has_the_published_eigenvalues_on_panels_that_adapt():
     following = spec.enclosures(ker.CircularArcLaw(1.2), 4, tolerance=1e-5)
     smallest = min(following, key=lambda entry: abs(entry.value))
     assert abs(smallest.value) <= found.separation.radius < abs(smallest.value) + 0.01
+
+
+@pytest.mark.parametrize("k", [2, 3])
+def test_enclosures_on_panels_that_adapt_are_as_narrow_as_wanted(k):
+    """Diffuse reflection halves the eigenvalues of the arc."""
+    law = 0.5 * ker.CircularArcLaw(1.2) + 0.5 * ker.lambertian()
+    found = enclosure.enclosed_trial_space(law, k, None, 1e-4)
+    assert found.worst <= 1e-4
+    for entry, value in zip(found.enclosures, [1.0, 0.3670253152 / 2, -0.311346443 / 2], strict=False):
+        assert value in entry
+
+
+@pytest.mark.parametrize(
+    ("law", "basis", "slack"),
+    [
+        (ker.CircularArcLaw(1.2), ker.Legendre(6), 1e-4),
+        (RANK, ker.Legendre(4), 1e-13),
+        (ker.henyey_greenstein(0.5), ker.Legendre(4), 1e-13),
+    ],
+    ids=["arc", "jumps", "smooth"],
+)
+def test_values_of_trial_functions_are_their_quotients(law, basis, slack):
+    """The matrix of trial functions is that of the law, also where images have kinks or jumps."""
+    values, vectors, _, _ = enclosure._trial(law, basis, 3, 1e-8)
+    assert values == pytest.approx(residuals(law, basis, vectors, values).quotients, rel=0.0, abs=slack)
+
+
+def test_trial_functions_have_a_parity_where_law_and_basis_are_mirror_symmetric():
+    skew = ker.MatrixLaw([[0.6, 0.3, 0.1], [0.3, 0.5, 0.2], [0.1, 0.2, 0.7]])
+    for law, basis, names in (
+        (ker.lambertian(), ker.Bins(2), ("even", "odd")),
+        (ker.lambertian(), ker.Bins([0.0, 1.0, np.pi]), ("none", "none")),
+        (skew, ker.Bins(3), ("none", "none")),
+    ):
+        assert enclosure._trial(law, basis, 2, 1e-8)[2] == names
+
+
+def test_four_eigenvalues_are_enclosed_unless_another_number_is_given():
+    assert len(spec.enclosures(ker.MatrixLaw(0.5 * np.eye(6) + 1.0 / 12.0))) == 4
 
 
 @pytest.mark.parametrize(("k", "basis"), [(1, "Legendre(32)"), (12, "Legendre(36)")])
@@ -327,7 +374,8 @@ def test_laws_and_numbers_that_cannot_be_enclosed_are_refused():
 def test_powers_are_recognised_where_they_tell_something():
     law, other = ker.henyey_greenstein(0.5), ker.henyey_greenstein(0.25)
     assert enclosure.as_power(law**3) == enclosure.as_power(law @ law @ law) == (law, 3)
-    assert enclosure.as_power(ker.Power(law, 1)) == (law, 1)
+    assert enclosure.as_power(ker.Power(law, 1)) == enclosure.as_power(ker.Composition((law,))) == (law, 1)
+    assert enclosure.as_power(law @ law) == (law, 2)
     skew = ker.MatrixLaw(np.roll(np.eye(3), 1, axis=1))
     for nothing in (
         law,
@@ -336,6 +384,7 @@ def test_powers_are_recognised_where_they_tell_something():
         other @ law @ law,
         ker.specular() @ law,
         skew**2,
+        ker.Power(law, 0),
     ):
         assert enclosure.as_power(nothing) is None
 
@@ -348,6 +397,106 @@ def test_a_phase_function_and_its_square_have_powers_of_g(g):
         for entry in found:
             value = g ** (power * entry.index)
             assert value in entry and entry.width < 1e-13 and entry.residual < 1e-12 and entry.kind == "bound"
+            assert entry.parity == ("odd" if entry.index % 2 else "even")
+
+
+def test_a_power_has_the_powers_of_the_ends_at_a_smaller_tolerance():
+    law = ker.CircularArcLaw(1.2)
+    square, base = spec.enclosures(law**2, 3, tolerance=1e-5), spec.enclosures(law, 3, tolerance=0.5e-5)
+    assert square.method == f"power 2; {base.method}"
+    assert [(entry.value, entry.index) for entry in square] == [(entry.value**2, entry.index) for entry in base]
+    assert spec.enclosures(ring() ** 2, 3, ker.Bins(8)).method.startswith("power 2; trial functions in Bins(8)")
+
+
+# ---- words of scatterings ----------------------------------------------------------------------------------------
+def test_a_product_of_scatterings_that_hardly_scatter_is_one_scattering():
+    near = ker.henyey_greenstein(0.999)
+    (_, first) = spec.enclosures(near @ near, 2)
+    assert 0.999**2 in first and first.width < 1e-13 and (first.label, first.kind) == ("indexed", "bound")
+
+
+def test_a_product_in_the_other_frame_stays_there():
+    found = spec.enclosures((ker.henyey_greenstein(0.5) @ ker.henyey_greenstein(0.8)).in_specular_frame(), 2)
+    assert found.convention == "specular" and -0.4 in found[1] and found[1].width < 1e-13
+
+
+def test_a_scattering_before_and_after_teeth_is_not_a_scattering():
+    """Its eigenvalues are those of the matrix of the teeth, multiplied by 0.5^l from both sides."""
+    scattering, teeth = ker.henyey_greenstein(0.5), ker.TriangularTeethLaw(0.7)
+    found = spec.enclosures(scattering @ teeth @ scattering, 2)
+    power = 0.5 ** np.arange(40.0)
+    matrix = power[:, None] * ker.discretise(teeth, ker.Legendre(40), tolerance=1e-10).symmetric * power
+    value = np.sort(np.abs(np.linalg.eigvalsh(matrix)))[-2]
+    assert found[1].value == pytest.approx(value, rel=0.0, abs=1e-10) and found[1].width < 1e-11
+
+
+def test_a_given_basis_is_used_for_words_too():
+    law = 0.25 * ker.retroreflection() + 0.75 * ker.henyey_greenstein(0.5)
+    given, free = spec.enclosures(law, 3, ker.Legendre(8)), spec.enclosures(law, 3)
+    assert given.method.startswith("trial functions in Legendre(8),")
+    assert free.method == "eigenvalues of a matrix that the law is near to"
+    for found in (given, free):
+        for degree, entry in enumerate(found):
+            assert 0.25 + 0.75 * 0.5**degree in entry and entry.index == degree and entry.width < 1e-13
+
+
+def scattered(values, certain, essential=0.0, distance=0.0625) -> Enclosures:
+    parities = ("even", *["odd", "even", "odd"][: len(values) - 1])
+    found = ScatteredSpectrum(np.array(values), parities, tuple(certain), distance, essential, 8, "bound")
+    return enclosure._of_scattered(found, "specular")
+
+
+@pytest.mark.parametrize("essential", [0.0, 0.25])
+def test_eigenvalues_are_within_the_distance_of_those_of_a_near_matrix(essential):
+    reason = "the law is a matrix in 8 Legendre polynomials within 0.062"
+    if essential:
+        reason += ", beyond them the essential spectrum of modulus 0.25"
+    unknown = f"not indexed: another value, or the essential spectrum, may be as large; {reason}"
+    found = scattered([1.0, -0.75, 0.5, 0.375], [True, True, True, False], essential)
+    assert found.convention == "specular" and found.separation == Separation(essential + 0.0625, "bound", reason)
+    assert list(found) == [
+        Enclosure(1.0, 1.0, 1.0, "indexed", 0, 0.0, "bound", f"P 1 = 1; {reason}", "even"),
+        Enclosure(0.5, 0.4375, 0.5625, "indexed", 2, 0.0625, "bound", reason, "even"),
+        Enclosure(0.375, 0.3125, 0.4375, "contains-spectrum", None, 0.0625, "bound", unknown, "odd"),
+        Enclosure(-0.75, -0.8125, -0.6875, "indexed", 1, 0.0625, "bound", reason, "odd"),
+    ]
+
+
+def test_no_eigenvalue_near_that_of_a_matrix_is_beyond_one():
+    constants, first = scattered([1.0, 1.0], [True, True])
+    assert (constants.index, constants.low, first.low, first.high) == (0, 1.0, 0.9375, 1.0)
+
+
+# ---- ties --------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("one", "other", "overlap"),
+    [
+        ((0.25, 0.5), (0.5, 0.75), True),
+        ((0.25, 0.5), (0.625, 0.75), False),
+        ((0.25, 0.5), (-0.75, -0.5), True),
+        ((0.25, 0.5), (-0.75, -0.625), False),
+        ((-0.5, -0.25), (-0.75, -0.5), True),
+        ((-0.5, -0.25), (-0.75, -0.625), False),
+        ((-0.25, 0.125), (0.25, 0.5), True),
+        ((-0.125, 0.25), (0.375, 0.5), False),
+        ((-0.125, 0.25), (-0.0625, 0.03125), True),
+        ((0.0, 0.0), (-0.125, 0.5), True),
+        ((0.03125, 0.0625), (-0.0625, 0.015625), True),
+    ],
+)
+def test_moduli_overlap_where_two_intervals_have_points_of_one_modulus(one, other, overlap):
+    first, second = (item(low, low, high, 1) for low, high in (one, other))
+    assert enclosure._moduli_overlap(first, second) == enclosure._moduli_overlap(second, first) == overlap
+    # every end and 0 lie on the grid
+    grids = [np.linspace(low, high, round(64 * (high - low)) + 1) for low, high in (one, other)]
+    assert overlap == bool(np.intersect1d(*map(np.abs, grids)).size)
+
+
+def test_only_indexed_enclosures_may_change_places():
+    items = [item(0.25, 0.5, 0.75, 2), item(-0.5, -0.5, -0.5, 1), item(0.5, 0.5, 0.5), item(0.0, 0.125, 0.1875, 4)]
+    items.append(item(0.75, 0.75, 0.75, 3))
+    added = ["; may change places with 1, 3", "; may change places with 2", "", "", "; may change places with 2"]
+    assert [entry.reason for entry in enclosure._with_ties(items)] == ["why" + more for more in added]
 
 
 def test_the_reach_of_functions_is_the_largest_end():

@@ -194,10 +194,10 @@ def enclosures(
     refuse_unless_self_adjoint(law)
     words = None if isinstance(law, DensityLaw) else scattered_words(law)
     if words is not None:
-        only = next(iter(words)) if len(words) == 1 else ()
-        if len(only) == 1 and isinstance(only[0], DensityLaw):
+        if [len(word) for word in words] == [1]:
             # a product of HG laws is one HG law
-            return replace(enclosures(only[0], k, basis, tolerance), convention=law.frame)
+            ((only,),) = words
+            return replace(enclosures(only, k, basis, tolerance), convention=law.frame)
         if basis is None:
             return _of_scattered(scattered_spectrum(law, words, k, tolerance), law.frame)
     power = as_power(law)
@@ -275,7 +275,8 @@ def _moduli_overlap(one: Enclosure, other: Enclosure) -> bool:
 def as_power(law: Law) -> tuple[Law, int] | None:
     """Base and exponent of a power of a law, also if written as a product, or None.
 
-    ``law ** 1`` counts as a power. None is returned for other laws, irreversible bases and laws made of isometries.
+    ``law ** 1`` and a composition of one law count as powers. None is returned for other laws, irreversible bases and
+    laws made of isometries.
 
     Examples
     --------
@@ -286,7 +287,7 @@ def as_power(law: Law) -> tuple[Law, int] | None:
     """
     if isinstance(law, Power) and law.exponent >= 1:
         base, exponent = law.law, law.exponent
-    elif isinstance(law, Composition) and len(law.laws) > 1 and all(part == law.laws[0] for part in law.laws):
+    elif isinstance(law, Composition) and all(part == law.laws[0] for part in law.laws):
         base, exponent = law.laws[0], len(law.laws)
     else:
         return None
@@ -297,9 +298,8 @@ def _raised(found: Enclosures, exponent: int) -> Enclosures:
     """Enclosures of the eigenvalues of a power, by decreasing value."""
     items = []
     for item in found:
-        ends = [item.low**exponent, item.high**exponent]
-        if exponent % 2 == 0 and item.low < 0.0 < item.high:
-            ends.append(0.0)
+        nearest_to_zero = min(max(item.low, 0.0), item.high)
+        ends = [point**exponent for point in (item.low, nearest_to_zero, item.high)]
         # lambda^n - rho^n is lambda - rho times a sum of products, for any lambda in the spectrum
         slope = sum(min(abs(item.value), 1.0) ** degree for degree in range(exponent))
         items.append(
@@ -381,8 +381,8 @@ def _reach(after: Residuals) -> float:
 
 
 def _galerkin(law: Law, basis: Basis, tolerance: float) -> Floats:
-    if isinstance(law, DensityLaw) and isinstance(basis, Legendre):
-        # a product rule may miss a peak of the density; the conditional distributions have adapted panels
+    if isinstance(law, DensityLaw) and isinstance(basis, Legendre) and not law.outgoing_breakpoints.size:
+        # a Gauss rule integrates the smooth images, at less cost than a discretisation where the density has a peak
         angle, weight = SINE.quadrature(basis.edges, basis.nodes_per_interval)
         image, _ = image_rule(law, basis, np.eye(basis.size))(angle, tolerance)
         symmetric = basis.evaluate(angle).T @ (weight[:, None] * image)
@@ -403,7 +403,7 @@ def _enclosed(
     number, apart = known
     own = names[position]
     value, norm = float(found.quotients[position]), float(found.norms[position])
-    rank = int(np.flatnonzero(order == position)[0])
+    rank = order.tolist().index(position)
     if rank == 0 and position == 0 and number:
         return Enclosure(1.0, 1.0, 1.0, "indexed", 0, norm, apart.kind, f"P 1 = 1; {apart.reason}", own)
     if rank < number:
