@@ -219,7 +219,7 @@ def test_the_specular_frame_is_exact_in_bases_that_the_flip_does_not_keep(basis:
         ({"method": "qmc"}, "it has quadrature, monte-carlo"),
         ({"tolerance": -1.0}, "tolerance"),
         ({"samples": 0}, "samples"),
-        ({"rng": 3}, "rng"),
+        ({"rng": "three"}, "rng"),
         ({"law": 0.5 * ker.lambertian()}, "sum of 1"),
     ],
 )

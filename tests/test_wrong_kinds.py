@@ -144,6 +144,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "resistance": (ker.resistance, {"law": LAW, "tolerance": 0.1}),
     "study_convergence": (ker.study_convergence, {"members": [LAW, LAW], "limit": None, "names": None, "order": 1,
                                                   "kind": "rows", "tolerance": 0.1}),
+    "exchange_hollow": (ker.exchange_hollow, {
+        "exchange": ker.IntervalExchangeLaw(ker.discretise(ker.lambertian(), ker.Bins(2))), "opening": 0.1}),
     "two_mirrors": (ker.two_mirrors, {"a": 0.3, "b": 0.6, "half_width": 0.02, "opening": 0.01}),
     "ReferenceValue": (spec.ReferenceValue, {"value": 0.0, "error": 0.0, "source": "by hand", "made_by": ()}),
     "WorkMethod": (spec.WorkMethod, {"name": "a", "solve": float, "is_random": False, "order": None}),
@@ -163,6 +165,10 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "mean_squared_slope": (spec.mean_squared_slope, {"wall": TEETH}),
     "mixing_time": (spec.mixing_time, {"kernel": MATRIX, "within": 0.25, "distance": "total variation",
                                        "density": None, "start": None, "initial": 1.0}),
+    "accommodation": (spec.accommodation, {"law": LAW, "theta": [1.0], "tolerance": 0.1, "rng": 0}),
+    "Between": (spec.Between, {"low": 0.2, "high": 0.4, "points": 4, "resolution": 0.1}),
+    "sweep": (spec.sweep, {"family": ker.maxwell, "grid": {"diffuse_fraction": [0.5]}, "quantities": "gap",
+        "tolerance": 0.1, "progress": False, "zipped": False}),
     "spectral_gap": (spec.spectral_gap, {"law": LAW, "tolerance": 0.1, "rng": 0}),
     "spectrum": (spec.spectrum, {"kernel": LAW, "k": 2, "tolerance": 0.1, "rng": 0}),
     "work_precision": (spec.work_precision, {"problem": PROBLEM, "methods": [METHOD], "budgets": [1.0], "repeats": 1,
@@ -172,14 +178,15 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 }  # fmt: skip
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
-    "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BranchLaw", "Conductance", "Container", "Convergence",
-    "ConvergenceStep", "Curve", "CylinderCollision", "Defect", "Dichotomy", "DifferenceTest", "Diffusivity", "Distance",
-    "DrivenLaw", "Enclosure", "Enclosures", "EssentialEdge", "ExitTimes", "ExtremalResistance", "FittedOrder", "Hollow",
+    "Accommodation", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BranchLaw", "Conductance",
+    "Container", "Convergence", "ConvergenceStep", "Curve", "CylinderCollision", "Defect", "Dichotomy",
+    "DifferenceTest", "Diffusivity", "Distance", "DrivenLaw", "Enclosure", "Enclosures", "EssentialEdge",
+    "ExchangeHollow", "ExitTimes", "ExtremalResistance", "Extremum", "FittedOrder", "Generations", "Hollow",
     "LaplacianComparison", "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine", "MethodFacts",
     "MixingTime", "ModifiedCollision", "NamedWall", "Reflector", "RigidCollision", "SpectralGap", "Spectrum",
-    "SpectrumErrors", "Status", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow", "WallDesign", "WallForLaw",
-    "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat", "lambertian", "retroreflection", "specular",
-    "verify",
+    "SpectrumErrors", "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow",
+    "WallDesign", "WallForLaw", "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat", "lambertian",
+    "retroreflection", "specular", "verify",
 }  # fmt: skip
 
 WRONG: dict[str, Any] = {

@@ -15,6 +15,7 @@ from ..expectations.angle_panels import NODES, AnglePanels
 from ..laws.law import DrivenLaw, Law
 from ..laws.structure import is_compound
 from ..matrices.matrix import KernelMatrix
+from ..walls.repeated_teeth import RepeatedTeethLaw
 from .method import Budget, MethodName, computed, rounding
 
 # Limit on the values of basis functions in `law.apply`: one or two seconds of work.
@@ -43,7 +44,8 @@ class Actions:
     name: MethodName = "quadrature"
 
     def accepts(self, law: Law, basis: Basis) -> bool:
-        if is_compound(law):
+        if is_compound(law) or isinstance(law, RepeatedTeethLaw):
+            # repeated teeth have exact integrals, and too many breakpoints for panels
             return False
         # `_apply` of a driven law is a fixed rule in the entry point. A subclass's own `_apply` is accurate for smooth
         # functions such as Legendre's, not for functions with edges.

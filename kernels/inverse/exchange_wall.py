@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import Floats, generator, instance, number_between, positive_number, whole_number
+from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
+from ...core.kinds import explained
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
 from ..laws.law import Law, mixture, specular
@@ -88,7 +89,7 @@ class ExchangeHollow:
     opening: tuple[float, float]
     mirrors: int
 
-    def loss(self, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> Estimate:
+    def loss(self, samples: int = SAMPLES, rng: Rng = None) -> Estimate:
         """The fraction of the flux through the opening that does not leave where the exchange sends it.
 
         A ray is counted as missed unless it leaves, after at most 8 collisions, in the interval with which that of its
@@ -98,7 +99,7 @@ class ExchangeHollow:
         ----------
         samples : int
             Rays, at least 2.
-        rng : numpy.random.Generator, optional
+        rng : None, int or numpy.random.Generator
             ``np.random.default_rng(0)`` by default.
         """
         theta, traced = self._traced(samples, rng)
@@ -106,7 +107,7 @@ class ExchangeHollow:
         half = fraction_half_width(missed, theta.size)
         return Estimate(missed / theta.size, half, "estimate", f"{theta.size} traced rays")
 
-    def displacement(self, samples: int = SAMPLES, rng: np.random.Generator | None = None) -> Estimate:
+    def displacement(self, samples: int = SAMPLES, rng: Rng = None) -> Estimate:
         """Mean distance, radians, of the outgoing angles from those of the exchange; pi for rays that are followed no
         longer.
 
@@ -123,7 +124,7 @@ class ExchangeHollow:
         function: Callable[[Floats, Floats], Floats],
         unfollowed: float,
         samples: int = SAMPLES,
-        rng: np.random.Generator | None = None,
+        rng: Rng = None,
     ) -> Estimate:
         """The mean of a function of the incoming and the outgoing angle over the flux through the opening.
 
@@ -137,7 +138,7 @@ class ExchangeHollow:
             The value for rays that are followed no longer: with the largest one the mean is an upper bound.
         samples : int
             Rays.
-        rng : numpy.random.Generator, optional
+        rng : None, int or numpy.random.Generator
             ``np.random.default_rng(0)`` by default.
 
         Examples
@@ -163,11 +164,11 @@ class ExchangeHollow:
         theta, weights = SINE.quadrature(ends, order)
         return float(np.sum(weights * function(theta, self.exchange.image(theta))))
 
-    def _traced(self, samples: int, rng: np.random.Generator | None) -> tuple[Floats, Trace]:
+    def _traced(self, samples: int, rng: Rng) -> tuple[Floats, Trace]:
         from ...geometry import trace
 
         number = whole_number("samples", samples, 2)
-        source = np.random.default_rng(0) if rng is None else generator(rng)
+        source = generator(rng, 0)
         theta = SINE.sample(number, source)
         x = self.opening[0] + (self.opening[1] - self.opening[0]) * source.random(number)
         return theta, trace(self.wall, x, theta, max_collisions=MOST_COLLISIONS)
@@ -179,9 +180,7 @@ class ExchangeHollow:
         out = SINE.cdf(np.where(traced.escaped, traced.theta, 0.5 * np.pi))
         return np.asarray(traced.escaped & (out >= starts[other]) & (out <= starts[other] + widths[other]))
 
-    def generations(
-        self, number: int, neck: float = NECK, samples: int = SAMPLES, rng: np.random.Generator | None = None
-    ) -> Generations:
+    def generations(self, number: int, neck: float = NECK, samples: int = SAMPLES, rng: Rng = None) -> Generations:
         """The law of a wall in which the flat tops carry smaller copies of the chamber, these copies of their own, ...
 
         Parameters
@@ -192,7 +191,7 @@ class ExchangeHollow:
             Width of the flat top that is left on each side of an opening, over the width of the opening.
         samples : int
             Rays for the distance.
-        rng : numpy.random.Generator, optional
+        rng : None, int or numpy.random.Generator
             ``np.random.default_rng(0)`` by default.
 
         Returns
@@ -235,6 +234,7 @@ class ExchangeHollow:
         return np.where(traced.escaped, np.abs(traced.theta - image), np.pi)
 
 
+@explained
 def exchange_hollow(exchange: IntervalExchangeLaw, opening: float = 1e-3) -> ExchangeHollow:
     """A chamber whose mirrors send every ray where an exchange of intervals sends it, but for the order of the opening.
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, angles, frozen, generator, positive_number
+from ...core.checks import Floats, Rng, angles, frozen, generator, positive_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, ErrorKind, Estimate
+from ...core.kinds import explained
 from ...core.rounding import EPS
 from ...kernels import SINE, KernelMatrix, Law, Panels, discretise
 from ...kernels.bases.basis import Basis
@@ -66,9 +67,8 @@ class Accommodation:
     kind_at: ErrorKind
 
 
-def accommodation(
-    law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = None, rng: np.random.Generator | None = None
-) -> Accommodation:
+@explained
+def accommodation(law: Law, tolerance: float = 1e-8, theta: ArrayLike | None = None, rng: Rng = None) -> Accommodation:
     r"""Tangential and normal momentum accommodation coefficients, and the Maxwell fraction that fits a law best.
 
     Parameters
@@ -79,7 +79,7 @@ def accommodation(
         Wanted error of the law's matrix and of its conditional means.
     theta : array_like, optional
         Angles at which the coefficients are given; by default the midpoints of 32 cells of equal measure.
-    rng : numpy.random.Generator, optional
+    rng : None, int or numpy.random.Generator
         For laws that are traced or sampled; ``np.random.default_rng(0)`` by default, so that results repeat.
 
     Returns
@@ -131,7 +131,7 @@ def accommodation(
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     wanted = positive_number("tolerance", tolerance)
     incoming = _default_angles() if theta is None else _checked(theta)
-    source = np.random.default_rng(0) if rng is None else generator(rng)
+    source = generator(rng, 0)
     paper = law.in_specular_frame() if law.frame == "specular" else law
     basis: Basis = Panels(np.linspace(0.0, np.pi, PANELS + 1), DEGREE) if has_chain(paper) else Directions()
     matrix = discretise(paper, basis, tolerance=wanted, rng=source)
@@ -150,6 +150,8 @@ def _default_angles() -> Floats:
 
 def _checked(theta: ArrayLike) -> Floats:
     incoming = np.atleast_1d(angles("theta", theta)).ravel()
+    if not incoming.size:
+        raise InputError("theta: expected at least one angle, got none")
     for name, rest in (("pi/2", np.cos(incoming)), ("arcsin(pi/4)", np.sin(incoming) - MEAN_SINE)):
         bad = np.abs(rest) < POLE
         if bad.any():

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from ...core.checks import instance
+from ...core.checks import instance, shortened
 from ...core.errors import InputError
 from ...core.estimates import Estimate
 from ...kernels import Law, resistance
@@ -83,6 +83,15 @@ QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
 )
 
 
+def listed_quantities(asked: str | UserQuantity | Sequence[str | UserQuantity]) -> tuple[str | UserQuantity, ...]:
+    """One quantity or several as a tuple; an InputError for anything else."""
+    if isinstance(asked, str) or callable(asked):
+        return (asked,)
+    if not isinstance(asked, Sequence):
+        raise InputError(f"quantities: expected names or functions such as ['gap', 'eta'], got {shortened(asked)}")
+    return tuple(asked)
+
+
 def quantities_from(asked: str | UserQuantity | Sequence[str | UserQuantity]) -> tuple[Quantity, ...]:
     """The quantities that names and functions mean, each once.
 
@@ -96,8 +105,7 @@ def quantities_from(asked: str | UserQuantity | Sequence[str | UserQuantity]) ->
     >>> [one.names for one in quantities_from(["gap", "eta"])]
     [('gap',), ('eta',)]
     """
-    listed = [asked] if isinstance(asked, str) or callable(asked) else list(asked)
-    found = [_quantity(one) for one in listed]
+    found = [_quantity(one) for one in listed_quantities(asked)]
     names = [name for one in found for name in one.names]
     twice = {name for name in names if names.count(name) > 1}
     if not names or twice:

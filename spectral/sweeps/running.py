@@ -15,13 +15,14 @@ from typing import Any, TypeAlias
 from ...core.checkpoints import Checkpoint
 from ...core.checks import finite_number, positive_number
 from ...core.errors import AsperityError, InputError
+from ...core.kinds import explained
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
 from ...kernels import CollisionLaw, Law, WallLaw
 from ...kernels.walls.identity import law_digest
 from .points import Grid, Point, key_of
-from .quantities import Quantity, UserQuantity, name_of, quantities_from
+from .quantities import Quantity, UserQuantity, listed_quantities, name_of, quantities_from
 from .row import SweepRow
 from .table import SweepTable
 
@@ -70,6 +71,7 @@ class _Study:
         return [row.as_list() for row in self.rows(point)]
 
 
+@explained
 def sweep(
     family: Family,
     grid: Mapping[str, Any],
@@ -136,7 +138,7 @@ def sweep(
     'diffuse_fraction: expected a number in [0, 1], got 2.0'
     """
     wanted = positive_number("tolerance", tolerance)
-    listed = (quantities,) if isinstance(quantities, str) or callable(quantities) else tuple(quantities)
+    listed = listed_quantities(quantities)
     found = quantities_from(listed)
     if not callable(family):
         raise InputError(f"family: expected a function that returns a wall, as geo.focusing_arcs, got {family!r}")
