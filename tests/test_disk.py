@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from asperity import geometry as geo
 from asperity.errors import InputError
+from asperity.geometry.disk.disk import branch_block, contact_normal, direction
 
 EPS = np.finfo(float).eps
 logs = st.floats(-6.0, 6.0)
@@ -124,3 +125,25 @@ def test_foreshortening_of_known_disks():
 def test_unsuitable_arguments_are_refused_in_words(call, words):
     with pytest.raises(InputError, match=words):
         call()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_block_of_a_branch_turns_minus_the_incoming_velocity(sign):
+    """theta' = sign theta + offset and psi' = pi - psi."""
+    theta, psi, offset = 0.7, 1.1, 0.4
+    block = np.array(branch_block(sign, np.cos(offset), np.sin(offset)))
+    outgoing = direction(sign * theta + offset, np.pi - psi)
+    assert block @ -np.array(direction(theta, psi)) == pytest.approx(outgoing, rel=0.0, abs=1e-15)
+    assert block @ [0.0, 0.0, 1.0] == pytest.approx([0.0, 0.0, 1.0], rel=0.0, abs=0.0)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.6, -1.1])
+def test_the_normal_of_a_contact_measures_the_speed_of_the_satellite_along_the_normal_of_the_wall(turn):
+    mass, inertia, wall_normal = 2.0, 0.5, np.array([0.6, 0.8])
+    metric = np.array([mass, mass, inertia])
+    normal = np.array(contact_normal(mass, inertia, wall_normal, turn))
+    assert normal @ (metric * normal) == pytest.approx(1.0, rel=1e-14)
+    # v + omega d/d turn (sin turn, -cos turn)
+    speeds = np.append(wall_normal, wall_normal @ [np.cos(turn), np.sin(turn)])
+    ratio = metric * normal / speeds
+    assert ratio[0] > 0.0 and ratio == pytest.approx(np.full(3, ratio[0]), rel=1e-14)

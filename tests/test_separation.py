@@ -144,3 +144,11 @@ def test_the_lambertian_fraction_of_sums_and_products():
     # the weights add up to 1 + 2e-16
     fractions = 0.1 * diffuse + 0.1 * diffuse + 0.4 * diffuse + 0.3 * diffuse + 0.1 * diffuse
     assert lambertian_fraction(fractions) == 1.0
+
+
+def test_the_bound_for_a_matrix_is_beyond_the_rounding_and_the_asymmetry_of_its_entries():
+    skew = 1e-9
+    for excess, least in ((0.0, 0.4), (skew, 0.4 + skew)):
+        law = ker.MatrixLaw([[0.7 + excess, 0.3 - excess], [0.3, 0.7]])
+        radius = rest_of_spectrum(law, np.array([1.0]), 0.0, 0.0).radius
+        assert least < radius < least + 2.0 * excess + 1e-14

@@ -267,8 +267,8 @@ def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
 
 
 def _moduli_overlap(one: Enclosure, other: Enclosure) -> bool:
-    # the moduli in [a, b] range from max(a, -b, 0) to max(-a, b)
-    least = max(max(item.low, -item.high, 0.0) for item in (one, other))
+    # the moduli in [a, b] range from max(a, -b), or 0 if this is negative, to max(-a, b)
+    least = max(max(item.low, -item.high) for item in (one, other))
     return least <= min(max(-item.low, item.high) for item in (one, other))
 
 
