@@ -16,6 +16,7 @@ from asperity.kernels.bases import measure as weights_module
 from asperity.kernels.bases.assembly import add_products, largest_square_sum, one_blas_thread, overlaps
 from asperity.kernels.bases.basis import Basis
 from asperity.kernels.bases.directions import Directions
+from asperity.kernels.bases.legendre import legendre_moments
 from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
 
 UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]
@@ -371,3 +372,12 @@ def test_the_largest_sum_of_squares_is_attained_and_exceeded_nowhere(basis: Basi
     found = np.sum(basis.evaluate(angle) ** 2, axis=-1).max()
     assert found <= largest_square_sum(basis) * (1.0 + 1e-14)
     assert found >= largest_square_sum(basis) * (1.0 - 1e-6)
+
+
+def test_moments_of_polynomials_are_sums_of_weights_times_polynomials():
+    local = np.array([[-0.9, 0.3, 0.75], [0.1, -0.4, 0.6]])
+    weight = np.array([[0.5, 2.0, -1.0], [1.0, 0.25, 3.0]])
+    for degree in (0, 1, 6):
+        exact = [(weight * np.polynomial.Legendre.basis(k)(local)).sum(axis=1) for k in range(degree + 1)]
+        found = legendre_moments(local, weight, degree)
+        assert found.shape == (degree + 1, 2) and np.abs(found - exact).max() < 1e-14
