@@ -151,3 +151,13 @@ def test_rays_that_never_escape_are_counted_bounded_and_finally_refused() -> Non
 def test_bins_without_rays_are_named() -> None:
     with pytest.raises(AccuracyError, match="bins have no incoming pair"):
         ker.discretise(Bounce(), ker.Bins(64), "monte-carlo", samples=64)
+
+
+def test_rays_that_all_go_to_one_cell_leave_the_error_of_rounding() -> None:
+    # the cells below and above pi/2 are exchanged: counts have no variance
+    basis = ker.Bins([0.0, 0.5 * np.pi, np.pi])
+    law = ker.InvolutionLaw(lambda theta: np.pi - np.asarray(theta))
+    for method in ("qmc", "monte-carlo"):
+        found = ker.discretise(law, basis, method=method, samples=4096)
+        exact = np.array([[0.0, 1.0], [1.0, 0.0]])
+        assert np.linalg.norm(found.symmetric - exact) <= float(found.error) < 1e-13

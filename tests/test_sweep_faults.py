@@ -107,7 +107,7 @@ def test_a_lost_scheduler_ends_the_sweep_which_then_goes_on(undisturbed, tmp_pat
     program = (
         "import time\nfrom distributed import LocalCluster\n"
         "if __name__ == '__main__':\n"
-        "    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None)\n"
+        "    cluster = LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address='127.0.0.1:0')\n"
         "    print(cluster.scheduler_address, flush=True)\n    time.sleep(600)\n"
     )
     (tmp_path / "cluster.py").write_text(program)

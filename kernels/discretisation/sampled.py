@@ -8,7 +8,7 @@ from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.counts import SampledArray
 from ..sampling.monte_carlo import independent_rays
 from ..sampling.sobol import PARTS, SobolSampler
-from .method import Budget, MethodName
+from .method import Budget, MethodName, rounding
 
 
 class Sobol:
@@ -52,7 +52,8 @@ def _sampled(
     return KernelMatrix(
         array.symmetric,
         basis,
-        frobenius_error(array.error, "estimate", how),
+        # All rays of a cell can go to one cell: then only rounding is left.
+        frobenius_error(array.error + rounding(basis), "estimate", how),
         method=name,
         counts=array.counts,
         replicates=array.replicates,

@@ -14,6 +14,9 @@ from .errors import AsperityError, InputError
 
 # Tasks that the scheduler knows at a time: two for each of a thousand workers.
 BACKLOG = 2000
+# Seconds to wait for a result whose worker is gone, before it is asked whether there is any other.
+PATIENCE = 20.0
+SCHEDULER_GONE = "the scheduler is gone, and with it the tasks that it had; start one, and this again"
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -48,7 +51,7 @@ def connected(client: Any) -> Iterator[Any]:
         else:
             number = whole_number("client", client, 1)
             cluster = stack.enter_context(
-                LocalCluster(n_workers=number, threads_per_worker=1, processes=True, dashboard_address=None)
+                LocalCluster(n_workers=number, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0")
             )
             found = stack.enter_context(Client(cluster))
             _pin(found)
@@ -114,12 +117,28 @@ def _collected(waiting: dict[Any, Task], more: Callable[[], dict[Any, Task]]) ->
             )
         if future.status != "finished":
             break
-        yield waiting.pop(future), future.result()
+        yield waiting.pop(future), _result(future)
         following = more()
         waiting |= following
         done.update(following)
     if waiting:
-        raise AsperityError("the scheduler is gone, and with it the tasks that it had; start one, and this again")
+        raise AsperityError(SCHEDULER_GONE)
+
+
+def _result(future: Any) -> Any:
+    """The result of a finished future, which is computed again if its worker has been lost with it."""
+    from asyncio import CancelledError
+
+    try:
+        while True:
+            try:
+                return future.result(timeout=PATIENCE)
+            except TimeoutError as reason:
+                if not future.client.nthreads():
+                    words = "the tasks ended every worker, and no other has come; perhaps they need more memory"
+                    raise AsperityError(words) from reason
+    except (OSError, CancelledError) as reason:
+        raise AsperityError(SCHEDULER_GONE) from reason
 
 
 def _one_worker_a_machine(client: Any) -> list[str]:
