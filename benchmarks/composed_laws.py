@@ -2,7 +2,8 @@
 
 ``python -m benchmarks.composed_laws --count 2000`` draws laws and bases from seeds 0, 1, ... It prints how many
 reported errors hold, by method and by basis, and lists the cases that fail or are undecided. Outcomes are stored in the
-file ``--record``, so that a run can be continued, or split into ranges (``--first``, ``--count``).
+file ``--record``, so that a run can be continued, or split into ranges (``--first``, ``--count``). From seed 2000 on,
+the bases have narrow cells, on which the rounding of angles is large.
 
 The reference expands the expression into words. It applies the laws of a word, from the last one back, to the functions
 of the basis as functions of any angle. Teeth and arcs use formulas of single rays, scatterings their eigenvalues, and
@@ -485,6 +486,8 @@ LOPSIDED = np.array([[0.5, 0.5, 0.0], [0.5, 0.25, 0.25], [0.0, 0.25, 0.75]])
 CYCLE = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 # Cost of a law of isometries or of arcs in a word, and limits on the cost of a word and on the number of words.
 TEETH, ARCS, DEAREST, MOST_WORDS = 1, 4, 4, 12
+# The seed from which bases have narrow cells.
+FIRST_NARROW = 2000
 
 
 def random_leaf(rng: np.random.Generator) -> Expression:
@@ -556,6 +559,20 @@ def random_basis(rng: np.random.Generator) -> tuple[str, ker.Basis]:
         return kind, ker.Legendre(int(rng.choice([4, 8, 16, 32, 64], p=[0.25, 0.3, 0.25, 0.1, 0.1])))
     edges = np.concatenate(([0.0], np.sort(rng.uniform(0.05, 3.09, int(rng.integers(1, 6)))), [np.pi]))
     return kind, ker.Bins(edges) if kind == "Bins(edges)" else ker.Panels(edges, int(rng.integers(0, 4)))
+
+
+def narrow_basis(rng: np.random.Generator) -> tuple[str, ker.Basis]:
+    """Bins or panels with a narrow cell, in the middle or at both ends, on which the rounding of angles is large."""
+    if rng.random() < 0.7:
+        middle, width = rng.uniform(0.3, 2.8), 10.0 ** rng.uniform(-6.0, -2.0)
+        edges = np.array([0.0, 0.5 * middle, middle, middle + width, 0.5 * (middle + np.pi), np.pi])
+    else:
+        # The references sum a limited number of crossings of crevices, so that cells at grazing cannot be narrower.
+        width = 10.0 ** rng.uniform(-2.0, -1.0)
+        edges = np.array([0.0, width, 1.0, 2.0, np.pi - width, np.pi])
+    if rng.random() < 0.4:
+        return "narrow bins", ker.Bins(edges)
+    return "narrow panels", ker.Panels(edges, int(rng.integers(0, 5)))
 
 
 # ---- outcomes -----------------------------------------------------------------------------------------------------
@@ -687,7 +704,7 @@ def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
             expression = expression.turned()
         if expression.cost <= DEAREST and len(expression.words) <= MOST_WORDS:
             break
-    kind, basis = random_basis(rng)
+    kind, basis = narrow_basis(rng) if seed >= FIRST_NARROW else random_basis(rng)
     method = rng.choice(["auto", "quadrature", "exact", "qmc", "monte-carlo"], p=[0.6, 0.2, 0.08, 0.04, 0.08])
     return expression, kind, basis, str(method)
 

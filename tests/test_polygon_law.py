@@ -55,8 +55,8 @@ def test_the_table_of_triangular_teeth_is_their_law(psi: float) -> None:
 def test_matrices_from_the_table_are_those_of_quadrature_between_kinks(psi: float, basis: ker.Basis) -> None:
     law = ker.TriangularTeethLaw(psi)
     found = ker.discretise(law, basis)
-    reference, omitted = branch_matrix(law, basis, 0.0)
-    assert found.method == "exact" and omitted == 0.0
+    reference, error = branch_matrix(law, basis, 0.0)
+    assert found.method == "exact" and error < 1e-11
     assert np.linalg.norm(found.symmetric - reference) < 2e-13
     assert np.linalg.norm(found.symmetric - found.symmetric.T) < 2e-13
 

@@ -16,8 +16,11 @@ from asperity.kernels.bases import measure as weights_module
 from asperity.kernels.bases.assembly import add_products, largest_square_sum, one_blas_thread, overlaps
 from asperity.kernels.bases.basis import Basis
 from asperity.kernels.bases.directions import Directions
+from asperity.kernels.bases.displacement import node_rounding
+from asperity.kernels.bases.intervals import cell_among
 from asperity.kernels.bases.legendre import legendre_moments
 from asperity.kernels.bases.measure import gauss_on_intervals, gauss_rule, measure_by_name
+from asperity.kernels.discretisation.method import rounding
 
 UNEVEN = [0.0, 0.4, 1.1, 2.0, np.pi]
 
@@ -381,3 +384,43 @@ def test_moments_of_polynomials_are_sums_of_weights_times_polynomials():
         exact = [(weight * np.polynomial.Legendre.basis(k)(local)).sum(axis=1) for k in range(degree + 1)]
         found = legendre_moments(local, weight, degree)
         assert found.shape == (degree + 1, 2) and np.abs(found - exact).max() < 1e-14
+
+
+BASES = [*ENDS, Panels([0.0, np.pi], 12), Legendre(6), Legendre(6, "sin2"), Bins(UNEVEN), Directions()]
+
+
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+def test_magnitudes_are_exceeded_nowhere(basis: Basis) -> None:
+    largest, weighted = basis.magnitudes()
+    angle = np.linspace(1e-9, np.pi - 1e-9, 10_001)
+    cell = cell_among(basis.edges, angle)
+    found = np.sqrt(np.sum(basis.evaluate(angle) ** 2, axis=-1))
+    assert np.all(found <= largest[cell] * (1.0 + 1e-8))
+    assert np.all(found * np.sqrt(np.sin(angle)) <= weighted[cell])
+    # neither is larger than needed by more than the factor of Bernstein's inequality
+    assert largest.max() <= found.max() * (1.0 + 1e-6)
+    if np.isfinite(weighted).all():
+        assert weighted.max() <= 2.0 * (found * np.sqrt(np.sin(angle))).max()
+
+
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+def test_derivative_norms_are_those_of_differences(basis: Basis) -> None:
+    # the default of all bases, against the closed forms of polynomials, panels and bins
+    assert basis.derivative_norm() == pytest.approx(Basis.derivative_norm(basis), rel=1e-7, abs=1e-12)
+
+
+def test_the_derivative_norm_of_polynomials_is_the_root_of_their_eigenvalues() -> None:
+    # l (l + 1) for l = 0, 1, 2, and l (l + 2)
+    assert Legendre(3).derivative_norm() == pytest.approx(8.0**0.5)
+    assert Legendre(3, "sin2").derivative_norm() == pytest.approx(11.0**0.5)
+
+
+@pytest.mark.parametrize("basis", [Panels([0.0, 1.0, 1.0 + 1e-3, np.pi], 3), Legendre(12)], ids=repr)
+def test_displaced_nodes_change_a_matrix_by_at_most_the_derivative_norm(basis: Basis) -> None:
+    shift = 1e-8
+    angle, weight = basis.measure.quadrature(basis.edges, basis.nodes_per_interval)
+    before, after = basis.evaluate(angle), basis.evaluate(angle + shift)
+    change = np.linalg.norm((before * weight[:, None]).T @ (after - before))
+    assert 0.1 * shift * basis.derivative_norm() < change <= shift * basis.derivative_norm()
+    assert node_rounding(basis) == pytest.approx(2.0 * np.finfo(float).eps * basis.derivative_norm())
+    assert rounding(basis) > node_rounding(basis)

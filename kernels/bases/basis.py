@@ -11,10 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
 from .intervals import cell_among
-from .measure import AngularMeasure
+from .measure import AngularMeasure, gauss_rule
 
 Frame = Literal["paper", "specular"]
 AngleFunction = Callable[[Floats], Floats]
+
+# Step of numerical derivatives, relative to an interval between edges.
+DIFFERENCE = 1e-6
+# Maxima are taken over this many times the nodes of a Gauss rule, with a margin for those between nodes.
+DENSER, BETWEEN = 3, 1.02
 
 
 class Basis(ABC):
@@ -99,6 +104,31 @@ class Basis(ABC):
         """
         return False
 
+    def magnitudes(self) -> tuple[Floats, Floats]:
+        """Bounds of |e| and of sin(theta)^(1/2) |e| on each interval between edges, with |e|^2 the sum of e_i^2.
+
+        Two arrays of shape (intervals,). The default takes the largest values at the ends and at Gauss nodes.
+        """
+        angle = self._ends_and_nodes()
+        return largest(angle, np.sum(self.evaluate(angle) ** 2, axis=-1))
+
+    def derivative_norm(self) -> float:
+        """The square root of the sum of the integrals of (d e_i / d theta)^2, apart from jumps at edges.
+
+        A rounding error h of all angles changes a Galerkin matrix by at most h times this norm. The default takes
+        differences between neighbouring angles.
+        """
+        step = np.repeat(DIFFERENCE * np.diff(self.edges), self.nodes_per_interval)
+        angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
+        slope = (self.evaluate(angle + step) - self.evaluate(angle - step)) / (2.0 * step[:, None])
+        return float(np.sqrt(weight @ np.sum(slope**2, axis=1)))
+
+    def _ends_and_nodes(self) -> Floats:
+        """Both ends of each interval between edges and Gauss nodes inside, shape (intervals, angles)."""
+        low, high = self.edges[:-1], np.nextafter(self.edges[1:], 0.0)
+        nodes = gauss_rule(self.edges, DENSER * self.nodes_per_interval)[0].reshape(low.size, -1)
+        return np.concatenate((low[:, None], nodes, high[:, None]), axis=1)
+
     @abstractmethod
     def coarsened(self) -> tuple[Basis, Floats] | None:
         """A basis of a subspace of about half the size, and the (coarse, n) matrix R of its coefficients in this basis.
@@ -110,3 +140,9 @@ class Basis(ABC):
         """Coefficients <e_i, f> of a vectorised function of the angle, shape (n,)."""
         angle, weight = self.measure.quadrature(self.edges, order or self.nodes_per_interval)
         return np.asarray(self.evaluate(angle).T @ (weight * np.asarray(function(angle), dtype=np.float64)))
+
+
+def largest(angle: Floats, squares: Floats) -> tuple[Floats, Floats]:
+    """The magnitudes of a basis from the sums of squares at the angles, both of shape (intervals, angles)."""
+    weighted = squares * np.sin(angle)
+    return np.sqrt(squares.max(axis=1)), BETWEEN * np.sqrt(weighted.max(axis=1))

@@ -122,6 +122,12 @@ class Bins(Basis):
         np.put_along_axis(values, index[..., None], self.normalisation[index][..., None], axis=-1)
         return values
 
+    def magnitudes(self) -> tuple[Floats, Floats]:
+        return self.normalisation, np.full(self.size, np.inf)
+
+    def derivative_norm(self) -> float:
+        return 0.0
+
     def coarsened(self) -> tuple[Bins, Floats] | None:
         if self.size < 2:
             return None

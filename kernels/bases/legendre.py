@@ -98,6 +98,19 @@ class Legendre(Basis):
             values *= np.sqrt(2.0 * np.arange(self.n) + 1.0).reshape((-1,) + (1,) * angle.ndim)
         return np.moveaxis(values, 0, -1)
 
+    def magnitudes(self) -> tuple[Floats, Floats]:
+        # Bernstein's inequality: sin(theta) P_l^2 < 2 / (pi (l + 1/2)), so the sum of e_l^2 is below 4 n / (pi sin).
+        # The sum of U_l^2 is at most n / sin^2.
+        intervals = self.edges.size - 1
+        if self.weight == "sin":
+            return np.full(intervals, float(self.n)), np.full(intervals, np.sqrt(4.0 * self.n / np.pi))
+        return np.full(intervals, np.sqrt(self.n * (self.n + 1) * (2 * self.n + 1) / 6)), np.full(intervals, np.inf)
+
+    def derivative_norm(self) -> float:
+        # The eigenvalues of minus the second derivative in the measure are l (l + 1), or l (l + 2).
+        degree = np.arange(float(self.n))
+        return float(np.sqrt(np.sum(degree * (degree + (1.0 if self.weight == "sin" else 2.0)))))
+
     def coarsened(self) -> tuple[Legendre, Floats] | None:
         if self.n < 2:
             return None

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, check_memory, frozen, number_between, whole_number
 from ...core.kinds import explained
-from .basis import Basis
+from .basis import Basis, largest
 from .bins import Bins
 from .measure import SINE, AngularMeasure, WeightName
 
@@ -166,6 +166,22 @@ class Panels(Basis):
         values = np.zeros((*angle.shape, self._cells.size, self.degree + 1))
         np.put_along_axis(values, panel[..., None, None], local[..., None, :], axis=-2)
         return values.reshape((*angle.shape, self.size))
+
+    def magnitudes(self) -> tuple[Floats, Floats]:
+        angle = self._ends_and_nodes()
+        panel = np.broadcast_to(np.arange(self._cells.size)[:, None], angle.shape)
+        values = np.einsum("pak,pki->pai", self.legendre(angle, panel), self._coefficients)
+        return largest(angle, np.sum(values**2, axis=-1))
+
+    def derivative_norm(self) -> float:
+        angle, weight = self.measure.quadrature(self.edges, self.nodes_per_interval)
+        panel = np.repeat(np.arange(self._cells.size), self.nodes_per_interval)
+        # L_k' is a sum of lower polynomials of the local variable, which runs through (-1, 1) on a panel.
+        lower = np.polynomial.legendre.legder(np.eye(self.degree + 1))
+        polynomials = self.legendre(angle, panel)[:, : len(lower)] @ lower
+        slope = np.einsum("ak,aki->ai", polynomials, self._coefficients[panel])
+        slope *= (2.0 / np.diff(self.edges))[panel, None]
+        return float(np.sqrt(weight @ np.sum(slope**2, axis=1)))
 
     def coarsened(self) -> tuple[Panels, Floats] | None:
         if self.degree > 0:

@@ -10,14 +10,15 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats
 from ..bases.assembly import add_products, largest_square_sum
 from ..bases.basis import Basis
+from ..bases.displacement import Displacement
 from ..bases.measure import gauss_on_intervals
 from ..laws.branches import preimages
 from ..laws.law import Law
 from ..laws.structure import Rules, fold, has_chain, lists_branches
 from ..matrices.matrix import KernelMatrix
 from ..walls.repeated_teeth import RepeatedTeethLaw, repeated_teeth_matrix
-from .isometry_tables import bounded, table_matrix
-from .method import Budget, MethodName
+from .isometry_tables import add_mirrored_edges, bounded, table_matrix
+from .method import Budget, MethodName, rounding
 
 # A probability linear in cot(theta), times sin(theta), is a combination of sin and cos. A Gauss rule with m nodes has
 # an error of about (width/2)^(2m)/(2m)! for it. Probabilities of compositions are products of such terms, smooth on the
@@ -49,19 +50,22 @@ class Isometries:
         return lists_branches(law) and not has_chain(law)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, omitted = isometric_matrix(law, basis, budget.tolerance)
-        how = "Gauss rules between the breakpoints of isometries, to rounding"
-        return bounded(symmetric, basis, omitted, how + (", plus omitted breakpoints" if omitted else ""))
+        symmetric, error = isometric_matrix(law, basis, budget.tolerance)
+        how = "Gauss rules between the breakpoints of isometries: rounding and omitted breakpoints"
+        return bounded(symmetric, basis, error, how)
 
 
 def isometric_matrix(law: Law, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """The matrix of a law that lists its isometries, and a bound on its Frobenius error apart from rounding."""
+    """The matrix of a law that lists its isometries, and a bound on its Frobenius error."""
     table = law.isometry_table()
     if table is not None:
         return table_matrix(table, basis)
     teeth = fold(law, REPEATED_TEETH)
     if teeth is not None:
-        return repeated_teeth_matrix(teeth[0], basis, exchanged=teeth[1])
+        symmetric, omitted = repeated_teeth_matrix(teeth[0], basis, exchanged=teeth[1])
+        displacement = Displacement(basis)
+        add_mirrored_edges(basis, displacement)
+        return symmetric, omitted + rounding(basis) + displacement.bound()
     return branch_matrix(law, basis, tolerance)
 
 
@@ -75,7 +79,7 @@ REPEATED_TEETH: Rules[tuple[RepeatedTeethLaw, bool] | None] = Rules(
 
 
 def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Floats, float]:
-    """<e_i, P e_j> for a law of isometries, and a bound on its Frobenius error apart from rounding.
+    """<e_i, P e_j> for a law of isometries, and a bound on its Frobenius error.
 
     The interval (0, pi) is cut at the breakpoints of the law, the edges of the basis and the angles that a branch maps
     to edges. On each piece every integrand is smooth. Let m be the measure of angles near grazing whose breakpoints the
@@ -95,7 +99,7 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
     edges = np.unique(
         np.concatenate((edges, preimages(law.branches, np.concatenate(([0.0], breakpoints, [np.pi])), basis.edges)))
     )
-    total = np.zeros((basis.size, basis.size))
+    total, displacement = np.zeros((basis.size, basis.size)), Displacement(basis)
     width, near = np.diff(edges), np.minimum(edges[1:], np.pi - edges[:-1])
     narrow = (width < NARROW) & (width < NARROW * near)
     order, order_narrow = NODES_WIDE, NODES_NARROW
@@ -106,7 +110,17 @@ def branch_matrix(law: Branching, basis: Basis, tolerance: float) -> tuple[Float
         narrow, order_narrow = narrow & tame, NODES_NARROW + 2
     for chosen, nodes in ((narrow, order_narrow), (~narrow, order)):
         _add_pieces(law, basis, edges[:-1][chosen], edges[1:][chosen], nodes, total)
-    return total, omitted * worst
+    for middle in np.array_split(0.5 * (edges[1:] + edges[:-1]), 1 + edges.size * law.evaluations // CHUNK):
+        _add_cuts(law, basis, middle, displacement)
+    return total, omitted * worst + rounding(basis) + displacement.bound()
+
+
+def _add_cuts(law: Branching, basis: Basis, middle: Floats, displacement: Displacement) -> None:
+    probability, outgoing = law.branches(middle)
+    density, source = np.sin(middle), basis.index(middle)
+    for slot in range(outgoing.shape[-1]):
+        image = outgoing[:, slot]
+        displacement.add(middle, image, density * probability[:, slot], source, basis.index(image))
 
 
 def _add_pieces(law: Branching, basis: Basis, low: Floats, high: Floats, order: int, total: Floats) -> None:

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ..bases.angles import clipped_inside
-from ..bases.assembly import add_products, largest_square_sum
+from ..bases.assembly import add_masses, add_products, largest_square_sum
 from ..bases.basis import Basis
+from ..bases.displacement import Displacement
 from ..bases.intervals import between_cuts, edges_inside
 from ..bases.legendre import Legendre
 from ..bases.measure import gauss_on_intervals
@@ -21,7 +22,7 @@ from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.crevice_tail import crevice_nodes, first_crossing
 from ..walls.rectangular import crevice_pieces
-from .method import Budget, MethodName, computed, isometric_rounding
+from .method import Budget, MethodName, computed, rounding
 
 # On a piece of width w, products of two basis functions and a sinusoid vary like exp(n w), with the stiffness n of
 # `_nodes`. The error of a Gauss rule with m nodes, relative to the measure of the piece, is (n w / 2)^(2m) / (2m)!. It
@@ -44,33 +45,38 @@ class IsometryTables:
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         table = cast(IsometryTable, law.isometry_table())
-        symmetric, omitted = table_matrix(table, basis)
+        symmetric, error = table_matrix(table, basis)
         how = "masses and Gauss rules on every piece of the table of isometries, to rounding"
-        found = bounded(symmetric, basis, omitted, how + (", plus unresolved beams" if omitted else ""))
+        found = bounded(symmetric, basis, error, how + (", plus unresolved beams" if table.unresolved else ""))
         return replace(found, unresolved=table.unresolved)
 
 
-def bounded(symmetric: Floats, basis: Basis, omitted: float, how: str) -> KernelMatrix:
-    """The exact matrix with the error bound ``omitted`` plus rounding."""
+def bounded(symmetric: Floats, basis: Basis, error: float, how: str) -> KernelMatrix:
+    """The exact matrix with the error bound ``error``."""
     # The distance of two matrices is at most the sum of their norms.
     furthest = float(np.linalg.norm(symmetric)) + float(np.sqrt(basis.size))
-    return computed(symmetric, basis, "exact", min(omitted + isometric_rounding(basis), furthest), how, "bound")
+    return computed(symmetric, basis, "exact", min(error, furthest), how, "bound")
 
 
 def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
-    """<e_i, P e_j> of a table, and a bound on its Frobenius error apart from rounding.
+    """<e_i, P e_j> of a table, and a bound on its Frobenius error.
 
     Every piece is cut at the edges and at the angles that it maps to edges. For partitions the mass between two cuts is
     elementary; for other bases Gauss rules integrate between the cuts. If a measure m of unresolved rays is
     retroreflected by convention, the matrix has an error of at most 2 m sup |e|^2, as in `branch_matrix`.
     """
-    total = np.zeros((basis.size, basis.size))
-    _add_table(table, basis, total)
+    total, displacement = np.zeros((basis.size, basis.size)), Displacement(basis)
+    _add_table(table, basis, total, displacement)
+    if isinstance(basis, Legendre):
+        # Polynomials are smooth, so only the ends of pieces are cuts.
+        for end, density in ((table.low, table.start), (table.high, table.end)):
+            image = table.images(end)
+            displacement.add(end, image, 0.5 * density, basis.index(end), basis.index(image))
     moved = 2.0 * table.unresolved
     begin = first_crossing(basis)
     for crevice in table.crevices:
         listed = crevice_pieces(crevice.height_to_width, begin).scaled(crevice.fraction)
-        _add_table(listed.in_specular_frame() if crevice.exchanged else listed, basis, total)
+        _add_table(listed.in_specular_frame() if crevice.exchanged else listed, basis, total, displacement)
         theta, specular, retro, omitted = crevice_nodes(crevice.height_to_width, basis)
         moved += 4.0 * crevice.fraction * omitted
         if crevice.exchanged:
@@ -80,18 +86,39 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
         outgoing = np.concatenate([mirror, theta, theta, mirror])
         weight = crevice.fraction * np.concatenate([specular, retro, specular, retro])
         add_products(total, basis, incoming, outgoing, weight)
-    return total, moved * largest_square_sum(basis) if moved else 0.0
+    if table.crevices:
+        # The probabilities of a crevice are continuous, so that only the images of the basis's edges are cuts.
+        add_mirrored_edges(basis, displacement)
+    error = rounding(basis) + displacement.bound()
+    return total, error + (moved * largest_square_sum(basis) if moved else 0.0)
 
 
-def _add_table(table: IsometryTable, basis: Basis, total: Floats) -> None:
+def _add_table(table: IsometryTable, basis: Basis, total: Floats, displacement: Displacement) -> None:
     # Pieces of a table are cut into about as many parts as the basis has cells on them.
     step = max(CHUNK // (2 * basis.edges.size), 1)
     for begin in range(0, table.low.size, step):
         piece, low, high = _cut(table, basis, np.arange(begin, min(begin + step, table.low.size)))
+        middle = 0.5 * (low + high)
+        density, image = table.density(middle, piece), table.images(middle, piece)
+        source, target = basis.index(middle), basis.index(image)
+        if not isinstance(basis, Legendre):
+            displacement.add(middle, image, density, source, target)
         if basis.is_partition:
-            _add_masses(table, basis, piece, low, high, total)
+            # The integral of a sinusoid is its value in the middle times 2 sin(width/2).
+            add_masses(total, basis, source, target, density * np.sin(0.5 * (high - low)))
         else:
             _add_nodes(table, basis, piece, low, high, total)
+
+
+def add_mirrored_edges(basis: Basis, displacement: Displacement) -> None:
+    """Add the cuts of a mirror, whose images of the basis's edges are rounded; polynomials have no edges."""
+    if isinstance(basis, Legendre):
+        return
+    mirror = IsometryTable.flat(1.0)
+    piece, low, high = _cut(mirror, basis, np.arange(mirror.low.size))
+    middle = 0.5 * (low + high)
+    image = mirror.images(middle, piece)
+    displacement.add(middle, image, np.sin(middle), basis.index(middle), basis.index(image))
 
 
 def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[NDArray[np.int64], Floats, Floats]:
@@ -113,16 +140,6 @@ def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[
     return between_cuts(np.concatenate(owner), np.concatenate(cut))
 
 
-def _add_masses(
-    table: IsometryTable, basis: Basis, piece: NDArray[np.int64], low: Floats, high: Floats, total: Floats
-) -> None:
-    middle = 0.5 * (low + high)
-    # The integral of a sinusoid is its value in the middle times 2 sin(width/2).
-    mass = table.density(middle, piece) * np.sin(0.5 * (high - low))
-    image = clipped_inside(table.sign[piece] * middle + table.offset[piece])
-    add_products(total, basis, middle, image, mass)
-
-
 def _add_nodes(
     table: IsometryTable, basis: Basis, piece: NDArray[np.int64], low: Floats, high: Floats, total: Floats
 ) -> None:
@@ -134,7 +151,7 @@ def _add_nodes(
             part = chosen[begin : begin + step]
             angle, weight = gauss_on_intervals(low[part], high[part], int(nodes))
             owner = np.repeat(piece[part], nodes)
-            image = clipped_inside(table.sign[owner] * angle + table.offset[owner])
+            image = table.images(angle, owner)
             add_products(total, basis, angle, image, 0.5 * weight * table.density(angle, owner))
 
 

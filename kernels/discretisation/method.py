@@ -13,6 +13,7 @@ from ...core.checks import Floats
 from ...core.estimates import ErrorKind
 from ...core.rounding import EPS
 from ..bases.basis import Basis
+from ..bases.displacement import node_rounding
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.chunks import Engine
@@ -30,9 +31,6 @@ SEED_WITHOUT_RNG = 0
 # Rounding error of a matrix with n functions, divided by n. Each edge of n cells has a rounding error that moves a
 # fraction of about n eps of a cell's measure; an error of 1.2e-13 was measured for n eps = 1.1e-13.
 ROUNDING = 8.0 * EPS
-# Edges and offsets of isometries are rounded to about one ulp. This moves a fraction of about n eps of each of n cells
-# of a partition, and the n-th Legendre function, whose derivative has norm n, by n eps: n^(3/2) eps in all.
-DISPLACED = EPS
 
 
 def _fixed_source() -> np.random.Generator:
@@ -126,13 +124,8 @@ def computed(
 
 
 def rounding(basis: Basis) -> float:
-    """The rounding error of a matrix in the Frobenius norm."""
-    return ROUNDING * basis.size
-
-
-def isometric_rounding(basis: Basis) -> float:
-    """The rounding error of a matrix of isometries in the Frobenius norm."""
-    return float(ROUNDING * basis.size + DISPLACED * basis.size**1.5)
+    """The rounding error of a matrix in the Frobenius norm: of sums and masses, and of quadrature nodes."""
+    return ROUNDING * basis.size + node_rounding(basis)
 
 
 def until_settled(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:

@@ -23,7 +23,7 @@ from ..laws.structure import lists_branches
 from ..matrices.matrix import KernelMatrix
 from ..walls.simplification import law_of
 from .isometries import Isometries, isometric_matrix
-from .method import Budget, MethodName, Recipe, computed, isometric_rounding
+from .method import Budget, MethodName, Recipe, computed, rounding
 from .scattering import degrees_used, is_scattered, local_values, scattered_matrix, split
 
 # Width and degree of the first panels; panels of width OSCILLATION / n resolve the n polynomials of a Legendre basis.
@@ -103,8 +103,7 @@ class Chain:
 
     def _scattered(self, basis: Basis, budget: Budget) -> KernelMatrix:
         def isometric(laws: Sequence[Law], joint: Basis) -> tuple[Floats, float]:
-            symmetric, omitted = isometric_matrix(law_of(tuple(laws)), joint, budget.tolerance)
-            return symmetric, omitted + isometric_rounding(joint)
+            return isometric_matrix(law_of(tuple(laws)), joint, budget.tolerance)
 
         symmetric, error = scattered_matrix(self.laws, basis, isometric)
         how = "eigenvalues of scatterings between isometries, to rounding, plus omitted breakpoints and polynomials"
@@ -113,7 +112,7 @@ class Chain:
     def _through_panels(self, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error = product_matrix(self.factors, basis, budget)
         how = "what panels leave out between the factors, from their last coefficients, plus the factors' errors"
-        return computed(symmetric, basis, "quadrature", error + isometric_rounding(basis), how)
+        return computed(symmetric, basis, "quadrature", error + rounding(basis), how)
 
 
 @dataclass(frozen=True)

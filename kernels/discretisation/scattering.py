@@ -87,6 +87,16 @@ class JointBasis(Basis):
     def evaluate(self, angle: ArrayLike) -> Floats:
         return np.concatenate((self.first.evaluate(angle), self.polynomials.evaluate(angle)), axis=-1)
 
+    def magnitudes(self) -> tuple[Floats, Floats]:
+        middle = 0.5 * (self._edges[1:] + self._edges[:-1])
+        local, smooth = self.first.magnitudes(), self.polynomials.magnitudes()
+        cells = self.first.index(middle)
+        largest, weighted = (np.hypot(mine[cells], other[0]) for mine, other in zip(local, smooth, strict=True))
+        return largest, weighted
+
+    def derivative_norm(self) -> float:
+        return float(np.hypot(self.first.derivative_norm(), self.polynomials.derivative_norm()))
+
     def coarsened(self) -> None:
         return None
 

@@ -205,6 +205,10 @@ class IsometryTable:
         raised = self.start[piece] * np.sin(high - theta) + self.end[piece] * np.sin(theta - low)
         return np.asarray(raised / np.sin(high - low))
 
+    def images(self, theta: Floats, piece: Whole | slice = slice(None)) -> Floats:
+        """The angle to which the given piece maps each angle."""
+        return clipped_inside(self.sign[piece] * theta + self.offset[piece])
+
     def conditionals(self, theta: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """Probability, sign and offset of the branches at each angle, shape ``theta.shape + (branches,)``.
 
