@@ -70,7 +70,7 @@ def beam_matrices(wall: geo.Wall, names: tuple[str, ...]) -> dict[str, Found] | 
     for name in names:
         exact = ker.discretise(ker.PolygonLaw(wall), BASES[name], "exact")
         other, doubt, _ = traced_matrix(wall, BASES[name], Budget(ROW_TOLERANCE, segments=MOST_ROW_RAYS))
-        way = "adaptive rows"
+        way = "adaptive angles"
         if doubt > ROWS_CONFIRM:
             rays = sampled_matrices(wall, (name,), RANDOM_RAYS)[name]
             other, doubt, way = rays.value, 4.0 * rays.error, rays.source

@@ -497,7 +497,8 @@ def test_moduli_overlap_where_two_intervals_have_points_of_one_modulus(one, othe
 def test_only_indexed_enclosures_may_change_places():
     items = [item(0.25, 0.5, 0.75, 2), item(-0.5, -0.5, -0.5, 1), item(0.5, 0.5, 0.5), item(0.0, 0.125, 0.1875, 4)]
     items.append(item(0.75, 0.75, 0.75, 3))
-    added = ["; may change places with 1, 3", "; may change places with 2", "", "", "; may change places with 2"]
+    with_two = "; the order with 2 is not certain"
+    added = ["; the order with 1, 3 is not certain", with_two, "", "", with_two]
     assert [entry.reason for entry in enclosure._with_ties(items)] == ["why" + more for more in added]
 
 

@@ -1,4 +1,4 @@
-"""Reported errors of adaptive rows and matrices, against the references that tests/reference_rows.py wrote."""
+"""Reported errors of adaptive angles and matrices, against the references that tests/reference_rows.py wrote."""
 
 from __future__ import annotations
 

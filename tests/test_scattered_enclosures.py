@@ -90,7 +90,8 @@ def test_indices_that_may_change_places_say_so():
         return Enclosure(0.5 * (low + high), low, high, "indexed", index, 0.0, "estimate", "reason")
 
     first, second, third = _with_ties([item(0.3, 0.4, 1), item(-0.35, -0.2, 2), item(-0.1, 0.15, 3)])
-    assert first.reason == "reason; may change places with 2" and second.reason == "reason; may change places with 1"
+    assert first.reason == "reason; the order with 2 is not certain"
+    assert second.reason == "reason; the order with 1 is not certain"
     assert third.reason == "reason"
 
 

@@ -76,11 +76,6 @@ class Beams:
     rounding: float
     complete: bool
 
-    @property
-    def leaf_count(self) -> int:
-        """The number of leaves."""
-        return int(self.leaf[-1]) + 1 if len(self.leaf) else 0
-
     def flux(self) -> Floats:
         """Return the fraction of the opening's flux in each piece, shape (pieces,)."""
         return _flux(self.low, self.high, self.sine, self.cosine)

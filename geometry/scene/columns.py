@@ -84,7 +84,6 @@ END_X = 2
 END_Y = 3
 START_CORNER = 4  # 1 if the start is a corner of the wall
 END_CORNER = 5  # 1 if the end is a corner
-CURVE_COLUMNS = 6
 
 # circles and ellipses: columns 6 to 13 are in coordinates with y multiplied by STRETCH, in which the arc is circular.
 NORMAL_X = 6  # unit normal at the start, towards the free side

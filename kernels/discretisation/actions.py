@@ -24,7 +24,7 @@ MOST_VALUES = 2**26
 CHUNK = 2**21
 # Number of breakpoints among the first panel edges; the fraction of the tolerance that the error of one panel may have;
 # and the error that rounding leaves.
-FIRST_BREAKPOINTS, PANEL_FRACTION, SETTLED = 32, 0.02, 1e-15
+FIRST_BREAKPOINTS, PANEL_FRACTION, CONVERGED = 32, 0.02, 1e-15
 # First panel edges near grazing, where angles of reflection vary on the scale of the angle itself.
 GRAZING_EDGES = np.pi * 0.25 ** np.arange(2.0, 9.0)
 
@@ -84,16 +84,16 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
         spent += values * low.size
         # The next round is at most twice as large.
         last = spent + 2 * values * low.size > MOST_VALUES
-        settled = np.zeros(low.size, dtype=np.bool_)
+        converged = np.zeros(low.size, dtype=np.bool_)
         step = max(1, CHUNK // max(values, basis.size**2))
         for start in range(0, low.size, step):
             panels = AnglePanels.between(low[start : start + step], high[start : start + step], basis.size)
             panels.image = law.apply(basis.evaluate, panels.angle)
             difference = panels.differences(basis)
-            done = last | (difference <= max(PANEL_FRACTION * tolerance, SETTLED))
-            settled[start : start + step] = done
+            done = last | (difference <= max(PANEL_FRACTION * tolerance, CONVERGED))
+            converged[start : start + step] = done
             total += panels.selected(done).values(basis).sum(axis=0)
             error += float(difference[done].sum())
-        middle = 0.5 * (low + high)[~settled]
-        low, high = np.append(low[~settled], middle), np.append(middle, high[~settled])
+        middle = 0.5 * (low + high)[~converged]
+        low, high = np.append(low[~converged], middle), np.append(middle, high[~converged])
     return total, error

@@ -22,7 +22,7 @@ from ..laws.involution import InvolutionLaw, jumps_of_map
 from ..laws.law import Law
 from ..laws.least_resistance import LeastResistanceLaw
 from ..matrices.matrix import KernelMatrix
-from .method import Budget, MethodName, computed, rounding, until_settled
+from .method import Budget, MethodName, computed, rounding, until_converged
 
 # Limits on the evaluations of a density and on the points of a map: one or two seconds of work each.
 MOST_DENSITY_VALUES, MOST_MAP_POINTS = 2**25, 2**20
@@ -120,8 +120,8 @@ def density_matrix(law: HasDensity, basis: Basis, tolerance: float) -> tuple[Flo
         order = affordable[0] if affordable else CONDITIONAL_NODES[-1]
         if min(cost) <= MOST_CONDITIONAL_VALUES:
             levels = _conditional_levels(law, basis, edges, outer, order)
-            return until_settled((_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance)
-    return until_settled(_density_levels(law, basis, edges), tolerance)
+            return until_converged((_with_mirror_image(half) for half in levels) if mirrored else levels, tolerance)
+    return until_converged(_density_levels(law, basis, edges), tolerance)
 
 
 def _with_mirror_image(half: Floats) -> Floats:
@@ -207,7 +207,7 @@ def map_matrix(map_angle: Callable[[Floats], Floats], basis: Basis, tolerance: f
     width = np.diff(ends)[:, None] * GRADING
     graded = (ends[:-1, None] + width).ravel(), (ends[1:, None] - width).ravel()
     edges = np.unique(np.concatenate((basis.edges, ends, *graded)))
-    return until_settled(_map_levels(map_angle, basis, edges), tolerance)
+    return until_converged(_map_levels(map_angle, basis, edges), tolerance)
 
 
 def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floats) -> Iterator[Floats]:

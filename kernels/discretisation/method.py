@@ -25,8 +25,8 @@ MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
 # explicit request for quadrature, the time of two million rays.
 MOST_SEGMENTS, QUICK_SEGMENTS = 40_000_000, 4_000_000
 # The error of a traced matrix falls like its segments to the power -ORDER (1.6 to 2.2 on nine walls). Angles that were
-# too coarse are computed again, which costs the factor DONE_AGAIN.
-ORDER, DONE_AGAIN = 1.75, 2.0
+# too coarse are computed again, which costs the factor REPEATED.
+ORDER, REPEATED = 1.75, 2.0
 SEED_WITHOUT_RNG = 0
 # Rounding error of a matrix with n functions, divided by n. Each edge of n cells has a rounding error that moves a
 # fraction of about n eps of a cell's measure; an error of 1.2e-13 was measured for n eps = 1.1e-13.
@@ -68,7 +68,7 @@ class Budget:
 
     def predicted(self, error: float, spent: int) -> float:
         """The predicted error after all segments, from the error after ``spent`` segments."""
-        return float(error / max(self.segments / (DONE_AGAIN * spent), 1.0) ** ORDER)
+        return float(error / max(self.segments / (REPEATED * spent), 1.0) ** ORDER)
 
     def out_of_reach(self, error: float, spent: int) -> bool:
         """Whether the error predicted from ``spent`` segments exceeds the fallback error.
@@ -128,7 +128,7 @@ def rounding(basis: Basis) -> float:
     return ROUNDING * basis.size + node_rounding(basis)
 
 
-def until_settled(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:
+def until_converged(levels: Iterator[Floats], tolerance: float) -> tuple[Floats, float]:
     """The first level that differs from the previous one by at most the tolerance, or the last; and the difference."""
     current = next(levels)
     difference = np.inf

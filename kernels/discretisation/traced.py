@@ -89,7 +89,7 @@ class Traced:
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error, rays = traced_matrix(cast(WallLaw, law).wall, basis, budget)
         how = (
-            f"adaptive rows and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
+            f"adaptive angles and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
             "plus undecided entry points"
         )
         return computed(symmetric, basis, self.name, error + rounding(basis), how)

@@ -37,7 +37,7 @@ CHECK_NODES = 8
 CELL_NODES = 6
 # The mean of a function has converged if two rules differ by at most this fraction of the function's largest value.
 # Each panel is cut into at most MOST_PARTS parts. Means of discontinuous functions do not converge by this.
-SETTLED, MOST_PARTS = 1e-13, 8
+CONVERGED, MOST_PARTS = 1e-13, 8
 # Cells on each panel in the table of the cdf that is sampled.
 CELLS_PER_PANEL = 16
 PROBES = 24
@@ -195,17 +195,17 @@ class DensityLaw(Law):
 
     def _apply_chunk(self, function: AngleFunction, theta: Floats) -> Floats:
         found, height = self._means(function, theta, 1)
-        unsettled, parts = np.arange(theta.size), 2
-        while unsettled.size and parts <= MOST_PARTS:
+        unconverged, parts = np.arange(theta.size), 2
+        while unconverged.size and parts <= MOST_PARTS:
             # Keeps the number of values in memory at its value for the coarsest panels.
             step = max(1, theta.size // parts)
-            starts = range(0, unsettled.size, step)
-            finer = [self._means(function, theta[unsettled[start : start + step]], parts) for start in starts]
+            starts = range(0, unconverged.size, step)
+            finer = [self._means(function, theta[unconverged[start : start + step]], parts) for start in starts]
             value = np.concatenate([one for one, _ in finer])
             height = max(height, *(most for _, most in finer))
-            change = np.abs(value - found[unsettled]).reshape(unsettled.size, -1).max(axis=1, initial=0.0)
-            found[unsettled] = value
-            unsettled = unsettled[change > SETTLED * height]
+            change = np.abs(value - found[unconverged]).reshape(unconverged.size, -1).max(axis=1, initial=0.0)
+            found[unconverged] = value
+            unconverged = unconverged[change > CONVERGED * height]
             parts *= 2
         return found
 

@@ -127,7 +127,7 @@ class IsometryTable:
         return cls.of_pieces(-1.0, np.pi, 0.0, np.pi, fraction, 0.0)
 
     @classmethod
-    def sent_back(cls, fraction: float) -> IsometryTable:
+    def retroreflected(cls, fraction: float) -> IsometryTable:
         """Retroreflection with probability ``fraction``."""
         return cls.of_pieces(1.0, 0.0, 0.0, np.pi, fraction, 0.0)
 

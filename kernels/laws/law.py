@@ -781,7 +781,7 @@ class IsometryLaw(BranchLaw):
 
     def isometry_table(self) -> IsometryTable:
         """The table of this single isometry."""
-        return IsometryTable.sent_back(1.0) if self.retro else IsometryTable.flat(1.0)
+        return IsometryTable.retroreflected(1.0) if self.retro else IsometryTable.flat(1.0)
 
     def __repr__(self) -> str:
         return "retroreflection()" if self.retro else "specular()"

@@ -248,7 +248,7 @@ def enclosed_trial_space(
         found = residuals(law, basis, vectors, values)
     order = np.argsort(-np.abs(found.quotients), kind="stable")
     apart = _first_that_separates(law, found, order, next_value)
-    method = f"trial functions in {basis!r}, residuals by adaptive quadrature in {found.angles_used} rows"
+    method = f"trial functions in {basis!r}, residuals by adaptive quadrature at {found.angles_used} angles"
     # exact if images are computed to rounding or by sums; otherwise the difference of two rules estimates their errors
     exact = isinstance(law, ROUNDED if isinstance(basis, Legendre) else MatrixLaw)
     items = [_enclosed(found, apart, order, position, names, exact) for position in range(len(values))]
@@ -262,7 +262,7 @@ def _with_ties(items: list[Enclosure]) -> tuple[Enclosure, ...]:
         others = [other for other in items if other is not item and other.index is not None]
         tied = [other for other in others if item.index is not None and _moduli_overlap(item, other)]
         words = ", ".join(sorted(str(other.index) for other in tied))
-        listed.append(replace(item, reason=f"{item.reason}; may change places with {words}") if tied else item)
+        listed.append(replace(item, reason=f"{item.reason}; the order with {words} is not certain") if tied else item)
     return tuple(listed)
 
 

@@ -37,8 +37,8 @@ MEAN_TOLERANCE = 1e-8
 NODES_PER_DEGREE = 1.2
 # Additional nodes of the two rules that are compared.
 MORE_NODES = (0, 8)
-# Parts of each panel for these two rules and for a third one, used if the two differ by more than SETTLED.
-PARTS, SETTLED = (1, 1, 4), 1e-12
+# Parts of each panel for these two rules and for a third one, used if the two differ by more than CONVERGED.
+PARTS, CONVERGED = (1, 1, 4), 1e-12
 
 
 @dataclass(frozen=True)
@@ -276,11 +276,11 @@ def _of_rules(means: Callable[..., Floats], functions: int) -> Means:
         first, second = (_in_chunks(partial(means, level=level), theta, functions) for level in (0, 1))
         error = _largest(second - first)
         # two similar rules may both miss a breakpoint: a much finer rule detects it
-        unsettled = np.flatnonzero(error > SETTLED)
-        if unsettled.size:
-            finest = _in_chunks(partial(means, level=2), theta[unsettled], functions)
-            error[unsettled] = _largest(finest - first[unsettled]) + _largest(finest - second[unsettled])
-            second[unsettled] = finest
+        unconverged = np.flatnonzero(error > CONVERGED)
+        if unconverged.size:
+            finest = _in_chunks(partial(means, level=2), theta[unconverged], functions)
+            error[unconverged] = _largest(finest - first[unconverged]) + _largest(finest - second[unconverged])
+            second[unconverged] = finest
         return second, error
 
     return rule

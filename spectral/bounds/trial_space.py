@@ -31,7 +31,7 @@ MOST_LEVELS, MOST_PANELS = 12, {True: 60, False: 200}
 EXTRA = 2
 # Additional functions of one parity in the iteration.
 GUARD = 12
-MOST_ITERATIONS, SETTLED = 60, 0.02
+MOST_ITERATIONS, CONVERGED = 60, 0.02
 PARITIES: dict[int, Parity] = {1: "even", -1: "odd", 0: "none"}
 # Error of conditional expectations as a fraction of the wanted residual.
 MEAN_FRACTION = 0.03
@@ -84,7 +84,7 @@ def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = M
     while True:
         level = _Level(law, edges, mirrored, MEAN_FRACTION * goal)
         with one_blas_thread():
-            values, vectors, parity = level.leading(k + EXTRA, SETTLED * goal)
+            values, vectors, parity = level.leading(k + EXTRA, CONVERGED * goal)
         squares = level.squared_residuals(values, vectors, parity)
         goal = np.sqrt(tolerance * _room(values, k))
         joint = float(np.sqrt(squares[:, :k].sum()))

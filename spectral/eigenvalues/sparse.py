@@ -25,7 +25,7 @@ GUARD = 12
 # Relative distance of the shift from the bound of the largest eigenvalue. A solve then loses half of the digits only;
 # Rayleigh-Ritz separates values closer than this.
 SHIFT = 1e-9
-MOST_ITERATIONS, SETTLED = 300, 64.0
+MOST_ITERATIONS, CONVERGED = 300, 64.0
 # Width of an acceptable gap below the k-th value, as a fraction of the widest.
 WIDE_GAP = 0.25
 # Least width of the gap of a reliable count, in margins of rounding.
@@ -193,7 +193,7 @@ def _block_iteration(
         number = k + int(np.argmax(drops >= WIDE_GAP * drops.max()))
         leading = block[:, :number]
         worst = float(np.linalg.norm(matrix @ leading - leading * values[:number], axis=0).max())
-        if worst <= SETTLED * EPS:
+        if worst <= CONVERGED * EPS:
             return values, block, number, float(drops[number - k])
     if worst <= 1e-3 * float(drops[number - k]):
         return values, block, number, float(drops[number - k])

@@ -30,8 +30,8 @@ TURN, HALVINGS = 0.1, 60
 FIRST_PANELS, QUADRATURE_TOLERANCE, MOST_RAYS, NARROWEST = 8, 1e-9, 20_000, 1e-13
 # Shifted lattices for integrands with too many changes of itinerary; their spread is the error.
 LATTICES, LATTICE_POINTS = 8, 2048
-# If the row sums change by less than SETTLED between three powers of ten, and the scale is known, no more are needed.
-SETTLED, FEWEST_ANGLES = 2e-8, 3
+# If the row sums change by less than CONVERGED between three powers of ten, and the scale is known, no more are needed.
+CONVERGED, FEWEST_ANGLES = 2e-8, 3
 # No limit has an eigenvalue above 1, the norm of a law. If one exceeds 1 by more than its error, the limit is unknown.
 NORM, UNKNOWN = 1.0, 1.0
 SWAP = np.array([[0.0, 1.0], [1.0, 0.0]])
@@ -181,8 +181,9 @@ def _limit(law: Law, where: Grazed) -> GrazingLimit:
     limits: list[list[tuple[Floats, float]]] = []
     for angle in (1.0 if where.scale is None else where.scale) * ANGLES:
         limits.append([_at_angle(law, angle, end, where.parts[end]) for end in (0, 1)])
-        settled = len(limits) >= FEWEST_ANGLES and where.scale is not None
-        if settled and all(np.ptp([row[end][0].sum() for row in limits[-FEWEST_ANGLES:]]) <= SETTLED for end in (0, 1)):
+        converged = len(limits) >= FEWEST_ANGLES and where.scale is not None
+        last = limits[-FEWEST_ANGLES:]
+        if converged and all(np.ptp([row[end][0].sum() for row in last]) <= CONVERGED for end in (0, 1)):
             break
     found = _extrapolated(limits)
     matrix = found.matrix + where.flat * SWAP
@@ -208,8 +209,8 @@ def _extrapolated(limits: list[list[tuple[Floats, float]]]) -> GrazingLimit:
     error = float(np.max(moved) + noise[-3:].max())
     # entries whose change decreases from one power of ten to the next converge; alternating ones do not
     steps = np.abs(np.diff(values[-3:], axis=0)).max(axis=(1, 2))
-    unsettled = float(steps[1]) if steps[1] < 0.5 * steps[0] else float(np.ptp(values, axis=0).max())
-    return GrazingLimit(matrix * scale[:, None], error, max(error, unsettled))
+    unconverged = float(steps[1]) if steps[1] < 0.5 * steps[0] else float(np.ptp(values, axis=0).max())
+    return GrazingLimit(matrix * scale[:, None], error, max(error, unconverged))
 
 
 def _aitken(first: Floats, second: Floats, third: Floats, noise: float) -> Floats:
@@ -246,7 +247,7 @@ def _entry_integral(function: Callable[[Floats], Floats], first: float, last: fl
     """The integral over entry points in (first, last) of a piecewise analytic function, and its error."""
     edges = np.linspace(first, last, FIRST_PANELS + 1)
     low, high = edges[:-1], edges[1:]
-    total, settled, rays = np.zeros(2), 0.0, 0
+    total, converged, rays = np.zeros(2), 0.0, 0
     while low.size:
         half = 0.5 * (high - low)
         x = (0.5 * (low + high))[:, None] + half[:, None] * NODES
@@ -258,16 +259,16 @@ def _entry_integral(function: Callable[[Floats], Floats], first: float, last: fl
         if rays > MOST_RAYS:
             done[:] = True
         total = total + integral[done].sum(axis=0)
-        settled += float(error[done].sum())
+        converged += float(error[done].sum())
         middle = 0.5 * (low + high)
         low, high = np.concatenate([low[~done], middle[~done]]), np.concatenate([middle[~done], high[~done]])
-    if settled <= 1e-6:
-        return total, settled
-    return _lattice_integral(function, first, last, total, settled)
+    if converged <= 1e-6:
+        return total, converged
+    return _lattice_integral(function, first, last, total, converged)
 
 
 def _lattice_integral(
-    function: Callable[[Floats], Floats], first: float, last: float, total: Floats, settled: float
+    function: Callable[[Floats], Floats], first: float, last: float, total: Floats, converged: float
 ) -> tuple[Floats, float]:
     """The integral by shifted lattices, if their spread is less than the error of the given total."""
     shift = (np.arange(LATTICES) + 0.5) / LATTICES * np.sqrt(2.0) % 1.0
@@ -275,4 +276,4 @@ def _lattice_integral(
     values = function(entry_inside(first + (last - first) * points.ravel()))
     means = (last - first) * values.reshape(LATTICES, LATTICE_POINTS, 2).mean(axis=1)
     spread = 2.0 * float(means.sum(axis=1).std(ddof=1)) / np.sqrt(LATTICES)
-    return (means.mean(axis=0), spread) if spread < settled else (total, settled)
+    return (means.mean(axis=0), spread) if spread < converged else (total, converged)

@@ -121,7 +121,7 @@ def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Savi
         what = f"{plan.pieces_left_out} flat tops and {plan.hollows - 1} other hollows"
         traced(what, followed, without_formulas(scene_in_one(wall)))
     if plan.distinct_hollows < plan.hollows and wall.is_polygonal:
-        found.append(_alike(name, wall, repeats))
+        found.append(_equal_hollows(name, wall, repeats))
     if WallLaw(wall).exact_law is not None or WallLaw(wall).closed_form is not None:
         found.append(_tracing(name, wall, rays, repeats))
     if plan.mirror_symmetric and len(wall.pieces) <= MIRROR_PIECES:
@@ -166,7 +166,7 @@ def largest_difference(first: Trace, second: Trace) -> float:
     return float(error[most]) if gone.mean() > 0.999 else float("inf")
 
 
-def _alike(name: str, wall: Wall, repeats: int) -> Saving:
+def _equal_hollows(name: str, wall: Wall, repeats: int) -> Saving:
     """Beams of every hollow compared with beams of the different hollows only."""
     plan = wall.plan()
     parts = [_alone(wall, number) for number in range(len(wall.hollows))]

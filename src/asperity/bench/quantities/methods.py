@@ -90,8 +90,8 @@ def beam_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
 def adaptive_matrix(wall: Wall, basis: Basis, budget: float) -> KernelMatrix:
     """By adaptive conditional distributions to the tolerance 1/budget, for every wall."""
     symmetric, error, rays = traced_matrix(wall, basis, Budget(1.0 / budget))
-    how = frobenius_error(error, "estimate", f"adaptive rows, {rays} rays")
-    return KernelMatrix(symmetric, basis, how, method="adaptive rows")
+    how = frobenius_error(error, "estimate", f"adaptive angles, {rays} rays")
+    return KernelMatrix(symmetric, basis, how, method="adaptive angles")
 
 
 def qmc_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generator) -> KernelMatrix:
@@ -123,7 +123,7 @@ def auto_matrix(wall: Wall, basis: Basis, budget: float, rng: np.random.Generato
 AUTO = MatrixMethod("auto", auto_matrix, "1/tolerance", (1e2, 1e6), (1e2, 1e3, 1e4, 1e6, 1e8), True)
 CLOSED_FORM = MatrixMethod("closed form", closed_form_matrix, "-", (1.0,), (1.0,))
 BEAMS = MatrixMethod("beams", beam_matrix, "beams a hollow", (1e3, 1e4), (1e2, 1e3, 1e4, 1e5))
-ROWS = MatrixMethod("adaptive rows", adaptive_matrix, "1/tolerance", (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
+ROWS = MatrixMethod("adaptive angles", adaptive_matrix, "1/tolerance", (1e2, 1e3), (1e2, 1e3, 1e4, 1e6, 1e8))
 QMC = MatrixMethod("randomised QMC", qmc_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
 STRATIFIED = MatrixMethod("stratified", stratified_matrix, "rays", QUICK_RAYS, RAYS, True, JUMPING_ORDER)
 MONTE_CARLO = MatrixMethod("Monte Carlo", monte_carlo_matrix, "rays", QUICK_RAYS, RAYS, True, RANDOM_ORDER)

@@ -88,7 +88,7 @@ def test_rows_of_equal_hollows_and_flat_tops_are_those_of_one_hollow() -> None:
 def test_discretise_takes_adaptive_rows_for_a_curved_wall_of_few_pieces() -> None:
     found = ker.discretise(ker.WallLaw(geo.dispersing_arcs(0.5)), ker.Legendre(2), tolerance=1e-5)
     assert found.method == "quadrature" and found.tolerance_met
-    assert "adaptive rows" in found.error.method
+    assert "adaptive angles" in found.error.method
     assert float(np.linalg.norm(found.symmetric - found.symmetric.T)) <= float(found.error)
 
 
