@@ -693,6 +693,7 @@ def _orthonormal(low: Any, high: Any, degree: int) -> Floats:
 def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
     """The expression, the kind of its basis, the basis and the method of a seed."""
     rng = np.random.default_rng([seed, 16])
+    dearest = DEAREST if seed < FIRST_NARROW else DEAREST // 2
     while True:
         depth, turned = int(rng.integers(1, 4)), bool(rng.random() < 0.25)
         try:
@@ -702,7 +703,7 @@ def drawn(seed: int) -> tuple[Expression, str, ker.Basis, str]:
             continue
         if rng.random() < 0.1:
             expression = expression.turned()
-        if expression.cost <= DEAREST and len(expression.words) <= MOST_WORDS:
+        if expression.cost <= dearest and len(expression.words) <= MOST_WORDS:
             break
     kind, basis = narrow_basis(rng) if seed >= FIRST_NARROW else random_basis(rng)
     method = rng.choice(["auto", "quadrature", "exact", "qmc", "monte-carlo"], p=[0.6, 0.2, 0.08, 0.04, 0.08])
