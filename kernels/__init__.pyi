@@ -13,10 +13,13 @@ from .bases.measure import SINE_SQUARED as SINE_SQUARED
 from .bases.measure import AngularMeasure as AngularMeasure
 from .bases.panels import Panels as Panels
 from .bases.tensor import TensorBasis as TensorBasis
-from .collisions.billiard import BilliardRecord as BilliardRecord
-from .collisions.billiard import Reflector as Reflector
-from .collisions.billiard import play as play
+from .billiards.billiard import BilliardRecord as BilliardRecord
+from .billiards.billiard import Reflector as Reflector
+from .billiards.billiard import play as play
+from .billiards.lyapunov import lyapunov_exponent as lyapunov_exponent
 from .collisions.collision_law import CollisionLaw as CollisionLaw
+from .collisions.collision_law import no_slip as no_slip
+from .collisions.collision_law import smooth as smooth
 from .collisions.limit_plot import draw_limit as draw_limit
 from .collisions.satellite_law import SatelliteLaw as SatelliteLaw
 from .collisions.small_scale_limit import LimitStudy as LimitStudy

@@ -23,6 +23,7 @@ BINS, MATRIX = ker.Bins(4), ker.discretise(LAW, ker.Bins(4))
 SAMPLED = ker.discretise(LAW, BINS, "monte-carlo", samples=64, rng=0)
 COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DISK, 0.01)
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5]), geo.Container.strip()
+CIRCLE = geo.Container.circle()
 VELOCITY, POSITION = [[0.2, -1.0, 0.1]], [[0.3, 0.1]]
 PROBLEM = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
 METHOD = spec.WorkMethod("b", float)
@@ -137,6 +138,14 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "limit_study": (ker.limit_study, {"disk": DISK, "wall": TEETH, "scales": [0.1, 0.05, 0.02], "rng": 0, "psi": 1.2,
                                       "spacing": None, "limit": None, "samples": (2, 2, 2), "repetitions": 2}),
     "load_matrix": (ker.load_matrix, {"path": "no.npz"}),
+    "no_slip": (ker.no_slip, {"disk": DISK}),
+    "smooth": (ker.smooth, {"disk": DISK}),
+    "Container.from_curves": (geo.Container.from_curves, {"curves": CIRCLE.curves}),
+    "Container.stadium": (geo.Container.stadium, {"length": 1.0, "radius": 1.0}),
+    "Container.sinai": (geo.Container.sinai, {"side": 1.0, "radius": 0.2}),
+    "Container.ellipse": (geo.Container.ellipse, {"a": 1.0, "b": 0.2}),
+    "lyapunov_exponent": (ker.lyapunov_exponent, {"container": CIRCLE, "laws": ker.smooth(DISK), "collisions": 64,
+                                                  "trajectories": 8, "rng": 0}),
     "no_slip_matrix": (ker.no_slip_matrix, {"disk": DISK}),
     "smooth_matrix": (ker.smooth_matrix, {"disk": DISK}),
     "play": (ker.play, {"container": STRIP, "laws": COLLISION, "position": [[0.0, 0.0]], "velocity": [[1.0, 1.0, 0.0]],

@@ -1,1 +1,1 @@
-"""Regions with straight walls in which the centre of a disk moves."""
+"""Regions in which the centre of a disk moves, and their boundaries."""

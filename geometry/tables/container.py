@@ -1,15 +1,25 @@
-"""The convex region between straight walls in which the centre of a disk moves."""
+"""The region in which the centre of a disk moves: between straight walls, or inside curves."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, frozen, number_between, positive_number
 from ...core.errors import InputError
+from ...core.kinds import explained
+from ..curves.arc import Arc
+from ..curves.curve import Curve
+from ..curves.segment import Segment
+from . import boundary
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Tolerance for the length 1 of the normals, which have a few rounding errors.
 UNIT_TOLERANCE = 1e-12
@@ -17,22 +27,26 @@ UNIT_TOLERANCE = 1e-12
 
 @dataclass(frozen=True)
 class Container:
-    """The convex region {x : (x - p_i).n_i >= 0 for all i} in which the centre of the disk moves.
+    """The region in which the centre of the disk moves: {x : (x - p_i).n_i >= 0 for all i}, and inside of curves.
 
     The walls bound the centre, not the rim. For example, the centre of a disk of radius 1 between two plates at
-    distance 3 moves in ``Container.strip(1.0)``.
+    distance 3 moves in ``Container.strip(1.0)``, and the centre of a disk of radius 1 in a round room of radius 4 moves
+    in ``Container.circle(3.0)``. Walls are numbered: first the straight walls without ends, then the curves.
 
     Parameters
     ----------
     points : array_like, shape (k, 2)
-        A point p_i on every wall.
+        A point p_i on every straight wall without ends.
     normals : array_like, shape (k, 2)
-        The unit normal n_i of every wall, into the region.
+        The unit normal n_i of every such wall, into the region.
+    curves : sequence of Segment and Arc, optional
+        Closed loops with the region on their left: at most one outer loop, counterclockwise, and obstacles, clockwise.
 
     Raises
     ------
     InputError
-        If a shape is wrong or a normal does not have length 1.
+        If a shape is wrong, a normal does not have length 1, there is no wall, or the curves are no closed loops, cross
+        themselves or each other, or run with the region on their right.
 
     Examples
     --------
@@ -41,22 +55,108 @@ class Container:
     [[0.0, 1.0], [-1.0, 0.0], [0.6, -0.8]]
     >>> room.contains([[3.0, 1.0], [1.0, 1.0]]).tolist()
     [True, False]
+
+    A channel with a round pillar:
+
+    >>> from math import pi
+    >>> pillar = Arc((0.0, 0.5), 0.25, 2 * pi, 0.0)
+    >>> channel = Container([[0, 0], [0, 1]], [[0, 1], [0, -1]], [pillar])
+    >>> channel.contains([[0.0, 0.5], [5.0, 0.5], [0.0, 2.0]]).tolist()
+    [False, True, False]
     """
 
     points: Floats
     normals: Floats
+    curves: tuple[Segment | Arc, ...] = ()
 
     def __post_init__(self) -> None:
         points, normals = finite_array("points", self.points), finite_array("normals", self.normals)
-        if points.ndim != 2 or points.shape[1] != 2 or points.shape != normals.shape or not len(points):
+        curves = boundary.checked_curves(self.curves)
+        if points.ndim != 2 or points.shape[1] != 2 or points.shape != normals.shape or not len(points) + len(curves):
             raise InputError(
                 f"points, normals: expected two arrays of shape (k, 2), got {points.shape}, {normals.shape}"
             )
         lengths = np.hypot(normals[:, 0], normals[:, 1])
         if np.any(np.abs(lengths - 1.0) > UNIT_TOLERANCE):
             raise InputError(f"normals: expected unit vectors, got lengths {lengths.tolist()}")
+        if curves:
+            boundary.check_nesting(curves, boundary.loops_of(curves))
         object.__setattr__(self, "points", frozen(points))
         object.__setattr__(self, "normals", frozen(normals))
+        object.__setattr__(self, "curves", curves)
+
+    @classmethod
+    @explained
+    def from_curves(cls, curves: Sequence[Curve]) -> Container:
+        """Return the inside of closed loops of segments and arcs, which run with the inside on their left.
+
+        The outer loop is counterclockwise, and each loop around an obstacle clockwise. Every curve is a wall of its
+        own, which can have its own law. The order of the loops is free.
+
+        Parameters
+        ----------
+        curves : sequence of Segment and Arc
+            The curves, on which the centre of the disk is reflected.
+
+        Raises
+        ------
+        InputError
+            If there is no curve, a curve is a Bezier curve, or the curves do not form loops as described.
+
+        Examples
+        --------
+        Half a disk:
+
+        >>> from math import pi
+        >>> half = Container.from_curves([Segment((-1, 0), (1, 0)), Arc((0, 0), 1.0, 0.0, pi)])
+        >>> half.area == pi / 2, half.perimeter == 2 + pi
+        (True, True)
+        """
+        if not len(tuple(curves)):
+            raise InputError("curves: expected at least one curve, got none")
+        return cls(np.empty((0, 2)), np.empty((0, 2)), boundary.checked_curves(curves))
+
+    @classmethod
+    def circle(cls, radius: float = 1.0) -> Container:
+        """Return the disk of this radius around the origin; its one wall is wall 0."""
+        return cls.ellipse(radius, radius)
+
+    @classmethod
+    def ellipse(cls, a: float, b: float) -> Container:
+        """Return the ellipse with semi-axes ``a`` along x1 and ``b`` along x2 around the origin; one wall."""
+        axes = positive_number("a", a), positive_number("b", b)
+        return cls.from_curves([Arc((0.0, 0.0), axes, 0.0, 2.0 * math.pi)])
+
+    @classmethod
+    def stadium(cls, length: float = 2.0, radius: float = 1.0) -> Container:
+        """Return the stadium: a rectangle of this length and height 2 radius between two half disks.
+
+        Walls 0 to 3 are the lower side, the right half circle, the upper side and the left half circle. The origin is
+        the centre. Source: L. A. Bunimovich (1979).
+        """
+        half, r = 0.5 * positive_number("length", length), positive_number("radius", radius)
+        corners = [(-half, -r), (half, -r), (half, r), (-half, r)]
+        right = Arc((half, 0.0), r, -0.5 * math.pi, 0.5 * math.pi).pinned(corners[1], corners[2])
+        left = Arc((-half, 0.0), r, 0.5 * math.pi, 1.5 * math.pi).pinned(corners[3], corners[0])
+        return cls.from_curves([Segment(*corners[:2]), right, Segment(*corners[2:]), left])
+
+    @classmethod
+    def sinai(cls, side: float = 1.0, radius: float = 0.25) -> Container:
+        """Return the Sinai table: a square around the origin without the disk of this radius in its middle.
+
+        Walls 0 to 3 are the lower, right, upper and left side, wall 4 is the circle. Unfolded by reflections, it is the
+        periodic Lorentz gas on the square lattice. Source: Ya. G. Sinai (1970).
+
+        Raises
+        ------
+        InputError
+            If ``radius`` is not in (0, side/2).
+        """
+        half = 0.5 * positive_number("side", side)
+        r = number_between("radius", radius, 0.0, half)
+        corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
+        sides = [Segment(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+        return cls.from_curves([*sides, Arc((0.0, 0.0), r, 2.0 * math.pi, 0.0)])
 
     @classmethod
     def strip(cls, gap: float = 1.0) -> Container:
@@ -99,12 +199,100 @@ class Container:
         return frozen(np.stack([self.normals[:, 1], -self.normals[:, 0]], axis=1))
 
     def distances(self, position: ArrayLike) -> Floats:
-        """Return the signed distances (n, k) of points (n, 2) from the walls, negative outside."""
+        """Return the signed distances (n, k) of points (n, 2) from the endless straight walls, negative outside."""
         positions = finite_array("position", position)
         if positions.ndim != 2 or positions.shape[1] != 2:
             raise InputError(f"position: expected shape (n, 2), got {positions.shape}")
         return np.asarray(np.einsum("nki,ki->nk", positions[:, None, :] - self.points, self.normals))
 
+    @property
+    def wall_count(self) -> int:
+        """The number of walls: straight walls without ends, and curves."""
+        return len(self.points) + len(self.curves)
+
+    @property
+    def area(self) -> float:
+        """The area, of a container of curves with an outer loop.
+
+        Raises
+        ------
+        InputError
+            If the container has straight walls without ends, or no outer loop.
+        """
+        self._check_closed()
+        return math.fsum(boundary.signed_area(curve) for curve in self.curves)
+
+    @property
+    def perimeter(self) -> float:
+        """The length of all curves; a disk with specular reflection flies pi area/perimeter on average (Santalo)."""
+        self._check_closed()
+        return math.fsum(curve.length for curve in self.curves)
+
+    def _check_closed(self) -> None:
+        if len(self.points) or not self._has_outer_loop:
+            raise InputError("container: expected one from curves with an outer loop, such as Container.circle()")
+
+    @property
+    def _has_outer_loop(self) -> bool:
+        areas = (sum(boundary.signed_area(self.curves[k]) for k in loop) for loop in boundary.loops_of(self.curves))
+        return bool(self.curves) and any(area > 0.0 for area in areas)
+
+    @explained
     def contains(self, position: ArrayLike) -> NDArray[np.bool_]:
         """Return whether each of the points (n, 2) is inside or on the boundary."""
-        return np.asarray(np.all(self.distances(position) >= 0.0, axis=1))
+        inside = np.all(self.distances(position) >= 0.0, axis=1)
+        if self.curves:
+            points = finite_array("position", position)
+            inside = inside & boundary.on_the_left(self.curves, points, self._has_outer_loop)
+        return np.asarray(inside)
+
+    def next_wall(
+        self, position: Floats, velocity: Floats, last: NDArray[np.int64]
+    ) -> tuple[Floats, NDArray[np.int64]]:
+        """Return the time to the next wall and its index, inf and -1 if there is none.
+
+        Parameters
+        ----------
+        position : array, shape (n, 2)
+            Points inside or on the boundary.
+        velocity : array, shape (n, 2) or (n, 3)
+            The first two columns count.
+        last : array of int, shape (n,)
+            The wall on which a point is, -1 if on none. A straight wall and an obstacle cannot be the next one too.
+            A centre that meets two walls at once, in a corner, meets one of them first and the other after no time.
+        """
+        times = np.full((len(position), self.wall_count), np.inf)
+        straight = len(self.points)
+        if straight:
+            approach = -(velocity[:, :2] @ self.normals.T)
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                flight = np.maximum(self.distances(position), 0.0) / approach
+            own = last[:, None] == np.arange(straight)
+            times[:, :straight] = np.where((approach > 0.0) & ~own & np.isfinite(flight), flight, np.inf)
+        slack = boundary.SLACK * boundary.size_of(self.curves) if self.curves else 0.0
+        for k, curve in enumerate(self.curves, straight):
+            times[:, k] = boundary.arrival(curve, position, velocity, last == k, slack)
+        wall = np.argmin(times, axis=1)
+        first = times[np.arange(len(position)), wall]
+        return first, np.where(np.isfinite(first), wall, -1)
+
+    def touch(self, wall: int, position: Floats) -> boundary.Touch:
+        """Return points (n, 2) of a wall without their rounding error, with unit tangents and curvatures there.
+
+        The inside is on the left of the tangent; seen with the wall below, the tangent points to the right.
+        """
+        if wall >= len(self.points):
+            return boundary.touch(self.curves[wall - len(self.points)], position)
+        return boundary.Touch(position, np.broadcast_to(self.tangents[wall], position.shape), np.zeros(len(position)))
+
+    def draw(self, ax: Axes | None = None) -> Axes:
+        """Draw the boundary into matplotlib Axes, new ones by default, and return them."""
+        from matplotlib import pyplot
+
+        axes = pyplot.subplots()[1] if ax is None else ax
+        for curve in self.curves:
+            axes.plot(*curve.flattened(1e-4 * boundary.size_of(self.curves)).T, color="black", linewidth=1.2)
+        for point, tangent in zip(self.points, self.tangents, strict=True):
+            axes.axline(tuple(point), tuple(point + tangent), color="black", linewidth=1.2)
+        axes.set_aspect("equal")
+        return axes

@@ -16,7 +16,7 @@ from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
-from ..laws.law import Combination, Law
+from ..laws.law import Combination, Law, retroreflection, specular
 from ..walls.isometry_branches import isometries
 from .velocity_matrices import isometry_matrix
 
@@ -194,3 +194,33 @@ class CollisionLaw:
 
 def _with_psi(function: VelocityFunction, psi: Floats, theta: Floats) -> Floats:
     return function(theta, psi)
+
+
+@explained
+def no_slip(disk: Disk) -> CollisionLaw:
+    """The no-slip collision law, K of retroreflection: it reverses v2 and the slip v1 + omega.
+
+    Source: Rudzis 2022, eq. 2.25; its velocity matrix is `no_slip_matrix`.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> (ker.no_slip(geo.Disk(1.0, 1.0)).sample([1.0, -1.0, 0.0]).round(12) + 0.0).tolist()
+    [0.0, 1.0, -1.0]
+    """
+    return CollisionLaw(retroreflection(), disk)
+
+
+@explained
+def smooth(disk: Disk) -> CollisionLaw:
+    """The smooth collision law, K of specular reflection: it reverses v2, and leaves v1 and omega unchanged.
+
+    Source: Rudzis 2022, eq. 2.25; its velocity matrix is `smooth_matrix`.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> (ker.smooth(geo.Disk(1.0, 1.0)).sample([1.0, -1.0, 3.0]).round(12) + 0.0).tolist()
+    [1.0, 1.0, 3.0]
+    """
+    return CollisionLaw(specular(), disk)

@@ -1,4 +1,4 @@
-"""The motion of disks between rough walls, with any collision law, deterministic or random."""
+"""The motion of a disk in a container, with any collision law of its walls, deterministic or random."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
+from ..laws.law import Law
 
 if TYPE_CHECKING:
     from ...geometry import Container, Disk
@@ -91,13 +92,13 @@ def play(
     container : Container
         The region of the centres.
     laws : Reflector or sequence of Reflector
-        One law for all walls or one per wall, all for the same disk: ``CollisionLaw(retroreflection(), disk)`` for a
-        no-slip wall, ``CollisionLaw.from_wall(wall, disk)`` for a rough wall. Each law is applied in coordinates in
-        which its wall is below the disk.
-    position : array_like, shape (n, 2)
+        One law for all walls or one per wall, all for the same disk: ``no_slip(disk)``, ``smooth(disk)``,
+        ``CollisionLaw.from_wall(wall, disk)`` for a rough wall, ``CollisionLaw(law, disk)`` for a law of angles. Each
+        law is applied in coordinates in which its wall is below the disk.
+    position : array_like, shape (n, 2) or (2,)
         Initial centres, inside the container.
-    velocity : array_like, shape (n, 3)
-        Initial (v1, v2, omega).
+    velocity : array_like, shape (n, 3) or (3,)
+        Initial (v1, v2, omega). One position is repeated for many velocities, and the other way round.
     collisions : int
         Number of collisions per disk.
     rng : None, int or numpy.random.Generator
@@ -109,7 +110,11 @@ def play(
     Raises
     ------
     InputError
-        If a shape is wrong, a centre is outside, or the laws do not match the walls.
+        If a shape is wrong, a centre is outside, a law is one of angles, or the laws do not match the walls.
+
+    Notes
+    -----
+    A curved wall is curved on a scale far larger than its roughness: the law acts as on the tangent of the wall.
 
     Examples
     --------
@@ -117,35 +122,29 @@ def play(
 
     >>> import numpy as np
     >>> from asperity import geometry as geo, kernels as ker
-    >>> no_slip = ker.CollisionLaw(ker.retroreflection(), geo.Disk(1.0, 1.0))
-    >>> record = ker.play(geo.Container.strip(), no_slip, [[0.0, 0.0]], [[1.0, 1.0, 0.0]], 4, np.random.default_rng(0))
+    >>> no_slip = ker.no_slip(geo.Disk(1.0, 1.0))
+    >>> record = ker.play(geo.Container.strip(), no_slip, [0.0, 0.0], [1.0, 1.0, 0.0], 4)
     >>> record.position[:, 0, 0].round(12).tolist()
     [0.0, 1.0, 1.0, 0.0, 0.0]
+
+    A smooth disk in a round room, from wall to wall along a square:
+
+    >>> record = ker.play(geo.Container.circle(1.0), ker.smooth(geo.Disk()), [1.0, 0.0], [-1.0, 1.0, 0.0], 4)
+    >>> (record.position[1:, 0].round(12) + 0.0).tolist()
+    [[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]]
     """
     rng = generator(rng)
     whole_number("collisions", collisions, 1)
     check_memory("collisions", "the record", 8 * collisions)
-    walls = len(container.normals)
-    each = list(laws) if isinstance(laws, Sequence) else [laws] * walls
-    if not all(isinstance(law, Reflector) for law in each):
-        raise InputError(f"laws: expected collision laws such as ker.CollisionLaw(law, disk), got {shortened(laws)}")
-    if len(each) != walls:
-        raise InputError(f"laws: expected one law or one for each of the {walls} walls, got {len(each)}")
+    each = laws_of_walls(container, laws)
     disk = each[0].disk
-    if any(law.disk != disk for law in each):
-        raise InputError("laws: expected laws of the same disk")
-    located, moving = finite_array("position", position).copy(), finite_array("velocity", velocity).copy()
-    inside = container.contains(located)
-    if moving.shape != (len(located), 3):
-        raise InputError(f"velocity: expected shape ({len(located)}, 3) for (v1, v2, omega), got {moving.shape}")
-    if not inside.all():
-        raise InputError(f"position: expected centres in the container, got {located[int(np.argmin(inside))].tolist()}")
+    located, moving = _starts(container, position, velocity)
     n = len(located)
     time, angle, last = np.zeros(n), np.zeros(n), np.full(n, -1)
     made = np.zeros(n, dtype=np.int64)
     states = [(time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy())]
     for _ in range(collisions):
-        flight, wall = _next_wall(container, located, moving, last)
+        flight, wall = container.next_wall(located, moving, last)
         hit = wall >= 0
         made[hit] += 1
         step = np.where(hit, flight, 0.0)
@@ -153,9 +152,11 @@ def play(
         located = located + moving[:, :2] * step[:, None]
         last = np.where(hit, wall, last)
         for k, law in enumerate(each):
-            here = wall == k
-            if here.any():
-                moving[here] = _collide(container, k, law, moving[here], rng)
+            here = np.flatnonzero(wall == k)
+            if here.size:
+                point = container.touch(k, located[here])
+                located[here] = point.position
+                moving[here] = _collide(point.tangent, law, moving[here], rng)
         states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
     columns = [np.stack(column) for column in zip(*states, strict=True)]
     for array in (*columns, made):
@@ -163,25 +164,43 @@ def play(
     return BilliardRecord(disk, columns[0], columns[1], columns[2], columns[3], columns[4].astype(np.int64), made)
 
 
-def _next_wall(
-    container: Container, located: Floats, moving: Floats, last: NDArray[np.int64]
-) -> tuple[Floats, NDArray[np.int64]]:
-    """Time to the next wall and its index, -1 if there is none."""
-    approach = moving[:, :2] @ container.normals.T
-    distance = np.maximum(container.distances(located), 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        times = np.where(approach < 0.0, distance / -approach, np.inf)
-    # a disk that leaves a straight wall cannot meet the same wall next
-    rows = np.flatnonzero(last >= 0)
-    times[rows, last[rows]] = np.inf
-    wall = np.argmin(times, axis=1)
-    first = times[np.arange(len(located)), wall]
-    return first, np.where(np.isfinite(first), wall, -1)
+def laws_of_walls(container: Container, laws: Reflector | Sequence[Reflector]) -> list[Reflector]:
+    """Return the law of every wall; raise an InputError if they do not match the walls or belong to two disks."""
+    walls = container.wall_count
+    each = list(laws) if isinstance(laws, Sequence) else [laws] * walls
+    for law in each:
+        if isinstance(law, Law):
+            raise InputError(
+                f"laws: expected collision laws, got {shortened(law)}, a law of angles, which does not know the disk; "
+                f"pass ker.CollisionLaw(law, disk), or ker.smooth(disk) and ker.no_slip(disk) for specular reflection "
+                "and retroreflection"
+            )
+    if not all(isinstance(law, Reflector) for law in each):
+        raise InputError(f"laws: expected collision laws such as ker.CollisionLaw(law, disk), got {shortened(laws)}")
+    if len(each) != walls:
+        raise InputError(f"laws: expected one law or one for each of the {walls} walls, got {len(each)}")
+    if any(law.disk != each[0].disk for law in each):
+        raise InputError("laws: expected laws of the same disk")
+    return each
 
 
-def _collide(container: Container, k: int, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
-    """Velocities after a collision with wall k, by its law in coordinates in which the wall is below."""
-    normal, tangent = container.normals[k], container.tangents[k]
-    local = np.stack([moving[:, :2] @ tangent, moving[:, :2] @ normal, moving[:, 2]], axis=1)
-    out = law.sample(local, rng)
+def _starts(container: Container, position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:
+    """Return centres (n, 2) inside the container and velocities (n, 3), repeated to the same length."""
+    located, moving = np.atleast_2d(finite_array("position", position)), finite_array("velocity", velocity)
+    if located.ndim != 2 or located.shape[1] != 2:
+        raise InputError(f"position: expected shape (n, 2) or (2,), got {np.shape(position)}")
+    n = len(located) if len(located) != 1 or moving.ndim != 2 else len(moving)
+    if moving.ndim not in (1, 2) or moving.shape[-1] != 3 or (moving.ndim == 2 and len(moving) not in (1, n)):
+        raise InputError(f"velocity: expected shape ({n}, 3) for (v1, v2, omega), got {moving.shape}")
+    inside = container.contains(located)
+    if not inside.all():
+        raise InputError(f"position: expected centres in the container, got {located[int(np.argmin(inside))].tolist()}")
+    return np.broadcast_to(located, (n, 2)).copy(), np.broadcast_to(moving, (n, 3)).copy()
+
+
+def _collide(tangent: Floats, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
+    """Velocities after a collision with a wall of these unit tangents (n, 2), on whose left the disk is."""
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+    along, up = np.sum(moving[:, :2] * tangent, axis=1), np.sum(moving[:, :2] * normal, axis=1)
+    out = law.sample(np.stack([along, up, moving[:, 2]], axis=1), rng)
     return np.concatenate([out[:, :1] * tangent + out[:, 1:2] * normal, out[:, 2:]], axis=1)

@@ -1,0 +1,1 @@
+"""Billiards with collision laws: one disk in a container, phase portraits, Lyapunov exponents, and gases of disks."""
