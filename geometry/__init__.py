@@ -22,6 +22,7 @@ from .plotting.collisions import collision_path, draw_collision, draw_configurat
 from .plotting.walls import draw_wall
 from .scene.plan import TracePlan
 from .tables.container import Container
+from .tracing.boundary_map import BoundaryStates, billiard_map, nested_reflection
 from .tracing.tracing import Status, Trace, trace, trajectory
 from .walls.catalogue import WALLS, NamedWall, wall_from_text
 from .walls.mushroom import mushrooms
@@ -44,6 +45,7 @@ __all__ = [
     "WALLS",
     "Arc",
     "Bezier",
+    "BoundaryStates",
     "ConfigurationSpace",
     "Container",
     "Curve",
@@ -60,6 +62,7 @@ __all__ = [
     "Trace",
     "TracePlan",
     "Wall",
+    "billiard_map",
     "collide",
     "collide_cylinder",
     "collide_modified",
@@ -75,6 +78,7 @@ __all__ = [
     "koch",
     "load_wall",
     "mushrooms",
+    "nested_reflection",
     "plane_crossing",
     "plane_crossing_differential",
     "read_profile",

@@ -17,6 +17,10 @@ from .billiards.billiard import BilliardRecord as BilliardRecord
 from .billiards.billiard import Reflector as Reflector
 from .billiards.billiard import play as play
 from .billiards.lyapunov import lyapunov_exponent as lyapunov_exponent
+from .billiards.pictures import animate as animate
+from .billiards.pictures import draw_paths as draw_paths
+from .billiards.pictures import draw_phase_portrait as draw_phase_portrait
+from .billiards.pictures import phase_portrait as phase_portrait
 from .collisions.collision_law import CollisionLaw as CollisionLaw
 from .collisions.collision_law import no_slip as no_slip
 from .collisions.collision_law import smooth as smooth

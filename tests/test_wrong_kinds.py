@@ -24,6 +24,7 @@ SAMPLED = ker.discretise(LAW, BINS, "monte-carlo", samples=64, rng=0)
 COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DISK, 0.01)
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5]), geo.Container.strip()
 CIRCLE = geo.Container.circle()
+RECORD = ker.play(CIRCLE, ker.smooth(DISK), [0.5, 0.0], [0.0, 1.0, 0.0], 3)
 VELOCITY, POSITION = [[0.2, -1.0, 0.1]], [[0.3, 0.1]]
 PROBLEM = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
 METHOD = spec.WorkMethod("b", float)
@@ -140,6 +141,13 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "load_matrix": (ker.load_matrix, {"path": "no.npz"}),
     "no_slip": (ker.no_slip, {"disk": DISK}),
     "smooth": (ker.smooth, {"disk": DISK}),
+    "phase_portrait": (ker.phase_portrait, {"record": RECORD, "coordinates": "velocity"}),
+    "draw_phase_portrait": (ker.draw_phase_portrait, {"record": RECORD, "coordinates": "boundary"}),
+    "draw_paths": (ker.draw_paths, {"record": RECORD}),
+    "animate": (ker.animate, {"record": RECORD, "frames": 3, "duration": 1.0}),
+    "billiard_map": (geo.billiard_map, {"container": CIRCLE, "s": [0.1], "theta": [1.0], "iterations": 2}),
+    "nested_reflection": (geo.nested_reflection, {"container": CIRCLE, "openings": [0], "s": [0.1], "theta": [1.0],
+                                                  "max_collisions": 9}),
     "Container.from_curves": (geo.Container.from_curves, {"curves": CIRCLE.curves}),
     "Container.stadium": (geo.Container.stadium, {"length": 1.0, "radius": 1.0}),
     "Container.sinai": (geo.Container.sinai, {"side": 1.0, "radius": 0.2}),
@@ -187,8 +195,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 }  # fmt: skip
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
-    "Accommodation", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BranchLaw", "Conductance",
-    "Container", "Convergence", "ConvergenceStep", "Curve", "CylinderCollision", "Defect", "Dichotomy",
+    "Accommodation", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BoundaryStates", "BranchLaw",
+    "Conductance", "Container", "Convergence", "ConvergenceStep", "Curve", "CylinderCollision", "Defect", "Dichotomy",
     "DifferenceTest", "Diffusivity", "Distance", "DrivenLaw", "Enclosure", "Enclosures", "EssentialEdge",
     "ExchangeHollow", "ExitTimes", "ExtremalResistance", "Extremum", "FittedOrder", "Generations", "Hollow",
     "LaplacianComparison", "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine", "MethodFacts",

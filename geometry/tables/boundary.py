@@ -31,6 +31,8 @@ FLATTENING = 1e-6
 # Directions, radians, of the lines by which it is decided whether a point is inside; the majority counts.
 LINES_OF_SIGHT = (0.7312, 2.8251, 4.9187)
 FULL_CIRCLE = 2.0 * math.pi
+# Halvings after which an interval of angles has the width of their rounding.
+BISECTIONS = 56
 
 
 def size_of(curves: Sequence[Curve]) -> float:
@@ -237,6 +239,46 @@ def touch(curve: Segment | Arc, position: Floats) -> Touch:
     tangent = curve.direction * np.stack([-a * unit[:, 1], b * unit[:, 0]], axis=1)
     speed = np.hypot(tangent[:, 0], tangent[:, 1])
     return Touch(center + axes * unit, tangent / speed[:, None], curve.direction * a * b / speed**3)
+
+
+def length_at(curve: Segment | Arc, position: Floats) -> Floats:
+    """Return the arc lengths (n,) from the start of a curve to points (n, 2) on it."""
+    if isinstance(curve, Segment):
+        along = (position - np.array(curve.start)) @ curve.tangent(0.0)
+        return np.asarray(np.clip(along, 0.0, curve.length))
+    unit = (position - np.array(curve.center)) / np.array(curve.semi_axes)
+    span = abs(curve.end_angle - curve.start_angle)
+    turned = curve.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - curve.start_angle) % FULL_CIRCLE
+    # rounding may put a point just before the start or behind the end: it belongs to the nearer one
+    turned = np.where(turned > 0.5 * (span + FULL_CIRCLE), 0.0, np.minimum(turned, span))
+    return _length_turned(curve, turned)
+
+
+def point_at_length(curve: Segment | Arc, length: Floats) -> Floats:
+    """Return the points (n, 2) at these arc lengths (n,) from the start of a curve."""
+    if isinstance(curve, Segment) or curve.is_circular:
+        return curve.point(length / curve.length)
+    low, high = np.zeros_like(length), np.full_like(length, abs(curve.end_angle - curve.start_angle))
+    span = high[:1].sum()
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        short = _length_turned(curve, middle) < length
+        low, high = np.where(short, middle, low), np.where(short, high, middle)
+    return curve.point(np.clip(0.5 * (low + high) / span, 0.0, 1.0)) if len(length) else np.empty((0, 2))
+
+
+def _length_turned(curve: Arc, turned: Floats) -> Floats:
+    """Arc lengths from the start to where the parametric angle has grown or fallen by ``turned``."""
+    a, b = curve.semi_axes
+    if curve.is_circular:
+        return a * turned
+    from scipy.special import ellipeinc
+
+    # the longer semi-axis in front, so that the parameter m is in (0, 1)
+    shift, long, short = (0.0, b, a) if b > a else (0.5 * math.pi, a, b)
+    m = (1.0 - short / long) * (1.0 + short / long)
+    start = curve.start_angle - shift
+    return np.asarray(long * np.abs(ellipeinc(start + curve.direction * turned, m) - ellipeinc(start, m)))
 
 
 def is_on(curve: Segment | Arc, position: Floats, slack: float) -> NDArray[np.bool_]:

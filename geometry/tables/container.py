@@ -285,6 +285,43 @@ class Container:
             return boundary.touch(self.curves[wall - len(self.points)], position)
         return boundary.Touch(position, np.broadcast_to(self.tangents[wall], position.shape), np.zeros(len(position)))
 
+    def point_at(self, length: ArrayLike) -> tuple[Floats, NDArray[np.int64]]:
+        """Return the points (n, 2) of the boundary at these arc lengths (n,), and their walls (n,).
+
+        The arc length runs along the curves in their order, from 0 to `perimeter`, modulo which it counts.
+
+        Examples
+        --------
+        >>> points, wall = Container.stadium(2.0, 1.0).point_at([0.5, 3.0 + np.pi])
+        >>> points.round(12).tolist(), wall.tolist()
+        ([[-0.5, -1.0], [0.0, 1.0]], [0, 2])
+        """
+        ends = self._ends()
+        along = finite_array("length", length) % ends[-1]
+        if along.ndim != 1:
+            raise InputError(f"length: expected shape (n,), got {along.shape}")
+        wall = np.minimum(np.searchsorted(ends, along, side="right") - 1, len(self.curves) - 1)
+        points = np.empty((len(along), 2))
+        for k, curve in enumerate(self.curves):
+            here = wall == k
+            points[here] = boundary.point_at_length(curve, along[here] - ends[k])
+        return points, wall.astype(np.int64)
+
+    def length_at(self, position: ArrayLike, wall: NDArray[np.int64]) -> Floats:
+        """Return the arc lengths (n,), from 0 to `perimeter`, of points (n, 2) on these walls (n,)."""
+        points, ends = finite_array("position", position), self._ends()
+        length = np.empty(len(points))
+        for k, curve in enumerate(self.curves):
+            here = wall == k
+            length[here] = ends[k] + boundary.length_at(curve, points[here])
+        return length
+
+    def _ends(self) -> Floats:
+        """The arc lengths at the ends of the curves, 0 before the first."""
+        if len(self.points):
+            raise InputError("container: expected one from curves, such as Container.circle()")
+        return np.cumsum([0.0, *(curve.length for curve in self.curves)])
+
     def draw(self, ax: Axes | None = None) -> Axes:
         """Draw the boundary into matplotlib Axes, new ones by default, and return them."""
         from matplotlib import pyplot

@@ -38,6 +38,7 @@ class BilliardRecord:
 
     Attributes
     ----------
+    container : Container
     disk : Disk
     time : array, shape (steps + 1, n)
     position : array, shape (steps + 1, n, 2)
@@ -50,6 +51,7 @@ class BilliardRecord:
     collisions : array of int, shape (n,)
     """
 
+    container: Container
     disk: Disk
     time: Floats
     position: Floats
@@ -161,7 +163,9 @@ def play(
     columns = [np.stack(column) for column in zip(*states, strict=True)]
     for array in (*columns, made):
         array.setflags(write=False)
-    return BilliardRecord(disk, columns[0], columns[1], columns[2], columns[3], columns[4].astype(np.int64), made)
+    return BilliardRecord(
+        container, disk, columns[0], columns[1], columns[2], columns[3], columns[4].astype(np.int64), made
+    )
 
 
 def laws_of_walls(container: Container, laws: Reflector | Sequence[Reflector]) -> list[Reflector]:
