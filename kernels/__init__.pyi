@@ -16,7 +16,10 @@ from .bases.tensor import TensorBasis as TensorBasis
 from .billiards.billiard import BilliardRecord as BilliardRecord
 from .billiards.billiard import Reflector as Reflector
 from .billiards.billiard import play as play
+from .billiards.gas import GasRecord as GasRecord
+from .billiards.gas import play_gas as play_gas
 from .billiards.lyapunov import lyapunov_exponent as lyapunov_exponent
+from .billiards.pair_law import PairLaw as PairLaw
 from .billiards.pictures import animate as animate
 from .billiards.pictures import draw_paths as draw_paths
 from .billiards.pictures import draw_phase_portrait as draw_phase_portrait

@@ -24,6 +24,7 @@ SAMPLED = ker.discretise(LAW, BINS, "monte-carlo", samples=64, rng=0)
 COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DISK, 0.01)
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5]), geo.Container.strip()
 CIRCLE = geo.Container.circle()
+PAIR = ker.PairLaw(LAW, DISK)
 RECORD = ker.play(CIRCLE, ker.smooth(DISK), [0.5, 0.0], [0.0, 1.0, 0.0], 3)
 VELOCITY, POSITION = [[0.2, -1.0, 0.1]], [[0.3, 0.1]]
 PROBLEM = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
@@ -141,6 +142,12 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "load_matrix": (ker.load_matrix, {"path": "no.npz"}),
     "no_slip": (ker.no_slip, {"disk": DISK}),
     "smooth": (ker.smooth, {"disk": DISK}),
+    "PairLaw": (ker.PairLaw, {"law": LAW, "first": DISK, "second": DISK, "radii": (1.0, 2.0)}),
+    "PairLaw.from_wall": (ker.PairLaw.from_wall, {"wall": TEETH, "first": DISK, "second": DISK, "radii": (1.0, 2.0)}),
+    "PairLaw.sample": (PAIR.sample, {"normal": [0.0, 1.0], "first_velocity": [0.0, -1.0, 0.0],
+                                     "second_velocity": [0.0, 0.0, 0.0], "rng": 0}),
+    "play_gas": (ker.play_gas, {"container": CIRCLE, "pair": PAIR, "position": [[0.0, 0.0]],
+                                "velocity": [[1.0, 0.0, 0.0]], "events": 3, "walls": None, "rng": 0}),
     "phase_portrait": (ker.phase_portrait, {"record": RECORD, "coordinates": "velocity"}),
     "draw_phase_portrait": (ker.draw_phase_portrait, {"record": RECORD, "coordinates": "boundary"}),
     "draw_paths": (ker.draw_paths, {"record": RECORD}),
@@ -198,8 +205,9 @@ LEFT_OUT = {
     "Accommodation", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BoundaryStates", "BranchLaw",
     "Conductance", "Container", "Convergence", "ConvergenceStep", "Curve", "CylinderCollision", "Defect", "Dichotomy",
     "DifferenceTest", "Diffusivity", "Distance", "DrivenLaw", "Enclosure", "Enclosures", "EssentialEdge",
-    "ExchangeHollow", "ExitTimes", "ExtremalResistance", "Extremum", "FittedOrder", "Generations", "Hollow",
-    "LaplacianComparison", "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine", "MethodFacts",
+    "ExchangeHollow", "ExitTimes", "ExtremalResistance", "Extremum", "FittedOrder", "GasRecord", "Generations",
+    "Hollow", "LaplacianComparison", "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine",
+    "MethodFacts",
     "MixingTime", "ModifiedCollision", "NamedWall", "Reflector", "RigidCollision", "SpectralGap", "Spectrum",
     "SpectrumErrors", "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow",
     "WallDesign", "WallForLaw", "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat", "lambertian",
@@ -217,7 +225,7 @@ WRONG: dict[str, Any] = {
 # A function of the user that fails, or returns nonsense, fails in its own way; a bound may be met after hours.
 FUNCTIONS = ("density", "map", "function", "spacing", "family", "objective", "cost", "solve")
 ENDLESS_KINDS = ("zero", "beyond double", "minus beyond")
-ENDLESS = {"tolerance", "smallest_opening", "permutations", "max_contacts", "max_collisions"}
+ENDLESS = {"tolerance", "smallest_opening", "permutations", "max_contacts", "max_collisions", "iterations"}
 # Seconds of the processor that a call may take: one that takes its argument may work.
 LONGEST = 10.0
 

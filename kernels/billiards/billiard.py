@@ -158,7 +158,7 @@ def play(
             if here.size:
                 point = container.touch(k, located[here])
                 located[here] = point.position
-                moving[here] = _collide(point.tangent, law, moving[here], rng)
+                moving[here] = reflected(point.tangent, law, moving[here], rng)
         states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
     columns = [np.stack(column) for column in zip(*states, strict=True)]
     for array in (*columns, made):
@@ -202,7 +202,7 @@ def _starts(container: Container, position: ArrayLike, velocity: ArrayLike) -> t
     return np.broadcast_to(located, (n, 2)).copy(), np.broadcast_to(moving, (n, 3)).copy()
 
 
-def _collide(tangent: Floats, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
+def reflected(tangent: Floats, law: Reflector, moving: Floats, rng: np.random.Generator) -> Floats:
     """Velocities after a collision with a wall of these unit tangents (n, 2), on whose left the disk is."""
     normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
     along, up = np.sum(moving[:, :2] * tangent, axis=1), np.sum(moving[:, :2] * normal, axis=1)

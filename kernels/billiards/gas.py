@@ -1,0 +1,291 @@
+"""A gas of equal rough disks in a container, simulated event by event."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, whole_number
+from ...core.errors import AccuracyError, InputError
+from ...core.estimates import Estimate, student_95
+from ...core.kinds import explained
+from ..collisions.collision_law import smooth
+from .billiard import BilliardRecord, Reflector, laws_of_walls, reflected
+from .pair_law import PairLaw
+
+if TYPE_CHECKING:
+    from ...geometry import Container
+
+# Depth, relative to the diameter, up to which two disks may overlap by rounding.
+OVERLAP = 1e-9
+# Batches of a mean over time, and the fraction of the events before the first.
+BATCHES, BURN_IN = 16, 0.2
+FEWEST_EVENTS = 200
+
+
+@dataclass(frozen=True)
+class GasRecord(BilliardRecord):
+    """States of all disks of a gas after each event; the first entry of every array is the initial state.
+
+    An event is a collision of one disk with a wall or of two disks with each other. Beside the attributes of
+    `BilliardRecord`, of which ``wall`` is -1 for disks that met no wall in the event:
+
+    Attributes
+    ----------
+    partner : array of int, shape (events + 1, n)
+        Index of the disk with which a disk collided in the event, -1 if with none.
+    """
+
+    partner: NDArray[np.int64]
+
+    @property
+    def rotational_energy(self) -> Floats:
+        """The energy of all spins, J omega^2/2, shape (events + 1,)."""
+        return np.asarray(0.5 * self.disk.inertia * np.sum(self.velocity[..., 2] ** 2, axis=1))
+
+    @property
+    def translational_energy(self) -> Floats:
+        """The energy of the motion of all centres, m |v|^2/2, shape (events + 1,)."""
+        return np.asarray(0.5 * self.disk.mass * np.sum(self.velocity[..., :2] ** 2, axis=(1, 2)))
+
+    def rotational_fraction(self, burn_in: float = BURN_IN) -> Estimate:
+        """Estimate the fraction of the energy in rotation, as a mean over time; 1/3 in equipartition.
+
+        Each disk has two degrees of freedom of translation and one of rotation. The mean is taken over time, not over
+        events, because fast states have more of them.
+
+        Parameters
+        ----------
+        burn_in : float
+            Fraction of the events that do not count, in [0, 1).
+
+        Returns
+        -------
+        Estimate
+            The error is the half width of 95 % from the means over 16 intervals with equally many events, which are
+            taken as independent. It is inf for fewer than 200 events, and too small if intervals have fewer collisions
+            than exchange the energy: a few for every disk.
+
+        Raises
+        ------
+        InputError
+            If ``burn_in`` is not in [0, 1).
+        """
+        if not 0.0 <= burn_in < 1.0:
+            raise InputError(f"burn_in: expected a number in [0, 1), got {burn_in!r}")
+        duration, rotation = np.diff(self.time[:, 0]), self.rotational_energy[:-1]
+        total = float(self.energy[0].sum())
+        first = int(burn_in * len(duration))
+        parts = np.array_split(np.arange(first, len(duration)), BATCHES)
+        if len(duration) - first < FEWEST_EVENTS:
+            value = float(rotation[first:] @ duration[first:] / (total * duration[first:].sum()))
+            return Estimate(value, math.inf, "estimate", "one interval of time")
+        passed = np.array([duration[part].sum() for part in parts])
+        stored = np.array([rotation[part] @ duration[part] for part in parts]) / total
+        value = float(stored.sum() / passed.sum())
+        deviation = float(np.std(stored - value * passed, ddof=1)) / (float(passed.mean()) * math.sqrt(BATCHES))
+        return Estimate(
+            value, student_95(BATCHES) * deviation, "estimate",
+            f"mean over time, 95 % from {BATCHES} batches of {len(parts[0])} events",
+        )  # fmt: skip
+
+
+@explained
+def play_gas(
+    container: Container,
+    pair: PairLaw,
+    position: ArrayLike,
+    velocity: ArrayLike,
+    events: int,
+    walls: Reflector | Sequence[Reflector] | None = None,
+    rng: Rng = None,
+) -> GasRecord:
+    """Simulate equal disks that collide with each other and with the walls of a container, event by event.
+
+    Parameters
+    ----------
+    container : Container
+        The region of the centres.
+    pair : PairLaw
+        The law of collisions between disks, of two equal disks with equal radii.
+    position : array_like, shape (n, 2)
+        Initial centres, inside the container, at least two radii apart.
+    velocity : array_like, shape (n, 3)
+        Initial (v1, v2, omega).
+    events : int
+        Number of collisions, with walls and of pairs. Each costs some n operations on arrays.
+    walls : Reflector or sequence of Reflector, optional
+        The laws of the walls as in `play`; smooth walls by default.
+    rng : None, int or numpy.random.Generator
+        The result depends on the seed alone.
+
+    Returns
+    -------
+    GasRecord
+
+    Raises
+    ------
+    InputError
+        If a shape is wrong, disks overlap or are outside, or the laws do not fit.
+    AccuracyError
+        If no disk meets anything any more.
+
+    Notes
+    -----
+    In a closed container the dynamics preserves the uniform measure on the energy surface. Where energy is the only
+    invariant, each of the 3 n quadratic terms then has the same mean, E/(3 n).
+
+    Source: Rudzis 2022, sections 1.1.2 and 3, for the collision of two bodies; D. S. Broomhead and E. Gutkin (1993) for
+    gases of no-slip disks.
+
+    Examples
+    --------
+    Two no-slip disks that meet head on exchange their velocities:
+
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> room = geo.Container.polygon([(0, 0), (10, 0), (10, 8), (0, 8)])
+    >>> pair = ker.PairLaw(ker.retroreflection(), geo.Disk())
+    >>> record = ker.play_gas(room, pair, [[2, 4], [8, 4]], [[1, 0, 0], [-1, 0, 0]], 1)
+    >>> float(record.time[1, 0]), (record.velocity[1, :, 0].round(12) + 0.0).tolist()
+    (2.0, [-1.0, 1.0])
+    """
+    instance("pair", pair, PairLaw, "ker.PairLaw(ker.retroreflection(), geo.Disk())")
+    disk, other = pair.disks
+    if disk != other or pair.radii[0] != pair.radii[1]:
+        raise InputError("pair: expected the law of two equal disks with equal radii")
+    whole_number("events", events, 1)
+    laws = laws_of_walls(container, smooth(disk) if walls is None else walls)
+    if laws[0].disk != disk:
+        raise InputError("walls: expected laws of the disk of the pair")
+    located, moving = _start(container, position, velocity, 2.0 * pair.radii[0])
+    check_memory("events", "the record", 10 * events * len(located))
+    rng = generator(rng)
+    gas = _Gas(container, pair, laws, located, moving)
+    states = [gas.state()]
+    for _ in range(events):
+        gas.next_event(rng)
+        states.append(gas.state())
+    columns = [np.stack(column) for column in zip(*states, strict=True)]
+    wall, partner = columns[4].astype(np.int64), columns[5].astype(np.int64)
+    made = np.sum((wall[1:] >= 0) | (partner[1:] >= 0), axis=0)
+    for array in (*columns[:4], wall, partner, made):
+        array.setflags(write=False)
+    return GasRecord(container, disk, columns[0], columns[1], columns[2], columns[3], wall, made, partner)
+
+
+def _start(container: Container, position: ArrayLike, velocity: ArrayLike, diameter: float) -> tuple[Floats, Floats]:
+    """Return copies of centres (n, 2) and velocities (n, 3) of disks that do not overlap."""
+    located, moving = finite_array("position", position).copy(), finite_array("velocity", velocity).copy()
+    if located.ndim != 2 or located.shape[1] != 2 or not len(located):
+        raise InputError(f"position: expected shape (n, 2), got {located.shape}")
+    if moving.shape != (len(located), 3):
+        raise InputError(f"velocity: expected shape ({len(located)}, 3) for (v1, v2, omega), got {moving.shape}")
+    inside = container.contains(located)
+    if not inside.all():
+        raise InputError(f"position: expected centres in the container, got {located[int(np.argmin(inside))].tolist()}")
+    apart = np.hypot(*np.moveaxis(located[:, None] - located[None, :], -1, 0)) + np.diag(np.full(len(located), np.inf))
+    if apart.min() < diameter * (1.0 - OVERLAP):
+        first, second = (int(i) for i in np.unravel_index(np.argmin(apart), apart.shape))
+        raise InputError(
+            f"position: expected centres at least {diameter:g} apart, got disks {first} and {second} at {apart.min():g}"
+        )
+    return located, moving
+
+
+class _Gas:
+    """The present state, and the times of the next collision of every pair and of every disk with a wall."""
+
+    def __init__(
+        self, container: Container, pair: PairLaw, laws: list[Reflector], position: Floats, velocity: Floats
+    ) -> None:
+        self.container, self.pair, self.laws = container, pair, laws
+        self.position, self.velocity = position, velocity
+        n = len(position)
+        self.now, self.angle = 0.0, np.zeros(n)
+        self.last, self.wall, self.partner = (np.full(n, -1) for _ in range(3))
+        self.pairs, self.walls = np.full((n, n), np.inf), np.full(n, np.inf)
+        self.next_wall = np.full(n, -1)
+        self.predict(np.arange(n))
+
+    def state(self) -> tuple[Floats, ...]:
+        """Copies of what a record stores of an event."""
+        n = len(self.position)
+        time = np.full(n, self.now)
+        return (
+            time,
+            self.position.copy(),
+            self.angle.copy(),
+            self.velocity.copy(),
+            self.wall.copy(),
+            self.partner.copy(),
+        )
+
+    def predict(self, disks: NDArray[np.int64]) -> None:
+        """Compute the next collisions of these disks."""
+        flight, self.next_wall[disks] = self.container.next_wall(
+            self.position[disks], self.velocity[disks], self.last[disks]
+        )
+        self.walls[disks] = self.now + flight
+        for k in disks:
+            times = self.now + meeting_times(
+                self.position - self.position[k], self.velocity - self.velocity[k], 2.0 * self.pair.radii[0]
+            )
+            times[k] = np.inf
+            self.pairs[k], self.pairs[:, k] = times, times
+
+    def next_event(self, rng: np.random.Generator) -> None:
+        """Move all disks to the next event, and collide."""
+        at_wall = int(np.argmin(self.walls))
+        first, second = (int(i) for i in np.unravel_index(np.argmin(self.pairs), self.pairs.shape))
+        then = float(min(self.walls[at_wall], self.pairs[first, second]))
+        if not math.isfinite(then):
+            raise AccuracyError("no disk meets a wall or another disk any more; is the container closed?", math.inf)
+        step = max(then - self.now, 0.0)
+        self.position += self.velocity[:, :2] * step
+        self.angle += self.velocity[:, 2] * step
+        self.now = then
+        self.wall[:], self.partner[:] = -1, -1
+        if self.walls[at_wall] <= self.pairs[first, second]:
+            self.collide_with_wall(at_wall, rng)
+            self.predict(np.array([at_wall]))
+        else:
+            self.collide_pair(first, second, rng)
+            self.predict(np.array([first, second]))
+
+    def collide_with_wall(self, disk: int, rng: np.random.Generator) -> None:
+        """Collide one disk with the wall where it is."""
+        wall = int(self.next_wall[disk])
+        point = self.container.touch(wall, self.position[[disk]])
+        self.position[disk] = point.position[0]
+        self.velocity[disk] = reflected(point.tangent, self.laws[wall], self.velocity[[disk]], rng)[0]
+        self.wall[disk] = self.last[disk] = wall
+
+    def collide_pair(self, first: int, second: int, rng: np.random.Generator) -> None:
+        """Collide two disks that touch."""
+        between = self.position[first] - self.position[second]
+        normal = between / np.hypot(*between)
+        self.velocity[first], self.velocity[second] = self.pair.sample(
+            normal, self.velocity[first], self.velocity[second], rng
+        )
+        self.partner[first], self.partner[second] = second, first
+        # away from a curved wall, or along it: the same wall may be next
+        self.last[[first, second]] = -1
+
+
+def meeting_times(offset: Floats, velocity: Floats, distance: float) -> Floats:
+    """Return the times (n,) at which relative positions (n, 2) approach to this distance, inf where they do not."""
+    plane = velocity[:, :2]
+    closing = -np.sum(offset * plane, axis=1)
+    speed = np.sum(plane**2, axis=1)
+    across = offset[:, 0] * plane[:, 1] - offset[:, 1] * plane[:, 0]
+    excess = np.sum(offset**2, axis=1) - distance**2
+    reach = distance * np.sqrt(speed)
+    root = np.sqrt(np.maximum((reach - across) * (reach + across), 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time = np.maximum(excess, 0.0) / (closing + root)
+    return np.where((closing > 0.0) & (np.abs(across) <= reach), time, np.inf)
