@@ -25,6 +25,7 @@ def load(name):
 
 def test_every_example_has_a_test():
     tested = {
+        "billiards",
         "disk_in_a_strip",
         "exchange_hollow",
         "gallery",
@@ -175,3 +176,16 @@ def test_the_pictures_of_the_page_on_true_disks_are_drawn(tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {path.name for path in committed.iterdir()}
     for path in committed.iterdir():
         assert f"true-disk/{path.name}" in page and path.stat().st_size < 150_000
+
+
+def test_roughness_reduces_chaos_and_a_gas_comes_to_equipartition(tmp_path):
+    found = load("billiards").main(200, 60, 900, tmp_path / "portraits.png")
+    assert (tmp_path / "portraits.png").stat().st_size > 20_000
+    for law in ("smooth", "no-slip"):
+        assert abs(found[f"circle, {law}"].value) < found[f"circle, {law}"].error
+    for table in ("stadium", "Sinai table"):
+        smooth, rough = found[f"{table}, smooth"], found[f"{table}, no-slip"]
+        assert smooth.value - smooth.error > rough.value + rough.error > 0.0
+    gas = found["rotational fraction of a gas"]
+    # 900 events are few for 12 disks that begin without spin
+    assert abs(gas.value - 1 / 3) < 0.1

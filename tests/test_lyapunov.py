@@ -21,7 +21,7 @@ STARTS = {"smooth": (SMOOTH, False), "no-slip": (NO_SLIP, True)}
 
 
 def test_small_scatterers_have_the_exponent_that_dahlqvist_derived():
-    # P. Dahlqvist, Nonlinearity 10 (1997) 159: -2 ln R + 1 - 4 ln 2 + 27 zeta(3)/(2 pi^2) + O(R ln^2 R) per return to
+    # P. Dahlqvist (arXiv chao-dyn/9601007): -2 ln R + 1 - 4 ln 2 + 27 zeta(3)/(2 pi^2) + O(R ln^2 R) per return to
     # the disk of radius R in the unit square; such returns are (1 - pi R^2)/(2 R) apart on average
     constant = 1.0 - 4.0 * math.log(2.0) + 27.0 * float(mp.zeta(3)) / (2.0 * math.pi**2)
     for radius, seed in ((0.02, 0), (0.005, 1)):

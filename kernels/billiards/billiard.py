@@ -61,6 +61,11 @@ class BilliardRecord:
     collisions: NDArray[np.int64]
 
     @property
+    def radius(self) -> float | None:
+        """The radius of the disks relative to the container; None where only the centres count."""
+        return None
+
+    @property
     def energy(self) -> Floats:
         """Kinetic energies <w, w>/2, shape (steps + 1, n)."""
         return np.asarray(0.5 * self.disk.inner(self.velocity, self.velocity))

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 
 # Depth, relative to the diameter, up to which two disks may overlap by rounding.
 OVERLAP = 1e-9
-# Batches of a mean over time, and the fraction of the events before the first.
-BATCHES, BURN_IN = 16, 0.2
-FEWEST_EVENTS = 200
+# Numbers of batches of a mean over time, of which the one with the largest error counts: batches that depend on each
+# other show a smaller error than longer ones. The fraction of the events before the first batch, and the least number
+# of events in batches, per disk.
+BATCHES, BURN_IN, FEWEST_EVENTS = (16, 8, 4), 0.2, 64
 
 
 @dataclass(frozen=True)
@@ -39,9 +40,16 @@ class GasRecord(BilliardRecord):
     ----------
     partner : array of int, shape (events + 1, n)
         Index of the disk with which a disk collided in the event, -1 if with none.
+    pair : PairLaw
     """
 
     partner: NDArray[np.int64]
+    pair: PairLaw
+
+    @property
+    def radius(self) -> float:
+        """The radius of the disks."""
+        return self.pair.radii[0]
 
     @property
     def rotational_energy(self) -> Floats:
@@ -67,9 +75,8 @@ class GasRecord(BilliardRecord):
         Returns
         -------
         Estimate
-            The error is the half width of 95 % from the means over 16 intervals with equally many events, which are
-            taken as independent. It is inf for fewer than 200 events, and too small if intervals have fewer collisions
-            than exchange the energy: a few for every disk.
+            The error is the largest half width of 95 % from the means over 16, 8 and 4 intervals with equally many
+            events. It is inf for fewer than 64 events per disk after the burn-in.
 
         Raises
         ------
@@ -78,21 +85,21 @@ class GasRecord(BilliardRecord):
         """
         if not 0.0 <= burn_in < 1.0:
             raise InputError(f"burn_in: expected a number in [0, 1), got {burn_in!r}")
-        duration, rotation = np.diff(self.time[:, 0]), self.rotational_energy[:-1]
-        total = float(self.energy[0].sum())
+        duration, rotation = np.diff(self.time[:, 0]), self.rotational_energy[:-1] / float(self.energy[0].sum())
         first = int(burn_in * len(duration))
-        parts = np.array_split(np.arange(first, len(duration)), BATCHES)
-        if len(duration) - first < FEWEST_EVENTS:
-            value = float(rotation[first:] @ duration[first:] / (total * duration[first:].sum()))
-            return Estimate(value, math.inf, "estimate", "one interval of time")
-        passed = np.array([duration[part].sum() for part in parts])
-        stored = np.array([rotation[part] @ duration[part] for part in parts]) / total
-        value = float(stored.sum() / passed.sum())
-        deviation = float(np.std(stored - value * passed, ddof=1)) / (float(passed.mean()) * math.sqrt(BATCHES))
-        return Estimate(
-            value, student_95(BATCHES) * deviation, "estimate",
-            f"mean over time, 95 % from {BATCHES} batches of {len(parts[0])} events",
-        )  # fmt: skip
+        duration, rotation = duration[first:], rotation[first:]
+        value = float(rotation @ duration / duration.sum())
+        if len(duration) < FEWEST_EVENTS * self.velocity.shape[1]:
+            return Estimate(value, math.inf, "estimate", "mean over a time too short for an error")
+        error = max(_batch_error(duration, rotation - value, count) for count in BATCHES)
+        return Estimate(value, error, "estimate", f"mean over time, 95 % from {BATCHES[0]} batches or fewer")
+
+
+def _batch_error(duration: Floats, deviation: Floats, batches: int) -> float:
+    """The half width of 95 % of a mean over time, from the mean deviations in batches of equally many events."""
+    parts = np.array_split(np.arange(len(duration)), batches)
+    sums = [deviation[part] @ duration[part] for part in parts]
+    return student_95(batches) * float(np.std(sums, ddof=1)) * math.sqrt(batches) / float(duration.sum())
 
 
 @explained
@@ -175,7 +182,7 @@ def play_gas(
     made = np.sum((wall[1:] >= 0) | (partner[1:] >= 0), axis=0)
     for array in (*columns[:4], wall, partner, made):
         array.setflags(write=False)
-    return GasRecord(container, disk, columns[0], columns[1], columns[2], columns[3], wall, made, partner)
+    return GasRecord(container, disk, columns[0], columns[1], columns[2], columns[3], wall, made, partner, pair)
 
 
 def _start(container: Container, position: ArrayLike, velocity: ArrayLike, diameter: float) -> tuple[Floats, Floats]:

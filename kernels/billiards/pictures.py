@@ -137,7 +137,7 @@ def draw_phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boun
 
     axes = pyplot.subplots()[1] if ax is None else ax
     for k in range(first.shape[1]):
-        axes.plot(first[:, k], second[:, k], ",", color=COLOURS[k % len(COLOURS)])
+        axes.plot(first[:, k], second[:, k], ".", markersize=1.2, markeredgewidth=0, color=COLOURS[k % len(COLOURS)])
     if coordinates == "boundary":
         axes.set(xlim=(0.0, record.container.perimeter), ylim=(-1.0, 1.0), xlabel="arc length $s$")
         axes.set_ylabel("tangential velocity $v_1/|v|$")
@@ -151,6 +151,8 @@ def draw_phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boun
 @explained
 def animate(record: BilliardRecord, frames: int = 200, duration: float = 10.0) -> FuncAnimation:
     """Make an animation of the disks of a record, each with a spoke that shows its rotation and a trace behind it.
+
+    Disks are drawn small, because walls bound the centres; those of a gas are drawn in their size.
 
     Parameters
     ----------
@@ -186,7 +188,10 @@ def animate(record: BilliardRecord, frames: int = 200, duration: float = 10.0) -
     for line in axes.lines[-record.position.shape[1] :]:
         line.remove()
     times = np.linspace(0.0, float(record.time[-1].min()), count)
-    size = DRAWN_RADIUS * max(np.ptp(record.position[..., 0]), np.ptp(record.position[..., 1]))
+    small = DRAWN_RADIUS * max(np.ptp(record.position[..., 0]), np.ptp(record.position[..., 1]))
+    size = record.radius or small
+    low, high = record.position.min(axis=(0, 1)) - 1.2 * size, record.position.max(axis=(0, 1)) + 1.2 * size
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     trace = TRACE * float(np.mean(np.diff(record.time, axis=0)))
     lines: list[list[Line2D]] = []
     for k in range(record.position.shape[1]):
