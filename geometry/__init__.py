@@ -11,6 +11,7 @@ from .cells.measured import Profile
 from .cells.profile import read_profile
 from .collisions.configuration_space import ConfigurationSpace
 from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
+from .collisions.pair import PairCollision, SatelliteDisk, collide_pair
 from .collisions.rigid import RigidCollision, collide
 from .curves.arc import Arc
 from .curves.bezier import Bezier
@@ -54,9 +55,11 @@ __all__ = [
     "Hollow",
     "ModifiedCollision",
     "NamedWall",
+    "PairCollision",
     "Profile",
     "RigidCollision",
     "RollingCharts",
+    "SatelliteDisk",
     "Segment",
     "Status",
     "Trace",
@@ -66,6 +69,7 @@ __all__ = [
     "collide",
     "collide_cylinder",
     "collide_modified",
+    "collide_pair",
     "collision_path",
     "dispersing_arcs",
     "double_parabola",

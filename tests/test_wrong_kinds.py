@@ -24,6 +24,7 @@ SAMPLED = ker.discretise(LAW, BINS, "monte-carlo", samples=64, rng=0)
 COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DISK, 0.01)
 PROFILE, STRIP = geo.Profile([0.0, 1.0, 2.0], [0.0, -1.0, 0.5]), geo.Container.strip()
 CIRCLE = geo.Container.circle()
+BUMPS = geo.SatelliteDisk(DISK, 9, 0.1)
 PAIR = ker.PairLaw(LAW, DISK)
 RECORD = ker.play(CIRCLE, ker.smooth(DISK), [0.5, 0.0], [0.0, 1.0, 0.0], 3)
 VELOCITY, POSITION = [[0.2, -1.0, 0.1]], [[0.3, 0.1]]
@@ -142,6 +143,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "load_matrix": (ker.load_matrix, {"path": "no.npz"}),
     "no_slip": (ker.no_slip, {"disk": DISK}),
     "smooth": (ker.smooth, {"disk": DISK}),
+    "SatelliteDisk": (geo.SatelliteDisk, {"disk": DISK, "count": 9, "size": 0.1, "radius": 1.0}),
+    "collide_pair": (geo.collide_pair, {"first": BUMPS, "second": BUMPS, "position": [[[0, 4, 0], [0, 0, 0]]],
+                                        "velocity": [[[0, -1, 0], [0, 0, 0]]], "max_contacts": 9}),
     "PairLaw": (ker.PairLaw, {"law": LAW, "first": DISK, "second": DISK, "radii": (1.0, 2.0)}),
     "PairLaw.from_wall": (ker.PairLaw.from_wall, {"wall": TEETH, "first": DISK, "second": DISK, "radii": (1.0, 2.0)}),
     "PairLaw.sample": (PAIR.sample, {"normal": [0.0, 1.0], "first_velocity": [0.0, -1.0, 0.0],
@@ -207,8 +211,8 @@ LEFT_OUT = {
     "DifferenceTest", "Diffusivity", "Distance", "DrivenLaw", "Enclosure", "Enclosures", "EssentialEdge",
     "ExchangeHollow", "ExitTimes", "ExtremalResistance", "Extremum", "FittedOrder", "GasRecord", "Generations",
     "Hollow", "LaplacianComparison", "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine",
-    "MethodFacts",
-    "MixingTime", "ModifiedCollision", "NamedWall", "Reflector", "RigidCollision", "SpectralGap", "Spectrum",
+    "MethodFacts", "MixingTime", "ModifiedCollision", "NamedWall", "PairCollision",
+    "Reflector", "RigidCollision", "SpectralGap", "Spectrum",
     "SpectrumErrors", "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow",
     "WallDesign", "WallForLaw", "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat", "lambertian",
     "retroreflection", "specular", "verify",
