@@ -173,7 +173,7 @@ def test_the_disks_share_the_energy_equally_and_their_velocities_are_those_of_th
 
 
 def test_smooth_disks_exchange_nothing_with_their_spins():
-    record = gas(LAWS["smooth"], 300, 2)
+    record = gas(LAWS["smooth"], 600, 2)
     fraction = record.rotational_fraction()
     assert abs(fraction.value) < 1e-25 and fraction.error < 1e-25
     assert math.isinf(record.rotational_fraction(0.9).error)

@@ -239,7 +239,9 @@ class _Encounter:
         limit = self.margin / fastest
         if not gap.size:
             return limit, None
-        velocity = (one + spin1 * _turned(arms[0]))[:, None] - (two + spin2 * _turned(arms[1]))[None, :]
+        velocity = (one + spin1 * _spin_velocities(arms[0]))[:, None] - (two + spin2 * _spin_velocities(arms[1]))[
+            None, :
+        ]
         rate = np.sum(velocity * normal, axis=-1)
         touching = np.argwhere((gap <= TOUCHING * self.span) & (rate < 0.0))
         if len(touching):
@@ -265,6 +267,6 @@ class _Encounter:
             moving[2] += sign * impulse * lever / disk.inertia
 
 
-def _turned(arms: Floats) -> Floats:
+def _spin_velocities(arms: Floats) -> Floats:
     """The velocities of satellites (k, 2) for spin 1."""
     return np.stack([-arms[:, 1], arms[:, 0]], axis=1)

@@ -223,8 +223,8 @@ def _within_span(curve: Arc, unit: Floats, slack: float) -> NDArray[np.bool_]:
     if span + slack >= FULL_CIRCLE:
         return np.ones(len(unit), dtype=bool)
     with np.errstate(invalid="ignore"):
-        turned = curve.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - curve.start_angle) % FULL_CIRCLE
-    return np.asarray((turned <= span + slack) | (turned >= FULL_CIRCLE - slack))
+        swept = curve.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - curve.start_angle) % FULL_CIRCLE
+    return np.asarray((swept <= span + slack) | (swept >= FULL_CIRCLE - slack))
 
 
 def touch(curve: Segment | Arc, position: Floats) -> Touch:
@@ -248,10 +248,10 @@ def length_at(curve: Segment | Arc, position: Floats) -> Floats:
         return np.asarray(np.clip(along, 0.0, curve.length))
     unit = (position - np.array(curve.center)) / np.array(curve.semi_axes)
     span = abs(curve.end_angle - curve.start_angle)
-    turned = curve.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - curve.start_angle) % FULL_CIRCLE
+    swept = curve.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - curve.start_angle) % FULL_CIRCLE
     # rounding may put a point just before the start or behind the end: it belongs to the nearer one
-    turned = np.where(turned > 0.5 * (span + FULL_CIRCLE), 0.0, np.minimum(turned, span))
-    return _length_turned(curve, turned)
+    swept = np.where(swept > 0.5 * (span + FULL_CIRCLE), 0.0, np.minimum(swept, span))
+    return _length_swept(curve, swept)
 
 
 def point_at_length(curve: Segment | Arc, length: Floats) -> Floats:
@@ -262,23 +262,23 @@ def point_at_length(curve: Segment | Arc, length: Floats) -> Floats:
     span = high[:1].sum()
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        short = _length_turned(curve, middle) < length
+        short = _length_swept(curve, middle) < length
         low, high = np.where(short, middle, low), np.where(short, high, middle)
     return curve.point(np.clip(0.5 * (low + high) / span, 0.0, 1.0)) if len(length) else np.empty((0, 2))
 
 
-def _length_turned(curve: Arc, turned: Floats) -> Floats:
-    """Arc lengths from the start to where the parametric angle has grown or fallen by ``turned``."""
+def _length_swept(curve: Arc, swept: Floats) -> Floats:
+    """Arc lengths from the start to where the parametric angle has grown or fallen by ``swept``."""
     a, b = curve.semi_axes
     if curve.is_circular:
-        return a * turned
+        return a * swept
     from scipy.special import ellipeinc
 
     # the longer semi-axis in front, so that the parameter m is in (0, 1)
     shift, long, short = (0.0, b, a) if b > a else (0.5 * math.pi, a, b)
     m = (1.0 - short / long) * (1.0 + short / long)
     start = curve.start_angle - shift
-    return np.asarray(long * np.abs(ellipeinc(start + curve.direction * turned, m) - ellipeinc(start, m)))
+    return np.asarray(long * np.abs(ellipeinc(start + curve.direction * swept, m) - ellipeinc(start, m)))
 
 
 def is_on(curve: Segment | Arc, position: Floats, slack: float) -> NDArray[np.bool_]:

@@ -78,7 +78,7 @@ def lyapunov_exponent(
     Notes
     -----
     At a collision with a wall of curvature k the velocity u = (v1, v2, omega) becomes A u, where A is the velocity
-    matrix turned into the direction of the tangent. Perturbations change by
+    matrix rotated into the direction of the tangent. Perturbations change by
 
         dq' = dq + (v - v') dt,   du' = A du + k ds (Z A - A Z) u,   dt = -(dq.n)/(v.n),   ds = (dq + v dt).t,
 
@@ -173,9 +173,9 @@ class Pencil:
         """Return the disks and their neighbours after the next collision of each."""
         flight, wall = container.next_wall(self.position, self.velocity, self.wall)
         if np.any(wall < 0):
-            lost = self.position[int(np.argmin(wall))].tolist()
+            stray = self.position[int(np.argmin(wall))].tolist()
             raise AccuracyError(
-                f"a disk at {lost} meets no wall; take another rng, or curves that join more closely", math.inf
+                f"a disk at {stray} meets no wall; take another rng, or curves that join more closely", math.inf
             )
         position = self.position + self.velocity[:, :2] * flight[:, None]
         velocity = self.velocity.copy()
@@ -202,14 +202,14 @@ def reflected_pair(
     turn = np.zeros((len(tangent), 3, 3))
     # columns: tangent, normal and spin
     turn[:, :2, 0], turn[:, :2, 1], turn[:, 2, 2] = tangent, normal, 1.0
-    turned = turn @ matrix @ np.swapaxes(turn, 1, 2)
+    rotated = turn @ matrix @ np.swapaxes(turn, 1, 2)
     plane = velocity[:, :2]
     delay = -np.sum(shift * normal, axis=1) / np.sum(plane * normal, axis=1)
     along = np.sum((shift + plane * delay[:, None]) * tangent, axis=1)
-    after = _times(turned, velocity)
-    bend = _quarter_turn(after) - _times(turned, _quarter_turn(velocity))
+    after = _times(rotated, velocity)
+    bend = _quarter_turn(after) - _times(rotated, _quarter_turn(velocity))
     new_shift = shift + (plane - after[:, :2]) * delay[:, None]
-    return after, new_shift, _times(turned, tilt) + (point.curvature * along)[:, None] * bend
+    return after, new_shift, _times(rotated, tilt) + (point.curvature * along)[:, None] * bend
 
 
 def _times(matrices: Floats, vectors: Floats) -> Floats:
