@@ -264,7 +264,6 @@ def test_the_default_spacing_is_the_least_divisor_that_is_allowed(scale):
         ({"velocity": [[0.0, -1.0]]}, r"shape \(n, 3\)"),
         ({"position": [0.0, 0.0]}, r"shape \(n, 2\)"),
         ({"position": np.zeros((3, 2)), "velocity": [[0, -1, 0]] * 2}, "equally many rows"),
-        ({"wall": geo.double_parabola()}, "Bezier"),
         ({"wall": "teeth"}, "expected a Wall"),
         ({"disk": 1.0}, "expected a Disk"),
     ],

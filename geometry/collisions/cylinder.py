@@ -69,7 +69,6 @@ def collide_cylinder(
     ----------
     disk : Disk
     wall : Wall
-        Of segments and arcs, circular or elliptic.
     scale : float
         eps, greater than 0: the wall's unit of length, in units of the disk's radius.
     position : array_like, shape (n, 2)

@@ -15,8 +15,9 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
-from ..scene.columns import ARC_COLUMNS, ELLIPSES_END, FIRST_ELLIPSE, LINE_COLUMNS, SIZE
+from ..scene.columns import ARC_COLUMNS, BEZIER_COLUMNS, ELLIPSES_END, FIRST_ELLIPSE, LINE_COLUMNS, SIZE
 from ..tracing.threads import new_flag
+from .compiled.graph_table import graphs_of
 
 if TYPE_CHECKING:
     from ..scene.scene import Scene
@@ -30,7 +31,8 @@ SLACK = 16.0 * EPS
 class Ground(NamedTuple):
     """The wall: its period, whether satellites pass from cell to cell below its tops, and the tables of its scene.
 
-    ``exact_arcs`` is the table of `refined_arcs`; ``stop`` is the flag that interrupts a collision.
+    ``exact_arcs`` is the table of `refined_arcs`, ``graphs`` that of `graphs_of`; the hollows have ranges of graphs in
+    the columns of Bezier pieces. ``stop`` is the flag that interrupts a collision.
     """
 
     cell: float
@@ -40,6 +42,8 @@ class Ground(NamedTuple):
     lines: Floats
     arcs: Floats
     exact_arcs: Floats
+    beziers: Floats
+    graphs: Floats
     stop: NDArray[np.int64]
 
 
@@ -106,7 +110,11 @@ def ground_of(scene: Scene) -> Ground:
     arcs = [table for table in (circles, ellipses) if len(table)]
     table = np.concatenate(arcs) if arcs else none
     exact_arcs = refined_arcs(table)
-    return Ground(scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, new_flag())
+    beziers = np.empty((0, BEZIER_COLUMNS)) if scene.beziers is None else scene.beziers
+    graphs = graphs_of(beziers, hollows)
+    return Ground(
+        scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, beziers, graphs, new_flag()
+    )
 
 
 def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, finite_array, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
-from ..curves.bezier import Bezier
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
 from ..tracing.threads import in_blocks
@@ -73,7 +72,6 @@ def collide(
     ----------
     disk : Disk
     wall : Wall
-        Of segments and arcs, circular or elliptic.
     scale : float
         eps, greater than 0: the period is ``scale * wall.period`` in units of the disk's radius.
     position : array_like, shape (n, 2)
@@ -96,8 +94,8 @@ def collide(
     Raises
     ------
     InputError
-        If a shape is wrong, some v2 is not negative, the spacing does not divide the circle, three satellites could
-        touch the wall, or the wall has a Bezier piece.
+        If a shape is wrong, some v2 is not negative, the spacing does not divide the circle, or three satellites could
+        touch the wall.
 
     Notes
     -----
@@ -162,15 +160,9 @@ def from_the_tops(
 
 
 def check_kinds(disk: Disk, wall: Wall) -> None:
-    """Raise an InputError unless ``disk`` is a Disk and ``wall`` a Wall of segments and arcs."""
+    """Raise an InputError unless ``disk`` is a Disk and ``wall`` a Wall."""
     instance("disk", disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
-    beziers = sum(isinstance(piece, Bezier) for path in (wall.pieces, *wall.islands) for piece in path)
-    if beziers:
-        raise InputError(
-            f"wall: expected segments and arcs, got {beziers} Bezier pieces; replace each by a polyline, "
-            "geo.Wall.from_vertices(wall.outline(tolerance))"
-        )
 
 
 def checked_states(position: ArrayLike, velocity: ArrayLike) -> tuple[Floats, Floats]:

@@ -39,7 +39,6 @@ def draw_limit(
     ----------
     disk : Disk
     wall : Wall
-        A wall of segments and arcs.
     scales : array_like
         Values of eps, at most four.
     angles : (float, float)

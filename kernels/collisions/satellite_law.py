@@ -27,7 +27,7 @@ class SatelliteLaw:
     Parameters
     ----------
     wall : Wall
-        A wall of segments and arcs, not foreshortened.
+        Not foreshortened.
     disk : Disk
     scale : float
         eps.

@@ -144,7 +144,6 @@ def limit_study(
     ----------
     disk : Disk
     wall : Wall
-        A wall of segments and arcs.
     scales : array_like, shape (n,)
         Values of eps > 0.
     rng : None, int or numpy.random.Generator

@@ -2,6 +2,8 @@
 
 A satellite meets a line or an upright conic at F = 0, see below.
 
+Bezier pieces are graphs, see `graphs`.
+
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
 bounds the third derivative. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is
 a safe step; if the parabola has no root, F has none. The steps converge quadratically because c tends to F''. All
@@ -32,38 +34,31 @@ from typing import NamedTuple
 import numpy as np
 
 from ...scene.columns import (
-    CIRCLES_END,
     CURVATURE,
     EDGE_X,
     EDGE_Y,
-    ELLIPSES_END,
-    FIRST_CIRCLE,
-    FIRST_ELLIPSE,
-    FIRST_JOINT,
     IS_CORNER,
     JOINT_X,
     JOINT_Y,
-    JOINTS_END,
-    LEFT,
     LENGTH,
     LINE_NORMAL_X,
     LINE_NORMAL_Y,
     NORMAL_X,
     NORMAL_Y,
-    RIGHT,
-    SIZE,
     START_X,
     START_Y,
-    STARTS_LINE,
     STRETCH,
 )
 from ...tracing.compiled.arcs import near_end, on_arc
 from ...tracing.compiled.options import compiled, inlined
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
-from ...tracing.compiled.records import LINE, NO_PIECE, SIDE
+from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE
 from ...tracing.double_double.sides import ARC as CURVED
+from ...tracing.double_double.sides import BEZIER as SPLINE
 from ...tracing.double_double.sides import LINE as STRAIGHT
 from ...tracing.double_double.sides import Arrival, Face, in_front_at
+from .graph_table import FIRST_S, PIECE
+from .shapes import in_frame, parameter_at
 
 # Angle below which `turning` uses series up to the tenth power; the omitted terms are below 3e-18 of the sum.
 SMALL_TURN = 0.1
@@ -277,14 +272,23 @@ def where_on_line(joints, lines, j, x, y, slack):
     return from_start >= -slack and from_end >= -slack, corner
 
 
+@inlined
+def face_at(kind, number, x, y, ground):
+    """-> Face: a piece next to a position, for double-double arithmetic."""
+    arc = ground.exact_arcs[number if kind == ARC else 0]
+    graph = ground.graphs[number if kind == BEZIER else 0]
+    if kind != BEZIER:
+        return Face(CURVED if kind == ARC else STRAIGHT, number, arc, arc, (0.0, 0.0))
+    along, _ = in_frame(graph, x - graph[START_X], y - graph[START_Y])
+    curve = ground.beziers[int(graph[PIECE])]
+    return Face(SPLINE, number, arc, curve, (graph[FIRST_S] + parameter_at(graph, along), 0.0))
+
+
 @compiled
 def is_in_front(kind, number, own, x, y, slack, ground):
     """-> bool: whether a satellite at (x, y) on the piece ``own`` lies in front of another piece close by."""
-    own_arc, arc = own.piece if own.kind == ARC else 0, number if kind == ARC else 0
-    # without Bezier pieces, and without a test for faces passed from behind on the last path
-    row, other, nowhere = ground.exact_arcs[own_arc], ground.exact_arcs[arc], (0.0, 0.0)
-    start = Face(CURVED if own.kind == ARC else STRAIGHT, own.piece, row, row, nowhere)
-    piece = Face(CURVED if kind == ARC else STRAIGHT, number, other, other, nowhere)
+    # without a test for faces passed from behind on the last path
+    start, piece = face_at(own.kind, own.piece, x, y, ground), face_at(kind, number, x, y, ground)
     arrival = Arrival(0.0, slack, slack)
     return in_front_at(ground.joints, piece, start, (x, 0.0), (y, 0.0), 0.0, 0.0, arrival)
 
@@ -388,35 +392,3 @@ def first_on_piece(kind, number, own, path, span, size, ground):
         if code == CLEAR or inward < 0.0:
             sign = -sign
         leaving = True
-
-
-@inlined
-def first_in_hollow(h, own, came_from, path, span, ground):
-    """-> Touch: the first contact of one satellite with the pieces of hollow h.
-
-    The sides of the cell of an open wall count as pieces. ``came_from`` is -1 or 1 if the satellite has just entered
-    through the left or the right side.
-    """
-    hollows, joints, motion = ground.hollows, ground.joints, path.motion
-    t, end, rotation = span
-    kind, number, code, size = NO_PIECE, -1, CLEAR, hollows[h, SIZE]
-    where = satellite_after(t, rotation, path.turn, motion)
-    ranges = (FIRST_JOINT, JOINTS_END), (FIRST_CIRCLE, CIRCLES_END), (FIRST_ELLIPSE, ELLIPSES_END)
-    for first, end_of_range in ranges:
-        tried = LINE if first == FIRST_JOINT else ARC
-        for k in range(int(hollows[h, first]), int(hollows[h, end_of_range])):
-            if tried == ARC or joints[k, STARTS_LINE] > 0.0:
-                rest = Span(t, end, rotation)
-                hit, there, unclear = first_on_piece(tried, k, own, path, rest, size, ground)
-                if hit < end:
-                    end, kind, number, code, where = hit, tried, k, unclear, there
-    if ground.is_open:
-        for side in (-1, 1):
-            edge = hollows[h, LEFT] if side < 0 else hollows[h, RIGHT]
-            line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
-            rest = Span(t, end, rotation)
-            hit, then, unclear = next_root(1.0, came_from == side, line, None, rest, path, np.inf)
-            if hit < end:
-                end, kind, number, code = hit, SIDE, side, unclear
-                where = satellite_after(hit, then, path.turn, motion)
-    return Touch(end if kind != NO_PIECE else np.inf, kind, number, where, code)

@@ -33,7 +33,7 @@ from ...scene.columns import (
 from ...tracing.compiled.interruption import is_raised
 from ...tracing.compiled.options import compiled, inlined
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
-from ...tracing.compiled.records import LINE, NO_PIECE, SIDE
+from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
 from .columns import ALPHA, OMEGA, V1, V2, X1
 from .contact import (
     CLEAR,
@@ -45,13 +45,14 @@ from .contact import (
     Span,
     Touch,
     Touching,
-    first_in_hollow,
     flight,
     next_root,
     satellite_after,
     towards_line,
     turning,
 )
+from .hollows import first_in_hollow
+from .shapes import graph_surface
 
 TOP = 7
 # Limit on the cells that one satellite passes, and on the satellites that pass the lowest point, between two contacts.
@@ -169,6 +170,8 @@ def first_contact(own, base, path, t, end, ground):
 def surface(kind, index, x, y, ground):
     """Return the point (x, y) projected onto the piece that is hit, and the unit normal towards the free side."""
     joints, lines, arcs = ground.joints, ground.lines, ground.arcs
+    if kind == BEZIER:
+        return graph_surface(ground.graphs[index], x, y)
     if kind == LINE:
         n1, n2 = lines[index, LINE_NORMAL_X], lines[index, LINE_NORMAL_Y]
         ex, ey, length = lines[index, EDGE_X], lines[index, EDGE_Y], lines[index, LENGTH]

@@ -23,7 +23,7 @@ DISK = geo.Disk(1.0, 0.5)
 SINE_MEAN, COSINE_MEAN = 0.75, 0.25
 # Number of true disks at every scale; their noise is about 0.002.
 TRUE_DISKS = 2**18
-# The rigid tracer has no Bezier curves.
+# Not the wall of all kinds of pieces, for which there are no reference values of collisions.
 DISK_SCENES = tuple(name for name in standard_names() if name != "mixed")
 
 
