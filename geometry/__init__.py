@@ -24,6 +24,7 @@ from .plotting.walls import draw_wall
 from .scene.plan import TracePlan
 from .tables.container import Container
 from .tracing.boundary_map import BoundaryStates, billiard_map, nested_reflection
+from .tracing.generations import MushroomGenerations
 from .tracing.tracing import Status, Trace, trace, trajectory
 from .walls.catalogue import WALLS, NamedWall, wall_from_text
 from .walls.mushroom import mushrooms
@@ -54,6 +55,7 @@ __all__ = [
     "Disk",
     "Hollow",
     "ModifiedCollision",
+    "MushroomGenerations",
     "NamedWall",
     "PairCollision",
     "Profile",

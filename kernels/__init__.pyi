@@ -77,6 +77,7 @@ from .matrices.matrix import KernelMatrix as KernelMatrix
 from .matrices.matrix import load_matrix as load_matrix
 from .sampling.estimation import estimate as estimate
 from .walls.circular_arc import CircularArcLaw as CircularArcLaw
+from .walls.mushroom_law import MushroomLaw as MushroomLaw
 from .walls.polygon import PolygonLaw as PolygonLaw
 from .walls.rectangular import RectangularTeethLaw as RectangularTeethLaw
 from .walls.triangular import TriangularTeethLaw as TriangularTeethLaw

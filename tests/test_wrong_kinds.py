@@ -19,6 +19,7 @@ from asperity.estimates import Estimate
 from asperity.study import study_wall
 
 TEETH, DISK, LAW = geo.triangular_teeth(1.0), geo.Disk(), ker.henyey_greenstein(0.5)
+MUSHROOMS = geo.MushroomGenerations(0.25, 0.5, 2)
 BINS, MATRIX = ker.Bins(4), ker.discretise(LAW, ker.Bins(4))
 SAMPLED = ker.discretise(LAW, BINS, "monte-carlo", samples=64, rng=0)
 COLLISION, SPACE = ker.CollisionLaw(LAW, DISK), geo.ConfigurationSpace(TEETH, DISK, 0.01)
@@ -71,6 +72,11 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "focusing_arcs": (geo.focusing_arcs, {"half_angle": 1.0}),
     "koch": (geo.koch, {"generations": 1}),
     "mushrooms": (geo.mushrooms, {"stem_to_cap": 0.2, "stem_aspect": 0.5, "generations": 1}),
+    "MushroomGenerations": (geo.MushroomGenerations, {"stem_to_cap": 0.2, "stem_aspect": 0.5, "generations": 2}),
+    "MushroomGenerations.trace": (MUSHROOMS.trace, {"x": [0.3], "theta": [1.0], "max_collisions": 9, "threads": 1}),
+    "MushroomGenerations.generation": (MUSHROOMS.generation, {"x": [0.3]}),
+    "MushroomGenerations.width": (MUSHROOMS.width, {"generation": 2}),
+    "MushroomLaw": (ker.MushroomLaw, {"wall": MUSHROOMS}),
     "rectangular_teeth": (geo.rectangular_teeth, {"height_to_width": 1.0}),
     "triangular_teeth": (geo.triangular_teeth, {"angle": 1.0}),
     "draw_wall": (geo.draw_wall, {"wall": TEETH, "x": [0.3], "theta": [1.0]}),

@@ -1,0 +1,104 @@
+"""The law of any number of generations of mushrooms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.checks import Floats, angles, instance
+from ...core.errors import AccuracyError
+from ...core.kinds import explained_class
+from ...geometry import MushroomGenerations
+from ..bases.angles import mirrored_angle
+from ..bases.basis import AngleFunction
+from ..laws.distribution import Distribution
+from ..laws.law import DrivenLaw, RandomMap, entry_points
+from .traced_map import UNRESOLVED_TOLERANCE, traced_reflection
+from .wall_law import WallLaw
+
+
+@explained_class
+@dataclass(frozen=True)
+class MushroomLaw(DrivenLaw):
+    """The law P~ of `geometry.MushroomGenerations`, for rays that enter at a uniform point of the period.
+
+    All mushrooms are similar, and reflection does not depend on their size. So a ray enters one with the probability
+    1 - (1 - s)^generations, at a uniform point of the opening, and else is reflected specularly by a flat top.
+
+    Parameters
+    ----------
+    wall : geometry.MushroomGenerations
+
+    Raises
+    ------
+    AccuracyError
+        In `reflect`, `sample` and `apply`, if more than a fraction of 1e-4 of the rays did not escape.
+
+    Notes
+    -----
+    Source: Rudzis 2022, sections 2.2.4 and 2.3.4.
+
+    Examples
+    --------
+    A vertical ray of one generation either meets the flat top or falls through the stem to the bottom of the cap:
+
+    >>> import numpy as np
+    >>> from asperity import geometry as geo
+    >>> law = MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 40))
+    >>> law.reflect(0.99999999, 1.0) == np.pi - 1.0, float(law.wall.opened) > 0.9999
+    (True, True)
+    """
+
+    wall: MushroomGenerations
+
+    reversible = True
+    mirror_symmetric: bool | None = True
+
+    def __post_init__(self) -> None:
+        instance("wall", self.wall, MushroomGenerations, "geo.MushroomGenerations(0.1, 0.1, 20)")
+
+    def reflect_with_status(self, x: ArrayLike, theta: ArrayLike) -> tuple[Floats, NDArray[np.bool_]]:
+        """Outgoing angles and the mask of the rays that escaped; the other rays count as retroreflected.
+
+        The openings are moved to the left: ``x`` below ``wall.opened`` enters a mushroom.
+        """
+        x, theta = np.broadcast_arrays(entry_points(x), angles("theta", theta))
+        left, right = self.wall.opening
+        inside = x < self.wall.opened
+        outgoing, escaped = np.array(np.pi - theta), np.ones(theta.shape, dtype=np.bool_)
+        entry = left + (right - left) * (x[inside] / self.wall.opened)
+        outgoing[inside], escaped[inside] = traced_reflection(self.wall.mushroom, entry, theta[inside])
+        return outgoing, escaped
+
+    def random_map(self) -> RandomMap:
+        """The map `reflect_with_status`."""
+        return self.reflect_with_status
+
+    def reflect(self, x: ArrayLike, theta: ArrayLike) -> Floats:
+        """Outgoing angle for the entry point ``x`` in (0, 1), see `reflect_with_status`, and the angle ``theta``."""
+        outgoing, escaped = self.reflect_with_status(x, theta)
+        unresolved = 1.0 - float(np.mean(escaped)) if escaped.size else 0.0
+        if unresolved > UNRESOLVED_TOLERANCE:
+            raise AccuracyError(
+                f"MushroomLaw: {unresolved:.2g} of {escaped.size} rays did not escape, more than "
+                f"{UNRESOLVED_TOLERANCE:g}; MushroomLaw.reflect_with_status() says which they were",
+                unresolved,
+            )
+        return outgoing
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The distributions of generation 1 by quadrature, its flat tops reduced to those of the last generation."""
+        left, right = self.wall.opening
+        found = WallLaw(self.wall.mushroom).distribution(theta, edges)
+        factor = self.wall.opened / (right - left)
+        flat = factor * (found.mass - (1.0 - (right - left))) + (1.0 - self.wall.opened)
+        return Distribution(factor * found.below, found.position, flat)
+
+    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+        left, right = self.wall.opening
+        factor = self.wall.opened / (right - left)
+        level = np.asarray(function(mirrored_angle(theta)), dtype=np.float64)
+        inside = WallLaw(self.wall.mushroom).apply(function, theta) - (1.0 - (right - left)) * level
+        return np.asarray(factor * inside + (1.0 - self.wall.opened) * level)
