@@ -1,5 +1,6 @@
 """How Sphinx builds these pages; it needs asperity installed and no network."""
 
+import sys
 from pathlib import Path
 
 import asperity
@@ -10,6 +11,12 @@ from asperity.ledger.text import page_of
 generated = Path(__file__).parent / "generated"
 generated.mkdir(exist_ok=True)
 (generated / "ledger.md").write_text(page_of(entries()), encoding="utf-8")
+# docs/paper-figures.md includes the figures
+sys.path.insert(0, str(Path(__file__).parent / "examples"))
+import paper_figures  # noqa: E402
+
+paper_figures.main(generated / "figures")
+(generated / "figures.md").write_text(paper_figures.page(), encoding="utf-8")
 
 project = "asperity"
 author = "The asperity developers"

@@ -34,6 +34,7 @@ def test_every_example_has_a_test():
         "maxwell_or_rough",
         "measured_profile",
         "no_slip_or_smooth",
+        "paper_figures",
         "published_gap",
         "true_disk",
         "true_disk_pictures",

@@ -470,7 +470,7 @@ def page() -> str:
     blocks = []
     for number, figure in enumerate(FIGURES, start=1):
         caption = str(figure.__doc__).splitlines()[0]
-        blocks.append(f"```{{figure}} /generated/figures/{figure.__name__}.png\n{number}. {caption}\n```\n")
+        blocks.append(f"```{{figure}} /generated/figures/{figure.__name__}.png\n({number}) {caption}\n```\n")
     return "\n".join(blocks)
 
 
