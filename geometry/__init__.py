@@ -19,6 +19,7 @@ from .curves.curve import Curve
 from .curves.segment import Segment
 from .disk.charts import RollingCharts, plane_crossing, plane_crossing_differential
 from .disk.disk import Disk
+from .disk.inner_disk import InnerDisk
 from .plotting.collisions import collision_path, draw_collision, draw_configurations
 from .plotting.walls import draw_wall
 from .scene.plan import TracePlan
@@ -54,6 +55,7 @@ __all__ = [
     "CylinderCollision",
     "Disk",
     "Hollow",
+    "InnerDisk",
     "ModifiedCollision",
     "MushroomGenerations",
     "NamedWall",

@@ -76,6 +76,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "MushroomGenerations.trace": (MUSHROOMS.trace, {"x": [0.3], "theta": [1.0], "max_collisions": 9, "threads": 1}),
     "MushroomGenerations.generation": (MUSHROOMS.generation, {"x": [0.3]}),
     "MushroomGenerations.width": (MUSHROOMS.width, {"generation": 2}),
+    "InnerDisk": (geo.InnerDisk, {"spacing": 0.25, "depth": 0.1}),
+    "InnerDisk.contains": (geo.InnerDisk(0.25, 0.1).contains, {"configuration": [0.0, 0.0, 0.0], "point": [0.0, 0.1]}),
     "MushroomLaw": (ker.MushroomLaw, {"wall": MUSHROOMS}),
     "rectangular_teeth": (geo.rectangular_teeth, {"height_to_width": 1.0}),
     "triangular_teeth": (geo.triangular_teeth, {"angle": 1.0}),

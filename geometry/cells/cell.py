@@ -9,11 +9,13 @@ from functools import cached_property
 from typing import Any, Self
 
 from ...core.checks import Floats, frozen, positive_number
+from ...core.estimates import Estimate
 from ...core.kinds import explained
 from ..curves.curve import Curve, Point
 from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between
 from .origin import HighestPoint, highest_point_of
+from .regularity import largest_curvature_of, singular_points_of
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,6 +73,35 @@ class Cell:
     def arc_length(self) -> float:
         """The total length of all pieces, islands included."""
         return math.fsum(p.length for path in (self.pieces, *self.islands) for p in path)
+
+    @cached_property
+    def singular_points(self) -> Floats:
+        """The points of one period where the wall is not C^2, shape (n, 2), read-only: corners and jumps of curvature.
+
+        Elsewhere the collision of rays and of disks is smooth (Rudzis 2022, sections 1.2.1 and 6.1).
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> geo.triangular_teeth(1.5707963267948966).singular_points.round(15).tolist()
+        [[0.0, 0.0], [0.5, -0.5]]
+        """
+        return singular_points_of((self.pieces, *self.islands))
+
+    @cached_property
+    def largest_curvature(self) -> Estimate:
+        """kappa_max, the largest curvature of the wall off its singular points, with a bound on the error.
+
+        The lemmas of Rudzis 2022, section 5.3.4, use it. It is infinite if the tangent vector of a Bezier piece
+        vanishes.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> float(geo.dispersing_arcs(0.5).largest_curvature), float(geo.koch(1).largest_curvature)
+        (0.5, 0.0)
+        """
+        return largest_curvature_of((self.pieces, *self.islands))
 
     @cached_property
     def is_polygonal(self) -> bool:

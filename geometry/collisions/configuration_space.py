@@ -13,6 +13,7 @@ from ...core.kinds import explained
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal
+from ..disk.inner_disk import InnerDisk
 from ..disk.satellites import Satellites
 from ..walls.interior import in_solid
 from ..walls.wall import Wall
@@ -83,6 +84,11 @@ class ConfigurationSpace:
     def zoomed(self) -> RollingCharts:
         """The charts in the unit ``scale``."""
         return RollingCharts(self.spacing, self.scale)
+
+    @property
+    def inner_disk(self) -> InnerDisk:
+        """D_0, the disk inside the satellites, whose clearance tells whether it can touch the wall (eq. 1.34)."""
+        return InnerDisk(self.spacing, self.depth)
 
     @property
     def gap_radius(self) -> float:
