@@ -14,6 +14,7 @@ from asperity.geometry.collisions.compiled import graph_table as graphs
 from asperity.geometry.collisions.records import ground_of
 from asperity.geometry.disk.satellites import Satellites
 from precise_collision import Flight
+from random_curved_walls import COUNT, random_curved_wall
 from test_rigid import DISK, states
 
 PARABOLAS = geo.double_parabola()
@@ -180,3 +181,20 @@ def test_double_parabolas_of_shrinking_scale_approach_no_slip():
     assert reached[0] > reached[1] > reached[2]
     assert reached[2] == pytest.approx(0.054, abs=0.003)
     assert math.isclose(float(ker.distance(ker.WallLaw(PARABOLAS), ker.retroreflection())), 0.0581, abs_tol=3e-4)
+
+
+@pytest.mark.parametrize("number", range(0, COUNT, 3))
+def test_disks_return_from_random_curved_walls_and_retrace_their_way(number):
+    wall = random_curved_wall(number)
+    for scale in (1e-1, 1e-3):
+        position, velocity = states(wall, scale, 500, seed=number)
+        out = geo.collide(DISK, wall, scale, position, velocity)
+        assert out.escaped.all()
+        back = geo.collide(DISK, wall, scale, out.position, -out.velocity)
+        # a few states amplify rounding by ten orders
+        assert np.mean(np.abs(back.velocity + velocity).max(axis=1) < 1e-4) >= 0.996
+        assert np.mean(back.contacts == out.contacts) >= 0.996
+
+
+def test_the_double_parabola_is_near_no_slip_in_the_papers_pseudometric():
+    assert float(ker.distance(ker.WallLaw(PARABOLAS), ker.retroreflection(), kind="pseudometric")) < 0.03
