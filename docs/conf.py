@@ -1,22 +1,33 @@
 """How Sphinx builds these pages; it needs asperity installed and no network."""
 
+import os
 import sys
+import warnings
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import asperity
 from asperity.ledger import entries
 from asperity.ledger.text import page_of
 
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+reference = import_module("reference")
+# Pictures of the gallery are drawn to files, also where a display exists.
+os.environ.setdefault("MPLBACKEND", "Agg")
+
 # docs/ledger.md includes the rows
-generated = Path(__file__).parent / "generated"
+generated = HERE / "generated"
 generated.mkdir(exist_ok=True)
 (generated / "ledger.md").write_text(page_of(entries()), encoding="utf-8")
 # docs/paper-figures.md includes the figures
-sys.path.insert(0, str(Path(__file__).parent / "examples"))
-import paper_figures  # noqa: E402
-
+sys.path.insert(0, str(HERE / "examples"))
+paper_figures = import_module("paper_figures")
 paper_figures.main(generated / "figures")
 (generated / "figures.md").write_text(paper_figures.page(), encoding="utf-8")
+# docs/api/index.md lists the pages of the tasks
+reference.write_pages(HERE / "api" / "generated")
 
 project = "asperity"
 author = "The asperity developers"
@@ -27,18 +38,65 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.intersphinx",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "_templates", "generated"]
+exclude_patterns = [
+    *("_build", "_templates", "how-to", "examples"),
+    *("generated/ledger.md", "generated/backreferences", "**/sg_execution_times*", "**/*.ipynb"),
+]
 templates_path = ["_templates"]
 
 html_theme = "furo"
 html_title = f"asperity {release}"
+# MathJax as one file that needs neither network nor fonts; the package has some hundred files more
+mathjax = Path(str(find_spec("sphinx-mathjax-offline").origin)).parent / "static" / "mathjax" / "tex-svg.js"
+html_static_path = [str(mathjax), "pages.css"]
+html_css_files = ["pages.css"]
+mathjax_path = mathjax.name
 
 myst_enable_extensions = ["amsmath", "dollarmath"]
 myst_heading_anchors = 3
+
+# Links into other documents, by inventories of the few names that these pages mention: no network is needed.
+inventories = reference.write_inventories(HERE / "links.txt", generated)
+addresses = {
+    "python": "https://docs.python.org/3/",
+    "numpy": "https://numpy.org/doc/stable/",
+    "scipy": "https://docs.scipy.org/doc/scipy/",
+    "matplotlib": "https://matplotlib.org/stable/",
+}
+intersphinx_mapping = {name: (address, inventories[name]) for name, address in addresses.items()}
+
+# The short examples are executed; the studies take minutes, so that their source is shown only.
+sphinx_gallery_conf = {
+    "examples_dirs": ["how-to", "examples"],
+    "gallery_dirs": ["generated/how-to", "generated/examples"],
+    "filename_pattern": r"/how-to/",
+    "ignore_pattern": r"(gallery|true_disk_pictures)\.py$",
+    "within_subsection_order": "reference.StoryOrder",
+    "backreferences_dir": "generated/backreferences",
+    "doc_module": ("asperity",),
+    "reference_url": {"asperity": None},
+    "image_scrapers": ("matplotlib",),
+    "matplotlib_animations": False,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "show_signature": False,
+    "download_all_examples": False,
+    "min_reported_time": 10**6,
+    "write_computation_times": False,
+    "default_thumb_file": str(HERE / "gallery" / "walls.png"),
+    # a name that no example uses has no list of examples
+    "log_level": {"backreference_missing": "info"},
+}
+warnings.filterwarnings("ignore", message="FigureCanvasAgg is non-interactive")
+
+# single backticks in docstrings are names
+default_role = "py:obj"
 
 # The rooms are listed by their __all__, whichever file a name was written in.
 autosummary_ignore_module_all = False
@@ -46,7 +104,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 autodoc_typehints_format = "short"
 # by the names in the source, not by the unions behind them
-autodoc_type_aliases = {"ArrayLike": "ArrayLike", "Floats": "Floats"}
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "Floats", "Rng", "ErrorKind")}
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
 napoleon_google_docstring = False

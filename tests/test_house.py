@@ -17,7 +17,14 @@ import asperity
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = {"numba", "sympy", "ot", "matplotlib", "shapely", "dask", "distributed", "pandas", "xarray", "adaptive"}
-PAGES = ["README.md", "docs/quickstart.md", "docs/verifying.md", "docs/errors.md", "docs/theory/configurations.md"]
+PAGES = [
+    "README.md",
+    "docs/index.md",
+    "docs/quickstart.md",
+    "docs/verifying.md",
+    "docs/errors.md",
+    "docs/theory/configurations.md",
+]
 
 
 def run_python(*arguments: str) -> str:

@@ -1,4 +1,7 @@
-"""A disk between two plates: no-slip plates hold it in a bounded part of the strip, really rough ones let it go.
+"""A disk in a strip and in a wedge
+================================
+
+A disk between two plates: no-slip plates hold it in a bounded part of the strip, really rough ones let it go.
 
 Between no-slip plates at distance 1 (for the disk's centre) the motion along them stays within the full width
 l sqrt(1 + m/J), l = sqrt(1/v2^2 - 1) with v2 the normal fraction of the kinetic speed. In a no-slip wedge whose angle

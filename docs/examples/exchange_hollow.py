@@ -1,9 +1,13 @@
-"""Which chamber behind a small opening sends every ray where an exchange of intervals of angles sends it?
+"""Chambers that exchange intervals
+================================
+
+Which chamber behind a small opening sends every ray where an exchange of intervals of angles sends it?
 
 A symmetric matrix is that of an exchange of intervals, and pairs of mirrors perform the exchange: the wall of the
 theorem that every symmetric law is a limit of laws of walls.
 """
 
+# sphinx_gallery_thumbnail_path = "gallery/exchange-hollow.png"
 from __future__ import annotations
 
 import sys

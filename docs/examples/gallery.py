@@ -1,4 +1,4 @@
-"""Draw the pictures of docs/gallery.md: python docs/examples/gallery.py docs/gallery"""
+"""Draw the pictures that pages and README show: python docs/examples/gallery.py docs/gallery"""
 
 from __future__ import annotations
 
@@ -7,39 +7,40 @@ from pathlib import Path
 
 import exchange_hollow
 import least_resistance
-import measured_profile
 import wall_for_a_law
 import walls_converge
 
 from asperity import geometry as geo
-from asperity.study import PICTURES, Study, study_wall
+from asperity import kernels as ker
 from asperity.study.pictures import draw_gallery
 
 
-def main(folder: Path, tolerance: float = 1e-3) -> dict[str, Study]:
-    """Write the named walls, the least resistance, walls for laws, and two studies, which are returned."""
+def main(folder: Path) -> list[Path]:
+    """Write the front page's picture, the named walls, and the pictures of the theory pages; returns the files."""
     folder.mkdir(parents=True, exist_ok=True)
+    draw_front(folder / "front.png")
     draw_gallery(folder / "walls.png", overwrite=True)
     least_resistance.main(picture=folder / "least-resistance.png")
     wall_for_a_law.main(picture=folder / "wall-for-a-law.png")
     walls_converge.main(picture=folder / "walls-converge.png")
     exchange_hollow.main(picture=folder / "exchange-hollow.png")
-    studies = {
-        "focusing-arcs": study_wall(geo.focusing_arcs(1.2), "focusing-arcs", tolerance=tolerance),
-        "measured-profile": measured_profile.main(tolerance=tolerance),
-    }
-    for name, report in studies.items():
-        paths = report.save(folder / name, overwrite=True)
-        for path in paths:
-            # the page shows the pictures; matrices and numbers are made again by the command above each of them
-            if path.name in PICTURES:
-                path.rename(folder / f"{name}-{path.name}")
-            else:
-                path.unlink()
-        (folder / name).rmdir()
-    return studies
+    return sorted(folder.glob("*.png"))
+
+
+def draw_front(path: Path) -> None:
+    """A wall with rays, and the density of its law."""
+    from matplotlib.figure import Figure
+
+    wall = geo.focusing_arcs(half_angle=1.2)
+    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=(1.1, 1.0))
+    geo.draw_wall(wall, x=[0.15, 0.5, 0.7], theta=[0.8, 1.9, 1.2], ax=left)
+    left.set_title("rays on a wall of arcs")
+    ker.discretise(ker.WallLaw(wall), ker.Bins(96)).plot(right)
+    right.set_title("density of the law of the outgoing angle")
+    figure.savefig(path, dpi=100)
 
 
 if __name__ == "__main__":
-    for report in main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/gallery")).values():
-        print(report.summary(), end="\n\n")
+    for path in main(Path(sys.argv[1] if len(sys.argv) > 1 else "docs/gallery")):
+        print(path)

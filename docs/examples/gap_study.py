@@ -1,4 +1,7 @@
-"""Gaps of focusing arcs and of dispersing bumps against their parameter, and beside the law 4 h of shallow walls.
+"""Gaps of two families of walls
+=============================
+
+Gaps of focusing arcs and of dispersing bumps against their parameter, and beside the law 4 h of shallow walls.
 
 h is the mean squared slope. The gap of bumps with curvature 1/3 is published as .0373 (Feres and Zhang 2010).
 """

@@ -1,10 +1,14 @@
-"""How much resistance can roughness add to a body, or take away from it?
+"""Resistance of families of hollows
+=================================
+
+How much resistance can roughness add to a body, or take away from it?
 
 Plakhov's problem: a convex body tumbles through a thin medium. Roughness changes its resistance by a factor between
 0.98782 and 3/2. The lower end is that of the law on the left of the picture, which no wall has but walls come near; the
 right side shows what simple hollows do. Among isosceles triangles the best are a little sharper than a right angle.
 """
 
+# sphinx_gallery_thumbnail_path = "gallery/least-resistance.png"
 from __future__ import annotations
 
 import sys

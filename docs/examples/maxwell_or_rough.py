@@ -1,4 +1,7 @@
-"""Maxwell's law against a rough wall: laws that can be mixed and composed.
+"""Maxwell's law against a rough wall
+==================================
+
+Maxwell's law against a rough wall: laws that can be mixed and composed.
 
 Maxwell let a fraction a of the particles leave the wall as Lambert's law says, and the others specularly. A rough wall
 without any diffuse fraction also scatters. Which fraction a has the same spectral gap? For Maxwell's law the gap is a,

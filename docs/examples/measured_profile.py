@@ -1,4 +1,7 @@
-"""A measured profile: how a transect of real terrain reflects particles.
+"""A transect of terrain
+=====================
+
+A measured profile: how a transect of real terrain reflects particles.
 
 The elevation model is the sample that matplotlib ships, ``jacksboro_fault_dem.npz`` (the Jacksboro fault, Tennessee, in
 metres; from the U.S. Geological Survey's National Elevation Dataset). One row of it is a profile that nobody made for

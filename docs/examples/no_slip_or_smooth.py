@@ -1,4 +1,7 @@
-"""Between smooth and no-slip: a disk on rectangular teeth.
+"""Between smooth and no-slip
+==========================
+
+Between smooth and no-slip: a disk on rectangular teeth.
 
 The teeth send a ray back or on, so that the disk's law is a coin toss between the matrices A_smooth and A_no-slip. The
 coin depends on the angle and on the foreshortened depth of the teeth, not monotonically: it oscillates between 0 and

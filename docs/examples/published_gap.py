@@ -1,4 +1,7 @@
-"""A published gap: bumps of arc radius 3 periods have the gap .0373 (Feres and Zhang 2010).
+"""A published gap
+===============
+
+A published gap: bumps of arc radius 3 periods have the gap .0373 (Feres and Zhang 2010).
 
 The gap of a shallow wall is four times its mean squared slope h, to leading order. This prints both for dispersing
 bumps and for focusing arcs as they get shallower.

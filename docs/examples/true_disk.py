@@ -1,4 +1,7 @@
-"""The collision law of a disk with satellites tends to K = delta (x) P~ (x) delta_{pi - psi}.
+"""The law of the true disk
+========================
+
+The collision law of a disk with satellites tends to K = delta (x) P~ (x) delta_{pi - psi}.
 
 P~ is the law of the foreshortened wall. The study measures, at several scales eps and ratios m/J, how far the law of
 the true disk is from that limit, and shows both cases of the dichotomy: a constant sequence of cells has a limit, an

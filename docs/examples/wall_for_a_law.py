@@ -1,9 +1,13 @@
-"""Which wall reflects as Lambert's law, or as Maxwell's, and on which does a disk collide without slip half the time?
+"""Walls for three laws
+====================
+
+Which wall reflects as Lambert's law, or as Maxwell's, and on which does a disk collide without slip half the time?
 
 The law of a wall is the mixture of the laws of its hollows, each with the width of its opening. Polygons enough have
 Lambert's law in their hull, and so a few dozen of them side by side have its first moments to rounding.
 """
 
+# sphinx_gallery_thumbnail_path = "gallery/wall-for-a-law.png"
 from __future__ import annotations
 
 import sys

@@ -1,5 +1,9 @@
-"""How fast do walls for a law approach it? Joint distance against moments and hollows, from the table of the page."""
+"""Walls that approach a law
+=========================
 
+How fast do walls for a law approach it? Joint distance against moments and hollows, from the table of the page."""
+
+# sphinx_gallery_thumbnail_path = "gallery/walls-converge.png"
 from __future__ import annotations
 
 import sys

@@ -1,0 +1,47 @@
+r"""
+Diffusivity of a rough channel
+==============================
+
+A gas so dilute that its particles meet only the walls diffuses along a channel. The coefficient follows from grazing
+flights alone. A simulation confirms it.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+
+# %%
+# The ratio :math:`\eta` of the diffusivity to :math:`D_0 = 4rs/\pi`, its value for diffuse walls. Walls without flat
+# tops and vertical sides turn all grazing flights, and have :math:`\eta = 1`, whatever their shape. The page about
+# :doc:`Knudsen diffusion </theory/knudsen-diffusion>` explains the limit.
+
+laws = {
+    "diffuse": ker.lambertian(),
+    "arcs, half angle 1.2": ker.CircularArcLaw(1.2),
+    "bumps": ker.WallLaw(geo.dispersing_arcs(curvature=1.0)),
+    "semicircles": ker.CircularArcLaw(np.pi / 2),
+    "Maxwell, half diffuse": ker.maxwell(0.5),
+}
+found = {name: spec.diffusivity(law) for name, law in laws.items()}
+for name, diffusivity in found.items():
+    print(f"{name:22} eta = {diffusivity.eta:.6f}")
+
+# %%
+# The mean time :math:`\tau` in which particles leave :math:`|x| < L` is :math:`L^2/(D\ln(L/r))` in the limit of large
+# :math:`L`. So :math:`L^2/(D_0\tau)` against :math:`\ln L` has the slope :math:`\eta`. The dashed lines have the slopes
+# above and go through the last points: for Maxwell's law the slope is reached slowly.
+
+lengths = 10.0 * 2.0 ** np.arange(0, 5.5, 0.5)
+fig, ax = plt.subplots(layout="constrained")
+for k, name in enumerate(("diffuse", "semicircles", "Maxwell, half diffuse")):
+    times = spec.exit_times(laws[name], lengths, 1000, rng=5)
+    line = times.scaled[-1] + found[name].eta * np.log(lengths / lengths[-1])
+    ax.plot(lengths, times.scaled, "o", color=f"C{k}", label=name)
+    ax.plot(lengths, line, "--", color=f"C{k}")
+    print(f"{name:22} eta = {times.eta()} from exit times")
+ax.set(xscale="log", xlabel="L / r", ylabel=r"$L^2 / (D_0 \tau)$")
+ax.legend()
+plt.show()
