@@ -95,6 +95,9 @@ sphinx_gallery_conf = {
 }
 warnings.filterwarnings("ignore", message="FigureCanvasAgg is non-interactive")
 
+# the name of a field, such as "value", may also be that of attributes of several classes
+suppress_warnings = ["ref.python"]
+
 # single backticks in docstrings are names
 default_role = "py:obj"
 

@@ -108,7 +108,7 @@ def write_pages(target: Path) -> None:
                 chosen = [name for name in names if is_class(name) == wanted]
                 if chosen:
                     lines += [".. autosummary::", "   :toctree:", f"   :template: autosummary/{template}.rst", ""]
-                    lines += [f"   {name}" for name in chosen] + [""]
+                    lines += [f"   ~{name}" for name in chosen] + [""]
         write(target / f"task-{page}.rst", "\n".join(lines))
     entries = "".join(f"   generated/task-{page}\n" for page, _, _ in listed)
     write(target / "tasks.txt", f".. toctree::\n   :maxdepth: 1\n\n{entries}")
