@@ -1,4 +1,7 @@
-"""Does roughness make billiards less chaotic? Lyapunov exponents of smooth and no-slip disks, and a gas of them.
+"""Billiards
+=========
+
+Does roughness make billiards less chaotic? Lyapunov exponents of smooth and no-slip disks, and a gas of them.
 
 In a stadium and in a Sinai table a smooth disk moves chaotically. No-slip walls exchange translation and spin, and keep
 a momentum at every flat piece; the exponents are smaller, but not 0. In a circle both kinds of motion are regular. In
