@@ -39,6 +39,7 @@ from .walls.named import (
     rectangular_teeth,
     triangular_teeth,
 )
+from .walls.random_heights import HeightCorrelation, SelfAffine, random_wall
 from .walls.wall import Wall, load_wall
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ __all__ = [
     "Curve",
     "CylinderCollision",
     "Disk",
+    "HeightCorrelation",
     "Hollow",
     "InnerDisk",
     "ModifiedCollision",
@@ -65,6 +67,7 @@ __all__ = [
     "RollingCharts",
     "SatelliteDisk",
     "Segment",
+    "SelfAffine",
     "Status",
     "Trace",
     "TracePlan",
@@ -89,6 +92,7 @@ __all__ = [
     "nested_reflection",
     "plane_crossing",
     "plane_crossing_differential",
+    "random_wall",
     "read_profile",
     "rectangular_teeth",
     "symbolic",

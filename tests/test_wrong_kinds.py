@@ -86,6 +86,10 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
                                             "velocity": VELOCITY[0], "spacing": None}),
     "draw_configurations": (geo.draw_configurations, {"space": SPACE, "height": 1.0}),
     "load_wall": (geo.load_wall, {"path": "no.toml"}),
+    "HeightCorrelation": (geo.HeightCorrelation, {"length": 0.1, "shape": "gaussian"}),
+    "SelfAffine": (geo.SelfAffine, {"hurst": 0.5, "longest": None, "shortest": None}),
+    "random_wall": (geo.random_wall, {"spectrum": geo.SelfAffine(0.5), "points": 8, "rms_slope": 0.1,
+                                      "rms_height": None, "period": 1.0, "smooth": False, "rng": 0}),
     "read_profile": (geo.read_profile, {"path": "no.txt", "row": None, "units": None}),
     "wall_from_text": (geo.wall_from_text, {"text": "flat"}),
     "plane_crossing": (geo.plane_crossing, {"configuration": [0.0, 1.0, 0.0], "velocity": [0.0, -1.0, 0.0]}),
@@ -235,7 +239,7 @@ WRONG: dict[str, Any] = {
     "law": LAW, "disk": DISK, "kernel": MATRIX, "path": "no/such/file", "nul": "a\0b",
 }  # fmt: skip
 # A function of the user that fails, or returns nonsense, fails in its own way; a bound may be met after hours.
-FUNCTIONS = ("density", "map", "function", "spacing", "family", "objective", "cost", "solve")
+FUNCTIONS = ("density", "map", "function", "spacing", "family", "objective", "cost", "solve", "spectrum")
 ENDLESS_KINDS = ("zero", "beyond double", "minus beyond")
 ENDLESS = {"tolerance", "smallest_opening", "permutations", "max_contacts", "max_collisions", "iterations"}
 # Seconds of the processor that a call may take: one that takes its argument may work.
