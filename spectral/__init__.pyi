@@ -25,6 +25,10 @@ from .gap.gap import gaps_in_both_conventions as gaps_in_both_conventions
 from .gap.gap import spectral_gap as spectral_gap
 from .gap.law_spectrum import spectrum as spectrum
 from .gap.verdict import SpectralGap as SpectralGap
+from .sweeps.ensembles import Ensemble as Ensemble
+from .sweeps.ensembles import EnsembleRow as EnsembleRow
+from .sweeps.ensembles import ensemble as ensemble
+from .sweeps.ensembles import mean_law as mean_law
 from .sweeps.extremum import Extremum as Extremum
 from .sweeps.points import Between as Between
 from .sweeps.row import SweepRow as SweepRow

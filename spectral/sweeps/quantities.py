@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -143,4 +144,5 @@ def name_of(function: Callable[..., object]) -> str:
     """
     # functions have names, the user's other callables may
     name = getattr(function, "__qualname__", None)
-    return f"{function.__module__}.{name}" if name else repr(function)
+    # without addresses, which differ from process to process
+    return f"{function.__module__}.{name}" if name else re.sub(r" at 0x[0-9a-fA-F]+", "", repr(function))

@@ -45,7 +45,7 @@ class _Study:
         quantities = quantities_from(self.asked)
         start = time.perf_counter()
         try:
-            law = _law(self.family(**point))
+            law = law_of(self.family(**point))
         except Exception as reason:  # a point must not stop the others
             names = [name for one in quantities for name in one.names]
             return [_refused(point, name, reason, time.perf_counter() - start) for name in names]
@@ -233,7 +233,7 @@ class _Run:
         }
 
 
-def _law(made: object) -> Law:
+def law_of(made: object) -> Law:
     """The law of what a family returns."""
     if isinstance(made, Wall):
         return WallLaw(made)
@@ -267,7 +267,7 @@ def _check_names(family: Family, point: Point) -> None:
 def _fingerprint(family: Family, point: Point) -> str:
     """A short text that tells what a family makes from what others make."""
     try:
-        return law_digest(_law(family(**point)))
+        return law_digest(law_of(family(**point)))
     except Exception as reason:  # a refused wall is a row of the table
         return f"refused: {reason}"
 

@@ -1,0 +1,319 @@
+"""Ensembles: mean and spread of quantities over random walls, and the mean of their laws."""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...core.checkpoints import Checkpoint
+from ...core.checks import Floats, Rng, check_memory, generator, instance, positive_number, whole_number
+from ...core.errors import AsperityError, InputError
+from ...core.estimates import Estimate
+from ...core.frames import data_frame
+from ...core.kinds import explained
+from ...core.version import __version__
+from ...core.workers import connected, results
+from ...kernels import Basis, KernelMatrix, discretise
+from ...kernels.sampling.counts import half_width
+from .quantities import UserQuantity, name_of
+from .running import Family, law_of, sweep
+from .statistics import FEWEST, mean_estimate, spread_estimate
+from .table import SweepTable
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+# What ``rng=None`` stands for: an ensemble without seed is the same each time, so that it goes on from its checkpoint.
+SEED_WITHOUT_RNG = 0
+# The parameter of a family that makes its walls differ.
+SEED = "rng"
+
+
+@dataclass(frozen=True)
+class EnsembleRow:
+    """One quantity over all realisations.
+
+    Attributes
+    ----------
+    quantity : str
+    mean, spread : Estimate
+        Expected value and standard deviation over the random walls. Where a realisation was refused their errors are
+        ``inf``, because the walls that remain are a selection.
+    realisations, refused : int
+        Number of all realisations, and of those without a value.
+    """
+
+    quantity: str
+    mean: Estimate
+    spread: Estimate
+    realisations: int
+    refused: int
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Quantities over random walls; made by `ensemble`.
+
+    Attributes
+    ----------
+    table : SweepTable
+        Every realisation, with the parameter ``rng``: the seed with which the family makes it again.
+    rows : tuple of EnsembleRow
+        Mean and spread of each quantity.
+    """
+
+    table: SweepTable
+    rows: tuple[EnsembleRow, ...]
+
+    def of(self, quantity: str) -> EnsembleRow:
+        """Mean and spread of one quantity.
+
+        Raises
+        ------
+        InputError
+            If there is no such quantity.
+        """
+        for row in self.rows:
+            if row.quantity == quantity:
+                return row
+        raise InputError(f"quantity: expected one of {', '.join(self.table.quantities)}, got {quantity!r}")
+
+    def to_frame(self) -> DataFrame:
+        """A pandas frame with a line for each quantity.
+
+        Raises
+        ------
+        InputError
+            If pandas is not installed.
+        """
+        found: DataFrame = data_frame({
+            "quantity": [row.quantity for row in self.rows],
+            "mean": [row.mean.value for row in self.rows],
+            "mean_error": [row.mean.error for row in self.rows],
+            "spread": [row.spread.value for row in self.rows],
+            "spread_error": [row.spread.error for row in self.rows],
+            "realisations": [row.realisations for row in self.rows],
+            "refused": [row.refused for row in self.rows],
+        })  # fmt: skip
+        return found
+
+
+@explained
+def ensemble(
+    family: Family,
+    realisations: int,
+    quantities: str | UserQuantity | Sequence[str | UserQuantity] = ("gap",),
+    tolerance: float = 1e-6,
+    *,
+    rng: Rng = None,
+    checkpoint: str | Path | None = None,
+    client: Any = None,
+    progress: bool = False,
+) -> Ensemble:
+    """Mean and spread of quantities over random walls, with errors.
+
+    Parameters
+    ----------
+    family : callable
+        Takes ``rng``, a whole number, by name and returns a wall or a law: ``functools.partial(geo.random_wall,
+        geo.HeightCorrelation(0.1), 64, rms_slope=0.1)``, or a function of one's own.
+    realisations : int
+        Number of walls, at least 4.
+    quantities, tolerance, checkpoint, client, progress
+        As of `sweep`, which computes the realisations.
+    rng : None, int or numpy.random.Generator
+        Source of the seeds. None stands for a fixed one.
+
+    Returns
+    -------
+    Ensemble
+        The error of a mean is the half width of 95 % over the realisations plus the mean of their own errors. Walls
+        that are too rare to be among the realisations are not in it.
+
+    Raises
+    ------
+    InputError
+        As `sweep`, and if there are fewer than four realisations.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity import kernels as ker
+    >>> def half_diffuse(rng):
+    ...     return ker.maxwell(np.random.default_rng(rng).uniform(0.25, 0.75))
+    >>> gap = ensemble(half_diffuse, 100, "gap").of("gap")
+    >>> abs(gap.mean.value - 0.5) < gap.mean.error, abs(gap.spread.value - 0.5 / 12**0.5) < gap.spread.error
+    (True, True)
+    """
+    number = whole_number("realisations", realisations, FEWEST)
+    table = sweep(
+        family, {SEED: _seeds(rng, number)}, quantities, tolerance, checkpoint=checkpoint, client=client,
+        progress=progress,
+    )  # fmt: skip
+    return Ensemble(table, tuple(_row(table, name) for name in table.quantities))
+
+
+def _seeds(rng: Rng, number: int) -> list[int]:
+    """The seeds of so many realisations; fewer are the first of more."""
+    root = [int(word) for word in generator(rng, SEED_WITHOUT_RNG).integers(0, 2**63, size=2)]
+    # of 53 bits, which every reader of JSON keeps
+    return [int(seed) >> 11 for seed in np.random.SeedSequence(root).generate_state(number, np.uint64)]
+
+
+def _row(table: SweepTable, quantity: str) -> EnsembleRow:
+    rows = table.of(quantity)
+    known = [(row.value, row.error) for row in rows if row.value is not None and row.error is not None]
+    refused = len(rows) - len(known)
+    if len(known) < FEWEST:
+        nothing = Estimate(math.nan, math.inf, "estimate", f"{refused} of {len(rows)} realisations were refused")
+        return EnsembleRow(quantity, nothing, nothing, len(rows), refused)
+    values, errors = zip(*known, strict=True)
+    mean, spread = mean_estimate(values, errors), spread_estimate(values, errors)
+    if refused:
+        mean, spread = (
+            Estimate(one.value, math.inf, one.kind, f"{one.method}, {refused} others were refused")
+            for one in (mean, spread)
+        )
+    return EnsembleRow(quantity, mean, spread, len(rows), refused)
+
+
+@dataclass(frozen=True)
+class _Matrices:
+    """What a worker is sent: it makes the matrix of a realisation."""
+
+    family: Family
+    basis: Basis
+    tolerance: float
+
+    def packed(self, seed: int) -> bytes | str:
+        """The matrix, with what is known of it, as a file of numpy's; or why there is none."""
+        try:
+            found = discretise(law_of(self.family(**{SEED: seed})), self.basis, tolerance=self.tolerance)
+        except Exception as reason:  # a task must not raise
+            return str(reason) if isinstance(reason, AsperityError) else f"{type(reason).__name__}: {reason}"
+        file = io.BytesIO()
+        np.savez(
+            file, symmetric=found.symmetric, error=float(found.error), unresolved=found.unresolved,
+            reversible=found.reversible is True, mirror_symmetric=found.mirror_symmetric is True, frame=found.frame,
+        )  # fmt: skip
+        return file.getvalue()
+
+
+@explained
+def mean_law(
+    family: Family,
+    realisations: int,
+    basis: Basis,
+    tolerance: float = 1e-6,
+    *,
+    rng: Rng = None,
+    checkpoint: str | Path | None = None,
+    client: Any = None,
+) -> KernelMatrix:
+    """The matrix of the mean law of random walls: of reflection from a surface of patches of many of them.
+
+    Parameters
+    ----------
+    family, realisations, rng
+        As of `ensemble`; the walls are the same as there.
+    basis : Basis
+    tolerance : float
+        Frobenius error asked of each matrix.
+    checkpoint, client
+        As of `sweep`.
+
+    Returns
+    -------
+    KernelMatrix
+        Its error is the 95 % quantile of the Frobenius distance from the expected matrix, by the spread of the
+        realisations, plus the mean of their own errors. ``replicates`` are the matrices of the realisations, from
+        which `bootstrap_intervals` takes the errors of eigenvalues.
+
+    Raises
+    ------
+    InputError
+        As `ensemble`.
+    AsperityError
+        If the law of a realisation is refused, which would leave a selection of the walls. The message has its seed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from asperity import kernels as ker
+    >>> def half_diffuse(rng):
+    ...     return ker.maxwell(np.random.default_rng(rng).uniform(0.25, 0.75))
+    >>> mean = mean_law(half_diffuse, 50, ker.Bins(4))
+    >>> exact = ker.discretise(ker.maxwell(0.5), ker.Bins(4))
+    >>> bool(np.linalg.norm(mean.symmetric - exact.symmetric) < mean.error.value < 0.15)
+    True
+    """
+    number = whole_number("realisations", realisations, FEWEST)
+    instance("basis", basis, Basis, "ker.Bins(64)")
+    check_memory("realisations", f"{number} matrices in {basis!r}", 2 * number * basis.size**2)
+    job = _Matrices(family, basis, positive_number("tolerance", tolerance))
+    seeds = _seeds(rng, number)
+    try:
+        if checkpoint is None:
+            return _mean(job, _all_matrices(job, seeds, None, client), seeds)
+        with Checkpoint(checkpoint, _identity(job, seeds)) as store:
+            return _mean(job, _all_matrices(job, seeds, store, client), seeds)
+    except KeyboardInterrupt as stop:
+        where = "without a checkpoint all is lost" if checkpoint is None else f"{checkpoint} has what was finished"
+        raise KeyboardInterrupt(f"mean_law stopped; {where}; the same call goes on from there") from stop
+
+
+def _identity(job: _Matrices, seeds: Sequence[int]) -> dict[str, Any]:
+    return {
+        "computation": "mean law", "version": __version__, "family": name_of(job.family), "basis": repr(job.basis),
+        "tolerance": job.tolerance, "realisations": len(seeds), "first seed": seeds[0], "last seed": seeds[-1],
+    }  # fmt: skip
+
+
+def _all_matrices(
+    job: _Matrices, seeds: Sequence[int], store: Checkpoint | None, client: Any
+) -> Mapping[int, bytes | str]:
+    """The packed matrix of each seed, those that the checkpoint has first."""
+    found = {} if store is None else {int(key): value for key, value in store.parts()}
+    with connected(client) as workers:
+        for seed, packed in results(job.packed, [seed for seed in seeds if seed not in found], workers):
+            if isinstance(packed, str):
+                raise AsperityError(f"family: the law of rng={seed} was refused, and with it the mean: {packed}")
+            found[seed] = packed
+            if store is not None:
+                store.put(str(seed), packed)
+    return found
+
+
+def _mean(job: _Matrices, packed: Mapping[int, bytes | str], seeds: Sequence[int]) -> KernelMatrix:
+    """The mean, added up in the order of the seeds whatever the order in which they came."""
+    arrays: list[Floats] = []
+    facts: list[dict[str, Any]] = []
+    for seed in seeds:
+        content = packed[seed]
+        assert isinstance(content, bytes)
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            arrays.append(file["symmetric"])
+            facts.append({name: file[name].item() for name in file.files if name != "symmetric"})
+    frames = {fact["frame"] for fact in facts}
+    if len(frames) > 1:
+        raise InputError("family: expected laws in one convention, got some in each; use law.in_specular_frame()")
+    symmetric = np.mean(arrays, axis=0)
+    error = half_width(symmetric, arrays) + math.fsum(fact["error"] for fact in facts) / len(facts)
+    return KernelMatrix(
+        symmetric,
+        job.basis,
+        Estimate(error, error, "estimate", f"spread of {len(arrays)} realisations"),
+        replicates=tuple(arrays),
+        method="mean law",
+        law=f"mean of {len(arrays)} of {name_of(job.family)}",
+        reversible=True if all(fact["reversible"] for fact in facts) else None,
+        mirror_symmetric=True if all(fact["mirror_symmetric"] for fact in facts) else None,
+        frame=frames.pop(),
+        unresolved=math.fsum(fact["unresolved"] for fact in facts) / len(facts),
+    )

@@ -1,0 +1,172 @@
+"""Ensembles: the errors of means cover the truth, mean laws, and the law of small slopes for random walls."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from asperity import AsperityError, Estimate, InputError
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.spectral.sweeps.quantities import name_of
+from asperity.spectral.sweeps.statistics import mean_estimate, spread_estimate
+
+# Of 400 trials 95 % succeed, give or take four standard deviations.
+TRIALS, LEAST, MOST = 400, 0.906, 0.994
+
+
+def half_diffuse(rng):
+    """Maxwell's laws with gaps uniform in [0.2, 0.8]: mean 0.5, standard deviation 0.6/sqrt(12)."""
+    return ker.maxwell(np.random.default_rng(rng).uniform(0.2, 0.8))
+
+
+def sometimes_refused(rng):
+    return ker.maxwell(2.0 if rng % 4 == 0 else 0.5)
+
+
+def gentle(points, slope, rng, smooth=False):
+    spectrum = geo.HeightCorrelation(0.3)
+    return geo.random_wall(spectrum, points, rms_slope=slope, rng=rng, smooth=smooth)
+
+
+def deficit(law):
+    """1 - <e_1, P e_1> in the specular convention, 4 h for small mean squared slopes h, also where there is no gap."""
+    found = spec.laplacian_comparison(law, 1, 1e-5)
+    return Estimate(4.0 * found.flatness, found.error, "estimate", "Legendre(2)")
+
+
+def test_errors_of_mean_and_spread_cover_the_truth_for_a_family_with_a_known_mean():
+    means, spreads = [], []
+    for trial in range(TRIALS):
+        row = spec.ensemble(half_diffuse, 8, rng=[trial, 1]).of("gap")
+        means.append(abs(row.mean.value - 0.5) <= row.mean.error)
+        spreads.append(abs(row.spread.value - 0.6 / np.sqrt(12.0)) <= row.spread.error)
+    assert LEAST <= np.mean(means) <= MOST
+    assert np.mean(spreads) >= LEAST
+
+
+@pytest.mark.parametrize(("number", "least"), [(12, 0.90), (100, 0.92)])
+def test_skew_values_have_larger_errors_than_students(number, least):
+    # by Student's t alone they cover 0.907 for 12 values
+    rng = np.random.default_rng(number)
+    found = [mean_estimate(rng.exponential(size=number).tolist(), [0.0] * number) for _ in range(4000)]
+    covered = np.mean([abs(one.value - 1.0) <= one.error for one in found])
+    assert covered > least + 0.01
+
+
+def test_errors_of_the_single_values_are_added():
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=20)
+    shifted, smaller = values + 0.5, 0.9 * values
+    plain, wide = mean_estimate(values.tolist(), [0.0] * 20), mean_estimate(values.tolist(), [0.5] * 20)
+    assert wide.error == pytest.approx(plain.error + 0.5)
+    assert abs(shifted.mean() - plain.value) <= wide.error
+    own = np.abs(smaller - values)
+    difference = (
+        spread_estimate(values.tolist(), own.tolist()).error - spread_estimate(values.tolist(), [0.0] * 20).error
+    )
+    assert abs(smaller.std(ddof=1) - values.std(ddof=1)) <= difference
+
+
+def test_equal_values_have_no_spread_but_their_errors():
+    assert spread_estimate([0.1] * 5, [0.25] * 5) == Estimate(
+        np.std([0.1] * 5, ddof=1), 0.25 * np.sqrt(1.25), "estimate", "standard deviation of 5 realisations"
+    )
+
+
+def test_fewer_realisations_are_the_first_of_more():
+    few, many = (spec.ensemble(half_diffuse, number, rng=3).table.rows for number in (5, 9))
+    assert [row.value for row in few] == [row.value for row in many[:5]]
+    assert len({row.value for row in many}) == 9
+
+
+def test_a_refused_realisation_leaves_no_error():
+    with pytest.raises(AsperityError, match="the law of rng="):
+        spec.mean_law(sometimes_refused, 20, ker.Bins(2))
+    row = spec.ensemble(sometimes_refused, 20).of("gap")
+    assert row.mean.value == 0.5 and row.mean.error == row.spread.error == np.inf
+    assert 0 < row.refused < 20 and "were refused" in row.mean.method
+    nothing = spec.ensemble(lambda rng: ker.maxwell(2.0), 5).of("gap")
+    assert np.isnan(nothing.mean.value) and nothing.mean.error == np.inf and nothing.refused == 5
+
+
+def test_the_error_of_a_mean_law_covers_the_law():
+    exact = ker.discretise(ker.maxwell(0.5), ker.Bins(4)).symmetric
+    covered = []
+    for trial in range(200):
+        found = spec.mean_law(half_diffuse, 8, ker.Bins(4), rng=[trial, 2])
+        covered.append(np.linalg.norm(found.symmetric - exact) <= float(found.error))
+    # of 200 trials, give or take four standard deviations
+    assert np.mean(covered) >= 0.888
+    assert len(found.replicates) == 8 and found.reversible and found.mirror_symmetric and found.frame == "paper"
+    np.testing.assert_allclose(np.mean(found.replicates, axis=0), found.symmetric, atol=1e-15)
+
+
+@pytest.mark.parametrize("client", [None, 2])
+def test_a_stopped_mean_law_goes_on_to_the_same_bits(client, tmp_path, monkeypatch):
+    if client:
+        pytest.importorskip("distributed")
+    whole = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1)
+    calls = []
+
+    def stops(rng):
+        calls.append(rng)
+        if len(calls) == 6:
+            raise KeyboardInterrupt
+        return half_diffuse(rng)
+
+    stops.__module__, stops.__qualname__ = half_diffuse.__module__, half_diffuse.__qualname__
+    with pytest.raises(KeyboardInterrupt, match="the same call goes on"):
+        spec.mean_law(stops, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a")
+    again = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a", client=client)
+    assert again.symmetric.tobytes() == whole.symmetric.tobytes() and again.error == whole.error
+    with pytest.raises(InputError, match="seed"):
+        spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=2, checkpoint=tmp_path / "a")
+
+
+def test_the_deficit_of_gentle_gaussian_walls_is_four_times_their_mean_squared_slope():
+    pytest.importorskip("SurfaceTopography")
+    ratios = []
+    for slope in (0.05, 0.2):
+        found = spec.ensemble(partial(gentle, 24, slope), 100, deficit, rng=4).of("deficit")
+        ratios.append(Estimate(found.mean.value / (4 * slope**2), found.mean.error / (4 * slope**2), "estimate", ""))
+    # the law holds to the first order in h; at a slope of 0.05 the next one is below 0.5 %
+    assert abs(ratios[0].value - 1.0) <= ratios[0].error + 0.005
+    # the same seeds: what they have in common is not in the difference
+    assert 0.005 < ratios[0].value - ratios[1].value < 0.08
+
+
+def test_smooth_gaussian_walls_have_the_gap_of_small_slopes_and_polygons_none():
+    pytest.importorskip("SurfaceTopography")
+    smooth = spec.ensemble(partial(gentle, 12, 0.1, smooth=True), 4, ["gap_specular", deficit], 4e-4, rng=5)
+    for gap, bound in zip(smooth.table.of("gap_specular"), smooth.table.of("deficit"), strict=True):
+        assert gap.verdict == "isolated"
+        # a Rayleigh quotient is no smaller than the gap, and shallow walls have Legendre's eigenfunctions
+        assert 0.98 * bound.value - gap.error <= gap.value <= bound.value + bound.error + gap.error
+    polygons = spec.ensemble(partial(gentle, 12, 0.1), 4, "gap_specular", rng=5)
+    assert polygons.of("gap_specular").mean.value == 0.0
+    assert {row.verdict for row in polygons.table.rows} == {"no gap"}
+
+
+def test_families_with_fixed_arguments_have_the_same_name_in_every_process(tmp_path):
+    family = partial(gentle, 24, 0.1)
+    assert " at 0x" not in name_of(family) and "gentle" in name_of(family) and "0.1" in name_of(family)
+    assert name_of(family) != name_of(partial(gentle, 24, 0.2))
+
+
+def test_the_frame_has_a_line_for_each_quantity():
+    pytest.importorskip("pandas")
+    frame = spec.ensemble(half_diffuse, 6, ["gap", "eta"]).to_frame()
+    assert list(frame["quantity"]) == ["gap", "eta"] and (frame["mean_error"] > 0.0).all()
+    with pytest.raises(InputError, match="gap, eta"):
+        spec.ensemble(half_diffuse, 6, ["gap", "eta"]).of("slem")
+
+
+def test_too_few_realisations_are_refused():
+    with pytest.raises(InputError, match="realisations"):
+        spec.ensemble(half_diffuse, 3)
+    with pytest.raises(InputError, match="basis"):
+        spec.mean_law(half_diffuse, 5, 8)
