@@ -116,8 +116,9 @@ def test_a_real_rough_wall_sets_the_disk_free_in_the_strip():
     rough = ker.CollisionLaw.from_wall(geo.focusing_arcs(1.2), disk)
     record = ker.play(geo.Container.strip(), rough, np.zeros((n, 2)), velocity, 400, rng)
     assert np.mean(record.extent() > bound) > 0.9
-    # it spreads like a diffusion: the squares of displacements grow with the time, up to logarithms
-    early, late = (np.mean(record.position[k, :, 0] ** 2) for k in (100, 400))
+    # it spreads like a diffusion: the squares of displacements grow with the time, up to logarithms; medians, because
+    # grazing flights give the squares no variance, and their mean depends on the seed
+    early, late = (np.median(record.position[k, :, 0] ** 2) for k in (100, 400))
     assert 2.5 < late / early < 8.0
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, Unpack, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,18 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
+from ...core.long_runs import Engine, all_parts, digest
+from ...core.version import __version__
+from ..collisions.collision_law import CollisionLaw
+from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law
+from ..walls.identity import law_digest, wall_digest
 
 if TYPE_CHECKING:
     from ...geometry import Container, Disk
+
+# Disks of a part: their random numbers depend on its number alone.
+TOGETHER = 1024
 
 
 @runtime_checkable
@@ -91,6 +99,7 @@ def play(
     velocity: ArrayLike,
     collisions: int,
     rng: Rng = None,
+    **engine: Unpack[Engine],
 ) -> BilliardRecord:
     """Simulate disks that move in a container and collide with its walls.
 
@@ -109,6 +118,10 @@ def play(
     collisions : int
         Number of collisions per disk.
     rng : None, int or numpy.random.Generator
+    checkpoint : path, optional
+        A file to which the states of every 1024 disks are added; the same call goes on with it.
+    client : int, str or distributed.Client, optional
+        As of `asperity.spectral.sweep`. The record is the same to the last bit without checkpoint and workers.
 
     Returns
     -------
@@ -117,7 +130,8 @@ def play(
     Raises
     ------
     InputError
-        If a shape is wrong, a centre is outside, a law is one of angles, or the laws do not match the walls.
+        If a shape is wrong, a centre is outside, a law is one of angles, or the laws do not match the walls; if the
+        checkpoint is of another simulation.
 
     Notes
     -----
@@ -140,37 +154,79 @@ def play(
     >>> (record.position[1:, 0].round(12) + 0.0).tolist()
     [[0.0, 1.0], [-1.0, 0.0], [0.0, -1.0], [1.0, 0.0]]
     """
-    rng = generator(rng)
+    root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     whole_number("collisions", collisions, 1)
     check_memory("collisions", "the record", 8 * collisions)
     each = laws_of_walls(container, laws)
     disk = each[0].disk
     located, moving = _starts(container, position, velocity)
-    n = len(located)
-    time, angle, last = np.zeros(n), np.zeros(n), np.full(n, -1)
-    made = np.zeros(n, dtype=np.int64)
-    states = [(time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy())]
-    for _ in range(collisions):
-        flight, wall = container.next_wall(located, moving, last)
-        hit = wall >= 0
-        made[hit] += 1
-        step = np.where(hit, flight, 0.0)
-        time, angle = time + step, angle + moving[:, 2] * step
-        located = located + moving[:, :2] * step[:, None]
-        last = np.where(hit, wall, last)
-        for k, law in enumerate(each):
-            here = np.flatnonzero(wall == k)
-            if here.size:
-                point = container.touch(k, located[here])
-                located[here] = point.position
-                moving[here] = reflected(point.tangent, law, moving[here], rng)
-        states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
-    columns = [np.stack(column) for column in zip(*states, strict=True)]
-    for array in (*columns, made):
+    job = _Disks(container, tuple(each), located, moving, collisions, root)
+    parts = all_parts(job.states, -(-len(located) // TOGETHER), job.identity(), engine)
+    columns = {
+        name: np.concatenate([part[name] for part in parts], axis=0 if name == "collisions" else 1) for name in parts[0]
+    }
+    for array in columns.values():
         array.setflags(write=False)
-    return BilliardRecord(
-        container, disk, columns[0], columns[1], columns[2], columns[3], columns[4].astype(np.int64), made
-    )
+    return BilliardRecord(container, disk, **columns)
+
+
+@dataclass(frozen=True, eq=False)
+class _Disks:
+    """Disks in a container, ``TOGETHER`` of them at a time; what a worker is sent."""
+
+    container: Container
+    laws: tuple[Reflector, ...]
+    position: Floats
+    velocity: Floats
+    collisions: int
+    root: tuple[int, ...]
+
+    def identity(self) -> dict[str, Any]:
+        """What tells these disks from others."""
+        return {
+            "computation": "disks between walls", "version": __version__, "laws": [*map(_told, self.laws)],
+            "container": digest(self.container.points, self.container.normals, self.container.curves), "collisions": self.collisions,
+            "start": digest(self.position, self.velocity), "seed": list(self.root),
+        }  # fmt: skip
+
+    def states(self, part: int) -> dict[str, NDArray[Any]]:
+        """The columns of the record for the disks of one part, whose random numbers depend on its number alone."""
+        rng = np.random.default_rng([*self.root, part])
+        own = slice(part * TOGETHER, (part + 1) * TOGETHER)
+        located, moving = self.position[own].copy(), self.velocity[own].copy()
+        n = len(located)
+        time, angle, last = np.zeros(n), np.zeros(n), np.full(n, -1)
+        made = np.zeros(n, dtype=np.int64)
+        states = [(time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy())]
+        for _ in range(self.collisions):
+            flight, wall = self.container.next_wall(located, moving, last)
+            hit = wall >= 0
+            made[hit] += 1
+            step = np.where(hit, flight, 0.0)
+            time, angle = time + step, angle + moving[:, 2] * step
+            located = located + moving[:, :2] * step[:, None]
+            last = np.where(hit, wall, last)
+            for k, law in enumerate(self.laws):
+                here = np.flatnonzero(wall == k)
+                if here.size:
+                    point = self.container.touch(k, located[here])
+                    located[here] = point.position
+                    moving[here] = reflected(point.tangent, law, moving[here], rng)
+            states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
+        columns = [np.stack(column) for column in zip(*states, strict=True)]
+        return {
+            "time": columns[0], "position": columns[1], "angle": columns[2], "velocity": columns[3],
+            "wall": columns[4].astype(np.int64), "collisions": made,
+        }  # fmt: skip
+
+
+def _told(law: Reflector) -> str:
+    """What tells a collision law from others."""
+    if isinstance(law, CollisionLaw):
+        return digest(law.disk, law_digest(law.law))
+    if isinstance(law, SatelliteLaw):
+        return digest(law.disk, wall_digest(law.wall), law.scale, law.spacing)
+    return repr(law)
 
 
 def laws_of_walls(container: Container, laws: Reflector | Sequence[Reflector]) -> list[Reflector]:

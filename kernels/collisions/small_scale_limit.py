@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +16,10 @@ from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
 from ...core.kinds import explained
+from ...core.long_runs import Engine, all_parts
 from ...core.rounding import EPS
+from ...core.version import __version__
+from ..walls.identity import wall_digest
 
 if TYPE_CHECKING:
     from ...geometry import Disk, Wall
@@ -137,6 +140,7 @@ def limit_study(
     limit: Wall | None = None,
     samples: tuple[int, int, int] = (16, 32, 32),
     repetitions: int = 4,
+    **engine: Unpack[Engine],
 ) -> LimitStudy:
     """Collide true disks of random position and angle at several scales, and compare them with the limit law K.
 
@@ -158,6 +162,11 @@ def limit_study(
         stratified: theta with respect to sin(theta), alpha in one spacing, x1 in one cell.
     repetitions : int
         Independent repetitions for the standard errors, at least 2.
+    checkpoint : path, optional
+        A file to which every repetition at a scale is added; the same call goes on with it.
+    client : int, str or distributed.Client, optional
+        As of `asperity.spectral.sweep`. But for its ``seconds`` the study is the same to the last bit without
+        checkpoint and workers.
 
     Returns
     -------
@@ -166,7 +175,7 @@ def limit_study(
     Raises
     ------
     InputError
-        As in `geometry.collide`, and if a number is out of range.
+        As in `geometry.collide`, and if a number is out of range; if the checkpoint is of another study.
 
     Source: Rudzis 2022, Theorem 5.1.
 
@@ -181,7 +190,7 @@ def limit_study(
     """
     from ...geometry.collisions.configuration_space import ConfigurationSpace
 
-    rng = generator(rng)
+    root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     eps = np.atleast_1d(finite_array("scales", scales))
     if eps.ndim != 1:
         raise InputError(f"scales: expected a list of numbers, got an array of shape {eps.shape}")
@@ -191,11 +200,11 @@ def limit_study(
     whole_number("repetitions", repetitions, 2)
     spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]
     target = (wall if limit is None else limit).foreshorten(disk)
-    runs, seconds = np.empty((len(eps), repetitions, len(COLUMNS))), np.zeros(len(eps))
-    for i, space in enumerate(spaces):
-        for k in range(repetitions):
-            runs[i, k], spent = _measured(disk, wall, target, (space.scale, space.spacing), psi, samples, rng)
-            seconds[i] += spent
+    sizes = tuple((space.scale, space.spacing) for space in spaces)
+    job = _Repetitions(disk, wall, target, sizes, psi, samples, repetitions, root)
+    parts = all_parts(job.measured, len(eps) * repetitions, job.identity(), engine)
+    runs = np.reshape([part["columns"] for part in parts], (len(eps), repetitions, len(COLUMNS)))
+    seconds = np.reshape([part["seconds"] for part in parts], (len(eps), repetitions)).sum(axis=1)
     means, errors = runs.mean(axis=1), runs.std(axis=1, ddof=1) / math.sqrt(repetitions)
     columns = {name: frozen(means[:, j]) for j, name in enumerate(COLUMNS)}
     return LimitStudy(
@@ -207,6 +216,35 @@ def limit_study(
         collisions=repetitions * math.prod(samples),
         **columns,
     )
+
+
+@dataclass(frozen=True)
+class _Repetitions:
+    """All repetitions at all scales; what a worker is sent."""
+
+    disk: Disk
+    wall: Wall
+    target: Wall
+    sizes: tuple[tuple[float, float], ...]
+    psi: float
+    samples: tuple[int, int, int]
+    repetitions: int
+    root: tuple[int, ...]
+
+    def identity(self) -> dict[str, Any]:
+        """What tells this study from others."""
+        return {
+            "computation": "limit of small scales", "version": __version__, "disk": repr(self.disk),
+            "wall": wall_digest(self.wall), "limit": wall_digest(self.target), "sizes": list(map(list, self.sizes)),
+            "psi": self.psi, "samples": list(self.samples), "repetitions": self.repetitions, "seed": list(self.root),
+        }  # fmt: skip
+
+    def measured(self, part: int) -> dict[str, Any]:
+        """Columns and processor seconds of one repetition, whose random numbers depend on its number alone."""
+        rng = np.random.default_rng([*self.root, part])
+        size = self.sizes[part // self.repetitions]
+        columns, seconds = _measured(self.disk, self.wall, self.target, size, self.psi, self.samples, rng)
+        return {"columns": columns, "seconds": seconds}
 
 
 def _measured(

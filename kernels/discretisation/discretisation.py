@@ -10,11 +10,11 @@ import numpy as np
 from ...core.checks import Rng, check_memory, finite_number, generator, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained
+from ...core.long_runs import Engine
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
-from ..sampling.chunks import Engine
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
 from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SEED_WITHOUT_RNG, Budget, MethodName

@@ -11,12 +11,12 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.estimates import ErrorKind
+from ...core.long_runs import Engine
 from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.displacement import node_rounding
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from ..sampling.chunks import Engine
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]

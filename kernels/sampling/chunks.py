@@ -6,8 +6,7 @@ import io
 import math
 import time
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, NamedTuple, TypedDict
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from ...core.checkpoints import Checkpoint
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ...core.long_runs import Engine
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ..bases.basis import Basis
@@ -28,21 +28,6 @@ RAYS_A_TASK = 2**22
 # Seconds between two states of a checkpoint, of n^2 counts each.
 STORED_EVERY = 5.0
 STATE = "state"
-
-
-class Engine(TypedDict, total=False):
-    """Where a long run stores what it has, and who computes.
-
-    Attributes
-    ----------
-    checkpoint : path
-        A file to which the counts are added; the same call goes on with it.
-    client : int, str or distributed.Client
-        As of `asperity.spectral.sweep`.
-    """
-
-    checkpoint: str | Path | None
-    client: Any
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...core.long_runs import Engine
 from ..bases.basis import Basis
 from ..laws.law import Law
-from .chunks import Engine, RayChunks, count_long
+from .chunks import RayChunks, count_long
 from .counts import BATCHES, LARGEST_REPLICATES, SampledArray
 from .rays import RaySums, progress_bar
 from .sobol import PARTS

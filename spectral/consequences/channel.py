@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,14 +12,19 @@ from ...core.checks import Floats, Rng, finite_array, frozen, generator, positiv
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.kinds import explained
+from ...core.long_runs import Engine, all_parts
+from ...core.version import __version__
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
+from ...kernels.walls.identity import law_digest
 from .diffusion import Arrangement, check_arrangement
 
 # Smallest angle; below half of it, pi - theta would round to pi.
 SMALLEST = float(np.spacing(np.pi))
 # Limit on the crossings of a particle; a law that retroreflects for ever reaches it.
 MOST_CROSSINGS = 1_000_000
+# Particles of a part: their random numbers depend on its number alone.
+TOGETHER = 4096
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,7 @@ def exit_times(
     radius: float = 1.0,
     speed: float = 1.0,
     arrangement: Arrangement = "mirror",
+    **engine: Unpack[Engine],
 ) -> ExitTimes:
     """Simulate exit times of particles from a channel between two rough walls.
 
@@ -98,6 +105,10 @@ def exit_times(
         Half the width of the channel, and the speed of the particles.
     arrangement : {"mirror", "half-turn"}
         The upper wall is the mirror image of the lower one, or is rotated by pi.
+    checkpoint : path, optional
+        A file to which the times of every 4096 particles are added; the same call goes on with it.
+    client : int, str or distributed.Client, optional
+        As of `sweep`. The times are the same to the last bit without checkpoint and workers.
 
     Returns
     -------
@@ -106,7 +117,8 @@ def exit_times(
     Raises
     ------
     InputError
-        If the lengths do not increase, or a particle has not left after 10^6 crossings.
+        If the lengths do not increase, or a particle has not left after 10^6 crossings; if the checkpoint is of another
+        simulation.
 
     Examples
     --------
@@ -123,31 +135,66 @@ def exit_times(
     check_arrangement(arrangement)
     whole_number("particles", particles, 2)
     width, pace = 2.0 * positive_number("radius", radius), positive_number("speed", speed)
-    rng = generator(rng)
     paper = law.in_specular_frame() if law.frame == "specular" else law
-    times = np.full((particles, levels.size), np.nan)
-    inside = np.arange(particles)
-    x, clock, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
-    # angle at which a particle leaves a wall, in the frame of this wall, and the sign of its x axis in the channel
-    theta, sign = SINE.sample(particles, rng), 1.0
-    for _ in range(MOST_CROSSINGS):
-        shift = sign * width * np.cos(theta) / np.sin(theta)
-        duration = width / (pace * np.sin(theta))
-        target = x + shift
-        crossing = np.flatnonzero(np.abs(target) >= levels[reached])
-        while crossing.size:
-            # fraction of the ray segment up to |x| = L
-            ahead = np.copysign(levels[reached[crossing]], target[crossing]) - x[crossing]
-            moment = clock[crossing] + ahead / shift[crossing] * duration[crossing]
-            times[inside[crossing], reached[crossing]] = moment
-            reached[crossing] += 1
-            crossing = crossing[reached[crossing] < levels.size]
-            crossing = crossing[np.abs(target[crossing]) >= levels[reached[crossing]]]
-        stays = reached < levels.size
-        if not stays.any():
-            return ExitTimes(frozen(levels), frozen(times), 0.5 * width, pace)
-        inside, reached, x, clock = inside[stays], reached[stays], target[stays], (clock + duration)[stays]
-        incoming = theta[stays] if arrangement == "half-turn" else np.pi - theta[stays]
-        theta = paper.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
-        sign = -sign if arrangement == "half-turn" else sign
-    raise InputError(f"law: {law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_CROSSINGS} flights")
+    root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
+    job = _Particles(paper, levels, particles, root, width, pace, arrangement)
+    parts = all_parts(job.times, -(-particles // TOGETHER), job.identity(), engine)
+    return ExitTimes(frozen(levels), frozen(np.concatenate([part["times"] for part in parts])), 0.5 * width, pace)
+
+
+@dataclass(frozen=True)
+class _Particles:
+    """Particles in a channel, ``TOGETHER`` of them at a time; what a worker is sent."""
+
+    law: Law
+    levels: Floats
+    particles: int
+    root: tuple[int, ...]
+    width: float
+    speed: float
+    arrangement: Arrangement
+
+    def identity(self) -> dict[str, Any]:
+        """What tells these particles from others."""
+        return {
+            "computation": "exit times", "version": __version__, "law": law_digest(self.law),
+            "lengths": self.levels.tolist(), "particles": self.particles, "seed": list(self.root),
+            "width": self.width, "speed": self.speed, "arrangement": self.arrangement,
+        }  # fmt: skip
+
+    def times(self, part: int) -> dict[str, Floats]:
+        """Exit times of the particles of one part, which depend on its number alone."""
+        rng = np.random.default_rng([*self.root, part])
+        return {"times": self._simulated(min(TOGETHER, self.particles - part * TOGETHER), rng)}
+
+    def _simulated(self, particles: int, rng: np.random.Generator) -> Floats:
+        levels = self.levels
+        times = np.full((particles, levels.size), np.nan)
+        inside = np.arange(particles)
+        x, clock, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
+        # angle at which a particle leaves a wall, in the frame of this wall, and the sign of its x axis in the channel
+        theta, sign = SINE.sample(particles, rng), 1.0
+        half_turn = self.arrangement == "half-turn"
+        for _ in range(MOST_CROSSINGS):
+            shift = sign * self.width * np.cos(theta) / np.sin(theta)
+            duration = self.width / (self.speed * np.sin(theta))
+            target = x + shift
+            crossing = np.flatnonzero(np.abs(target) >= levels[reached])
+            while crossing.size:
+                # fraction of the ray segment up to |x| = L
+                ahead = np.copysign(levels[reached[crossing]], target[crossing]) - x[crossing]
+                moment = clock[crossing] + ahead / shift[crossing] * duration[crossing]
+                times[inside[crossing], reached[crossing]] = moment
+                reached[crossing] += 1
+                crossing = crossing[reached[crossing] < levels.size]
+                crossing = crossing[np.abs(target[crossing]) >= levels[reached[crossing]]]
+            stays = reached < levels.size
+            if not stays.any():
+                return times
+            inside, reached, x, clock = inside[stays], reached[stays], target[stays], (clock + duration)[stays]
+            incoming = theta[stays] if half_turn else np.pi - theta[stays]
+            theta = self.law.sample(np.clip(incoming, SMALLEST, np.pi - SMALLEST), rng)
+            sign = -sign if half_turn else sign
+        raise InputError(
+            f"law: {self.law!r} keeps {x.size} particles within L = {levels[-1]:g} after {MOST_CROSSINGS} flights"
+        )

@@ -1,0 +1,122 @@
+"""Long runs in parts: each depends on its number alone, is computed by any worker, and stored when it is finished."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .checkpoints import Checkpoint
+from .errors import AsperityError, InputError
+from .workers import connected, results
+
+Arrays = dict[str, NDArray[Any]]
+
+
+class Engine(TypedDict, total=False):
+    """Where a long run stores what it has, and who computes.
+
+    Attributes
+    ----------
+    checkpoint : path
+        A file to which finished parts are added; the same call goes on with it.
+    client : int, str or distributed.Client
+        As of `asperity.spectral.sweep`.
+    """
+
+    checkpoint: str | Path | None
+    client: Any
+
+
+@dataclass(frozen=True)
+class _Packed:
+    """What a worker is sent: the function, whose arrays come back as a file of numpy's without pickle."""
+
+    function: Callable[[int], Mapping[str, Any]]
+
+    def part(self, number: int) -> bytes | tuple[str, str]:
+        """The packed arrays of a part, or the class and the words of the error that it ended with."""
+        try:
+            found = self.function(number)
+        except AsperityError as reason:  # a task must not raise
+            return type(reason).__name__, str(reason)
+        file = io.BytesIO()
+        np.savez(file, **found)
+        return file.getvalue()
+
+
+def all_parts(
+    function: Callable[[int], Mapping[str, Any]], number: int, identity: Mapping[str, Any], engine: Engine
+) -> list[Arrays]:
+    """The arrays of the parts 0, ..., number - 1, in this order.
+
+    Parameters
+    ----------
+    function : callable
+        From the number of a part to its arrays by name. It is sent to workers.
+    number : int
+    identity : mapping
+        Plain JSON values that tell this run from others, for the checkpoint.
+    engine : Engine
+
+    Raises
+    ------
+    InputError
+        If the checkpoint is of another run or cannot be written.
+    KeyboardInterrupt
+        After Ctrl-C; it says how many parts are stored, and how to go on.
+
+    Examples
+    --------
+    >>> [part["square"].item() for part in all_parts(lambda k: {"square": k**2}, 3, {}, {})]
+    [0, 1, 4]
+    """
+    path = engine.get("checkpoint")
+    packed: dict[int, bytes] = {}
+    try:
+        with ExitStack() as stack:
+            store = None if path is None else stack.enter_context(Checkpoint(path, identity))
+            if store is not None:
+                packed |= {int(key): content for key, content in store.parts()}
+            workers = stack.enter_context(connected(engine.get("client")))
+            rest = [part for part in range(number) if part not in packed]
+            for part, content in results(_Packed(function).part, rest, workers):
+                if isinstance(content, tuple):
+                    raise (InputError if content[0] == "InputError" else AsperityError)(content[1])
+                packed[part] = content
+                if store is not None:
+                    store.put(str(part), content)
+    except KeyboardInterrupt as stop:
+        done = f"stopped after {len(packed)} of {number} parts"
+        lost = "without a checkpoint they are lost"
+        raise KeyboardInterrupt(f"{done}; {lost if path is None else f'{path} has them: give the same call'}") from stop
+    return [_unpacked(packed[part]) for part in range(number)]
+
+
+def digest(*values: Any) -> str:
+    """Sixteen hexadecimal digits that tell values from others: arrays by their bytes, others by their repr.
+
+    Examples
+    --------
+    >>> digest(np.zeros(2), "a") == digest(np.zeros(2), "a") != digest(np.zeros(3), "a")
+    True
+    """
+    told = hashlib.sha256()
+    for value in values:
+        if isinstance(value, np.ndarray):
+            told.update(repr((value.shape, value.dtype.str)).encode() + np.ascontiguousarray(value).tobytes())
+        else:
+            told.update(repr(value).encode())
+    return told.hexdigest()[:16]
+
+
+def _unpacked(content: bytes) -> Arrays:
+    with np.load(io.BytesIO(content), allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}
