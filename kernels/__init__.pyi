@@ -76,6 +76,7 @@ from .matrices.defects import SymmetryDefect as SymmetryDefect
 from .matrices.matrix import KernelMatrix as KernelMatrix
 from .matrices.matrix import load_matrix as load_matrix
 from .sampling.estimation import estimate as estimate
+from .sampling.streams import estimate_stream as estimate_stream
 from .walls.circular_arc import CircularArcLaw as CircularArcLaw
 from .walls.mushroom_law import MushroomLaw as MushroomLaw
 from .walls.polygon import PolygonLaw as PolygonLaw

@@ -150,6 +150,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
                                     "samples": 4}),
     "estimate": (ker.estimate, {"theta_in": [0.5, 1.0, 2.0, 2.5], "theta_out": [0.5, 2.0, 1.0, 2.5],
                                 "basis": ker.Bins(2), "symmetrise": False, "invariant": None}),
+    "estimate_stream": (ker.estimate_stream, {"pairs": [([0.5, 1.0, 2.0, 2.5], [0.5, 2.0, 1.0, 2.5])],
+                                              "basis": ker.Bins(2), "symmetrise": False, "invariant": True}),
     "extremal_resistance": (ker.extremal_resistance, {"n": 4, "which": "min", "cost": None, "curvature": None}),
     "henyey_greenstein": (ker.henyey_greenstein, {"g": 0.5}),
     "maxwell": (ker.maxwell, {"diffuse_fraction": 0.5}),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, finite_array, frozen, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
@@ -198,6 +198,8 @@ def limit_study(
     for name, number in zip(("angles", "rotations", "positions"), samples, strict=True):
         whole_number(f"samples ({name})", number, 1)
     whole_number("repetitions", repetitions, 2)
+    # a part takes a thousand bytes, packed
+    check_memory("repetitions", "all repetitions", 128 * len(eps) * repetitions)
     spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]
     target = (wall if limit is None else limit).foreshorten(disk)
     sizes = tuple((space.scale, space.spacing) for space in spaces)

@@ -13,7 +13,7 @@ from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
 from ..matrices.matrix import KernelMatrix, frobenius_error
-from .counts import BATCHES, array_from_counts, array_from_sums, count_pairs, sum_products
+from .counts import BATCHES, Counts, array_from_counts, array_from_sums, count_pairs, sum_products
 
 # Incoming angles count as not invariant if their totals in bins deviate from the measure by this z-score.
 NOT_INVARIANT_Z = 4.0
@@ -87,10 +87,20 @@ def estimate(
     follows = _follows_measure(incoming, basis) if invariant is None else bool(invariant)
     counts = count_pairs(basis, incoming, outgoing) if basis.is_partition else None
     if counts is not None and (follows or incoming.size < 2 * WEIGHTED_BATCHES):
+        return matrix_of_pairs(basis, counts, None, follows, incoming.size, symmetrise)
+    means = _batch_means(basis, incoming, outgoing, follows)
+    return matrix_of_pairs(basis, counts, means, follows, incoming.size, symmetrise)
+
+
+def matrix_of_pairs(
+    basis: Basis, counts: Counts | None, means: list[Floats] | None, follows: bool, pairs: int, symmetrise: bool
+) -> KernelMatrix:
+    """The matrix from counts of all pairs, or from means of e_i(theta) e_j(theta') over batches if there are any."""
+    if means is None:
+        assert counts is not None
         array = array_from_counts([counts], basis, symmetrise=symmetrise, independent=True)
         method = "variance of multinomial counts"
     else:
-        means = _batch_means(basis, incoming, outgoing, follows)
         method = f"spread of {len(means)} batches"
         if counts is not None:
             fluxes = [mean / (basis.normalisation[:, None] * basis.normalisation) for mean in means]
@@ -104,7 +114,7 @@ def estimate(
         counts=counts,
         replicates=array.replicates,
         symmetrised=symmetrise,
-        samples=incoming.size,
+        samples=pairs,
         method="pairs",
         raw_defect=array.raw_defect,
         reversible=True if symmetrise else None,
@@ -112,8 +122,13 @@ def estimate(
     )
 
 
+def bins_of_test(basis: Basis) -> Bins:
+    """The bins in which the totals of incoming angles are tested."""
+    return basis if isinstance(basis, Bins) else Bins(TEST_BINS)
+
+
 def _follows_measure(incoming: Floats, basis: Basis) -> bool:
-    bins = basis if isinstance(basis, Bins) else Bins(TEST_BINS)
+    bins = bins_of_test(basis)
     totals = np.bincount(bins.index(incoming), minlength=bins.size)
     return invariance_z_score(totals, bins.weights) < NOT_INVARIANT_Z
 
@@ -123,12 +138,12 @@ def _batch_means(basis: Basis, incoming: Floats, outgoing: Floats, follows: bool
     means, number = [], min(BATCHES, incoming.size // 2) if follows else WEIGHTED_BATCHES
     for batch in range(number):
         theta, image = incoming[batch::number], outgoing[batch::number]
-        weight = np.full(theta.size, 1.0 / theta.size) if follows else _nearest_measure(theta)
+        weight = np.full(theta.size, 1.0 / theta.size) if follows else nearest_measure(theta)
         means.append(sum_products(basis, theta, image, weight))
     return means
 
 
-def _nearest_measure(theta: Floats) -> Floats:
+def nearest_measure(theta: Floats) -> Floats:
     """Measure of the angles nearest to each given angle, divided equally among equal angles."""
     distinct, owner, number = np.unique(theta, return_inverse=True, return_counts=True)
     middle = 0.5 * (distinct[1:] + distinct[:-1])

@@ -8,7 +8,7 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, finite_array, frozen, generator, positive_number, whole_number
+from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.kinds import explained
@@ -134,6 +134,7 @@ def exit_times(
         raise InputError(f"lengths: expected at least three increasing positive lengths, got {lengths!r}")
     check_arrangement(arrangement)
     whole_number("particles", particles, 2)
+    check_memory("particles", "all exit times", 2 * levels.size * particles)
     width, pace = 2.0 * positive_number("radius", radius), positive_number("speed", speed)
     paper = law.in_specular_frame() if law.frame == "specular" else law
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
