@@ -14,6 +14,7 @@ from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.kernels.sampling import chunks
+from asperity.kernels.sampling.rays import RaySums
 
 RAYS = 5 * 2**16 + 123
 BINS = ker.Bins(8)
@@ -74,6 +75,7 @@ RUN = """
 import numpy as np
 from asperity import kernels as ker
 from asperity.kernels.sampling import chunks
+from asperity.kernels.sampling.rays import RaySums
 chunks.RAYS_A_TASK, chunks.STORED_EVERY = 1, 0.0
 original = chunks.RayChunks.rays
 def told(self, *arguments):
@@ -116,8 +118,50 @@ def test_the_checkpoint_of_other_rays_is_refused_with_the_difference(changed, wo
     assert words in str(refusal.value)
 
 
-def test_long_runs_need_independent_rays_in_cells(tmp_path):
+@pytest.mark.parametrize("basis", [ker.Legendre(5), ker.Panels([0.0, 1.0, np.pi], 2)], ids=repr)
+def test_sums_in_other_bases_are_the_same_bits_after_a_stop_and_with_workers(basis, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    # three chunks and two tasks for each of 32 parts
+    monkeypatch.setattr(chunks, "RAYS_A_TASK", 2**10)
+    monkeypatch.setattr(chunks, "STORED_EVERY", 0.0)
+    monkeypatch.setattr(RaySums, "chunk", 2**9)
+    rays = 32 * (2**10 + 2**9)
+    law = ker.WallLaw(geo.mushrooms(0.2, 0.5, 1))
+
+    def found(**engine):
+        return ker.discretise(law, basis, "monte-carlo", samples=rays, rng=3, **engine)
+
+    whole = found()
+    made, original = [], chunks._Summing.summed
+
+    def stops(self, task):
+        made.append(task)
+        if len(made) == 21:
+            raise KeyboardInterrupt
+        return original(self, task)
+
+    monkeypatch.setattr(chunks._Summing, "summed", stops)
+    with pytest.raises(KeyboardInterrupt):
+        found(checkpoint=tmp_path / "a")
+    again = found(checkpoint=tmp_path / "a")
+    assert again.symmetric.tobytes() == whole.symmetric.tobytes() and again.error == whole.error
+    assert again.unresolved == whole.unresolved and made[21:] == list(range(20, 64))
+    monkeypatch.setattr(chunks._Summing, "summed", original)
+    with distributed.Client(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+        assert found(client=client).symmetric.tobytes() == whole.symmetric.tobytes()
+
+
+def test_real_sums_wait_for_those_before_them(monkeypatch):
+    whole = ker.discretise(ker.maxwell(0.5), ker.Legendre(4), "monte-carlo", samples=2**12, rng=3)
+
+    def backwards(function, tasks, client):
+        return [(task, function(task)) for task in reversed(list(tasks))]
+
+    monkeypatch.setattr(chunks, "results", backwards)
+    found = ker.discretise(ker.maxwell(0.5), ker.Legendre(4), "monte-carlo", samples=2**12, rng=3)
+    assert found.symmetric.tobytes() == whole.symmetric.tobytes()
+
+
+def test_long_runs_need_independent_rays(tmp_path):
     with pytest.raises(InputError, match="need 'monte-carlo'"):
         ker.discretise(ker.lambertian(), BINS, checkpoint=tmp_path / "a")
-    with pytest.raises(InputError, match="such as Bins"):
-        ker.discretise(ker.lambertian(), ker.Legendre(4), "monte-carlo", checkpoint=tmp_path / "a")

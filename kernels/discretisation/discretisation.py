@@ -61,13 +61,13 @@ def discretise(
         Whether each ray counts in both directions, for sampled matrices of reversible laws. The flux is then symmetric,
         and rows of ``array`` sum to 1 only within the sampling error.
     checkpoint : path, optional
-        A file in which the counts are stored every few seconds, for ``"monte-carlo"`` in a basis of cells. The same
-        call with the same file continues the run; the file of other rays is refused, and the
-        message names the difference.
+        A file in which the sums are stored every few seconds, for ``"monte-carlo"``. The same call with the same file
+        continues the run; the file of other rays is refused, and the message names the difference.
     client : int, str or distributed.Client, optional
         For the same: a number of workers on this machine, the address of a scheduler, or a client of dask.distributed.
         The matrix is the same to the last bit without checkpoint and workers, for any number of workers and any number
-        of restarts: counts are integers, and a chunk of rays depends only on its number.
+        of restarts: a chunk of rays depends only on its number, counts are integers, and in bases without cells sums
+        are added in the order of the chunks.
 
     Returns
     -------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import time
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 
 from ...core.checkpoints import Checkpoint
 from ...core.checks import Floats
-from ...core.errors import InputError
 from ...core.long_runs import Engine
 from ...core.version import __version__
 from ...core.workers import connected, results
@@ -23,7 +23,8 @@ from ..laws.law import DrivenLaw, Law, entry_inside
 from ..walls.identity import law_digest
 from .rays import RaySums, progress_bar
 
-# Rays of a task for a worker, a second of work or a few; the counts do not depend on it.
+# Rays of a task for a worker, a second of work or a few. Counts in cells do not depend on it; sums of real numbers are
+# added task by task, so that it is a constant.
 RAYS_A_TASK = 2**22
 # Seconds between two states of a checkpoint, of n^2 counts each.
 STORED_EVERY = 5.0
@@ -91,26 +92,58 @@ class _Counting:
         return sums.tables[0], sums.unresolved
 
 
+@dataclass(frozen=True)
+class _Summing:
+    """What a worker is sent: it adds e_i(theta) e_j(theta') over the rays of some chunks of one part."""
+
+    chunks: RayChunks
+    basis: Basis
+    samples: int
+    chunks_a_task: int
+
+    @property
+    def tasks_a_part(self) -> int:
+        """Number of tasks of each part."""
+        return math.ceil(self.samples / (self.chunks.chunk * self.chunks_a_task))
+
+    def rays_of(self, task: int) -> int:
+        """Rays of one task."""
+        whole = self.chunks.chunk * self.chunks_a_task
+        return min(whole, self.samples - task % self.tasks_a_part * whole)
+
+    def summed(self, task: int) -> tuple[Floats, int]:
+        """Sums over the rays, and the rays that did not escape."""
+        sums = RaySums(self.chunks.law, self.basis, 1)
+        part, own = divmod(task, self.tasks_a_part)
+        chunk, rays = self.chunks.chunk, self.rays_of(task)
+        for number, start in enumerate(range(0, rays, chunk)):
+            index = own * self.chunks_a_task + number
+            theta, outgoing, escaped = self.chunks.rays(part, index, min(chunk, rays - start))
+            sums.add(0, theta, outgoing)
+            sums.count_unresolved(escaped)
+        return sums.tables[0], sums.unresolved
+
+
 def count_long(sums: RaySums, chunks: RayChunks, engine: Engine) -> None:
-    """Count ``sums.each`` rays into the one table of ``sums``: exact integers, whoever counts them in which order.
+    """Add the rays of all parts of ``sums``: in cells exact counts, in other bases sums in the order of the chunks.
 
     Raises
     ------
     InputError
-        If the basis has no cells, or the checkpoint is of other rays or cannot be written.
+        If the checkpoint is of other rays or cannot be written.
     """
-    if not sums.basis.is_partition:
-        raise InputError(f"basis: checkpoints and workers need one of cells, such as Bins(64), got {sums.basis!r}")
-    job = _Counting(chunks, sums.basis, sums.each, max(RAYS_A_TASK // chunks.chunk, 1))
+    together = max(RAYS_A_TASK // chunks.chunk, 1)
+    job = (_Counting if sums.basis.is_partition else _Summing)(chunks, sums.basis, sums.each, together)
     path = engine.get("checkpoint")
-    if path is None:
-        _run(job, sums, None, engine.get("client"))
-        return
-    with Checkpoint(path, _identity(job)) as store:
-        _run(job, sums, store, engine.get("client"))
+    with ExitStack() as stack:
+        store = None if path is None else stack.enter_context(Checkpoint(path, _identity(job)))
+        if isinstance(job, _Counting):
+            _run(job, sums, store, engine.get("client"))
+        else:
+            _run_in_order(job, sums, store, engine.get("client"))
 
 
-def _identity(job: _Counting) -> dict[str, Any]:
+def _identity(job: _Counting | _Summing) -> dict[str, Any]:
     # task by task the checkpoint says what is done: so their size belongs to it
     return {
         "computation": "independent rays", "version": __version__, "law": law_digest(job.chunks.law),
@@ -162,3 +195,36 @@ def _run(job: _Counting, sums: RaySums, store: Checkpoint | None, client: Any) -
         if store is not None:
             store.put(STATE, state.packed(), now=True)
     sums.tables[0], sums.unresolved = state.counts, state.unresolved
+
+
+def _run_in_order(job: _Summing, sums: RaySums, store: Checkpoint | None, client: Any) -> None:
+    """Real sums are added in the order of the tasks; a result that comes too early waits for those before it."""
+    done, tasks = 0, len(sums.tables) * job.tasks_a_part
+
+    def keep() -> None:
+        if store is not None:
+            file = io.BytesIO()
+            np.savez(file, done=done, tables=sums.tables, unresolved=sums.unresolved)
+            store.put(STATE, file.getvalue(), now=True)
+
+    for _, content in () if store is None else store.parts():
+        with np.load(io.BytesIO(content), allow_pickle=False) as known:
+            done, sums.unresolved = int(known["done"]), int(known["unresolved"])
+            sums.tables[:] = known["tables"]
+    stored = time.monotonic()
+    early: dict[int, tuple[Floats, int]] = {}
+    with connected(client) as workers, progress_bar(len(sums.tables) * job.samples) as bar:
+        bar.update(sum(map(job.rays_of, range(done))))
+        for task, found in results(job.summed, range(done, tasks), workers):
+            early[task] = found
+            while done in early:
+                table, unresolved = early.pop(done)
+                sums.tables[done // job.tasks_a_part] += table
+                sums.unresolved += unresolved
+                bar.update(job.rays_of(done))
+                done += 1
+            if time.monotonic() - stored > STORED_EVERY:
+                keep()
+                stored = time.monotonic()
+    # not after an interrupt, which may come between table and number
+    keep()

@@ -9,7 +9,7 @@ from ..bases.basis import Basis
 from ..laws.law import Law
 from .chunks import RayChunks, count_long
 from .counts import BATCHES, LARGEST_REPLICATES, SampledArray
-from .rays import RaySums, progress_bar
+from .rays import RaySums
 from .sobol import PARTS
 
 # Tracing this number of rays takes about a second.
@@ -28,7 +28,7 @@ def independent_rays(
 
     In bases without cells the error comes from the spread of 32 parts, or of 8 if 32 matrices are too large to store.
     A chunk of rays depends only on numbers drawn from ``rng``, its part and its own index. With an ``engine`` its
-    workers count the rays and its checkpoint stores the counts; rays and counts are the same to the last bit.
+    workers count or add up the rays and its checkpoint stores the sums, which are the same to the last bit.
     """
     root = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
     most = LARGEST_REPLICATES // (np.dtype(np.float64).itemsize * basis.size**2)
@@ -36,14 +36,5 @@ def independent_rays(
     sums = RaySums(law, basis, parts)
     sums.each = max(-(-samples // parts), 1)
     chunks = RayChunks(law, root, sums.chunk)
-    if engine is not None:
-        count_long(sums, chunks, engine)
-        return sums.array(symmetrise=symmetrise)
-    with progress_bar(parts * sums.each) as bar:
-        for part in range(parts):
-            for index, start in enumerate(range(0, sums.each, chunks.chunk)):
-                theta, outgoing, escaped = chunks.rays(part, index, min(chunks.chunk, sums.each - start))
-                sums.count_unresolved(escaped)
-                sums.add(part, theta, outgoing)
-                bar.update(theta.size)
+    count_long(sums, chunks, engine or {})
     return sums.array(symmetrise=symmetrise)
