@@ -14,6 +14,7 @@ import precise_bump_gap
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 
 

@@ -183,9 +183,10 @@ class _Disks:
 
     def identity(self) -> dict[str, Any]:
         """What tells these disks from others."""
+        container = self.container
         return {
             "computation": "disks between walls", "version": __version__, "laws": [*map(_told, self.laws)],
-            "container": digest(self.container.points, self.container.normals, self.container.curves), "collisions": self.collisions,
+            "container": digest(container.points, container.normals, container.curves), "collisions": self.collisions,
             "start": digest(self.position, self.velocity), "seed": list(self.root),
         }  # fmt: skip
 
