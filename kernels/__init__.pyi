@@ -16,13 +16,17 @@ from .bases.tensor import TensorBasis as TensorBasis
 from .collisions.billiard import BilliardRecord as BilliardRecord
 from .collisions.billiard import Reflector as Reflector
 from .collisions.billiard import play as play
+from .collisions.collision_law import CollisionCombination as CollisionCombination
 from .collisions.collision_law import CollisionLaw as CollisionLaw
+from .collisions.collision_law import VelocityLaw as VelocityLaw
 from .collisions.limit_plot import draw_limit as draw_limit
 from .collisions.satellite_law import SatelliteLaw as SatelliteLaw
 from .collisions.small_scale_limit import LimitStudy as LimitStudy
 from .collisions.small_scale_limit import limit_study as limit_study
 from .collisions.velocity_matrices import no_slip_matrix as no_slip_matrix
 from .collisions.velocity_matrices import smooth_matrix as smooth_matrix
+from .collisions.weak_tests import WeakLimit as WeakLimit
+from .collisions.weak_tests import weak_limit as weak_limit
 from .discretisation.discretisation import discretise as discretise
 from .distances.distances import Distance as Distance
 from .distances.distances import distance as distance

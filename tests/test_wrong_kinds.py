@@ -93,6 +93,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "PolygonLaw": (ker.PolygonLaw, {"wall": TEETH, "tolerance": 1e-10, "max_beams": 1000}),
     "WallLaw": (ker.WallLaw, {"wall": TEETH}),
     "CollisionLaw": (ker.CollisionLaw, {"law": LAW, "disk": DISK}),
+    "CollisionCombination": (ker.CollisionCombination, {"terms": ((1.0, LAW, False),), "disk": DISK}),
     "CollisionLaw.from_wall": (ker.CollisionLaw.from_wall, {"wall": TEETH, "disk": DISK}),
     "CollisionLaw.sample": (COLLISION.sample, {"velocity": VELOCITY, "rng": 0}),
     "CollisionLaw.operator": (COLLISION.operator, {"theta_basis": BINS, "psi_basis": ker.Bins(4, "sin2")}),
@@ -136,6 +137,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "mixture": (ker.mixture, {"laws": [LAW, LAW], "weights": [0.5, 0.5]}),
     "limit_study": (ker.limit_study, {"disk": DISK, "wall": TEETH, "scales": [0.1, 0.05, 0.02], "rng": 0, "psi": 1.2,
                                       "spacing": None, "limit": None, "samples": (2, 2, 2), "repetitions": 2}),
+    "weak_limit": (ker.weak_limit, {"disk": DISK, "wall": TEETH, "scales": [0.01], "pairs": None, "rng": 0,
+                                    "window": 1.0, "samples": 8, "repetitions": 2}),
     "load_matrix": (ker.load_matrix, {"path": "no.npz"}),
     "no_slip_matrix": (ker.no_slip_matrix, {"disk": DISK}),
     "smooth_matrix": (ker.smooth_matrix, {"disk": DISK}),
@@ -185,7 +188,8 @@ LEFT_OUT = {
     "LaplacianComparison", "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine", "MethodFacts",
     "MixingTime", "ModifiedCollision", "NamedWall", "Reflector", "RigidCollision", "SpectralGap", "Spectrum",
     "SpectrumErrors", "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow",
-    "WallDesign", "WallForLaw", "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat", "lambertian",
+    "VelocityLaw", "WallDesign", "WallForLaw",
+    "WeakLimit", "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat", "lambertian",
     "retroreflection", "specular", "verify",
 }  # fmt: skip
 
