@@ -24,6 +24,7 @@ from .scene.plan import TracePlan
 from .tables.container import Container
 from .tracing.tracing import Status, Trace, trace, trajectory
 from .walls.catalogue import WALLS, NamedWall, wall_from_text
+from .walls.joined import join_walls
 from .walls.mushroom import mushrooms
 from .walls.named import (
     dispersing_arcs,
@@ -72,6 +73,7 @@ __all__ = [
     "elliptical_arcs",
     "flat",
     "focusing_arcs",
+    "join_walls",
     "koch",
     "load_wall",
     "mushrooms",

@@ -69,6 +69,10 @@ from .matrices.defects import Defect as Defect
 from .matrices.defects import SymmetryDefect as SymmetryDefect
 from .matrices.matrix import KernelMatrix as KernelMatrix
 from .matrices.matrix import load_matrix as load_matrix
+from .positions.displacement import Displacements as Displacements
+from .positions.displacement import displacements as displacements
+from .positions.distance_of_states import position_distance as position_distance
+from .positions.position_law import PositionLaw as PositionLaw
 from .sampling.estimation import estimate as estimate
 from .walls.circular_arc import CircularArcLaw as CircularArcLaw
 from .walls.polygon import PolygonLaw as PolygonLaw
