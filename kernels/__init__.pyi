@@ -74,6 +74,7 @@ from .positions.displacement import displacements as displacements
 from .positions.distance_of_states import position_distance as position_distance
 from .positions.position_law import PositionLaw as PositionLaw
 from .sampling.estimation import estimate as estimate
+from .thermal.spring_wall import SpringWall as SpringWall
 from .walls.circular_arc import CircularArcLaw as CircularArcLaw
 from .walls.polygon import PolygonLaw as PolygonLaw
 from .walls.rectangular import RectangularTeethLaw as RectangularTeethLaw

@@ -140,6 +140,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "weak_limit": (ker.weak_limit, {"disk": DISK, "wall": TEETH, "scales": [0.01], "pairs": None, "rng": 0,
                                     "window": 1.0, "samples": 8, "repetitions": 2}),
     "PositionLaw": (ker.PositionLaw, {"edges": [0.0, 1.0], "laws": [LAW]}),
+    "SpringWall": (ker.SpringWall, {"mass_ratio": 0.5, "temperature": 1.0, "frequency": 1.0, "depth": 1.0}),
     "displacements": (ker.displacements, {"wall": TEETH, "rays": 200, "rng": 0}),
     "position_distance": (ker.position_distance, {"first": geo.flat(), "second": geo.flat(), "tolerance": 0.5,
                                                   "rays": 16, "rng": 0}),
