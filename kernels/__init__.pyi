@@ -2,9 +2,16 @@ from .aerodynamics.drag import air_resistance as air_resistance
 from .aerodynamics.drag import resistance as resistance
 from .aerodynamics.extremal import ExtremalResistance as ExtremalResistance
 from .aerodynamics.extremal import extremal_resistance as extremal_resistance
+from .aerodynamics.polygonal_body import BodyForce as BodyForce
+from .aerodynamics.polygonal_body import PolygonalBody as PolygonalBody
+from .aerodynamics.polygonal_body import Scattering as Scattering
+from .aerodynamics.polygonal_body import invisible_body as invisible_body
+from .aerodynamics.polygonal_body import zero_resistance_body as zero_resistance_body
 from .aerodynamics.rough_body import RoughBody as RoughBody
 from .aerodynamics.shape_search import BestHollow as BestHollow
 from .aerodynamics.shape_search import best_hollow as best_hollow
+from .aerodynamics.spinning_disk import SpinForce as SpinForce
+from .aerodynamics.spinning_disk import spin_force as spin_force
 from .bases.basis import Basis as Basis
 from .bases.bins import Bins as Bins
 from .bases.legendre import Legendre as Legendre

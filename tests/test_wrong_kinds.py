@@ -140,6 +140,8 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "weak_limit": (ker.weak_limit, {"disk": DISK, "wall": TEETH, "scales": [0.01], "pairs": None, "rng": 0,
                                     "window": 1.0, "samples": 8, "repetitions": 2}),
     "PositionLaw": (ker.PositionLaw, {"edges": [0.0, 1.0], "laws": [LAW]}),
+    "PolygonalBody": (ker.PolygonalBody, {"polygons": [[(0, 0), (1, 0), (0, 1)]]}),
+    "spin_force": (ker.spin_force, {"law": LAW, "spin": 0.5, "radius": 1.0}),
     "SpringWall": (ker.SpringWall, {"mass_ratio": 0.5, "temperature": 1.0, "frequency": 1.0, "depth": 1.0}),
     "displacements": (ker.displacements, {"wall": TEETH, "rays": 200, "rng": 0}),
     "position_distance": (ker.position_distance, {"first": geo.flat(), "second": geo.flat(), "tolerance": 0.5,
@@ -188,16 +190,16 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 }  # fmt: skip
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
-    "Accommodation", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BranchLaw", "Conductance",
-    "Container", "Convergence", "ConvergenceStep", "Curve", "CylinderCollision", "Defect", "Dichotomy",
-    "DifferenceTest", "Diffusivity", "Displacements", "Distance", "DrivenLaw", "Enclosure", "Enclosures",
-    "EssentialEdge", "ExchangeHollow", "ExitTimes", "ExtremalResistance", "HilbertSchmidtNorm", "Extremum",
-    "FittedOrder", "Generations", "Hollow", "LaplacianComparison", "Law", "LeadingEigenvalues",
+    "Accommodation", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BodyForce", "BranchLaw",
+    "Conductance", "Container", "Convergence", "ConvergenceStep", "Curve", "CylinderCollision", "Defect",
+    "Dichotomy", "DifferenceTest", "Diffusivity", "Displacements", "Distance", "DrivenLaw", "Enclosure",
+    "Enclosures", "EssentialEdge", "ExchangeHollow", "ExitTimes", "ExtremalResistance", "Extremum", "FittedOrder",
+    "Generations", "HilbertSchmidtNorm", "Hollow", "LaplacianComparison", "Law", "LeadingEigenvalues",
     "LeastResistanceLaw", "LimitStudy", "Machine", "MethodFacts", "MixingTime", "ModifiedCollision", "NamedWall",
-    "Reflector", "RigidCollision", "SpectralGap", "Spectrum", "SpectrumErrors", "Status", "SweepRow",
-    "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow", "VelocityLaw", "WallDesign",
-    "WallForLaw", "WeakLimit", "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat", "lambertian",
-    "retroreflection", "specular", "verify",
+    "Reflector", "RigidCollision", "Scattering", "SpectralGap", "Spectrum", "SpectrumErrors", "SpinForce",
+    "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace", "TracePlan", "TwoMirrorHollow", "VelocityLaw",
+    "WallDesign", "WallForLaw", "WeakLimit", "WorkReport", "WorkRow", "air_resistance", "double_parabola", "flat",
+    "invisible_body", "lambertian", "retroreflection", "specular", "verify", "zero_resistance_body",
 }  # fmt: skip
 
 WRONG: dict[str, Any] = {
