@@ -150,6 +150,23 @@ def test_the_spin_force_has_the_symmetry_of_the_cell_and_the_limit_without_spin(
     assert float(plus.across) > 0.0 > float(plus.torque)
 
 
+@pytest.mark.parametrize("law", [ker.RectangularTeethLaw(2.0), ker.TriangularTeethLaw(0.3)], ids=repr)
+def test_reported_errors_of_spin_forces_hold(law):
+    """Against a midpoint rule in the coordinates of the plane, at spins for which kinks lie anywhere."""
+    phi = np.pi * ((np.arange(200_000) + 0.5) / 200_000 - 0.5)
+    normal, tangent = np.stack([np.cos(phi), np.sin(phi)]), np.stack([-np.sin(phi), np.cos(phi)])
+    for spin in np.random.default_rng(RNG).uniform(-1.5, 1.5, 4):
+        relative = np.array([[-1.0], [0.0]]) - spin * tangent
+        theta = np.arctan2(-np.sum(relative * normal, axis=0), np.sum(relative * tangent, axis=0))
+        speed = np.hypot(*relative)
+        push = relative - speed * (law.apply(np.sin, theta) * normal - law.apply(np.cos, theta) * tangent)
+        weight = np.cos(phi) * np.pi / phi.size
+        found = ker.spin_force(law, float(spin))
+        exact = (-push[0] @ weight, -push[1] @ weight, np.sum(push * tangent, axis=0) @ weight)
+        for number, value in zip((found.along, found.across, found.torque), exact, strict=True):
+            assert abs(float(number) - value) <= number.error + 2e-7
+
+
 def test_the_spin_force_of_a_traced_wall_agrees_with_single_particles():
     wall = geo.dispersing_arcs(1.5)
     law, spin, n = ker.WallLaw(wall), 0.5, 50_000
