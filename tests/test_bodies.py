@@ -187,6 +187,40 @@ def test_the_spin_force_of_a_traced_wall_agrees_with_single_particles():
         assert abs(values.mean() - float(number)) < 4.5 * values.std() / np.sqrt(n) + number.error
 
 
+def test_laws_that_differ_along_a_body_add_their_parts():
+    rough, smooth = ker.retroreflection(), ker.specular()
+    body = ker.RoughBody.disk(lambda normal: rough if normal < np.pi else smooth)
+    # 8/3 of the perimeter 2 pi, times (3/2 + 1)/2
+    assert float(body.resistance()) == pytest.approx(8.0 / 3.0 * 2.0 * np.pi * 1.25, abs=1e-9)
+    cost = body.resistance(cost=lambda u, v: 1.0 + np.cos(u - v))
+    assert float(cost) == pytest.approx(float(body.resistance()), abs=cost.error + 1e-9)
+    # a stream from above meets the rough half only, from below the smooth one
+    assert body.force(np.pi / 2) == pytest.approx([4.0, 0.0], abs=1e-4)
+    assert body.force(-np.pi / 2) == pytest.approx([8.0 / 3.0, 0.0], abs=1e-4)
+    # from the side the rough half sends momentum back along the stream, the smooth half pushes to the rough side
+    along, across = body.force(0.0)
+    assert along == pytest.approx(2.0 + 4.0 / 3.0, abs=1e-4)
+    assert across == pytest.approx(-2.0 / 3.0, abs=1e-3)
+    u, v, n = body.sample(4_000, RNG)
+    turned = np.abs(np.angle(np.exp(1j * (u - v)))) < 1e-9
+    assert np.array_equal(turned[np.abs(n - np.pi) > 1e-3], (n < np.pi)[np.abs(n - np.pi) > 1e-3])
+
+
+def test_a_direction_measure_weights_the_forces_of_streams():
+    """The integral over directions of chi(u) force(u), by a rule in the directions."""
+    body = ker.RoughBody.ellipse(ker.maxwell(0.5), 2.0, 1.0)
+
+    def chi(u):
+        return 1.0 + 0.5 * np.cos(2.0 * u)
+
+    found = body.resistance(directions=chi)
+    angles = 2.0 * np.pi * np.arange(48) / 48
+    exact = 2.0 * np.pi * np.mean([chi(angle) * body.force(angle)[0] for angle in angles])
+    assert float(found) == pytest.approx(exact, rel=1e-4)
+    with pytest.raises(InputError, match="one for every element"):
+        ker.RoughBody.polygon([ker.specular()], [(0, 0), (1, 0), (0, 1)])
+
+
 def test_wrong_arguments_are_refused():
     with pytest.raises(InputError, match="three points"):
         ker.PolygonalBody([[(0, 0), (1, 0)]])
