@@ -28,6 +28,7 @@ from .tracing.boundary_map import BoundaryStates, billiard_map, nested_reflectio
 from .tracing.generations import MushroomGenerations
 from .tracing.tracing import Status, Trace, trace, trajectory
 from .walls.catalogue import WALLS, NamedWall, wall_from_text
+from .walls.joined import join_walls
 from .walls.mushroom import mushrooms
 from .walls.named import (
     dispersing_arcs,
@@ -86,6 +87,7 @@ __all__ = [
     "elliptical_arcs",
     "flat",
     "focusing_arcs",
+    "join_walls",
     "koch",
     "load_wall",
     "mushrooms",

@@ -19,6 +19,8 @@ from .eigenvalues.sparse import leading_eigenvalues as leading_eigenvalues
 from .eigenvalues.spectra import Spectrum as Spectrum
 from .eigenvalues.spectra import SpectrumErrors as SpectrumErrors
 from .eigenvalues.standard_errors import bootstrap_intervals as bootstrap_intervals
+from .essential.compactness import HilbertSchmidtNorm as HilbertSchmidtNorm
+from .essential.compactness import hilbert_schmidt_norm as hilbert_schmidt_norm
 from .essential.edge import EssentialEdge as EssentialEdge
 from .essential.edge import essential_edge as essential_edge
 from .gap.gap import gaps_in_both_conventions as gaps_in_both_conventions

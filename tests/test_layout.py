@@ -24,8 +24,8 @@ FLOORS = [
     *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries", "geometry.itineraries.compiled"),
     *("geometry.collisions.compiled", "geometry.collisions", "geometry.plotting", "geometry"),
     *("kernels.bases", "kernels.matrices", "kernels.expectations", "kernels.laws", "kernels.walls", "kernels.sampling"),
-    *("kernels.discretisation", "kernels.distances", "kernels.collisions", "kernels.billiards", "kernels.inverse"),
-    *("kernels.aerodynamics", "kernels"),
+    *("kernels.discretisation", "kernels.distances", "kernels.positions", "kernels.thermal", "kernels.collisions"),
+    *("kernels.billiards", "kernels.inverse", "kernels.aerodynamics", "kernels"),
     *("spectral.eigenvalues", "spectral.essential", "spectral.bounds", "spectral.gap", "spectral.consequences"),
     *("spectral.sweeps", "spectral.work_diagrams", "spectral"),
     # the ledger's index finds the files of its folders without naming them

@@ -1,39 +1,353 @@
-"""The rough collision law of a disk and a wall, K = delta (x) P~ (x) delta_{pi - psi}."""
+"""The collision law of a disk and a rough wall, K = delta (x) P~ (x) delta_{pi - psi}, and the algebra of such laws."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, angles, finite_array, generator, instance
+from ...core.checks import (
+    Floats,
+    Rng,
+    angles,
+    finite_array,
+    finite_number,
+    generator,
+    instance,
+    shortened,
+    whole_number,
+)
 from ...core.errors import InputError
 from ...core.kinds import explained, explained_class
 from ...geometry import Disk, Wall
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
+from ..bases.tensor import TensorBasis
 from ..laws.law import Combination, Law, retroreflection, specular
+from ..laws.tensor_law import Discretiser, TensorLaw
 from ..walls.isometry_branches import isometries
 from .velocity_matrices import isometry_matrix
 
 if TYPE_CHECKING:
     from ..matrices.defects import SymmetryDefect
+    from ..matrices.matrix import KernelMatrix
     from .operator import CollisionOperator
 
 # Pairs of angles are evaluated as a grid if the grid of their distinct values has at most this many points per pair.
 GRID_EXCESS = 4
 DEFECT_SIZES = (32, 8)
+# Decimal weights sum to 1 within a few roundings.
+WEIGHT_TOLERANCE = 1e-12
 
 VelocityFunction = Callable[[Floats, Floats], Floats]
+StateFunction = Callable[[Floats, Floats, Floats], Floats]
+# Weight, law of theta, and whether psi becomes pi - psi (else it is unchanged).
+Term: TypeAlias = tuple[float, Law, bool]
+
+
+class VelocityLaw(TensorLaw):
+    """A law of velocities in the algebra of collision laws: a sum of P~ (x) J and Q~ (x) 1, with J the flip of psi.
+
+    Every law acts on states (y, w) with y = (y1, y3), and leaves y unchanged. Laws of one disk combine as operators in
+    the paper's convention: ``K1 @ K2`` is K2 applied to minus the outgoing velocity of K1, ``0.3 * K1 + 0.7 * K2`` a
+    mixture, ``K ** n`` a power, ``K.adjoint()`` the adjoint with respect to dy Lambda^2. Products of two collision laws
+    leave psi unchanged, because each of them flips it.
+
+    Source: Rudzis 2022, section 1.3.6.
+    """
+
+    # A law is an operator, not an array: with None, numpy leaves ``np.float64(0.3) * K`` to this class.
+    __array_ufunc__ = None
+
+    disk: Disk
+
+    @abstractmethod
+    def parts(self) -> tuple[Term, ...]:
+        """(weight, law of theta, whether psi is flipped): at most one term with the flip, and one without."""
+
+    def parts_checked(self) -> tuple[Term, ...]:
+        """`parts`; raises InputError if the weights do not sum to 1 within 1e-12."""
+        total = math.fsum(weight for weight, _, _ in self.parts())
+        if abs(total - 1.0) > WEIGHT_TOLERANCE:
+            raise InputError(f"weights: expected a sum of 1, got {total!r} for {self!r}; scale the weights")
+        return self.parts()
+
+    # ---- states and velocities -------------------------------------------------------------------------------
+    @explained
+    def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
+        """Draw an outgoing velocity for every incoming one.
+
+        Parameters
+        ----------
+        velocity : array_like of shape (..., 3)
+            Incoming (v1, v2, omega) with v2 < 0.
+        rng : None, int or numpy.random.Generator
+
+        Returns
+        -------
+        array of shape (..., 3)
+            Outgoing (v1, v2, omega) with v2 > 0, of the same kinetic energy and rolling momentum. A term without flip,
+            as in ``K @ K``, reverses the rolling momentum: it keeps that of minus the incoming velocity.
+
+        Raises
+        ------
+        InputError
+            If the shape is wrong or some v2 is not negative.
+        """
+        incoming = finite_array("velocity", velocity)
+        if incoming.ndim == 0 or incoming.shape[-1] != 3:
+            raise InputError(f"velocity: expected shape (..., 3) for (v1, v2, omega), got {incoming.shape}")
+        if not np.all(incoming[..., 1] < 0.0):
+            worst = np.argwhere(~(incoming[..., 1] < 0.0))[0].tolist()
+            raise InputError(f"velocity: expected incoming velocities with v2 < 0, got v2 >= 0 at row {worst}")
+        rng = generator(rng)
+        frame = np.asarray(self.disk.frame)
+        along, up, roll = (self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame)
+        # angle and length of minus the incoming velocity in the plane of chi_perp and e2^; the flip leaves ``roll``
+        theta = np.arctan2(-up, -along)
+        outgoing, flipped = self._sample(theta, rng)
+        size = np.hypot(along, up)
+        parts = (size * np.cos(outgoing), size * np.sin(outgoing), np.where(flipped, roll, -roll))
+        return np.asarray(sum(part[..., None] * direction for part, direction in zip(parts, frame, strict=True)))
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        """Outgoing theta, and for each whether psi is flipped."""
+        terms = self.parts_checked()
+        if len(terms) == 1:
+            return terms[0][1].sample(theta, rng), np.full(theta.shape, terms[0][2])
+        first = rng.random(theta.shape) < terms[0][0]
+        outgoing = np.empty(theta.shape)
+        for chosen, (_, law, _) in zip((first, ~first), terms, strict=True):
+            if chosen.any():
+                outgoing[chosen] = law.sample(theta[chosen], rng)
+        return outgoing, np.where(first, terms[0][2], terms[1][2])
+
+    @explained
+    def sample_states(self, position: ArrayLike, velocity: ArrayLike, rng: Rng = None) -> tuple[Floats, Floats]:
+        """Draw an outgoing state (y', w') for every incoming one; y' = y.
+
+        Parameters
+        ----------
+        position : array_like, shape (n, 2)
+            (x1, alpha) at x2 = 0, as in `geometry.collide`: coordinates of y.
+        velocity : array_like, shape (n, 3)
+            Incoming (v1, v2, omega) with v2 < 0.
+        rng : None, int or numpy.random.Generator
+
+        Returns
+        -------
+        (position, velocity)
+            Of shapes (n, 2) and (n, 3). The position is that before the collision.
+
+        Raises
+        ------
+        InputError
+            If a shape is wrong or some v2 is not negative.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo, kernels as ker
+        >>> K = ker.CollisionLaw(ker.specular(), geo.Disk(1.0, 1.0))
+        >>> position, velocity = K.sample_states([[0.25, 3.0]], [[1.0, -1.0, 0.0]], rng=0)
+        >>> position.tolist(), velocity.round(12).tolist()
+        ([[0.25, 3.0]], [[1.0, 1.0, 0.0]])
+        """
+        from ...geometry.collisions.rigid import checked_states
+
+        at, moving = checked_states(position, velocity)
+        return at.copy(), self.sample(moving, rng)
+
+    # ---- expectations ----------------------------------------------------------------------------------------
+    def apply(self, function: VelocityFunction, theta: ArrayLike, psi: ArrayLike) -> Floats:
+        """The expectation E[f(Theta', Psi') | theta, psi] for a vectorised function f(theta, psi) that broadcasts.
+
+        ``theta`` and ``psi`` in (0, pi) are the angles of minus the incoming velocity; they broadcast. Psi' is
+        pi - psi, and psi in a term without flip.
+        """
+        pairs = np.broadcast_arrays(angles("theta", theta), angles("psi", psi))
+        terms = [weight * _expectation(law, flip, function, *pairs) for weight, law, flip in self.parts_checked()]
+        return np.asarray(sum(terms[1:], terms[0]))
+
+    def apply_to_states(self, function: StateFunction, position: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Floats:
+        """The expectation E[f(y', Theta', Psi') | y, theta, psi] for a function of states; y' = y.
+
+        Parameters
+        ----------
+        function : callable
+            f(y, theta, psi), vectorised: y has shape (..., 2), the angles broadcast with its leading axes.
+        position : array_like, shape (..., 2)
+            y, in any coordinates of the plane x2 = 0.
+        theta, psi : array_like
+            Angles of minus the incoming velocity in (0, pi), radians; they broadcast with ``position.shape[:-1]``.
+
+        Raises
+        ------
+        InputError
+            If a shape is wrong, a number is not finite or an angle is not in (0, pi).
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo, kernels as ker
+        >>> K = ker.CollisionLaw(ker.lambertian(), geo.Disk())
+        >>> value = K.apply_to_states(lambda y, theta, psi: y[..., 0] * np.cos(theta) ** 2, [6.0, 0.0], 1.0, 2.0)
+        >>> round(float(value), 9)
+        2.0
+        """
+        at = finite_array("position", position)
+        if at.ndim == 0 or at.shape[-1] != 2:
+            raise InputError(f"position: expected shape (..., 2), got {at.shape}")
+        first, second = angles("theta", theta), angles("psi", psi)
+        shape = np.broadcast_shapes(at.shape[:-1], first.shape, second.shape)
+        points = np.broadcast_to(at, (*shape, 2)).reshape(-1, 2)
+        first, second = np.broadcast_to(first, shape).ravel(), np.broadcast_to(second, shape).ravel()
+        value = np.empty(first.size)
+        places, index = np.unique(points, axis=0, return_inverse=True)
+        for k, point in enumerate(places):
+            here = index.ravel() == k
+            value[here] = self.apply(partial(function, point), first[here], second[here])
+        return value.reshape(shape)
+
+    def branches(self, theta: ArrayLike) -> list[tuple[Floats, Floats]]:
+        """Probabilities and 3x3 velocity matrices of the branches of a law made of isometries.
+
+        Parameters
+        ----------
+        theta : array_like
+            Angle of minus the incoming velocity, in (0, pi), radians.
+
+        Returns
+        -------
+        list of (probability, matrix)
+            Probability of shape ``theta.shape``, matrix of shape ``theta.shape + (3, 3)``. Each matrix maps the
+            incoming (v1, v2, omega) to the outgoing one. Branches with probability 0 everywhere are omitted.
+
+        Raises
+        ------
+        InputError
+            If the law is not made of isometries.
+        """
+        found = []
+        for weight, law, flip in self.parts_checked():
+            probability, sign, offset = isometries(law, theta)
+            matrices = isometry_matrix(self.disk, sign, offset, flip)
+            found += [
+                (weight * probability[..., slot], matrices[..., slot, :, :])
+                for slot in range(probability.shape[-1])
+                if np.any(weight * probability[..., slot] > 0.0)
+            ]
+        return found
+
+    # ---- matrices --------------------------------------------------------------------------------------------
+    @explained
+    def operator(self, theta_basis: Basis, psi_basis: Basis, **discretisation: object) -> CollisionOperator:
+        """The matrix of the law on a product of two bases, as a linear operator that never forms the product.
+
+        ``theta_basis`` is for the weight sin(theta), ``psi_basis`` for sin(psi)^2 (``weight="sin2"``). Further keywords
+        are passed to `discretise`. A law with a closed form, such as that of `from_wall` for teeth and for the
+        elliptical arcs of the disk, is discretised by it, without rays.
+        """
+        from ..discretisation.discretisation import discretise
+        from .operator import CollisionOperator
+
+        parts: dict[bool, KernelMatrix] = {}
+        for weight, law, flip in self.parts_checked():
+            matrix = discretise(law, theta_basis, **discretisation)  # type: ignore[arg-type]
+            parts[flip] = matrix if weight == 1.0 else weight * matrix
+        return CollisionOperator(parts.get(True), psi_basis, parts.get(False))
+
+    def matrix_on(self, basis: TensorBasis, discretise: Discretiser) -> KernelMatrix:
+        """The matrix on a basis of products e_i(theta) f_j(psi): the sum of the tensor products of its terms."""
+        from ...core.estimates import Estimate
+        from ..bases.mirror import reflection_matrix
+        from ..matrices.matrix import KernelMatrix
+
+        theta_basis, psi_basis = basis.factors
+        exact = Estimate(0.0, 0.0, "bound", "the flip of psi")
+        total: KernelMatrix | None = None
+        for weight, law, flip in self.parts_checked():
+            rolled = reflection_matrix(psi_basis) if flip else np.eye(psi_basis.size)
+            name = "psi -> pi - psi" if flip else "psi -> psi"
+            factor = KernelMatrix(rolled, psi_basis, exact, law=name, reversible=True, mirror_symmetric=True)
+            term = discretise(law, theta_basis).tensor(factor)
+            term = term if weight == 1.0 else weight * term
+            total = term if total is None else total + term
+        assert total is not None  # a law has at least one term
+        return total
+
+    def symmetry_defect(
+        self, theta_basis: Basis | None = None, psi_basis: Basis | None = None, **discretisation: object
+    ) -> SymmetryDefect:
+        """The asymmetry of the law with respect to Lambda^2, measured on two bases.
+
+        The default bases are polynomials of degree below 32 in cos theta and below 8 in cos psi.
+        """
+        theta_basis = Legendre(DEFECT_SIZES[0]) if theta_basis is None else theta_basis
+        psi_basis = Legendre(DEFECT_SIZES[1], weight="sin2") if psi_basis is None else psi_basis
+        return self.operator(theta_basis, psi_basis, **discretisation).symmetry_defect()
+
+    # ---- the algebra -----------------------------------------------------------------------------------------
+    @property
+    def reversible(self) -> bool | None:
+        """Whether the law is symmetric with respect to Lambda^2; None if unknown."""
+        return True if all(law.reversible for _, law, _ in self.parts()) else None
+
+    def adjoint(self) -> VelocityLaw:
+        """The adjoint in L^2(dy Lambda^2): that of every law of theta. InputError if one of them is not known."""
+        if self.reversible:
+            return self
+        return _law_of([(weight, law.adjoint(), flip) for weight, law, flip in self.parts()], self.disk)
+
+    def __matmul__(self, other: VelocityLaw) -> VelocityLaw:
+        """This law, then the other on minus the outgoing velocity: the composition of operators."""
+        if not isinstance(other, VelocityLaw):
+            return NotImplemented
+        self._check_disk(other, "compose")
+        pairs = [
+            (weight * other_weight, law @ other_law, flip != other_flip)
+            for weight, law, flip in self.parts()
+            for other_weight, other_law, other_flip in other.parts()
+        ]
+        return _law_of(pairs, self.disk)
+
+    def __pow__(self, exponent: int) -> VelocityLaw:
+        """The composition of ``exponent`` equal factors, a whole number of at least 0; 0 is the identity."""
+        whole_number("exponent", exponent, 0)
+        if exponent == 1:
+            return self
+        if len(self.parts()) == 1 or exponent == 0:
+            ((weight, law, flip), *_) = self.parts()
+            power = law**exponent if exponent else retroreflection()
+            return _law_of([(weight**exponent, power, flip and exponent % 2 == 1)], self.disk)
+        half = self ** (exponent // 2)
+        return half @ half if exponent % 2 == 0 else half @ half @ self
+
+    def __rmul__(self, weight: float) -> VelocityLaw:
+        if isinstance(weight, bool) or not isinstance(weight, (int, float, np.integer, np.floating)):
+            return NotImplemented
+        return _law_of([(float(weight) * own, law, flip) for own, law, flip in self.parts()], self.disk)
+
+    __mul__ = __rmul__
+
+    def __add__(self, other: VelocityLaw) -> VelocityLaw:
+        if not isinstance(other, VelocityLaw):
+            return NotImplemented
+        self._check_disk(other, "add")
+        return _law_of([*self.parts(), *other.parts()], self.disk)
+
+    def _check_disk(self, other: VelocityLaw, verb: str) -> None:
+        if self.disk != other.disk:
+            raise InputError(f"cannot {verb} laws of different disks, {self.disk!r} and {other.disk!r}")
 
 
 @explained_class
 @dataclass(frozen=True)
-class CollisionLaw:
+class CollisionLaw(VelocityLaw):
     r"""The collision law K of a rough disk with a rough wall, in the limit of small roughness.
 
     K maps *minus* the incoming velocity, w = cos theta sin psi chi_perp + sin theta sin psi e2^ + cos psi chi, to the
@@ -57,6 +371,11 @@ class CollisionLaw:
     >>> K = ker.CollisionLaw(ker.retroreflection(), geo.Disk(mass=1.0, inertia=0.5))
     >>> K.sample([[1.0, -1.0, 0.0]], np.random.default_rng(0)).round(12).tolist()
     [[0.333333333333, 1.0, -1.333333333333]]
+
+    The composition of the law of a no-slip wall with itself is the identity: it sends minus the velocity on.
+
+    >>> (K @ K).sample([[1.0, -1.0, 2.0]]).round(12).tolist()
+    [[-1.0, 1.0, -2.0]]
     """
 
     law: Law
@@ -83,117 +402,117 @@ class CollisionLaw:
         instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
         return cls(WallLaw(wall.foreshorten(disk)), disk)
 
-    @explained
-    def sample(self, velocity: ArrayLike, rng: Rng = None) -> Floats:
-        """Draw an outgoing velocity for every incoming one.
-
-        Parameters
-        ----------
-        velocity : array_like of shape (..., 3)
-            Incoming (v1, v2, omega) with v2 < 0.
-        rng : None, int or numpy.random.Generator
-
-        Returns
-        -------
-        array of shape (..., 3)
-            Outgoing (v1, v2, omega) with v2 > 0, of the same kinetic energy and rolling momentum.
-
-        Raises
-        ------
-        InputError
-            If the shape is wrong or some v2 is not negative.
-        """
-        incoming = finite_array("velocity", velocity)
-        if incoming.ndim == 0 or incoming.shape[-1] != 3:
-            raise InputError(f"velocity: expected shape (..., 3) for (v1, v2, omega), got {incoming.shape}")
-        if not np.all(incoming[..., 1] < 0.0):
-            worst = np.argwhere(~(incoming[..., 1] < 0.0))[0].tolist()
-            raise InputError(f"velocity: expected incoming velocities with v2 < 0, got v2 >= 0 at row {worst}")
-        rng = generator(rng)
-        frame = np.asarray(self.disk.frame)
-        along, up, roll = (self.disk.inner(incoming, np.broadcast_to(direction, incoming.shape)) for direction in frame)
-        # angle and length of minus the incoming velocity in the plane of chi_perp and e2^; K leaves ``roll`` unchanged
-        theta = np.arctan2(-up, -along)
-        outgoing = self.law.sample(theta, rng)
-        size = np.hypot(along, up)
-        parts = (size * np.cos(outgoing), size * np.sin(outgoing), roll)
-        return np.asarray(sum(part[..., None] * direction for part, direction in zip(parts, frame, strict=True)))
-
-    def apply(self, function: VelocityFunction, theta: ArrayLike, psi: ArrayLike) -> Floats:
-        """The expectation E[f(Theta', pi - psi) | theta, psi] for a vectorised function f(theta, psi) that broadcasts.
-
-        ``theta`` and ``psi`` in (0, pi) are the angles of minus the incoming velocity; they broadcast.
-        """
-        theta_all, psi_all = np.broadcast_arrays(angles("theta", theta), angles("psi", psi))
-        theta_values, theta_index = np.unique(theta_all, return_inverse=True)
-        psi_values, psi_index = np.unique(psi_all, return_inverse=True)
-        rolled = np.pi - psi_values
-        if theta_values.size * psi_values.size <= GRID_EXCESS * theta_all.size:
-            # one call for the grid, with psi as an additional axis of the function's values
-            grid = self.law.apply(lambda outgoing: function(outgoing[..., None], rolled), theta_values)
-            return np.asarray(grid[theta_index, psi_index].reshape(theta_all.shape))
-        value = np.empty(theta_all.shape)
-        for k, angle in enumerate(rolled):
-            here = psi_index.reshape(psi_all.shape) == k
-            value[here] = self.law.apply(partial(_with_psi, function, angle), theta_all[here])
-        return value
-
-    def branches(self, theta: ArrayLike) -> list[tuple[Floats, Floats]]:
-        """Probabilities and 3x3 velocity matrices of the branches of a law made of isometries.
-
-        Parameters
-        ----------
-        theta : array_like
-            Angle of minus the incoming velocity, in (0, pi), radians.
-
-        Returns
-        -------
-        list of (probability, matrix)
-            Probability of shape ``theta.shape``, matrix of shape ``theta.shape + (3, 3)``. Each matrix maps the
-            incoming (v1, v2, omega) to the outgoing one. Branches with probability 0 everywhere are omitted.
-
-        Raises
-        ------
-        InputError
-            If the law is not made of isometries.
-        """
-        probability, sign, offset = isometries(self.law, theta)
-        matrices = isometry_matrix(self.disk, sign, offset)
-        return [
-            (probability[..., slot], matrices[..., slot, :, :])
-            for slot in range(probability.shape[-1])
-            if np.any(probability[..., slot] > 0.0)
-        ]
-
-    @explained
-    def operator(self, theta_basis: Basis, psi_basis: Basis, **discretisation: object) -> CollisionOperator:
-        """The matrix of K on a product of two bases, as a linear operator that never forms the product.
-
-        ``theta_basis`` is for the weight sin(theta), ``psi_basis`` for sin(psi)^2 (``weight="sin2"``). Further keywords
-        are passed to `discretise`.
-        """
-        from ..discretisation.discretisation import discretise
-        from .operator import CollisionOperator
-
-        return CollisionOperator(discretise(self.law, theta_basis, **discretisation), psi_basis)  # type: ignore[arg-type]
-
-    def symmetry_defect(
-        self, theta_basis: Basis | None = None, psi_basis: Basis | None = None, **discretisation: object
-    ) -> SymmetryDefect:
-        """The asymmetry of K with respect to Lambda^2, measured on two bases.
-
-        The default bases are polynomials of degree below 32 in cos theta and below 8 in cos psi.
-        """
-        theta_basis = Legendre(DEFECT_SIZES[0]) if theta_basis is None else theta_basis
-        psi_basis = Legendre(DEFECT_SIZES[1], weight="sin2") if psi_basis is None else psi_basis
-        return self.operator(theta_basis, psi_basis, **discretisation).symmetry_defect()
+    def parts(self) -> tuple[Term, ...]:
+        """The only term, P~ with the flip of psi."""
+        return ((1.0, self.law, True),)
 
     def __repr__(self) -> str:
         return f"CollisionLaw(law={self.law!r}, disk={self.disk!r})"
 
 
+@explained_class
+@dataclass(frozen=True)
+class CollisionCombination(VelocityLaw):
+    """A law w P~ (x) J + w' Q~ (x) 1 in the algebra of collision laws; made by ``K1 @ K2``, ``0.3 * K1``, ``K ** n``.
+
+    Sums and products of which only a term with flip and weight 1 remains are a `CollisionLaw` again.
+
+    Parameters
+    ----------
+    terms : tuple of (float, Law, bool)
+        Weight, law of theta in the paper's convention, and whether psi becomes pi - psi. At most one term with the
+        flip, and one without. A weighted law such as ``0.3 * K1`` need not have the sum 1 until it is used.
+    disk : Disk
+
+    Raises
+    ------
+    InputError
+        If a weight is negative or not finite, there are no terms or two of one kind, or a law is in the other frame.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> disk = geo.Disk()
+    >>> smooth, rough = ker.CollisionLaw(ker.specular(), disk), ker.CollisionLaw(ker.retroreflection(), disk)
+    >>> 0.5 * smooth + 0.5 * rough
+    CollisionLaw(law=0.5*specular() + 0.5*retroreflection(), disk=Disk(mass=1.0, inertia=0.5))
+    >>> smooth @ rough
+    CollisionCombination(terms=((1.0, specular() @ retroreflection(), False),), disk=Disk(mass=1.0, inertia=0.5))
+    >>> float((smooth @ smooth).apply(lambda theta, psi: psi, 1.0, 0.25))
+    0.25
+    """
+
+    terms: tuple[Term, ...]
+    disk: Disk
+
+    def __post_init__(self) -> None:
+        instance("disk", self.disk, Disk, "geo.Disk(mass=1.0, inertia=0.5)")
+        if not isinstance(self.terms, tuple) or not all(isinstance(t, tuple) and len(t) == 3 for t in self.terms):
+            raise InputError(f"terms: expected tuples (weight, law, flip), got {shortened(self.terms)}")
+        if not self.terms or len({bool(flip) for _, _, flip in self.terms}) < len(self.terms):
+            raise InputError(f"terms: expected one with flip, one without, or both, got {len(self.terms)} terms")
+        for weight, law, _ in self.terms:
+            if not isinstance(law, Law) or law.frame != "paper":
+                raise InputError(f"terms: expected laws in the paper's convention, got {law!r}")
+            if finite_number("weights", weight) < 0.0:
+                raise InputError(f"weights: expected ones of at least 0, got {weight!r} for {law!r}")
+
+    def parts(self) -> tuple[Term, ...]:
+        """The terms."""
+        return self.terms
+
+
+def _law_of(terms: Sequence[Term], disk: Disk) -> VelocityLaw:
+    """The sum of the terms, with those of one kind joined to one; a CollisionLaw if it is one."""
+    joined: list[Term] = []
+    for flip in (True, False):
+        same = [(weight, law) for weight, law, own in terms if own is flip]
+        used = [(weight, law) for weight, law in same if weight != 0.0]
+        if len(used) == 1:
+            joined.append((*used[0], flip))
+        elif used:
+            total = math.fsum(weight for weight, _ in used)
+            joined.append((total, _sum_of([(weight / total, law) for weight, law in used]), flip))
+    joined = joined or [terms[0]]
+    (weight, law, flip), *others = joined
+    if flip and not others and abs(weight - 1.0) <= WEIGHT_TOLERANCE:
+        return CollisionLaw(law, disk)
+    return CollisionCombination(tuple(joined), disk)
+
+
+def _sum_of(parts: Sequence[tuple[float, Law]]) -> Law:
+    """The weighted sum, with nested sums flattened."""
+    flat: list[tuple[float, Law]] = []
+    for weight, law in parts:
+        inner = law.terms if isinstance(law, Combination) else ((1.0, law),)
+        flat += [(weight * own, part) for own, part in inner]
+    return Combination(tuple(flat))
+
+
+def _expectation(law: Law, flip: bool, function: VelocityFunction, theta_all: Floats, psi_all: Floats) -> Floats:
+    """E[f(Theta', pi - psi)], or E[f(Theta', psi)] without flip, for arrays of equal shape."""
+    theta_values, theta_index = np.unique(theta_all, return_inverse=True)
+    psi_values, psi_index = np.unique(psi_all, return_inverse=True)
+    rolled = np.pi - psi_values if flip else psi_values
+    if theta_values.size * psi_values.size <= GRID_EXCESS * theta_all.size:
+        # one call for the grid, with psi as an additional axis of the function's values
+        grid = law.apply(lambda outgoing: _on_grid(function, outgoing[..., None], rolled), theta_values)
+        return np.asarray(grid[theta_index, psi_index].reshape(theta_all.shape))
+    value = np.empty(theta_all.shape)
+    for k, angle in enumerate(rolled):
+        here = psi_index.reshape(psi_all.shape) == k
+        value[here] = law.apply(partial(_with_psi, function, angle), theta_all[here])
+    return value
+
+
+def _on_grid(function: VelocityFunction, theta: Floats, psi: Floats) -> Floats:
+    """The values in the joint shape of both angles, also of a function that ignores one of them."""
+    values = np.asarray(function(theta, psi), dtype=np.float64)
+    return np.broadcast_to(values, np.broadcast_shapes(theta.shape, psi.shape))
+
+
 def _with_psi(function: VelocityFunction, psi: Floats, theta: Floats) -> Floats:
-    return function(theta, psi)
+    return _on_grid(function, theta, np.asarray(psi))
 
 
 @explained

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, number_between, whole_number
+from ...core.checks import Floats, Rng, angles, check_memory, finite_array, frozen, generator, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 # A slope with an error needs three points.
 FEWEST_SCALES = 3
-COLUMNS = ("distance", "floor", "psi_defect", "two_satellites", "outliers", "drift", "shift")
+COLUMNS = ("distance", "state_distance", "floor", "psi_defect", "two_satellites", "outliers", "drift", "shift")
 
 
 @dataclass(frozen=True)
@@ -58,17 +58,22 @@ class LimitStudy:
         E[u u']/E[u^2] with u = -cos theta, minus the same ratio for the limit at the same incoming angles. The true
         disk's correlation is <u, P~ u>/<u, u> plus ``shift``.
     errors : dict of arrays
-        Standard errors of the seven columns above, from independent repetitions.
+        Standard errors of the eight columns above, from independent repetitions.
     seconds : array
         Processor time of the collisions.
     collisions : int
         Number of collisions at each scale.
+    psi : array, shape (k,)
+        The incoming psi, radians. With several, every column above is the mean over them.
+    by_psi : dict of arrays
+        The eight columns for every psi, each of shape (scales, k).
     """
 
     scales: Floats
     spacings: Floats
     gap_fraction: Floats
     distance: Floats
+    state_distance: Floats
     floor: Floats
     psi_defect: Floats
     two_satellites: Floats
@@ -78,6 +83,8 @@ class LimitStudy:
     errors: dict[str, Floats]
     seconds: Floats
     collisions: int
+    psi: Floats
+    by_psi: dict[str, Floats]
 
     def to_frame(self) -> Any:
         """One row a scale; every measured column is followed by its standard error (extra ``studies``)."""
@@ -135,7 +142,7 @@ def limit_study(
     scales: ArrayLike,
     rng: Rng = None,
     *,
-    psi: float = 1.2,
+    psi: ArrayLike = 1.2,
     spacing: Callable[[float], float] | None = None,
     limit: Wall | None = None,
     samples: tuple[int, int, int] = (16, 32, 32),
@@ -151,15 +158,15 @@ def limit_study(
     scales : array_like, shape (n,)
         Values of eps > 0.
     rng : None, int or numpy.random.Generator
-    psi : float
-        Incoming psi in (0, pi), radians.
+    psi : float or array_like, shape (k,)
+        One or several incoming psi in (0, pi), radians.
     spacing : callable, optional
         rho as a function of eps; by default as in `geometry.collide`.
     limit : Wall, optional
         The wall whose foreshortened law is the limit; by default ``wall``.
     samples : (int, int, int)
         Numbers of incoming angles theta, of disk angles alpha per theta, and of positions x1 per alpha. All are
-        stratified: theta with respect to sin(theta), alpha in one spacing, x1 in one cell.
+        stratified: theta with respect to sin(theta), alpha in one spacing, x1 in one cell. For every psi.
     repetitions : int
         Independent repetitions for the standard errors, at least 2.
     checkpoint : path, optional
@@ -187,6 +194,8 @@ def limit_study(
     ...                         np.random.default_rng(0), samples=(8, 16, 16))
     >>> bool(np.all(np.diff(study.psi_defect) < 0)), abs(float(study.order("psi_defect", "spacings")) - 1.0) < 0.2
     (True, True)
+    >>> bool(np.all(np.diff(study.state_distance) < 0))
+    True
     """
     from ...geometry.collisions.configuration_space import ConfigurationSpace
 
@@ -194,7 +203,9 @@ def limit_study(
     eps = np.atleast_1d(finite_array("scales", scales))
     if eps.ndim != 1:
         raise InputError(f"scales: expected a list of numbers, got an array of shape {eps.shape}")
-    number_between("psi", psi, 0.0, math.pi)
+    rolls = np.atleast_1d(angles("psi", psi))
+    if rolls.ndim != 1 or not rolls.size:
+        raise InputError(f"psi: expected one angle or a list of angles, got an array of shape {rolls.shape}")
     for name, number in zip(("angles", "rotations", "positions"), samples, strict=True):
         whole_number(f"samples ({name})", number, 1)
     whole_number("repetitions", repetitions, 2)
@@ -203,10 +214,11 @@ def limit_study(
     spaces = [ConfigurationSpace(wall, disk, float(e), None if spacing is None else spacing(float(e))) for e in eps]
     target = (wall if limit is None else limit).foreshorten(disk)
     sizes = tuple((space.scale, space.spacing) for space in spaces)
-    job = _Repetitions(disk, wall, target, sizes, psi, samples, repetitions, root)
+    job = _Repetitions(disk, wall, target, sizes, tuple(map(float, rolls)), samples, repetitions, root)
     parts = all_parts(job.measured, len(eps) * repetitions, job.identity(), engine)
-    runs = np.reshape([part["columns"] for part in parts], (len(eps), repetitions, len(COLUMNS)))
+    each = np.reshape([part["columns"] for part in parts], (len(eps), repetitions, len(rolls), len(COLUMNS)))
     seconds = np.reshape([part["seconds"] for part in parts], (len(eps), repetitions)).sum(axis=1)
+    runs = each.mean(axis=2)
     means, errors = runs.mean(axis=1), runs.std(axis=1, ddof=1) / math.sqrt(repetitions)
     columns = {name: frozen(means[:, j]) for j, name in enumerate(COLUMNS)}
     return LimitStudy(
@@ -215,7 +227,9 @@ def limit_study(
         gap_fraction=frozen([2.0 * space.gap_radius / space.spacing for space in spaces]),
         errors={name: frozen(errors[:, j]) for j, name in enumerate(COLUMNS)},
         seconds=frozen(seconds),
-        collisions=repetitions * math.prod(samples),
+        collisions=repetitions * len(rolls) * math.prod(samples),
+        psi=frozen(rolls),
+        by_psi={name: frozen(each.mean(axis=1)[:, :, j]) for j, name in enumerate(COLUMNS)},
         **columns,
     )
 
@@ -228,7 +242,7 @@ class _Repetitions:
     wall: Wall
     target: Wall
     sizes: tuple[tuple[float, float], ...]
-    psi: float
+    psi: tuple[float, ...]
     samples: tuple[int, int, int]
     repetitions: int
     root: tuple[int, ...]
@@ -238,15 +252,16 @@ class _Repetitions:
         return {
             "computation": "limit of small scales", "version": __version__, "disk": repr(self.disk),
             "wall": wall_digest(self.wall), "limit": wall_digest(self.target), "sizes": list(map(list, self.sizes)),
-            "psi": self.psi, "samples": list(self.samples), "repetitions": self.repetitions, "seed": list(self.root),
+            "psi": list(self.psi), "samples": list(self.samples), "repetitions": self.repetitions,
+            "seed": list(self.root),
         }  # fmt: skip
 
     def measured(self, part: int) -> dict[str, Any]:
         """Columns and processor seconds of one repetition, whose random numbers depend on its number alone."""
         rng = np.random.default_rng([*self.root, part])
         size = self.sizes[part // self.repetitions]
-        columns, seconds = _measured(self.disk, self.wall, self.target, size, self.psi, self.samples, rng)
-        return {"columns": columns, "seconds": seconds}
+        each = [_measured(self.disk, self.wall, self.target, size, psi, self.samples, rng) for psi in self.psi]
+        return {"columns": [columns for columns, _ in each], "seconds": sum(seconds for _, seconds in each)}
 
 
 def _measured(
@@ -262,11 +277,11 @@ def _measured(
     from ...geometry import collide, collide_cylinder, collide_modified, trace
 
     scale, spacing = size
-    angles, turns, starts = samples
-    u = -1.0 + 2.0 * _strata(angles, rng)
+    directions, turns, starts = samples
+    u = -1.0 + 2.0 * _strata(directions, rng)
     theta = np.arccos(-u)
-    alpha = spacing * (_strata(turns, rng, (angles,)) - 0.5)
-    x1 = scale * wall.period * _strata(starts, rng, (angles, turns))
+    alpha = spacing * (_strata(turns, rng, (directions,)) - 0.5)
+    x1 = scale * wall.period * _strata(starts, rng, (directions, turns))
     position = np.stack([x1, np.broadcast_to(alpha[..., None], x1.shape)], axis=-1).reshape(-1, 2)
     velocity = -np.repeat(disk.from_angles(theta, psi), turns * starts, axis=0)
     begin = time.process_time()
@@ -281,20 +296,21 @@ def _measured(
     # midpoints of equal parts of the cell give quantiles of the limit, with an error of order 1/per_angle
     entry = target.period * (np.arange(per_angle) + 0.5) / per_angle
     limit = np.sort(trace(target, entry, theta[:, None]).theta, axis=1)
-    shape = (angles, per_angle)
+    shape = (directions, per_angle)
     psi_defect = float(np.mean(np.abs(rolled - (math.pi - psi))))
     away = float(np.mean(np.abs(np.sort(outgoing.reshape(shape), axis=1) - limit)))
-    moved = np.abs(true.position - position).max(axis=1)
+    moved = np.abs(true.position - position)
     differ = np.abs(modified.velocity - cylinder.velocity).max(axis=1) > 0.1
     # E[u^2] = 1/3 under sin(theta)/2 d theta
     shift = 3.0 * float(np.mean(u[:, None] * (np.cos(limit) - np.cos(outgoing.reshape(shape)))))
     columns = [
         away + psi_defect,
+        away + psi_defect + float(moved.sum(axis=1).mean()),
         float(np.mean(np.abs(np.sort(straight.reshape(shape), axis=1) - limit))),
         psi_defect,
         float(true.two_satellites.mean()),
         float(differ.mean()),
-        float(moved.mean()),
+        float(moved.max(axis=1).mean()),
         shift,
     ]
     return columns, spent

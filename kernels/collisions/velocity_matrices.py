@@ -45,17 +45,19 @@ def no_slip_matrix(disk: Disk) -> Floats:
     return isometry_matrix(disk, 1.0, 0.0)
 
 
-def isometry_matrix(disk: Disk, sign: ArrayLike, offset: ArrayLike) -> Floats:
+def isometry_matrix(disk: Disk, sign: ArrayLike, offset: ArrayLike, flip: bool = True) -> Floats:
     """The velocity matrix of theta' = sign theta + offset, psi' = pi - psi; shape ``sign.shape + (3, 3)``.
 
     It maps the true incoming velocity (v2 < 0) to the outgoing one and preserves the kinetic energy and the rolling
-    momentum -m v1 + J omega. Rudzis 2022, section 2.3.2, omits it for triangular teeth.
+    momentum -m v1 + J omega. Without ``flip``, psi' = psi, and the rolling momentum is reversed. Rudzis 2022, section
+    2.3.2, omits the matrix for triangular teeth.
     """
     sign, offset = np.broadcast_arrays(np.asarray(sign, dtype=np.float64), np.asarray(offset, dtype=np.float64))
     inner = np.zeros((*sign.shape, 3, 3))
     for row, entries in enumerate(branch_block(sign, np.cos(offset), np.sin(offset))):
         for column, entry in enumerate(entries):
             inner[..., row, column] = entry
+    inner[..., 2, 2] *= 1.0 if flip else -1.0
     frame = np.asarray(disk.frame)
     metric = np.array([disk.mass, disk.mass, disk.inertia])
     return np.asarray(frame.T @ inner @ (frame * metric))

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Unpack, get_args
 
 import numpy as np
 
 from ...core.checks import Rng, check_memory, finite_number, generator, whole_number
 from ...core.errors import InputError
+from ...core.estimates import Estimate
 from ...core.kinds import explained
 from ...core.long_runs import Engine
 from ..bases.basis import Basis
 from ..bases.measure import SINE
-from ..laws.law import Law
+from ..bases.mirror import reflection_matrix
+from ..bases.tensor import TensorBasis
+from ..laws.law import IsometryLaw, Law
+from ..laws.structure import Rules, fold
+from ..laws.tensor_law import TensorLaw
 from ..matrices.matrix import KernelMatrix
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
@@ -23,7 +31,7 @@ from .methods import recipe
 
 @explained
 def discretise(
-    law: Law,
+    law: Law | TensorLaw,
     basis: Basis,
     method: MethodName = "auto",
     tolerance: float = 1e-8,
@@ -35,9 +43,13 @@ def discretise(
 ) -> KernelMatrix:
     r"""The Galerkin matrix <e_i, P e_j> of a law P in a basis of L^2(sin theta d theta).
 
+    A law of angles (theta, psi), such as a `CollisionLaw`, takes a `TensorBasis` of a basis in theta and one in psi
+    with ``weight="sin2"``. A law made of specular reflection and retroreflection also takes a basis in psi alone,
+    because both preserve sin(psi)^2 d psi as well.
+
     Parameters
     ----------
-    law : Law
+    law : Law or CollisionLaw
         Any law; for a combination each term is computed by its best method.
     basis : Basis
         Bins, Legendre or Panels for theta.
@@ -117,13 +129,31 @@ def discretise(
     >>> P = discretise(maxwell(0.5), Bins(2))
     >>> P.array.round(12).tolist(), P.method
     ([[0.25, 0.75], [0.75, 0.25]], 'quadrature + exact')
+
+    The law of a smooth disk, on functions of both angles; the flip of psi alone; and their tensor product:
+
+    >>> from asperity import geometry as geo, kernels as ker
+    >>> angles = ker.Bins(2), ker.Bins(2, weight="sin2")
+    >>> K = discretise(ker.CollisionLaw(ker.specular(), geo.Disk()), ker.TensorBasis(angles))
+    >>> K.array[0].round(12).tolist()
+    [0.0, 0.0, 0.0, 1.0]
+    >>> flip = discretise(ker.specular(), angles[1])
+    >>> bool((discretise(ker.specular(), angles[0]).tensor(flip).array == K.array).all())
+    True
     """
+    if isinstance(law, TensorLaw):
+        return law.matrix_on(
+            _checked_pair(basis),
+            partial(discretise, method=method, tolerance=tolerance, samples=samples, rng=rng, symmetrise=symmetrise),
+        )
     if not isinstance(law, Law):
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
     if not isinstance(basis, Basis):
         raise InputError(f"basis: expected a basis such as Bins(64), got {basis!r}")
+    if isinstance(basis, TensorBasis):
+        raise InputError(f"basis: expected a basis of one angle for {law!r}, got {basis!r}; use P.tensor(Q)")
     if basis.measure != SINE:
-        raise InputError(f"basis: expected one for theta, with weight 'sin', got {basis!r}")
+        return _on_roll_angles(law, basis)
     check_memory("basis", f"the matrix in {basis!r}", basis.size**2)
     if method not in get_args(MethodName):
         raise InputError(f"method: expected one of {', '.join(get_args(MethodName))}, got {method!r}")
@@ -147,3 +177,38 @@ def discretise(
         requested_tolerance=float(tolerance),
         metadata={"numpy": np.__version__},
     )
+
+
+def _checked_pair(basis: Basis) -> TensorBasis:
+    """The basis, if it is a product of one for theta and one for psi; else raises InputError."""
+    if isinstance(basis, TensorBasis) and [factor.measure.name for factor in basis.factors] == ["sin", "sin2"]:
+        return basis
+    raise InputError(
+        "basis: expected a product of one basis in theta and one in psi, such as "
+        f"TensorBasis((Bins(16), Bins(8, weight='sin2'))), got {basis!r}"
+    )
+
+
+def _on_roll_angles(law: Law, basis: Basis) -> KernelMatrix:
+    """The matrix on functions of psi of a law made of specular reflection and retroreflection: 1 - p + p J."""
+    specular = fold(law, Rules(_is_specular, lambda terms: sum(w * p for w, p in terms), _odd, lambda p: 1.0 - p))
+    symmetric = (1.0 - specular) * np.eye(basis.size) + specular * reflection_matrix(basis)
+    exact = Estimate(0.0, 0.0, "bound", "closed form")
+    return KernelMatrix(
+        symmetric, basis, exact, method="exact", law=repr(law), reversible=True, mirror_symmetric=True, frame=law.frame
+    )
+
+
+def _is_specular(law: Law) -> float:
+    """1 for specular reflection, 0 for retroreflection; raises InputError for other laws."""
+    if isinstance(law, IsometryLaw):
+        return 0.0 if law.retro else 1.0
+    raise InputError(
+        f"basis: {law!r} preserves sin(theta) d theta, not sin(psi)^2 d psi; give a basis with weight 'sin', or "
+        "compose the law from specular() and retroreflection()"
+    )
+
+
+def _odd(probabilities: Sequence[float]) -> float:
+    """The probability of an odd number of successes."""
+    return 0.5 * (1.0 - math.prod(1.0 - 2.0 * p for p in probabilities))

@@ -1,0 +1,307 @@
+"""Bodies of polygons: scattering of particles by tracing, resistance to a stream, bodies of zero resistance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
+from ...core.errors import AccuracyError, InputError
+from ...core.estimates import NORMAL_95, Estimate
+from ...core.kinds import explained, explained_class
+from ..bases.measure import SINE
+
+# Reflections of a particle at most.
+MOST_REFLECTIONS = 100_000
+# If none of n rays shows an effect, its probability is below this number over n with a confidence of 95 %.
+RULE_OF_THREE = 3.0
+FEWEST_RAYS = 100
+# Directions and offsets, relative to the body's width, that differ by less count as unchanged: a few roundings a hit.
+UNCHANGED = 1e-9
+
+
+@dataclass(frozen=True)
+class Scattering:
+    """Particles after their reflections from a body; arrays with one entry per particle.
+
+    Attributes
+    ----------
+    position : array, shape (n, 2)
+        The last point of reflection; the start of a particle that met nothing.
+    velocity : array, shape (n, 2)
+        Unit vectors.
+    reflections : array of int, shape (n,)
+    """
+
+    position: Floats
+    velocity: Floats
+    reflections: NDArray[np.int64]
+
+
+@explained_class
+@dataclass(frozen=True, eq=False)
+class PolygonalBody:
+    """A body that consists of simple polygons with disjoint interiors, and reflects particles specularly.
+
+    Parameters
+    ----------
+    polygons : sequence of array_like, each of shape (k, 2)
+        Vertices, in either order.
+
+    Raises
+    ------
+    InputError
+        If there are no polygons, one has fewer than three vertices or no area, or two neighbouring vertices coincide.
+
+    Source: Rudzis 2022, section 1.2.7; A. Plakhov, "Exterior Billiards" (2012).
+
+    Examples
+    --------
+    A square in a stream along one of its axes returns the momentum of each particle twice:
+
+    >>> square = PolygonalBody([[(0, 0), (1, 0), (1, 1), (0, 1)]])
+    >>> square.force(0.0).along.value
+    2.0
+    """
+
+    polygons: tuple[Floats, ...]
+    _starts: Floats = field(init=False, repr=False)
+    _sides: Floats = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.polygons, Sequence) or not len(self.polygons):
+            raise InputError("polygons: expected a list of polygons, each a list of points")
+        found = []
+        for number, polygon in enumerate(self.polygons):
+            points = finite_array(f"polygons[{number}]", polygon)
+            if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 3:
+                raise InputError(f"polygons[{number}]: expected at least three points, got shape {points.shape}")
+            after = np.roll(points, -1, axis=0)
+            area = 0.5 * float(np.sum(points[:, 0] * after[:, 1] - points[:, 1] * after[:, 0]))
+            if area == 0.0 or np.any(np.all(points == after, axis=1)):
+                raise InputError(f"polygons[{number}]: expected distinct neighbours and an area, got {points.tolist()}")
+            found.append(frozen(points if area > 0.0 else points[::-1]))
+        object.__setattr__(self, "polygons", tuple(found))
+        object.__setattr__(self, "_starts", frozen(np.concatenate(found)))
+        sides = np.concatenate([np.roll(points, -1, axis=0) - points for points in found])
+        object.__setattr__(self, "_sides", frozen(sides))
+
+    @explained
+    def scatter(self, position: ArrayLike, velocity: ArrayLike) -> Scattering:
+        """Reflect particles until they fly free.
+
+        Parameters
+        ----------
+        position, velocity : array_like, shape (n, 2)
+            Starts outside of the body, and directions of motion.
+
+        Raises
+        ------
+        InputError
+            If a shape is wrong or a velocity is 0.
+        AccuracyError
+            If a particle has not left after 10^5 reflections.
+        """
+        at, moving = finite_array("position", position).copy(), finite_array("velocity", velocity)
+        if at.ndim != 2 or at.shape[1:] != (2,) or moving.shape != at.shape:
+            raise InputError(f"position, velocity: expected two arrays of shape (n, 2), got {at.shape}, {moving.shape}")
+        size = np.hypot(moving[:, 0], moving[:, 1])
+        if np.any(size == 0.0):
+            raise InputError("velocity: expected vectors other than 0")
+        moving = moving / size[:, None]
+        counts, last = np.zeros(len(at), dtype=np.int64), np.full(len(at), -1)
+        inside = np.arange(len(at))
+        for _ in range(MOST_REFLECTIONS):
+            time, side = self._next(at[inside], moving[inside], last[inside])
+            hit = np.isfinite(time)
+            inside, time, side = inside[hit], time[hit], side[hit]
+            if not inside.size:
+                return Scattering(frozen(at), frozen(moving), counts)
+            at[inside] += time[:, None] * moving[inside]
+            normal = self._normals[side]
+            moving[inside] -= 2.0 * np.sum(moving[inside] * normal, axis=1)[:, None] * normal
+            moving[inside] /= np.hypot(*moving[inside].T)[:, None]
+            counts[inside] += 1
+            last[inside] = side
+        raise AccuracyError(f"{inside.size} particles have not left the body", inside.size / len(at))
+
+    @property
+    def _normals(self) -> Floats:
+        """Outer unit normals of the sides."""
+        lengths = np.hypot(self._sides[:, 0], self._sides[:, 1])
+        return np.stack([self._sides[:, 1], -self._sides[:, 0]], axis=1) / lengths[:, None]
+
+    def _next(self, at: Floats, moving: Floats, last: NDArray[np.int64]) -> tuple[Floats, NDArray[np.intp]]:
+        """Times to the first side met from outside, and its number; inf if there is none. No side is met twice."""
+        offset = self._starts[None] - at[:, None]
+        turn = moving[:, None, 0] * self._sides[None, :, 1] - moving[:, None, 1] * self._sides[None, :, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            time = (offset[..., 0] * self._sides[:, 1] - offset[..., 1] * self._sides[:, 0]) / turn
+            along = (offset[..., 0] * moving[:, None, 1] - offset[..., 1] * moving[:, None, 0]) / turn
+        # sides run against the clock: a particle from outside crosses them with turn < 0
+        met = (turn < 0.0) & (along >= 0.0) & (along <= 1.0) & (time >= 0.0)
+        met[np.arange(len(at))[last >= 0], last[last >= 0]] = False
+        time = np.where(met, time, np.inf)
+        side = np.argmin(time, axis=1)
+        return time[np.arange(len(at)), side], side
+
+    @explained
+    def force(self, direction: float, rays: int = 4096, rng: Rng = 0) -> BodyForce:
+        """The force of a parallel stream on the body, in units of its momentum flux.
+
+        Parameters
+        ----------
+        direction : float
+            The stream has the velocity -(cos, sin) of this angle, radians.
+        rays : int
+            Particles, one at a random offset in each of equal strips, at least 100.
+        rng : None, int or numpy.random.Generator
+
+        Examples
+        --------
+        A pair of triangles without resistance along its axis (A. Aleksenko and A. Plakhov, 2009):
+
+        >>> zero_resistance_body().force(np.pi / 2).along.value < 1e-12
+        True
+        """
+        angle, number = finite_number("direction", direction), whole_number("rays", rays, FEWEST_RAYS)
+        source = generator(rng)
+        stream = -np.array([math.cos(angle), math.sin(angle)])
+        across = np.array([-stream[1], stream[0]])
+        offsets, depths = self._starts @ across, self._starts @ stream
+        low, high = float(offsets.min()), float(offsets.max())
+        before = float(depths.min()) - (high - low)
+        strips = low + (high - low) * (np.arange(number) + source.random(number)) / number
+        start = before * stream + strips[:, None] * across
+        out = self.scatter(start, np.broadcast_to(stream, start.shape))
+        push = stream - out.velocity
+        width = high - low
+        components = [self._mean(push @ axis, width, number) for axis in (stream, across)]
+        # where the outgoing line passes, against the incoming one
+        shift = np.abs((out.position - start) @ across)
+        bent = np.hypot(push[:, 0], push[:, 1])
+        unchanged = float(np.mean((bent < UNCHANGED) & (shift < UNCHANGED * max(width, 1.0))))
+        return BodyForce(components[0], components[1], width, unchanged)
+
+    @staticmethod
+    def _mean(push: Floats, width: float, number: int) -> Estimate:
+        """The mean over strips: an error from neighbouring strips, which overstates it, and the rule of three."""
+        steps = np.diff(push)
+        spread = math.sqrt(float(np.mean(steps**2)) / 2.0) / math.sqrt(number)
+        unseen = RULE_OF_THREE / number * 2.0
+        return Estimate(
+            width * float(push.mean()), width * (NORMAL_95 * spread + unseen), "estimate", f"{number} stratified rays"
+        )
+
+    @explained
+    def scatter_in_circle(
+        self, n: int, rng: Rng = None, centre: ArrayLike = (0.0, 0.0), radius: float | None = None
+    ) -> tuple[Floats, Floats]:
+        """Draw states from the scattering measure of the body B in a circle C around it: the law P^{B,C}.
+
+        Parameters
+        ----------
+        n : int
+        rng : None, int or numpy.random.Generator
+        centre, radius : array_like, float
+            The circle, by default the least one about the centre that contains the body.
+
+        Returns
+        -------
+        (before, after)
+            Shape (n, 2) each: the polar angle of the point where the particle enters or leaves the circle, and the
+            angle in (0, pi) from the clockwise tangent there to *minus* the incoming, or to the outgoing, velocity.
+            Particles enter with the density d phi sin(theta) d theta; the map is an involution and preserves it.
+
+        Raises
+        ------
+        InputError
+            If the circle does not contain the body.
+        """
+        whole_number("n", n, 1)
+        source, middle = generator(rng), finite_array("centre", centre)
+        if middle.shape != (2,):
+            raise InputError(f"centre: expected a point, got shape {middle.shape}")
+        reach = float(np.hypot(*(self._starts - middle).T).max())
+        size = reach if radius is None else positive_number("radius", radius)
+        if size < reach:
+            raise InputError(f"radius: expected at least {reach:g}, to contain the body, got {size:g}")
+        # a little outside, so that a corner on the circle is no obstacle
+        size *= 1.0 + 1e-12
+        place, theta = 2.0 * math.pi * source.random(n), SINE.sample(n, source)
+        return np.stack([place, theta], axis=1), self._through(place, theta, middle, size)
+
+    def _through(self, place: Floats, theta: Floats, centre: Floats, radius: float) -> Floats:
+        """Polar angle and angle of exit of the particles that enter the circle at (place, theta)."""
+        start = centre + radius * np.stack([np.cos(place), np.sin(place)], axis=1)
+        # the outer normal is 90 degrees against the clock from the clockwise tangent
+        inward = place - 0.5 * math.pi + theta
+        out = self.scatter(start, -np.stack([np.cos(inward), np.sin(inward)], axis=1))
+        offset = out.position - centre
+        forward = np.sum(offset * out.velocity, axis=1)
+        time = -forward + np.sqrt(np.maximum(forward**2 + radius**2 - np.sum(offset**2, axis=1), 0.0))
+        exits = offset + time[:, None] * out.velocity
+        phi = np.arctan2(exits[:, 1], exits[:, 0])
+        angle = np.arctan2(out.velocity[:, 1], out.velocity[:, 0]) - (phi - 0.5 * math.pi)
+        return np.stack([np.mod(phi, 2.0 * math.pi), np.mod(angle, 2.0 * math.pi)], axis=1)
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """The force of a parallel stream on a body, in units of the momentum flux.
+
+    Attributes
+    ----------
+    along, across : Estimate
+        Components along the stream (the resistance) and across it, positive to its left. A smooth convex body of
+        width w has a resistance of at most 2 w.
+    width : float
+        The width of the body across the stream.
+    unchanged : float
+        Fraction of the particles within this width that leave on the line on which they came: 1 for an invisible body.
+    """
+
+    along: Estimate
+    across: Estimate
+    width: float
+    unchanged: float
+
+
+def zero_resistance_body() -> PolygonalBody:
+    """Two isosceles triangles of angles 30, 30, 120 degrees that leave the velocity of a stream along y unchanged.
+
+    They are cut from two equilateral triangles of side 2, of which each has a vertex in the middle of a side of the
+    other. Each particle is reflected once by both triangles, and leaves in the direction in which it came.
+
+    Source: A. Aleksenko and A. Plakhov, "Bodies of zero resistance and bodies invisible in one direction",
+    Nonlinearity 22 (2009) 1247; Rudzis 2022, section 1.2.7.
+
+    Examples
+    --------
+    >>> zero_resistance_body().polygons[0].round(3).tolist()
+    [[-1.0, 0.0], [-0.5, 0.866], [-1.0, 1.732]]
+    """
+    top = math.sqrt(3.0)
+    left = np.array([(-1.0, 0.0), (-0.5, 0.5 * top), (-1.0, top)])
+    return PolygonalBody((left, left * [-1.0, 1.0]))
+
+
+def invisible_body() -> PolygonalBody:
+    """Four triangles that are invisible along y: `zero_resistance_body` and its mirror image below it.
+
+    Every particle of a stream along y leaves on the line on which it came.
+
+    Source: as for `zero_resistance_body`.
+
+    Examples
+    --------
+    >>> force = invisible_body().force(np.pi / 2)
+    >>> force.along.value < 1e-12, force.unchanged
+    (True, 1.0)
+    """
+    upper = zero_resistance_body().polygons
+    return PolygonalBody((*upper, *(polygon * [1.0, -1.0] for polygon in upper)))

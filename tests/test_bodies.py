@@ -1,0 +1,238 @@
+"""Polygonal bodies: Cauchy's formula, involution, zero resistance, invisibility; the spinning disk."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import InputError
+
+RNG = 20_260_401
+TRIANGLE = ker.PolygonalBody([[(0.0, 0.0), (2.0, 0.0), (0.3, 1.1)]])
+# a slotted block, which is not convex
+SLOT = ker.PolygonalBody([[(0, 0), (3, 0), (3, 2), (2, 2), (2, 0.5), (1, 0.5), (1, 2), (0, 2)]])
+
+
+def convex_force(polygon, angle):
+    """Of a convex polygon by its lit sides: each particle transfers twice its normal momentum."""
+    stream = -np.array([np.cos(angle), np.sin(angle)])
+    total = np.zeros(2)
+    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        side = end - start
+        normal = np.array([side[1], -side[0]]) / np.hypot(*side)
+        onto = -stream @ normal
+        if onto > 0.0:
+            total += -2.0 * np.hypot(*side) * onto**2 * normal
+    return total @ stream, total @ np.array([-stream[1], stream[0]])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.3, 2.9, 4.4])
+def test_the_force_on_a_convex_body_is_that_of_its_lit_sides(angle):
+    along, across = convex_force(TRIANGLE.polygons[0], angle)
+    hits = 0
+    for seed in range(20):
+        force = TRIANGLE.force(angle, 400, rng=seed)
+        for number, exact in ((force.along, along), (force.across, across)):
+            hits += int(abs(float(number) - exact) <= number.error)
+        assert force.along.error < 0.1
+    # 40 intervals
+    assert hits >= 36
+
+
+def test_a_body_of_zero_resistance_leaves_a_stream_as_it_is():
+    body = ker.zero_resistance_body()
+    x = np.random.default_rng(RNG).uniform(-1.0, 1.0, 3_000)
+    start = np.stack([x, np.full(x.size, 5.0)], axis=1)
+    out = body.scatter(start, np.tile([0.0, -1.0], (x.size, 1)))
+    assert np.max(np.abs(out.velocity - [0.0, -1.0])) < 1e-14
+    met = np.abs(x) > 0.5
+    assert np.all(out.reflections == np.where(met, 2, 0))
+    # but the particles leave on other lines, so that the body can be seen
+    assert np.all(np.abs(out.position[met, 0] - x[met]) > 0.1)
+    # the stream in the opposite direction and along x
+    assert float(body.force(-np.pi / 2).along) < 1e-13
+    sideways = body.force(0.0)
+    assert float(sideways.along) - sideways.along.error > 0.5
+
+
+def test_an_invisible_body_returns_every_particle_to_its_line():
+    body = ker.invisible_body()
+    for angle in (np.pi / 2, -np.pi / 2):
+        force = body.force(angle, 2_000, rng=RNG)
+        assert float(force.along) < 1e-13 and force.unchanged == 1.0 and force.width == pytest.approx(2.0)
+    x = np.random.default_rng(RNG).uniform(-1.0, 1.0, 1_000)
+    out = body.scatter(np.stack([x, np.full(x.size, 5.0)], axis=1), np.tile([0.0, -1.0], (x.size, 1)))
+    assert np.max(np.abs(out.position[:, 0] - x)) < 1e-13
+    assert np.all(out.reflections == np.where(np.abs(x) > 0.5, 4, 0))
+    tilted = body.force(np.pi / 2 + 0.1)
+    assert float(tilted.along) > 3.0 * tilted.along.error and tilted.unchanged < 0.9
+    # one triangle less is seen
+    part = ker.PolygonalBody(body.polygons[:3]).force(np.pi / 2)
+    assert part.unchanged < 0.8
+
+
+@pytest.mark.parametrize("body", [TRIANGLE, SLOT, ker.zero_resistance_body()], ids=["triangle", "slot", "pair"])
+def test_scattering_in_a_circle_is_an_involution_that_preserves_the_flux(body):
+    before, after = body.scatter_in_circle(20_000, RNG, (0.5, 0.6), 4.0)
+    again = body._through(after[:, 0], after[:, 1], np.array([0.5, 0.6]), 4.0 * (1.0 + 1e-12))
+    turn = np.abs(np.exp(1j * again[:, 0]) - np.exp(1j * before[:, 0]))
+    close = (turn < 1e-8) & (np.abs(again[:, 1] - before[:, 1]) < 1e-8)
+    assert close.mean() > 0.9995
+    # the outgoing states have the distribution of the incoming ones, d phi sin(theta) d theta
+    tests = [
+        (lambda p, t: np.cos(t), 0.0),
+        (lambda p, t: np.cos(t) ** 2, 1 / 3),
+        (lambda p, t: np.cos(p) * np.sin(t), 0.0),
+    ]
+    for function, exact in tests:
+        values = function(after[:, 0], after[:, 1])
+        assert abs(values.mean() - exact) < 4.5 * values.std() / np.sqrt(values.size)
+
+
+def test_the_fraction_of_lines_that_meet_a_convex_body_is_its_perimeter_over_that_of_the_circle():
+    """Cauchy and Crofton; and the mean momentum transfer is 8/3 of the perimeter, in any circle around the body."""
+    perimeter = np.sum(np.hypot(*(np.roll(TRIANGLE.polygons[0], -1, axis=0) - TRIANGLE.polygons[0]).T))
+    for radius in (2.5, 5.0):
+        n = 60_000
+        before, after = TRIANGLE.scatter_in_circle(n, RNG, (0.5, 0.5), radius)
+        incoming = before.sum(axis=1) - 0.5 * np.pi
+        outgoing = after.sum(axis=1) - 0.5 * np.pi
+        cost = 1.0 + np.cos(outgoing - incoming)
+        met = cost > 1e-12
+        fraction = perimeter / (2.0 * np.pi * radius)
+        assert abs(met.mean() - fraction) < 4.5 * np.sqrt(fraction * (1 - fraction) / n)
+        # 2 perimeter(C) E[cost] = (8/3) perimeter(B)
+        scaled = 2.0 * 2.0 * np.pi * radius * cost
+        assert abs(scaled.mean() - 8.0 / 3.0 * perimeter) < 4.5 * scaled.std() / np.sqrt(n)
+
+
+def diffuse_spin_force(spin):
+    """Lambert's law by an independent integral over the rim, in coordinates of the plane."""
+
+    def part(component):
+        def integrand(phi):
+            normal = np.array([np.cos(phi), np.sin(phi)])
+            tangent = np.array([-np.sin(phi), np.cos(phi)])
+            relative = np.array([-1.0, 0.0]) - spin * tangent
+            push = relative - np.hypot(*relative) * np.pi / 4.0 * normal
+            value = {"along": -push[0], "across": -push[1], "torque": tangent @ push}[component]
+            return np.cos(phi) * value
+
+        return quad(integrand, -0.5 * np.pi, 0.5 * np.pi, epsabs=1e-12)[0]
+
+    return [part(name) for name in ("along", "across", "torque")]
+
+
+@pytest.mark.parametrize("spin", [-0.7, 0.0, 0.2, 1.0, 3.0])
+def test_forces_on_a_spinning_disk_agree_with_integrals(spin):
+    found = ker.spin_force(ker.lambertian(), spin)
+    for number, exact in zip((found.along, found.across, found.torque), diffuse_spin_force(spin), strict=True):
+        assert abs(float(number) - exact) <= number.error + 1e-11
+    mixed = ker.spin_force(0.25 * ker.retroreflection() + 0.75 * ker.specular(), spin, radius=2.0)
+    assert float(mixed.along) == pytest.approx(2.0 * (1.0 + 2.0), abs=1e-9)
+    assert float(mixed.across) == pytest.approx(2.0 * 0.25 * np.pi * spin, abs=1e-9)
+    assert float(mixed.torque) == pytest.approx(-4.0 * 4.0 * 0.25 * spin, abs=1e-9)
+
+
+@pytest.mark.parametrize("law", [ker.TriangularTeethLaw(0.9), ker.CircularArcLaw(1.2)], ids=repr)
+def test_the_spin_force_has_the_symmetry_of_the_cell_and_the_limit_without_spin(law):
+    plus, minus, still = (ker.spin_force(law, spin) for spin in (0.4, -0.4, 0.0))
+    for name, sign in (("along", 1.0), ("across", -1.0), ("torque", -1.0)):
+        one, other = getattr(plus, name), getattr(minus, name)
+        assert abs(float(one) - sign * float(other)) <= one.error + other.error + 1e-9
+    body = ker.RoughBody.disk(law).force(0.0)
+    assert float(still.along) == pytest.approx(body[0], abs=2e-4)
+    assert float(still.across) == pytest.approx(0.0, abs=still.across.error + 1e-9)
+    # rough disks have the inverse Magnus effect, and their spin is braked
+    assert float(plus.across) > 0.0 > float(plus.torque)
+
+
+@pytest.mark.parametrize("law", [ker.RectangularTeethLaw(2.0), ker.TriangularTeethLaw(0.3)], ids=repr)
+def test_reported_errors_of_spin_forces_hold(law):
+    """Against a midpoint rule in the coordinates of the plane, at spins for which kinks lie anywhere."""
+    phi = np.pi * ((np.arange(200_000) + 0.5) / 200_000 - 0.5)
+    normal, tangent = np.stack([np.cos(phi), np.sin(phi)]), np.stack([-np.sin(phi), np.cos(phi)])
+    for spin in np.random.default_rng(RNG).uniform(-1.5, 1.5, 4):
+        relative = np.array([[-1.0], [0.0]]) - spin * tangent
+        theta = np.arctan2(-np.sum(relative * normal, axis=0), np.sum(relative * tangent, axis=0))
+        speed = np.hypot(*relative)
+        push = relative - speed * (law.apply(np.sin, theta) * normal - law.apply(np.cos, theta) * tangent)
+        weight = np.cos(phi) * np.pi / phi.size
+        found = ker.spin_force(law, float(spin))
+        exact = (-push[0] @ weight, -push[1] @ weight, np.sum(push * tangent, axis=0) @ weight)
+        for number, value in zip((found.along, found.across, found.torque), exact, strict=True):
+            assert abs(float(number) - value) <= number.error + 2e-7
+
+
+def test_the_spin_force_of_a_traced_wall_agrees_with_single_particles():
+    wall = geo.dispersing_arcs(1.5)
+    law, spin, n = ker.WallLaw(wall), 0.5, 50_000
+    found = ker.spin_force(law, spin)
+    rng = np.random.default_rng(RNG)
+    height = rng.uniform(-1.0, 1.0, n)
+    phi = np.arcsin(height)
+    normal = np.stack([np.cos(phi), np.sin(phi)], axis=1)
+    tangent = np.stack([-np.sin(phi), np.cos(phi)], axis=1)
+    relative = np.array([-1.0, 0.0]) - spin * tangent
+    theta = np.arctan2(-np.sum(relative * normal, axis=1), np.sum(relative * tangent, axis=1))
+    out = geo.trace(wall, rng.random(n), theta).theta
+    speed = np.hypot(*relative.T)[:, None]
+    push = relative - speed * (-np.cos(out)[:, None] * tangent + np.sin(out)[:, None] * normal)
+    samples = {"along": -2.0 * push[:, 0], "across": -2.0 * push[:, 1], "torque": 2.0 * np.sum(push * tangent, axis=1)}
+    for name, values in samples.items():
+        number = getattr(found, name)
+        assert abs(values.mean() - float(number)) < 4.5 * values.std() / np.sqrt(n) + number.error
+
+
+def test_laws_that_differ_along_a_body_add_their_parts():
+    rough, smooth = ker.retroreflection(), ker.specular()
+    body = ker.RoughBody.disk(lambda normal: rough if normal < np.pi else smooth)
+    # 8/3 of the perimeter 2 pi, times (3/2 + 1)/2
+    assert float(body.resistance()) == pytest.approx(8.0 / 3.0 * 2.0 * np.pi * 1.25, abs=1e-9)
+    cost = body.resistance(cost=lambda u, v: 1.0 + np.cos(u - v))
+    assert float(cost) == pytest.approx(float(body.resistance()), abs=cost.error + 1e-9)
+    # a stream from above meets the rough half only, from below the smooth one
+    assert body.force(np.pi / 2) == pytest.approx([4.0, 0.0], abs=1e-4)
+    assert body.force(-np.pi / 2) == pytest.approx([8.0 / 3.0, 0.0], abs=1e-4)
+    # from the side the rough half sends momentum back along the stream, the smooth half pushes to the rough side
+    along, across = body.force(0.0)
+    assert along == pytest.approx(2.0 + 4.0 / 3.0, abs=1e-4)
+    assert across == pytest.approx(-2.0 / 3.0, abs=1e-3)
+    u, v, n = body.sample(4_000, RNG)
+    turned = np.abs(np.angle(np.exp(1j * (u - v)))) < 1e-9
+    assert np.array_equal(turned[np.abs(n - np.pi) > 1e-3], (n < np.pi)[np.abs(n - np.pi) > 1e-3])
+
+
+def test_a_direction_measure_weights_the_forces_of_streams():
+    """The integral over directions of chi(u) force(u), by a rule in the directions."""
+    body = ker.RoughBody.ellipse(ker.maxwell(0.5), 2.0, 1.0)
+
+    def chi(u):
+        return 1.0 + 0.5 * np.cos(2.0 * u)
+
+    found = body.resistance(directions=chi)
+    angles = 2.0 * np.pi * np.arange(48) / 48
+    exact = 2.0 * np.pi * np.mean([chi(angle) * body.force(angle)[0] for angle in angles])
+    assert float(found) == pytest.approx(exact, rel=1e-4)
+    with pytest.raises(InputError, match="one for every element"):
+        ker.RoughBody.polygon([ker.specular()], [(0, 0), (1, 0), (0, 1)])
+
+
+def test_wrong_arguments_are_refused():
+    with pytest.raises(InputError, match="three points"):
+        ker.PolygonalBody([[(0, 0), (1, 0)]])
+    with pytest.raises(InputError, match="area"):
+        ker.PolygonalBody([[(0, 0), (1, 0), (2, 0)]])
+    with pytest.raises(InputError, match="polygons"):
+        ker.PolygonalBody([])
+    with pytest.raises(InputError, match="other than 0"):
+        TRIANGLE.scatter([[5.0, 5.0]], [[0.0, 0.0]])
+    with pytest.raises(InputError, match="to contain"):
+        TRIANGLE.scatter_in_circle(10, 0, radius=0.1)
+    with pytest.raises(InputError, match="convention"):
+        ker.spin_force(ker.specular().in_specular_frame(), 0.1)
+    with pytest.raises(InputError, match="rays"):
+        TRIANGLE.force(0.0, 10)
