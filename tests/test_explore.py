@@ -13,7 +13,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.errors import InputError
-from asperity.explore.answers import Answer, answers, first_answer, histogram, largest_gap
+from asperity.explore.answers import Answer, answers_to, first_answer, histogram, largest_gap
 from asperity.explore.background import GONE, Background
 from asperity.explore.files import LARGEST, new_folder, opened, plain_name, studied, unpacked, wall_as_toml
 from asperity.explore.question import Question, pinned, with_new_vertex
@@ -74,7 +74,7 @@ def test_polygons_are_answered_exactly_at_once(wall, convention):
 
 
 def test_answers_improve_and_agree_with_each_other():
-    found = list(answers(Question(geo.focusing_arcs(0.4), "arcs")))
+    found = list(answers_to(Question(geo.focusing_arcs(0.4), "arcs")))
     errors = [answer.gap.error for answer in found]
     assert all(later <= earlier for earlier, later in pairwise(errors))
     assert errors[-1] <= 1e-6

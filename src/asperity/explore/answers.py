@@ -90,7 +90,7 @@ class Answer:
         return replace(self, refusals=(*((q, r) for q, r in self.refusals if q != quantity), (quantity, str(reason))))
 
 
-def answers(question: Question) -> Iterator[Answer]:
+def answers_to(question: Question) -> Iterator[Answer]:
     """The first answer within a fraction of a second, then better ones until the last tolerance is met.
 
     A quantity that cannot be computed is refused with a reason, and the others go on.
@@ -98,7 +98,7 @@ def answers(question: Question) -> Iterator[Answer]:
     Examples
     --------
     >>> from asperity.geometry import triangular_teeth
-    >>> first, *_, last = answers(Question(triangular_teeth(0.7), "teeth"))
+    >>> first, *_, last = answers_to(Question(triangular_teeth(0.7), "teeth"))
     >>> first.matrix.method, first.gap.verdict, last.finished
     ('exact', 'no gap', True)
     """

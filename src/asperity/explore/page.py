@@ -9,12 +9,11 @@ from typing import Any
 
 import panel as pn
 from bokeh.events import PanEnd, PanStart
-from bokeh.io import curdoc
 
 from ..core.errors import AsperityError
 from ..core.estimates import compact
 from ..geometry import WALLS, Disk, Wall
-from .answers import Answer, answers
+from .answers import Answer, answers_to
 from .background import Background
 from .drawing import CollisionFigure, KernelFigure, SpectrumFigure, WallFigure, handles_of
 from .files import new_folder, opened, plain_name, studied, unpacked, wall_as_toml
@@ -72,10 +71,12 @@ class Page:
         self._background, self._saving = Background(), Background()
         self._dragging = self._filling = False
         self._archive: bytes | None = None
-        self._watch: Any = None
+        self._was_busy = False
         self._make_figures()
         self._make_controls(parameters or {})
         self.ask(wall, name)
+        if pn.state.curdoc is not None and pn.state.curdoc.session_context is not None:
+            pn.state.add_periodic_callback(self.collect, INTERVAL)
 
     def _make_figures(self) -> None:
         self.wall_figure, self.kernel = WallFigure(), KernelFigure()
@@ -199,13 +200,15 @@ class Page:
 
     def _vertices_changed(self, _name: str, _old: Any, new: Any) -> None:
         points = list(zip(new["x"], new["y"], strict=True))
-        before = handles_of(self.question.wall)
-        if len(points) == len(before) and all(tuple(p) == tuple(q) for p, q in zip(points, before, strict=True)):
+        before = self._handles()
+        if points == before:
             return
         if len(points) == len(before) + 1 and not self._dragging:
             points = with_new_vertex(points)
         if len(points) < 2:
-            self._refuse("a wall has two ends at least; the vertices are as they were")
+            # a curved wall has no vertices to add to, and one vertex is not a wall
+            self._refuse("this wall has no vertices to drag; choose a polygon")
+            self._settle()
             return
         period = self.question.wall.period
         if self._try(lambda: Wall.from_vertices(pinned(points, period), self.question.wall.unit), "polygon"):
@@ -216,7 +219,13 @@ class Page:
     def _settle(self) -> None:
         """Show the vertices of the wall that is asked, also where the last ones were refused or moved."""
         self.wall_figure.show(self.question.seen, self._title(), dragged=False)
-        self.wall_figure.show_vertices([] if self.question.foreshortened else handles_of(self.question.wall))
+        self.wall_figure.show_vertices(self._handles())
+
+    def _handles(self) -> list[tuple[float, float]]:
+        """The vertices that can be dragged: those of a polygon that is not foreshortened."""
+        if self.question.foreshortened:
+            return []
+        return [(float(x), float(y)) for x, y in handles_of(self.question.wall)]
 
     # -- what it does
 
@@ -245,21 +254,15 @@ class Page:
             self._refuse(str(reason))
             return
         if not self._dragging:
-            self.wall_figure.show_vertices([] if self.question.foreshortened else handles_of(wall))
-        self._background.ask(answers, self.question)
+            self.wall_figure.show_vertices(self._handles())
+        self._background.ask(answers_to, self.question)
         self._show_status()
-        self._watch_results()
 
     def _title(self) -> str:
         wall = self.question.seen
         felt = ", as the disk feels it" if self.question.foreshortened else ""
-        handles = len(handles_of(self.question.wall)) and not self.question.foreshortened
-        hint = ": drag its vertices, tap to add one" if handles else ""
+        hint = ": drag its vertices, tap to add one" if self._handles() else ""
         return f"{self.question.name}, depth {wall.depth:.4g}{felt}{hint}"
-
-    def _watch_results(self) -> None:
-        if self._watch is None and curdoc().session_context is not None:
-            self._watch = pn.state.add_periodic_callback(self.collect, INTERVAL)
 
     def collect(self) -> None:
         """Show the results that have come."""
@@ -272,9 +275,8 @@ class Page:
             self._show_status()
         for error, archive in self._saving.collect():
             self._study_came(error, archive)
-        if not (self._background.busy or self._saving.busy) and self._watch is not None:
-            self._watch.stop()
-            self._watch = None
+        if self._was_busy != self._background.busy:
+            self._was_busy = self._background.busy
             self._show_status()
 
     def _show_answer(self, answer: Answer) -> None:
@@ -313,7 +315,6 @@ class Page:
         self._studied_name = plain_name(self.question.name)
         self._tell("the study is being made, some seconds to a minute")
         self._saving.ask(studied, self.question)
-        self._watch_results()
 
     def _study_came(self, error: str | None, archive: bytes | None) -> None:
         self.study.disabled = False
