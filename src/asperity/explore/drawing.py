@@ -254,7 +254,7 @@ class SpectrumFigure:
         }  # fmt: skip
         self.plot.y_range.start = -1.1 if low.min() < -0.5 else min(-0.2, float(low.min()) - 0.1)
         largest = float(np.max(found.errors))
-        self.plot.title.text = f"Eigenvalues of {found.of}, error at most {largest:.1e}"
+        self.plot.title.text = f"Eigenvalues of {found.of} ± {largest:.0e}"
 
 
 class CollisionFigure:
@@ -298,4 +298,4 @@ class CollisionFigure:
         }  # fmt: skip
         for name, velocity in (("smooth", found.smooth), ("no-slip", found.no_slip)):
             self._marks[name].location, self._marks[name].visible = velocity, True
-        self.plot.title.text = f"Disk in with v = (1, -1), no spin; mean v1 out {found.mean}"
+        self.plot.title.text = f"Disk in with v = (1, -1), no spin: mean v1"
