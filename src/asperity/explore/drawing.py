@@ -298,4 +298,4 @@ class CollisionFigure:
         }  # fmt: skip
         for name, velocity in (("smooth", found.smooth), ("no-slip", found.no_slip)):
             self._marks[name].location, self._marks[name].visible = velocity, True
-        self.plot.title.text = f"Disk in with v = (1, -1), no spin: mean v1"
+        self.plot.title.text = "Disk in with v = (1, -1), no spin: mean v1"
