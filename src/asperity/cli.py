@@ -234,6 +234,34 @@ def sweep_walls(walls: tuple[str, ...], workers: int | None, scheduler: str | No
         click.echo(f"wrote {path}")
 
 
+@main.command(epilog=WALL_HELP)
+@click.argument("wall", default="triangular-teeth")
+@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any that is free.")
+@click.option("--no-browser", is_flag=True, help="Print the address, and open no browser.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Write what is saved into this folder.")
+def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
+    """Show WALL on a page in the browser: drag its vertices, and law, spectrum and collision follow.
+
+    The page is for this machine only. Without --out the browser takes what is saved. Needs asperity[explore].
+
+    \b
+    Examples:
+      asperity explore
+      asperity explore focusing-arcs:half_angle=0.9 --no-browser --port 8080
+    """
+    from .explore.server import serve_page
+
+    def say(line: str) -> None:
+        click.echo(f"asperity: {line}", err=True)
+
+    try:
+        serve_page(wall, port, out, browser=not no_browser, say=say)
+    except KeyboardInterrupt:
+        say("interrupted")
+        # at once: libraries would wait for their threads
+        os._exit(INTERRUPTED)
+
+
 @main.command()
 @click.argument("law")
 @click.option("--moments", default=10, show_default=True, help="Meet <e_l, P e_m> for all l, m below this number.")

@@ -1,0 +1,241 @@
+"""The answers to a question, coarse ones first: kernel, spectrum, gap and collision, each with its error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..core.checks import Floats
+from ..core.errors import AsperityError
+from ..core.estimates import LEVEL, NORMAL_95, Estimate
+from ..core.rounding import EPS
+from ..geometry import Disk
+from ..kernels import Bins, KernelMatrix, discretise, no_slip_matrix, smooth_matrix
+from ..spectral import SpectralGap, spectral_gap, spectrum
+from .question import Question
+
+# The first matrix: polygons of few pieces are exact, other walls have so many rays at most.
+FIRST_BINS, FIRST_TOLERANCE, FIRST_RAYS = 48, 0.1, 2**15
+# Errors asked of the gap, one after the other.
+GAP_TOLERANCES = (0.1, 1e-3, 1e-6)
+# The last matrix, and the error asked of the image of each of its bins.
+BINS, BIN_TOLERANCE, RAYS = 96, 1e-3, 2**22
+EIGENVALUES, EIGENVALUE_TOLERANCE = 10, 1e-4
+# A disk that comes in at 45 degrees without spin; collisions of the first and of the last histogram.
+INCOMING = (1.0, -1.0, 0.0)
+FIRST_COLLISIONS, COLLISIONS, VELOCITY_BINS = 2**13, 2**18, 40
+
+
+# Rounding of a mean relative to the range of the velocities, of some products in the disk's frame.
+MEAN_ROUNDING = 16.0 * EPS
+
+
+@dataclass(frozen=True)
+class Eigenvalues:
+    """Eigenvalues with errors, shape (k,) each, of the law or of its matrix in one basis.
+
+    Attributes
+    ----------
+    values, errors : ndarray, shape (k,)
+        Sorted descending; half widths, inf if unknown.
+    of : str
+        "the law", or the basis of the matrix.
+    """
+
+    values: Floats
+    errors: Floats
+    of: str
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """Outgoing velocities v1 of a disk that comes in with v = (1, -1) and no spin.
+
+    Attributes
+    ----------
+    edges : ndarray, shape (n + 1,)
+    fractions, low, high : ndarray, shape (n,)
+        Fraction of collisions in each bin, and the 95 % interval of Clopper and Pearson for its probability.
+    mean : Estimate
+        Mean of v1.
+    smooth, no_slip : float
+        v1 of a smooth disk and of one that does not slip, on a flat wall.
+    """
+
+    edges: Floats
+    fractions: Floats
+    low: Floats
+    high: Floats
+    mean: Estimate
+    smooth: float
+    no_slip: float
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is known of a question so far; None where nothing is known yet, or where ``refusals`` says why not."""
+
+    stage: str
+    matrix: KernelMatrix | None = None
+    gap: SpectralGap | None = None
+    eigenvalues: Eigenvalues | None = None
+    collision: Histogram | None = None
+    refusals: tuple[tuple[str, str], ...] = ()
+    finished: bool = False
+
+    def refused(self, quantity: str, reason: object) -> Answer:
+        """The same with a reason why a quantity is missing."""
+        return replace(self, refusals=(*((q, r) for q, r in self.refusals if q != quantity), (quantity, str(reason))))
+
+
+def answers_to(question: Question) -> Iterator[Answer]:
+    """The first answer within a fraction of a second, then better ones until the last tolerance is met.
+
+    A quantity that cannot be computed is refused with a reason, and the others go on.
+
+    Examples
+    --------
+    >>> from asperity.geometry import triangular_teeth
+    >>> first, *_, last = answers_to(Question(triangular_teeth(0.7), "teeth"))
+    >>> first.matrix.method, first.gap.verdict, last.finished
+    ('exact', 'no gap', True)
+    """
+    answer = first_answer(question)
+    yield answer
+    decided = answer.gap is not None and answer.gap.verdict == "no gap"
+    for tolerance in () if decided else GAP_TOLERANCES[:-1]:
+        if _reached(answer, tolerance):
+            continue
+        answer = replace(_with_gap(answer, question, tolerance), stage=f"gap to {tolerance:g}")
+        yield answer
+    answer = replace(_with_collision(answer, question, COLLISIONS), stage="collision")
+    yield answer
+    answer = replace(_with_matrix(answer, question), stage="kernel")
+    yield answer
+    answer = _with_eigenvalues_of_matrix(answer)
+    if not (decided or _reached(answer, GAP_TOLERANCES[-1])):
+        answer = _with_gap(answer, question, GAP_TOLERANCES[-1])
+    if answer.gap is not None and answer.gap.verdict == "isolated" and answer.gap.self_adjoint:
+        yield replace(answer, stage="spectrum")
+        answer = _with_eigenvalues_of_law(answer, question)
+    yield replace(answer, stage="done", finished=True)
+
+
+def _reached(answer: Answer, tolerance: float) -> bool:
+    """Whether the gap is known to the tolerance, with a verdict."""
+    return answer.gap is not None and answer.gap.verdict != "undecided" and answer.gap.error <= tolerance
+
+
+def first_answer(question: Question) -> Answer:
+    """A coarse answer: a small matrix, its eigenvalues, an upper limit of the gap, a small sample of collisions."""
+    answer = Answer("coarse")
+    try:
+        matrix = discretise(
+            question.law, Bins(FIRST_BINS), tolerance=FIRST_TOLERANCE, samples=FIRST_RAYS, rng=0
+        )  # fmt: skip
+        answer = _with_eigenvalues_of_matrix(replace(answer, matrix=matrix))
+    except AsperityError as reason:
+        answer = answer.refused("kernel", reason).refused("gap", reason).refused("spectrum", reason)
+    if question.seen.is_polygonal and not question.seen.islands:
+        # a theorem decides
+        answer = _with_gap(answer, question, GAP_TOLERANCES[0])
+    elif answer.eigenvalues is not None and answer.matrix is not None:
+        answer = replace(answer, gap=largest_gap(answer.matrix))
+    return _with_collision(answer, question, FIRST_COLLISIONS)
+
+
+def largest_gap(matrix: KernelMatrix) -> SpectralGap:
+    """The interval from 0 to an upper limit that holds the gap of the law of a matrix.
+
+    Its largest eigenvalue off the constants is at most the supremum of the law's spectrum there, so 1 minus it, with
+    the errors of the matrix, limits the gap from above. No discretisation error is estimated, because that from two
+    grids is too small if the gap ends at the essential spectrum.
+    """
+    found = spectrum(matrix, EIGENVALUES)
+    parts = found.gap_errors
+    error = float(parts.algebraic[0] + parts.quantile * parts.sampling[0])
+    error += 0.0 if matrix.samples else float(matrix.error)
+    half = 0.5 * min(max(found.gap + error, 0.0), 2.0)
+    kind = "estimate" if matrix.samples else matrix.error.kind
+    evidence = (f"the gap of a law is at most that of its matrix in {matrix.basis!r}",)
+    return SpectralGap(half, half, kind, "from 0 to the gap of a coarse matrix", "undecided", evidence, matrix.frame)
+
+
+def _with_eigenvalues_of_matrix(answer: Answer) -> Answer:
+    if answer.matrix is None:
+        return answer
+    try:
+        found = spectrum(answer.matrix, EIGENVALUES)
+    except AsperityError as reason:
+        return answer.refused("spectrum", reason)
+    parts = found.errors
+    errors = parts.algebraic + parts.quantile * parts.sampling
+    if not answer.matrix.samples:
+        errors = errors + float(answer.matrix.error)
+    return replace(answer, eigenvalues=Eigenvalues(found.values, errors, f"the matrix in {answer.matrix.basis!r}"))
+
+
+def _with_eigenvalues_of_law(answer: Answer, question: Question) -> Answer:
+    try:
+        found = spectrum(question.law, EIGENVALUES, tolerance=EIGENVALUE_TOLERANCE, rng=0)
+    except AsperityError as reason:
+        return answer.refused("spectrum", reason)
+    return replace(answer, eigenvalues=Eigenvalues(found.values, found.errors.total(), "the law"))
+
+
+def _with_gap(answer: Answer, question: Question, tolerance: float) -> Answer:
+    try:
+        found = spectral_gap(question.law, tolerance, 0)
+    except AsperityError as reason:
+        return answer if answer.gap is not None else answer.refused("gap", reason)
+    refusals = tuple((quantity, why) for quantity, why in answer.refusals if quantity != "gap")
+    return replace(answer, gap=found, refusals=refusals)
+
+
+def _with_matrix(answer: Answer, question: Question) -> Answer:
+    basis = Bins(BINS)
+    try:
+        matrix = discretise(question.law, basis, tolerance=BIN_TOLERANCE * np.sqrt(BINS), samples=RAYS, rng=0)
+    except AsperityError as reason:
+        return answer if answer.matrix is not None else answer.refused("kernel", reason)
+    return replace(answer, matrix=matrix)
+
+
+def _with_collision(answer: Answer, question: Question, number: int) -> Answer:
+    try:
+        law = question.collision
+        outgoing = law.sample(np.tile(INCOMING, (number, 1)), np.random.default_rng(0))[:, 0]
+    except AsperityError as reason:
+        return answer.refused("collision", reason)
+    return replace(answer, collision=histogram(outgoing, question.disk))
+
+
+def histogram(outgoing: Floats, disk: Disk) -> Histogram:
+    """Outgoing velocities in bins, with the intervals of their probabilities."""
+    from scipy.special import betaincinv
+
+    reach = _largest_velocity(disk)
+    edges = np.linspace(reach[0], reach[1], VELOCITY_BINS + 1)
+    number = len(outgoing)
+    counts = np.histogram(np.clip(outgoing, *reach), edges)[0]
+    tail = 0.5 * (1.0 - LEVEL)
+    # Beta(k, n - k + 1) and Beta(k + 1, n - k); a parameter 0 stands for the end of the interval
+    low = np.where(counts > 0, betaincinv(np.maximum(counts, 1), number - counts + 1, tail), 0.0)
+    high = np.where(counts < number, betaincinv(counts + 1, np.maximum(number - counts, 1), 1.0 - tail), 1.0)
+    half = NORMAL_95 * float(np.std(outgoing, ddof=1)) / np.sqrt(number)
+    # a smooth disk has no spread, and its mean the rounding of the frame
+    half += MEAN_ROUNDING * (reach[1] - reach[0])
+    mean = Estimate(float(np.mean(outgoing)), half, "estimate", f"{number} collisions")
+    incoming = np.array(INCOMING)
+    smooth, no_slip = (float((matrix(disk) @ incoming)[0]) for matrix in (smooth_matrix, no_slip_matrix))
+    return Histogram(edges, counts / number, low, high, mean, smooth, no_slip)
+
+
+def _largest_velocity(disk: Disk) -> tuple[float, float]:
+    """The range of v1 that energy and rolling momentum allow."""
+    along, up, roll = (float(disk.inner(np.array(INCOMING), direction)) for direction in np.asarray(disk.frame))
+    frame = np.asarray(disk.frame)
+    centre, radius = roll * frame[2, 0], float(np.hypot(along, up)) * abs(frame[0, 0])
+    return centre - radius, centre + radius

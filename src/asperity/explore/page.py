@@ -1,0 +1,384 @@
+"""The page of one browser tab: controls, figures, and what happens when one of them changes."""
+
+from __future__ import annotations
+
+import html
+import io
+from pathlib import Path
+from typing import Any
+
+import panel as pn
+from bokeh.events import PanEnd, PanStart
+
+from ..core.errors import AsperityError
+from ..core.estimates import compact
+from ..geometry import WALLS, Disk, Wall
+from .answers import Answer, answers_to
+from .background import Background
+from .drawing import CollisionFigure, KernelFigure, SpectrumFigure, WallFigure, handles_of
+from .files import new_folder, opened, plain_name, studied, unpacked, wall_as_toml
+from .question import Question, pinned, with_new_vertex
+
+# Milliseconds between two looks for better answers.
+INTERVAL = 40
+# Ranges of the sliders of the named walls.
+RANGES = {
+    "angle": (0.05, 3.0), "height_to_width": (0.05, 6.0), "half_angle": (0.05, 1.55), "curvature": (0.02, 1.98),
+    "mass": (0.1, 5.0), "inertia": (0.05, 5.0), "stem_to_cap": (0.02, 0.95), "stem_aspect": (0.0, 3.0),
+    "generations": (1, 4),
+}  # fmt: skip
+DRAWN = "a polygon of your own"
+CONVENTIONS = {"retroreflection = identity": "paper", "specular = identity": "specular"}
+REFINING = "refining"
+# As many columns of figures as fit.
+GRID = {"display": "grid", "grid-template-columns": "repeat(auto-fit, minmax(min(400px, 100%), 1fr))"}
+STYLE = """
+:host { font-family: system-ui, sans-serif; }
+.asperity-facts td { padding: 1px 10px 1px 0; vertical-align: top; }
+.asperity-facts td:first-child { color: #555; white-space: nowrap; }
+"""
+
+
+class Page:
+    """One tab: it has its own wall, its own answers and its own computation.
+
+    Parameters
+    ----------
+    wall : Wall
+        Shown first.
+    name : str
+        A named wall, or what the wall is called.
+    parameters : dict
+        Of a named wall.
+    out : Path, optional
+        Folder into which walls and studies are written; otherwise the browser takes them.
+
+    Attributes
+    ----------
+    question, answer
+        What is asked, and the last valid answer or None.
+    message : str
+        Why the last wall was refused; empty if it was not.
+    """
+
+    def __init__(
+        self, wall: Wall, name: str, parameters: dict[str, float | int] | None = None, out: Path | None = None
+    ) -> None:
+        self.question = Question(wall, name)
+        self.answer: Answer | None = None
+        self.message = ""
+        self._out = out
+        self._background, self._saving = Background(), Background()
+        self._dragging = self._filling = False
+        self._archive: bytes | None = None
+        self._was_busy = False
+        self._make_figures()
+        self._make_controls(parameters or {})
+        self.ask(wall, name)
+        if pn.state.curdoc is not None and pn.state.curdoc.session_context is not None:
+            pn.state.add_periodic_callback(self.collect, INTERVAL)
+
+    def _make_figures(self) -> None:
+        self.wall_figure, self.kernel = WallFigure(), KernelFigure()
+        self.spectrum, self.collision = SpectrumFigure(), CollisionFigure()
+        self.wall_figure.vertices.on_change("data", self._vertices_changed)
+        self.wall_figure.plot.on_event(PanStart, self._drag_begins)
+        self.wall_figure.plot.on_event(PanEnd, self._drag_ends)
+
+    def _make_controls(self, parameters: dict[str, float | int]) -> None:
+        name = self.question.name
+        self.choice = pn.widgets.Select(name="Wall", options=[*WALLS, DRAWN], value=name if name in WALLS else DRAWN,
+                                        sizing_mode="stretch_width")  # fmt: skip
+        self.sliders = pn.Column(sizing_mode="stretch_width", margin=0)
+        self.mass = _slider("mass of the disk", *RANGES["mass"], self.question.disk.mass)
+        self.inertia = _slider("inertia of the disk", *RANGES["inertia"], self.question.disk.inertia)
+        self.convention = pn.widgets.RadioButtonGroup(
+            name="Convention", options=CONVENTIONS, value="paper", orientation="vertical", sizing_mode="stretch_width"
+        )
+        self.foreshortened = pn.widgets.Toggle(
+            name="Foreshorten: the wall as the disk feels it", sizing_mode="stretch_width"
+        )
+        self.file = pn.widgets.FileInput(name="Wall file or profile", sizing_mode="stretch_width")
+        self.options = pn.widgets.TextInput(
+            name="Options of a profile", placeholder="seam=step,units=um/nm", sizing_mode="stretch_width"
+        )
+        self.status = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
+        self.facts = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
+        self._make_saving()
+        self._make_sliders(parameters)
+        self.choice.param.watch(lambda _: self._wall_chosen(), "value")
+        self.file.param.watch(lambda _: self._file_sent(), "value")
+        for widget in (self.mass, self.inertia, self.convention, self.foreshortened):
+            widget.param.watch(lambda _: self.ask(self.question.wall, self.question.name), "value")
+
+    def _make_saving(self) -> None:
+        stretch: dict[str, Any] = {"sizing_mode": "stretch_width"}
+        self.study = pn.widgets.Button(name="Make the study", button_type="primary", **stretch)
+        self.study.on_click(lambda _: self._study())
+        if self._out is None:
+            self.save: Any = pn.widgets.FileDownload(
+                callback=lambda: io.BytesIO(wall_as_toml(self.question.seen)), filename="wall.toml",
+                label="Save the wall", **stretch,
+            )  # fmt: skip
+            self.take: Any = pn.widgets.FileDownload(
+                callback=lambda: io.BytesIO(self._archive or b""), filename="study.zip", label="Take the study",
+                visible=False, **stretch,
+            )  # fmt: skip
+        else:
+            self.save = pn.widgets.Button(name="Save the wall", **stretch)
+            self.save.on_click(lambda _: self._write_wall())
+            self.take = pn.Spacer(height=0)
+        self.saved = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
+
+    def _make_sliders(self, parameters: dict[str, float | int]) -> None:
+        entry = WALLS.get(self.choice.value)
+        defaults = {**entry.defaults, **parameters} if entry else {}
+        self.parameters = {key: _slider(key, *RANGES[key], value) for key, value in defaults.items()}
+        for slider in self.parameters.values():
+            slider.param.watch(lambda _: self._parameters_moved(), "value")
+        self.sliders[:] = list(self.parameters.values())
+
+    def view(self) -> Any:
+        """Everything, in columns that wrap on narrow screens."""
+        figures = (self.wall_figure.plot, self.kernel.plot, self.spectrum.plot, self.collision.plot)
+        panes = [pn.pane.Bokeh(plot, sizing_mode="stretch_width", margin=4) for plot in figures]
+        controls = pn.Column(
+            self.choice, self.sliders, self.mass, self.inertia, self.foreshortened, self.convention, self.options,
+            self.file, self.save, self.study, self.take, self.saved, styles={"flex": "1 1 240px", "min-width": "240px"},
+            margin=4,
+        )  # fmt: skip
+        title = pn.pane.HTML("<h2 style='margin: 4px 0'>asperity explore</h2>", stylesheets=[STYLE])
+        plots = pn.Column(*panes, styles=GRID, sizing_mode="stretch_width", margin=0)
+        shown = pn.Column(self.status, self.facts, plots, styles={"flex": "5 1 300px", "min-width": "300px"}, margin=4)
+        both = pn.FlexBox(controls, shown, align_items="flex-start", sizing_mode="stretch_width")
+        return pn.Column(title, both, sizing_mode="stretch_width")
+
+    # -- what the user does
+
+    def _wall_chosen(self) -> None:
+        if self._filling:
+            return
+        self._make_sliders({})
+        entry = WALLS.get(self.choice.value)
+        if entry is not None:
+            self.ask(entry.build(), entry.name)
+        else:
+            self._polygon_from_here()
+
+    def _polygon_from_here(self) -> None:
+        """A polygon to drag, where the wall is one already, or a plain one."""
+        points = handles_of(self.question.wall)
+        self.ask(Wall.from_vertices(points if len(points) else [(0, 0), (0.3, -0.5), (0.6, -0.2), (1, 0)]), "polygon")
+
+    def _parameters_moved(self) -> None:
+        if self._filling:
+            return
+        entry = WALLS[self.choice.value]
+        values = {name: slider.value for name, slider in self.parameters.items()}
+        self._try(lambda: entry.build(**values), entry.name)
+
+    def _file_sent(self) -> None:
+        if not self.file.value:
+            return
+        name, content, options = str(self.file.filename), self.file.value, str(self.options.value or "")
+        if self._try(lambda: opened(name, content, options), Path(name).stem):
+            self._choose(DRAWN)
+
+    def _choose(self, choice: str) -> None:
+        """Set the choice without asking for its wall."""
+        self._filling = True
+        self.choice.value = choice
+        self._make_sliders({})
+        self._filling = False
+
+    def _drag_begins(self, _event: Any) -> None:
+        self._dragging = True
+
+    def _drag_ends(self, _event: Any) -> None:
+        self._dragging = False
+        self._settle()
+
+    def _vertices_changed(self, _name: str, _old: Any, new: Any) -> None:
+        points = list(zip(new["x"], new["y"], strict=True))
+        before = self._handles()
+        if points == before:
+            return
+        if len(points) == len(before) + 1 and not self._dragging:
+            points = with_new_vertex(points)
+        if len(points) < 2:
+            # a curved wall has no vertices to add to, and one vertex is not a wall
+            self._refuse("this wall has no vertices to drag; choose a polygon")
+            self._settle()
+            return
+        period = self.question.wall.period
+        if self._try(lambda: Wall.from_vertices(pinned(points, period), self.question.wall.unit), "polygon"):
+            self._choose(DRAWN)
+        if not self._dragging:
+            self._settle()
+
+    def _settle(self) -> None:
+        """Show the vertices of the wall that is asked, also where the last ones were refused or moved."""
+        self.wall_figure.show(self.question.seen, self._title(), dragged=False)
+        self.wall_figure.show_vertices(self._handles())
+
+    def _handles(self) -> list[tuple[float, float]]:
+        """The vertices that can be dragged: those of a polygon that is not foreshortened."""
+        if self.question.foreshortened:
+            return []
+        return [(float(x), float(y)) for x, y in handles_of(self.question.wall)]
+
+    # -- what it does
+
+    def _try(self, make: Any, name: str) -> bool:
+        try:
+            wall = make()
+        except AsperityError as reason:
+            self._refuse(str(reason))
+            return False
+        self.ask(wall, name)
+        return True
+
+    def _refuse(self, reason: str) -> None:
+        """Say why, and leave the last valid wall and its answer as they are."""
+        self.message = reason
+        self._show_status()
+
+    def ask(self, wall: Wall, name: str) -> None:
+        """Show a wall, and begin to compute its answers; those of the last wall stay until the first has come."""
+        self.message = ""
+        try:
+            disk = Disk(float(self.mass.value), float(self.inertia.value))
+            self.question = Question(wall, name, disk, self.convention.value, bool(self.foreshortened.value))
+            self.wall_figure.show(self.question.seen, self._title(), dragged=self._dragging)
+        except AsperityError as reason:
+            self._refuse(str(reason))
+            return
+        if not self._dragging:
+            self.wall_figure.show_vertices(self._handles())
+        self._background.ask(answers_to, self.question)
+        self._show_status()
+
+    def _title(self) -> str:
+        wall = self.question.seen
+        felt = ", as the disk feels it" if self.question.foreshortened else ""
+        hint = ": drag its vertices, tap to add one" if self._handles() else ""
+        return f"{self.question.name}, depth {wall.depth:.4g}{felt}{hint}"
+
+    def collect(self) -> None:
+        """Show the results that have come."""
+        for error, answer in self._background.collect()[-1:]:
+            if error is not None:
+                self.message = error
+            else:
+                self.answer = answer
+                self._show_answer(answer)
+            self._show_status()
+        for error, archive in self._saving.collect():
+            self._study_came(error, archive)
+        if self._was_busy != self._background.busy:
+            self._was_busy = self._background.busy
+            self._show_status()
+
+    def _show_answer(self, answer: Answer) -> None:
+        self.kernel.show(answer)
+        self.spectrum.show(answer)
+        self.collision.show(answer.collision)
+        self.facts.object = facts_as_html(answer)
+
+    def _show_status(self) -> None:
+        if self.message:
+            self.status.object = (
+                "<div role='alert' style='background: #fde8d8; border-left: 4px solid #D55E00; padding: 6px'>"
+                f"{html.escape(self.message)}. The last valid answer stays.</div>"
+            )
+            return
+        busy = self._background.busy
+        known = self.answer.stage if self.answer is not None else "nothing yet"
+        text = f"{REFINING}; known so far: {known}" if busy else "done"
+        colour = "#56B4E9" if busy else "#009E73"
+        self.status.object = f"<div role='status' style='border-left: 4px solid {colour}; padding: 6px'>{text}</div>"
+
+    # -- saving
+
+    def _write_wall(self) -> None:
+        assert self._out is not None
+        try:
+            file = new_folder(self._out, self.question.name) / "wall.toml"
+            self.question.seen.save(file)
+        except AsperityError as reason:
+            self._tell(str(reason))
+            return
+        self._tell(f"wrote {file}")
+
+    def _study(self) -> None:
+        self._archive, self.study.disabled = None, True
+        self._studied_name = plain_name(self.question.name)
+        self._tell("the study is being made, some seconds to a minute")
+        self._saving.ask(studied, self.question)
+
+    def _study_came(self, error: str | None, archive: bytes | None) -> None:
+        self.study.disabled = False
+        if error is not None or archive is None:
+            self._tell(f"no study: {error}")
+        elif self._out is None:
+            self._archive, self.take.visible = archive, True
+            self.take.filename = f"{self._studied_name}.zip"
+            self._tell("the study is ready")
+        else:
+            try:
+                self._tell(f"wrote {unpacked(archive, self._out, self._studied_name)}")
+            except AsperityError as reason:
+                self._tell(str(reason))
+
+    def _tell(self, text: str) -> None:
+        self.saved.object = f"<div role='log'>{html.escape(text)}</div>"
+
+    def close(self) -> None:
+        """End the computations."""
+        self._background.drop()
+        self._saving.drop()
+
+
+def _slider(name: str, low: float, high: float, value: float) -> Any:
+    if isinstance(low, int):
+        return pn.widgets.IntSlider(
+            name=name, start=low, end=max(int(high), int(value)), value=int(value), sizing_mode="stretch_width"
+        )
+    return pn.widgets.EditableFloatSlider(
+        name=name, start=min(low, value), end=max(high, value), fixed_start=0.0, step=0.01, value=float(value),
+        sizing_mode="stretch_width",
+    )  # fmt: skip
+
+
+def facts_as_html(answer: Answer) -> str:
+    """The numbers of an answer with their errors, as a table.
+
+    Examples
+    --------
+    >>> "not known yet" in facts_as_html(Answer("coarse"))
+    True
+    """
+    gap = answer.gap
+    if gap is None:
+        line = "not known yet"
+    elif gap.verdict == "no gap":
+        line = f"<b>0</b>, no gap ({html.escape(gap.evidence[0])})"
+    else:
+        name = "" if gap.self_adjoint else "1 - norm on functions of mean 0: "
+        line = f"{name}<b>{html.escape(compact(gap))}</b>, {gap.verdict}, error {gap.error:.1e} ({gap.kind})"
+    rows = {"gap": f"{line}; {gap.convention} convention" if gap else line}
+    if gap is not None and gap.verdict != "no gap":
+        rows["by"] = html.escape(gap.method)
+    if answer.matrix is not None:
+        matrix, error = answer.matrix, answer.matrix.error
+        rows["kernel"] = html.escape(
+            f"{matrix.basis!r}, {matrix.method}, Frobenius error {float(error):.1e} ({error.kind})"
+        )
+    if answer.collision is not None:
+        mean = answer.collision.mean
+        rows["collision"] = (
+            f"mean outgoing v1 <b>{html.escape(compact(mean))}</b>, error {mean.error:.1e}, {mean.method}"
+        )
+    rows |= {f"{quantity}": f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
+    cells = "".join(f"<tr><td>{title}</td><td>{text}</td></tr>" for title, text in rows.items())
+    return f"<table class='asperity-facts'>{cells}</table>"

@@ -1,0 +1,159 @@
+"""The server of the page: on the loopback address, for its own origin, without resources from the network."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import multiprocessing
+import signal
+import socket
+import time
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import InputError
+from ..geometry import WALLS, wall_from_text
+
+ADDRESS, PORT = "127.0.0.1", 5006
+# By these names the page may be called; another name may be an attacker's that leads to this machine.
+NAMES = (ADDRESS, "localhost")
+# Bytes of one message of the browser: a file of 64 MiB in base64.
+LARGEST_MESSAGE = 96 * 2**20
+# Milliseconds after which the computation of a closed tab ends, and between two checks.
+CLOSED_AFTER, CHECKED_EVERY = 3000, 2000
+FIRST_WALL = "triangular-teeth"
+
+
+def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = None) -> Any:
+    """Return a server of the page, which listens already and answers as soon as its ``io_loop`` is started.
+
+    Parameters
+    ----------
+    text : str
+        The wall that is shown first, as on the command line.
+    port : int
+        0 for any that is free.
+    out : Path, optional
+        Folder for what is saved; by default the browser takes it.
+
+    Raises
+    ------
+    InputError
+        If the wall cannot be made, the port is in use or not permitted, or panel and bokeh are missing.
+    """
+    wall = wall_from_text(text)
+    name, parameters = _called(text)
+    panel = _panel()
+    from .page import Page
+
+    def page() -> Any:
+        shown = Page(wall, name, parameters, out)
+        panel.state.on_session_destroyed(lambda _: shown.close())
+        return shown.view()
+
+    number = _usable(port)
+    hosts = [f"{name}:{number}" for name in NAMES]
+    # panel sets a handler of its own, which would end the loop without a word
+    interrupt = signal.getsignal(signal.SIGINT)
+    try:
+        return panel.io.server.get_server(
+            page, address=ADDRESS, port=number, show=False, start=False, title="asperity explore",
+            websocket_origin=hosts, auth_provider=_own_host(hosts), websocket_max_message_size=LARGEST_MESSAGE,
+            check_unused_sessions_milliseconds=CHECKED_EVERY, unused_session_lifetime_milliseconds=CLOSED_AFTER,
+        )  # fmt: skip
+    finally:
+        signal.signal(signal.SIGINT, interrupt)
+
+
+def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Callable[[str], object]) -> None:
+    """Serve the page until Ctrl-C, which raises KeyboardInterrupt; ``say`` prints a line."""
+    server = page_server(text, port, out)
+    say("preparing; the first time this compiles for some seconds")
+    _prepare(text)
+    address = f"http://{ADDRESS}:{server.port}/"
+    say(f"{address} shows the page; Ctrl-C ends it")
+    server.start()
+    if browser:
+        server.io_loop.add_callback(webbrowser.open, address)
+    try:
+        server.io_loop.start()
+    finally:
+        # what runs for the tabs that are open
+        for computation in multiprocessing.active_children():
+            computation.kill()
+
+
+def _prepare(text: str) -> None:
+    """Make a page and its first answer, which compiles and loads what every tab needs."""
+    from .page import Page
+
+    page = Page(wall_from_text(text), "")
+    try:
+        page.view().get_root()
+        while page.answer is None and not page.message:
+            time.sleep(0.02)
+            page.collect()
+    finally:
+        page.close()
+
+
+def _usable(port: int) -> int:
+    """The port, or a free one for 0; an InputError if it is in use or not permitted."""
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as probe:
+        # as servers do: a port whose last connections are still closing is free
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((ADDRESS, port))
+        except OSError as reason:
+            why = "is in use" if reason.errno == errno.EADDRINUSE else f"cannot be used ({reason.strerror})"
+            raise InputError(
+                f"port {port} {why}; choose another with --port N, or --port 0 for any that is free"
+            ) from reason
+        return int(probe.getsockname()[1])
+
+
+def _own_host(hosts: list[str]) -> Any:
+    """Refuses every request to another host name, or from a page of another origin, before the page is made."""
+    from bokeh.server.auth_provider import AuthProvider
+    from tornado.web import HTTPError
+
+    def user(handler: Any) -> str:
+        origin = handler.request.headers.get("Origin")
+        if handler.request.host not in hosts or origin not in (None, *(f"http://{host}" for host in hosts)):
+            raise HTTPError(403, "asperity explore answers to its own page only")
+        return "user"
+
+    class OwnHost(AuthProvider):
+        @property
+        def get_user(self) -> Any:
+            return user
+
+        @property
+        def login_url(self) -> str:
+            # never used: a request has the user or is refused
+            return "/"
+
+    return OwnHost()
+
+
+def _called(text: str) -> tuple[str, dict[str, float | int]]:
+    """The name of a wall, and its parameters if it is a named one."""
+    name, _, tail = text.partition(":")
+    entry = WALLS.get(name.strip().lower().replace("_", "-"))
+    if entry is None or Path(text).is_file():
+        return Path(name).stem, {}
+    given = (part.split("=") for part in tail.split(",") if part.strip())
+    return entry.name, {key.strip().replace("-", "_"): float(value) for key, value in given}
+
+
+def _panel() -> Any:
+    try:
+        import panel
+    except ImportError as reason:
+        raise InputError("the page needs panel and bokeh: pip install 'asperity[explore]'") from reason
+    for name in ("tornado.access", "tornado.general", "bokeh"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    panel.extension()
+    return panel

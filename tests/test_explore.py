@@ -1,0 +1,296 @@
+"""The model of the page: questions, answers with errors, computations that are dropped, files. No browser is needed."""
+
+import io
+import time
+import zipfile
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError
+from asperity.explore.answers import Answer, answers_to, first_answer, histogram, largest_gap
+from asperity.explore.background import GONE, Background
+from asperity.explore.files import LARGEST, new_folder, opened, plain_name, studied, unpacked, wall_as_toml
+from asperity.explore.question import Question, pinned, with_new_vertex
+from asperity.explore.server import _called, _usable
+
+TEETH = geo.Wall.from_vertices([(0, 0), (0.3, -0.6), (0.5, -0.1), (0.7, -0.8), (1, 0)])
+CURVED = {
+    "focusing arcs": geo.focusing_arcs(1.2),
+    "nearly semicircles": geo.focusing_arcs(1.5),
+    "dispersing arcs": geo.dispersing_arcs(1.5),
+    "mushrooms": geo.mushrooms(0.5, 0.0, 1),
+    "thin mushrooms": geo.mushrooms(0.05, 0.5, 1),
+    "two generations": geo.mushrooms(0.2, 0.5, 2),
+    "parabolas": geo.double_parabola(),
+}
+
+
+def test_pinned_vertices_span_the_period_and_stay_below_the_top():
+    points = pinned([(0.2, -0.3), (0.4, 0.1), (0.6, -0.5), (0.9, -0.2)], 2.0)
+    assert points == [(0.0, 0.0), (0.4, 0.0), (0.6, -0.5), (2.0, 0.0)]
+    assert pinned(points, 2.0) == points
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_a_new_vertex_joins_the_side_that_it_lies_on(k):
+    old = TEETH.vertices.tolist()
+    middle = 0.5 * (TEETH.vertices[k] + TEETH.vertices[k + 1])
+    joined = with_new_vertex([*old, middle])
+    assert joined == [*map(tuple, old[: k + 1]), tuple(middle.tolist()), *map(tuple, old[k + 1 :])]
+    assert geo.Wall.from_vertices(joined).arc_length == pytest.approx(TEETH.arc_length, rel=1e-15)
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_the_first_interval_of_the_gap_holds_the_gap_of_the_law(name):
+    known = spec.spectral_gap(ker.WallLaw(CURVED[name]), 1e-3, rng=0)
+    first = first_answer(Question(CURVED[name], name)).gap
+    assert first.verdict == "undecided"
+    assert abs(first.value - known.value) <= first.error + known.error
+
+
+def test_the_first_interval_holds_the_gap_for_95_of_100_generators():
+    law = ker.WallLaw(geo.dispersing_arcs(1.0))
+    known = 0.716163
+    high = [
+        2.0 * largest_gap(ker.discretise(law, ker.Bins(48), "qmc", samples=2**13, rng=seed)).value for seed in range(40)
+    ]
+    assert np.mean(np.array(high) >= known) >= 0.95
+
+
+@pytest.mark.parametrize("convention", ["paper", "specular"])
+@pytest.mark.parametrize("wall", [TEETH, geo.triangular_teeth(0.7), geo.flat()], ids=["skew", "symmetric", "flat"])
+def test_polygons_are_answered_exactly_at_once(wall, convention):
+    first = first_answer(Question(wall, "polygon", convention=convention))
+    assert first.matrix.method == "exact"
+    assert first.matrix.frame == convention
+    assert float(first.matrix.error) < 1e-10
+    assert (first.gap.value, first.gap.error, first.gap.verdict) == (0.0, 0.0, "no gap")
+
+
+def test_answers_improve_and_agree_with_each_other():
+    found = list(answers_to(Question(geo.focusing_arcs(0.4), "arcs")))
+    errors = [answer.gap.error for answer in found]
+    assert all(later <= earlier for earlier, later in pairwise(errors))
+    assert errors[-1] <= 1e-6
+    assert [answer.finished for answer in found] == [False] * (len(found) - 1) + [True]
+    for earlier, later in pairwise(found):
+        assert abs(earlier.gap.value - later.gap.value) <= earlier.gap.error + later.gap.error
+        mine, yours = earlier.collision.mean, later.collision.mean
+        assert abs(mine.value - yours.value) <= 2.0 * (mine.error + yours.error)
+    assert found[-1].eigenvalues.of == "the law"
+    assert found[-1].eigenvalues.values[1] == pytest.approx(1.0 - found[-1].gap.value, abs=1e-4)
+
+
+def test_intervals_of_the_histogram_hold_the_probabilities():
+    rng, disk = np.random.default_rng(5), geo.Disk()
+    law = ker.CollisionLaw.from_wall(geo.focusing_arcs(1.2), disk)
+    sample = lambda n: law.sample(np.tile([1.0, -1.0, 0.0], (n, 1)), rng)[:, 0]  # noqa: E731
+    true = histogram(sample(2**18), disk).fractions
+    held = [(h.low <= true) & (true <= h.high) for h in (histogram(sample(2**9), disk) for _ in range(40))]
+    assert np.mean(held) >= 0.95
+    assert histogram(sample(2**9), disk).fractions.sum() == pytest.approx(1.0)
+
+
+def test_a_flat_wall_lets_the_smooth_disk_go_on():
+    found = first_answer(Question(geo.flat(), "flat")).collision
+    assert found.smooth == pytest.approx(1.0, abs=1e-15)
+    assert abs(found.mean.value - 1.0) <= found.mean.error
+
+
+def test_the_histogram_reaches_the_extreme_velocities_of_energy_and_rolling_momentum():
+    disk = geo.Disk(2.0, 0.7)
+    incoming = np.array([1.0, -1.0, 0.0])
+    edges = histogram(np.array([0.5, 0.5]), disk).edges
+    for velocity in edges[[0, -1]]:
+        # the outgoing disk has no normal velocity then
+        spin = (disk.rolling_momentum(incoming) + disk.mass * velocity) / disk.inertia
+        outgoing = np.array([velocity, 0.0, spin])
+        assert disk.rolling_momentum(outgoing) == pytest.approx(disk.rolling_momentum(incoming))
+        assert disk.inner(outgoing, outgoing) == pytest.approx(disk.inner(incoming, incoming))
+
+
+def test_foreshortening_shows_the_law_that_the_disk_feels():
+    disk = geo.Disk(1.0, 0.5)
+    first = first_answer(Question(TEETH, "teeth", disk, foreshortened=True))
+    felt = ker.discretise(ker.WallLaw(TEETH.foreshorten(disk)), first.matrix.basis)
+    assert np.abs(first.matrix.array - felt.array).max() < 1e-12
+    plain = first_answer(Question(TEETH, "teeth", disk)).collision
+    assert np.array_equal(first.collision.fractions, plain.fractions)
+
+
+def test_a_refusal_replaces_an_earlier_one():
+    answer = Answer("coarse").refused("gap", "first").refused("spectrum", "other").refused("gap", "second")
+    assert answer.refusals == (("spectrum", "other"), ("gap", "second"))
+
+
+# -- computations of other processes
+
+
+def two_numbers():
+    yield from (1, 2)
+
+
+def never():
+    time.sleep(600)
+    yield 0
+
+
+def one_and_never():
+    yield 1
+    yield from never()
+
+
+def refuses():
+    raise InputError("no such wall")
+    yield
+
+
+def dies():
+    import os
+
+    os._exit(9)
+    yield
+
+
+def results(background, seconds=60.0):
+    found, end = [], time.monotonic() + seconds
+    while background.busy and time.monotonic() < end:
+        found += background.collect()
+        time.sleep(0.01)
+    return found
+
+
+@pytest.fixture
+def background():
+    made = Background()
+    yield made
+    made.drop()
+
+
+def test_results_come_in_order(background):
+    background.ask(two_numbers)
+    assert results(background) == [(None, 1), (None, 2)]
+
+
+def test_errors_come_as_their_message(background):
+    background.ask(refuses)
+    assert results(background) == [("no such wall", None)]
+
+
+def test_a_process_that_dies_is_reported(background):
+    background.ask(dies)
+    assert results(background) == [(GONE, None)]
+
+
+def test_a_new_question_ends_the_computation_of_the_old_one(background):
+    background.ask(one_and_never)
+    while not background.collect():
+        time.sleep(0.01)
+    old = background._process
+    background.ask(two_numbers)
+    assert results(background) == [(None, 1), (None, 2)]
+    with pytest.raises(ValueError, match="closed"):
+        old.is_alive()
+
+
+def test_a_computation_without_first_answer_is_dropped_after_some_patience(background, monkeypatch):
+    monkeypatch.setattr("asperity.explore.background.PATIENCE", 0.3)
+    background.ask(never)
+    background.ask(never)
+    background.ask(two_numbers)
+    assert results(background) == [(None, 1), (None, 2)]
+
+
+# -- files
+
+
+def test_a_saved_wall_is_opened_again():
+    for wall in (TEETH, geo.focusing_arcs(1.0)):
+        assert opened("wall.toml", wall_as_toml(wall)) == wall
+
+
+def test_a_profile_is_opened_with_its_options():
+    text = b"x [um], height [nm]\n0, 0\n1, 100\n2, 50\n"
+    wall = opened("profile.csv", text, "seam=step")
+    assert (wall.unit, wall.period) == ("um", 2.0)
+    assert wall.depth == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("wall.toml", b"period = [", "wall.toml"),
+        ("wall.toml", b"period = 1.0\nvertices = [[0,0],[0.7,-1],[0.2,-0.1],[0.8,-0.2],[0.3,-1],[1,0]]", "cross"),
+        ("../../etc/passwd", b"\x00\x01", "passwd"),
+        ("profile.txt", b"", "profile.txt"),
+    ],
+)
+def test_wrong_files_are_refused_by_name_and_leave_no_path(name, content, message):
+    with pytest.raises(InputError, match=message) as refusal:
+        opened(name, content)
+    assert "asperity-" not in str(refusal.value)
+
+
+def test_files_beyond_the_limit_are_refused():
+    with pytest.raises(InputError, match="expected at most"):
+        opened("wall.toml", bytes(LARGEST + 1))
+
+
+def test_names_of_files_stay_in_their_folder():
+    for name in ("../../a", "/etc/passwd", "..\\..\\a", "a/../..", "", "...", "\x00"):
+        assert "/" not in plain_name(name)
+        assert plain_name(name).strip(".")
+
+
+def test_nothing_that_is_saved_replaces_anything(tmp_path):
+    (tmp_path / "teeth").mkdir()
+    (tmp_path / "teeth" / "wall.toml").write_text("mine")
+    assert [new_folder(tmp_path, "teeth").name for _ in range(2)] == ["teeth-2", "teeth-3"]
+    assert (tmp_path / "teeth" / "wall.toml").read_text() == "mine"
+
+
+def test_the_study_holds_its_files_and_the_wall(tmp_path):
+    (archive,) = studied(Question(geo.triangular_teeth(0.7), "teeth"))
+    names = zipfile.ZipFile(io.BytesIO(archive)).namelist()
+    assert set(names) == {
+        "collision.png", "kernel.npz", "kernel.png", "spectrum.png", "study.json", "wall.png", "wall.toml",
+    }  # fmt: skip
+    folder = unpacked(archive, tmp_path, "teeth")
+    assert geo.load_wall(folder / "wall.toml") == geo.triangular_teeth(0.7)
+    assert ker.load_matrix(folder / "kernel.npz").method == "exact"
+
+
+def test_an_out_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="choose another --out"):
+        new_folder(tmp_path / "file", "teeth")
+
+
+# -- command line
+
+
+def test_a_port_in_use_is_named():
+    import socket
+
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        number = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"port {number} is in use; choose another with --port N"):
+            _usable(number)
+
+
+def test_the_name_and_parameters_of_a_wall_are_told_apart(tmp_path):
+    assert _called("focusing-arcs:half_angle=0.9") == ("focusing-arcs", {"half_angle": 0.9})
+    assert _called(str(tmp_path / "mine.toml")) == ("mine", {})
+
+
+def test_questions_are_values():
+    question = Question(TEETH, "teeth")
+    assert replace(question, foreshortened=True) != question == Question(TEETH, "teeth")
