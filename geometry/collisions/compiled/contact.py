@@ -58,7 +58,7 @@ from ...scene.columns import (
     STRETCH,
 )
 from ...tracing.compiled.arcs import near_end, on_arc
-from ...tracing.compiled.options import compiled, inlined
+from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import LINE, NO_PIECE, SIDE
 from ...tracing.double_double.sides import ARC as CURVED
@@ -277,7 +277,7 @@ def where_on_line(joints, lines, j, x, y, slack):
     return from_start >= -slack and from_end >= -slack, corner
 
 
-@compiled
+@inner
 def is_in_front(kind, number, own, x, y, slack, ground):
     """-> bool: whether a satellite at (x, y) on the piece ``own`` lies in front of another piece close by."""
     own_arc, arc = own.piece if own.kind == ARC else 0, number if kind == ARC else 0
