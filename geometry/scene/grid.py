@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import ceil, sqrt
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.compilation import jit
 from .columns import POINT_X, POINT_Y
 
 # Cells per piece; a cell is then about as large as a piece (not tuned).
@@ -60,7 +60,7 @@ def grid_of(starts: Floats, ends: Floats, first: int, base: int) -> tuple[list[f
     return frame, np.concatenate([offsets + (base + len(offsets)), entries])
 
 
-@njit(cache=True, nogil=True)
+@jit(error_model="python")
 def touches(ax, ay, bx, by, column, row):
     """Whether the segment from a to b, in units of cells, meets a cell enlarged by the margin."""
     x, y = column + 0.5, row + 0.5
@@ -71,13 +71,13 @@ def touches(ax, ay, bx, by, column, row):
     return abs(ex * (y - ay) - ey * (x - ax)) <= reach * (abs(ex) + abs(ey))
 
 
-@njit(cache=True, nogil=True)
+@jit(error_model="python")
 def cells_about(low, high, count):
     """Return the first and last cell that an interval, in units of cells, may touch."""
     return max(0, int(np.floor(low - MARGIN))), min(count - 1, int(np.floor(high + MARGIN)))
 
 
-@njit(cache=True, nogil=True)
+@jit(error_model="python")
 def list_entries(starts, ends, frame, first, next_entry, entries):
     """Write the lines of every cell into ``entries`` from ``next_entry`` of the cell on, and advance ``next_entry``.
 

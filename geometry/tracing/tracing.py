@@ -196,17 +196,20 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) ->
     """Return a function of x, theta and four arrays to fill, which traces by closed forms where possible."""
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
-        from .compiled.rays import nearby_address, trace_rays
+        from .compiled.pointers import checked
+        from .compiled.rays import SLOTS, trace_rays
         from .compiled.records import NOT_WANTED, Results
 
         out_x, out_theta, collisions, status = results
         wanted = Results(out_x, out_theta, collisions, status, *NOT_WANTED)
-        trace_rays(x, theta, scene.tables, max_collisions, stop, wanted, nearby_address())
+        checked(lambda: trace_rays(x, theta, scene.tables, max_collisions, stop, wanted, SLOTS))
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
-        from .compiled.closed_forms import UNDECIDED, trace_closed
+        from .compiled.closed_forms import CROSSINGS, UNDECIDED, room_for, trace_closed
+        from .compiled.pointers import checked
 
-        trace_closed(x, theta, scene.hollows, scene.closed, scene.cell, max_collisions, results)
+        tables, work = (scene.hollows, scene.closed, scene.cell), room_for(scene.hollows)
+        checked(lambda: trace_closed(x, theta, tables, max_collisions, results, work, CROSSINGS))
         rest = np.flatnonzero(results[-1] == UNDECIDED)
         if len(rest):
             followed = tuple(np.empty(len(rest), result.dtype) for result in results)
@@ -248,7 +251,8 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
     >>> geo.trajectory(geo.flat(), 0.5, pi / 2).tolist()
     [[0.5, 0.0], [0.5, 0.0], [0.5, 0.0]]
     """
-    from .compiled.rays import nearby_address, trace_rays
+    from .compiled.pointers import checked
+    from .compiled.rays import SLOTS, trace_rays
     from .compiled.records import results_for
 
     _check_wall(wall)
@@ -269,7 +273,7 @@ def trajectory(wall: Wall, x: float, theta: float, *, max_collisions: int = 10_0
         results = results_for(1, path=limit + 2)
         start, angle = np.array([entry - base]), np.array([incoming])
         stop = new_flag()
-        interruptibly(lambda: trace_rays(start, angle, scene.tables, limit, stop, results, nearby_address()))
+        interruptibly(lambda: checked(lambda: trace_rays(start, angle, scene.tables, limit, stop, results, SLOTS)))
         points = results.path[np.isfinite(results.path[:, 0])]
         points[:, 0] += base
     return points if wall.origin == (0.0, 0.0) else _in_coordinates_of(wall, points, position, incoming, limit)

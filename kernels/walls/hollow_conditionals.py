@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from ...geometry.scene.columns import LEFT, RIGHT, RUN_SINE
 if TYPE_CHECKING:
     from ...geometry.itineraries.compiled.changes import Setting
     from ...geometry.scene.scene import Scene
+
+Result = TypeVar("Result")
 
 # A ray is unresolved after MOST_COLLISIONS collisions. Where runs of collisions are computed in one step, at most
 # MOST_IN_RUNS of them count as ray segments.
@@ -41,6 +44,14 @@ class _Pieces(NamedTuple):
     high: Floats
     label: NDArray[np.uint64]
     width_that_matters: float
+
+
+def _result(call: Callable[[], Result]) -> Result:
+    """Return the result of a compiled call that may take seconds."""
+    from ...geometry.tracing.compiled.pointers import checked
+    from ...geometry.tracing.threads import interruptibly
+
+    return interruptibly(lambda: checked(call))
 
 
 @dataclass
@@ -99,16 +110,15 @@ class HollowConditionals:
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
         from ...geometry.itineraries.compiled.gauss import gauss_tables
-        from ...geometry.itineraries.compiled.march import march_angles
-        from ...geometry.tracing.threads import interruptibly
+        from ...geometry.itineraries.compiled.march import march_address, march_angles
 
         seeds = [
             self._seeds(angle, least) for angle, least in zip(theta.tolist(), tolerances * self.width, strict=True)
         ]
-        found = interruptibly(
+        found = _result(
             lambda: march_angles(
                 theta, tolerances, self._setting, self.degree, gauss_tables(self.least_level),
-                np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
+                np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]), march_address(),
             )
         )  # fmt: skip
         (nodes, widths), node_starts, pieces, piece_starts, errors, unresolved, rays, segments = found
@@ -149,7 +159,6 @@ class HollowConditionals:
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among ``theta`` and their neighbours at which a piece was missed."""
         from ...geometry.itineraries.compiled.neighbours import find_missed
-        from ...geometry.tracing.threads import interruptibly
 
         position = np.searchsorted(self._theta, theta)
         near = np.unique(np.clip(np.concatenate((position - 1, position, position + 1)), 0, len(self._theta) - 1))
@@ -160,8 +169,12 @@ class HollowConditionals:
         pieces = tuple(np.concatenate([conditional[part] for conditional in found_conditionals]) for part in range(3))
         starts = np.cumsum([0, *(len(conditional.low) for conditional in found_conditionals)])
         least = np.array([conditional.width_that_matters for conditional in found_conditionals])
-        found = interruptibly(lambda: find_missed(angles, least, pieces, starts, linked, self._setting, self.degree))
-        owner, entries, rays, segments = found
+        most = 2 * len(pieces[0])
+        found = np.empty(most, np.int64), np.empty(most), np.zeros(1, np.int64)
+        count, rays = _result(
+            lambda: find_missed(angles, least, pieces, starts, linked, self._setting, self.degree, found)
+        )
+        owner, entries, segments = found[0][:count], found[1][:count], int(found[2][0])
         self.rays, self.segments = self.rays + rays, self.segments + segments
         for angle, x in zip(angles[owner].tolist(), entries.tolist(), strict=True):
             self._missed.setdefault(angle, []).append(x)
@@ -211,6 +224,7 @@ class HollowConditionals:
                 there = self._pieces[beyond]
                 middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
                 drift = (0.5 * (low + high) - middle) / (present - beyond)
-        angle = float(find_critical(np.uint64(label), present, absent, low, high, drift, self._setting, self.degree))
+        piece = np.uint64(label), present, absent, low, high, drift
+        angle = float(_result(lambda: find_critical(*piece, self._setting, self.degree)))
         self._critical[key] = angle
         return angle

@@ -343,6 +343,23 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
         sys.exit(1)
 
 
+@main.command(name="warm-up")
+def warm_up() -> None:
+    """Compile what the other commands use, and store it, so that no later call has to.
+
+    Useful in the image of a container, and before a job on many nodes.
+    """
+    import time
+
+    from .study.warm_up import TASKS, folder
+
+    for name, task in TASKS.items():
+        start = time.perf_counter()
+        task()
+        click.echo(f"{name:40s} {time.perf_counter() - start:6.1f} s")
+    click.echo(f"stored in {folder()}")
+
+
 @main.command()
 @click.argument("problem", nargs=-1)
 @click.option("--quick", is_flag=True, help="Short ladders and cheap references: under three minutes.")

@@ -50,7 +50,7 @@ from ...scene.columns import (
     STRETCH,
 )
 from ...tracing.compiled.arcs import near_end, on_arc
-from ...tracing.compiled.options import compiled, inlined
+from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE
 from ...tracing.double_double.sides import ARC as CURVED
@@ -284,7 +284,7 @@ def face_at(kind, number, x, y, ground):
     return Face(SPLINE, number, arc, curve, (graph[FIRST_S] + parameter_at(graph, along), 0.0))
 
 
-@compiled
+@inner
 def is_in_front(kind, number, own, x, y, slack, ground):
     """-> bool: whether a satellite at (x, y) on the piece ``own`` lies in front of another piece close by."""
     # without a test for faces passed from behind on the last path

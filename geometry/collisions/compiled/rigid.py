@@ -31,7 +31,7 @@ from ...scene.columns import (
     STRETCH,
 )
 from ...tracing.compiled.interruption import is_raised
-from ...tracing.compiled.options import compiled, inlined
+from ...tracing.compiled.options import compiled, inlined, inner
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
 from .columns import ALPHA, OMEGA, V1, V2, X1
@@ -100,7 +100,7 @@ def near_edge(hollows, entry, slack):
     return False
 
 
-@compiled
+@inner
 def descent(path, span, ground):
     """-> (t, rotation, h, base, code): the time at which a satellite comes below the tops in the span, or inf.
 
@@ -128,7 +128,7 @@ def descent(path, span, ground):
     return t, rotation, hollow_at(ground.hollows, entry), base, CORNER if near or rising >= 0.0 else CLEAR
 
 
-@compiled
+@inner
 def first_contact(own, base, path, t, end, ground):
     """-> (Touch, h, base): the first contact in [t, end) of one satellite with the wall, its hollow and cell.
 
@@ -280,7 +280,7 @@ def first_of_all(own, below, path, height, angle, end, ring, ground):
     return time, hit, base, chosen, code
 
 
-@compiled
+@inner
 def left_below(own, below, path, angle, time, chosen, ring, ground):
     """-> Below: the neighbour, if any, that is below the tops when the satellite ``chosen`` touches the wall.
 

@@ -9,28 +9,23 @@ The constants of one angle are in a `Task`, the samples in a `Chain`.
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
-from ...scene.scene import Scene, Tables
-from ...tracing.compiled.options import OPTIONS
-from ...tracing.compiled.pointers import call_at
-from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, nearby_address, trace_rays_address
-from ...tracing.compiled.records import Results, results_for
+from ...scene.scene import NO_TABLES, Scene, Tables
+from ...tracing.compiled.options import allocating, inlined, inner
+from ...tracing.compiled.pointers import address_of, call_at
+from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, trace_rays_address
+from ...tracing.compiled.records import Results, Slots, results_for
 
-# Functions called from compiled code only have no wrappers, which would double the time of compilation. Functions that
-# neither allocate nor return arrays count no references, see `options`. Start integers as np.int64(0): a literal 0 has
-# its own type in numba, and each function that receives it would be compiled twice.
-_INNER = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-inner = njit(**_INNER)
-inlined = njit(**_INNER, forceinline=True)
-allocating = njit(**{**_INNER, "_nrt": True})
+# Start integers as np.int64(0): a literal 0 has its own type in numba, and each function that receives it would be
+# compiled twice.
 
 # Limit on the samples of one angle; the gaps that remain count as error.
 MOST_SAMPLES = 1 << 13
@@ -57,13 +52,14 @@ class Limits(NamedTuple):
 
 
 class Tracer(NamedTuple):
-    """The addresses of `trace_rays` and `hit_nearby`, and the arrays for a block of rays of equal incoming angle.
+    """The addresses of `trace_rays` and `halve_gaps`, the slots of late functions, and the arrays for a block of rays.
 
-    ``stop`` is never raised.
+    The rays of a block have the same incoming angle. ``stop`` is never raised.
     """
 
     address: int
-    nearby: int
+    halve: int
+    slots: Slots
     angles: Floats
     results: Results
     entries: Floats
@@ -103,8 +99,7 @@ class Chain(NamedTuple):
 def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats) -> Setting:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
     results, angles, stop = results_for(BLOCK, BLOCK, BLOCK), np.empty(BLOCK), np.zeros(1, np.int64)
-    address = trace_rays_address()
-    tracer = Tracer(address, nearby_address(), angles, results, np.empty(BLOCK), stop)
+    tracer = Tracer(trace_rays_address(), _halve_address(), SLOTS, angles, results, np.empty(BLOCK), stop)
     tables = scene.tables
     return Setting(tables.hollows[hollow], tables, limits, np.require(edges, np.float64, ["C", "A", "W"]), tracer)
 
@@ -136,7 +131,7 @@ def trace_block(entries, task):
     tracer = setting.tracer
     rays = entries, tracer.angles[: entries.shape[0]]
     limit = setting.limits.collisions
-    call_at(tracer.address, None, (*rays, setting.tables, limit, tracer.stop, tracer.results, tracer.nearby))
+    call_at(tracer.address, None, (*rays, setting.tables, limit, tracer.stop, tracer.results, tracer.slots))
 
 
 @inlined
@@ -253,6 +248,31 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
     return count
 
 
+def example_task() -> Task:
+    """Return a task of the types of all tasks, for which functions are compiled to be called by their address."""
+    results, stop = results_for(0), np.zeros(1, np.int64)
+    tracer = Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop)
+    setting = Setting(np.empty(0), NO_TABLES, Limits(1, 1, 1), np.empty(0), tracer)
+    return Task(setting, 0.0, 0, stop)
+
+
+def example_chain() -> Chain:
+    """Return a chain of the types of all chains."""
+    numbers, counts = np.empty(0), np.empty(0, np.int64)
+    return Chain(numbers, numbers, np.empty(0, np.uint64), counts, counts, counts)
+
+
+@cache
+def _halve_address() -> int:
+    return address_of(halve_gaps, (example_task(), example_chain(), 0, 0, 0.0, 0))
+
+
+@inlined
+def halved(task, chain, count, gap_count, goal, most):
+    """`halve_gaps`, called by its address."""
+    return call_at(task.setting.tracer.halve, count, (task, chain, count, gap_count, goal, most))
+
+
 @inner
 def sample_entries(entries, task, chain, goal):
     """Chain the samples at increasing positions and halve the gaps.
@@ -278,7 +298,7 @@ def sample_entries(entries, task, chain, goal):
                 gap_count += 1
     last = count - 1
     follow[last] = -1
-    return halve_gaps(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
+    return halved(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
 
 
 @inner
@@ -290,4 +310,4 @@ def add_change(x, first, task, chain, count, goal):
         before = follow[before]
     insert(x, before, count, task, chain)
     gaps[0], gaps[1] = before, count
-    return halve_gaps(task, chain, count + 1, np.int64(2), goal, np.int64(MOST_SAMPLES))
+    return halved(task, chain, count + 1, np.int64(2), goal, np.int64(MOST_SAMPLES))

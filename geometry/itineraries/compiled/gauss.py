@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from .changes import FIRST_LABEL, allocating, inner, is_spent, outcome, trace_block
+from ...tracing.compiled.options import allocating, inner
+from .changes import FIRST_LABEL, is_spent, outcome, trace_block
 
 ORDERS = (4, 7, 12, 20, 32)
 # Limit on the nodes of one incoming angle.

@@ -6,28 +6,32 @@ A node with another label than its piece reveals a missed change of itinerary; i
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
-from numba import njit
 
+from ....core.compilation import jit
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
-from ...tracing.compiled.growing import longer
+from ...tracing.compiled.growing import append, longer
+from ...tracing.compiled.options import allocating
+from ...tracing.compiled.pointers import address_of, call_at
 from .changes import (
     FIRST_LABEL,
     MOST_SAMPLES,
     add_change,
-    allocating,
     empty_chain,
+    example_chain,
+    example_task,
     is_spent,
     sample_entries,
     spread,
     task_of,
     undecided,
 )
-from .gauss import MOST_NODES, SPARE, integrate_piece
+from .gauss import MOST_NODES, SPARE, gauss_tables, integrate_piece
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 
 # Limit on the pieces of one angle whose middles are samples of the next angle.
 MOST_SEEDS = 128
@@ -141,14 +145,23 @@ def wide_middles(lows, highs, least):
     return middles
 
 
+@cache
+def march_address() -> int:
+    """Return the address of `march_angle`."""
+    pieces = np.empty(0), np.empty(0), np.empty(0, np.uint64)
+    rules, entries, nodes = gauss_tables(0), np.empty(0), (np.empty(0), np.empty(0))
+    return address_of(march_angle, (example_task(), 0.0, rules, entries, example_chain(), nodes, pieces))
+
+
 @_compile
-def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts):
+def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts, march):
     """Compute the conditional distributions at increasing incoming angles.
 
     The first samples at an angle are its seeds, which increase, and the middles of the pieces at the angle before, so
     that a narrow piece is followed until it disappears. Returns outgoing angles and masses, angle by angle, and the
     start of each angle; first positions, last positions and labels of the pieces, and the start of each angle; and for
-    each angle the error, the width of unresolved rays, and the numbers of rays and of ray segments.
+    each angle the error, the width of unresolved rays, and the numbers of rays and of ray segments. ``march`` is
+    `march_address`.
     """
     hollow = setting.hollow
     whole = hollow[RIGHT] - hollow[LEFT]
@@ -167,22 +180,26 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts)
         task = task_of(setting, thetas[k], degree, spent)
         goal = tolerances[k] * whole
         entries = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
-        filled, errors[k], unresolved[k], number, rays[k] = march_angle(
-            task, goal, rules, entries, chain, nodes, pieces
+        filled, errors[k], unresolved[k], number, rays[k] = call_at(
+            march,
+            (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)),
+            (task, goal, rules, entries, chain, nodes, pieces),
         )
         segments[k] = spent[0]
         previous = wide_middles(lows[:number], highs[:number], goal)
         begin, end = node_starts[k], node_starts[k] + filled
         if end > all_angles.shape[0]:
             all_angles, all_masses = longer(all_angles, 2 * end), longer(all_masses, 2 * end)
-        all_angles[begin:end], all_masses[begin:end] = angles[:filled], masses[:filled]
+        append(all_angles, begin, angles, filled)
+        append(all_masses, begin, masses, filled)
         node_starts[k + 1] = end
         begin, end = piece_starts[k], piece_starts[k] + number
         if end > all_lows.shape[0]:
             all_lows, all_highs = longer(all_lows, 2 * end), longer(all_highs, 2 * end)
             all_labels = longer(all_labels, 2 * end)
-        all_lows[begin:end], all_highs[begin:end] = lows[:number], highs[:number]
-        all_labels[begin:end] = labels[:number]
+        append(all_lows, begin, lows, number)
+        append(all_highs, begin, highs, number)
+        append(all_labels, begin, labels, number)
         piece_starts[k + 1] = end
     nodes, pieces = (all_angles, all_masses), (all_lows, all_highs, all_labels)
     return nodes, node_starts, pieces, piece_starts, errors, unresolved, rays, segments

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ....core.compilation import jit
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from .changes import inner, probe, task_of
+from ...tracing.compiled.options import inner
+from .changes import probe, task_of
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 # Number of positions, at most the last width away from the expected middle, at which a piece is searched. Near a
 # critical angle the width is proportional to the distance from this angle or to its square root; both cases are found.
 POINTS_TRIED = 17
@@ -28,22 +29,22 @@ def label_at(x, task):
 
 
 @_compile
-def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree):
+def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree, found):
     """Return entry points whose ray has another label than the piece around them.
 
     The candidates are the middles of the pieces at a neighbouring angle: angles ``k`` and ``k + 1`` are compared if
-    ``linked[k]``. Pieces no wider than ``least_widths`` of the other angle are ignored. Returns the numbers of the
-    angles, the positions, and the numbers of rays and of ray segments.
+    ``linked[k]``. Pieces no wider than ``least_widths`` of the other angle are ignored. ``found`` are arrays
+    to fill, with the numbers of the angles, with the positions, and with the number of ray segments; each piece may be
+    found twice. Returns the numbers of positions and of rays.
     """
     lows, highs, labels = pieces
-    spent = np.zeros(1, np.int64)
-    owners, entries = [0 for _ in range(0)], [0.0 for _ in range(0)]
-    rays = 0
+    owners, entries, segments = found
+    count, rays = np.int64(0), np.int64(0)
     for k in range(thetas.shape[0] - 1):
         if not linked[k]:
             continue
         for here, there in ((k, k + 1), (k + 1, k)):
-            task = task_of(setting, thetas[there], degree, spent)
+            task = task_of(setting, thetas[there], degree, segments)
             m, end = starts[there], starts[there + 1]
             for p in range(starts[here], starts[here + 1]):
                 if highs[p] - lows[p] <= least_widths[there]:
@@ -55,9 +56,9 @@ def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree):
                 if labels[m] != labels[p] and lows[m] < x < highs[m]:
                     rays += 1
                     if label_at(x, task) != labels[m]:
-                        owners.append(there)
-                        entries.append(x)
-    return np.array(owners, dtype=np.int64), np.array(entries), rays, spent[0]
+                        owners[count], entries[count] = there, x
+                        count += 1
+    return count, rays
 
 
 @inner

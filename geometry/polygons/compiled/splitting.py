@@ -12,8 +12,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
+from ....core.compilation import jit
 from ....core.rounding import EPS
 from ...tracing.compiled.growing import larger, longer, taller
 from ...tracing.compiled.options import inlined
@@ -61,7 +61,7 @@ from .columns import (
 )
 from .heap import BeamTables, copied, pop, push, put
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 # Rounding error of f, in eps times the sum of the absolute terms: five products of numbers with one to three errors.
 FUNCTIONAL_ULPS = 8.0
 # Rounding error of 2 d R n, by which a reflection changes T: d, n, R and the two products have one error each.

@@ -2,16 +2,19 @@
 
 A hollow is a row of the table of `scene/closed_forms`. Rays are computed in blocks that fit into the first-level cache,
 hollow by hollow. The loops over a block have no branches and work in place, so the compiler vectorises them. They use
-sums, products, quotients, roots and selections only, so a ray's result does not depend on its block.
+sums, products, quotients, roots and selections only, so a ray's result does not depend on its block. `cross_arc` and
+`cross_wedge` are called by their address, once for many rays, and compiled for walls that have such a hollow.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
+from ....core.checks import Floats
 from ...scene.columns import (
     CHAIN,
     CIRCLE_X,
@@ -34,6 +37,8 @@ from ...scene.columns import (
     WEDGE_X,
     WEDGE_Y,
 )
+from .options import compiled, inlined, inner
+from .pointers import Late, address_at, call_at
 from .rays import FLAT_TOP, TOP_CORNER, opening_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 
@@ -44,10 +49,21 @@ RAYS = 512
 # Adding and then subtracting this number rounds a number below 2^51 to an integer.
 ROUNDER = 1.5 * 2.0**52
 
-_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+
+class Room(NamedTuple):
+    """Work space: six arrays for the rays of a block, three lists of rays, and the first ray of each hollow (-1)."""
+
+    numbers: Floats
+    lists: NDArray[np.int64]
+    heads: NDArray[np.int64]
 
 
-@_compile
+def room_for(hollows: Floats) -> Room:
+    """Return the work space of `trace_closed`, for one thread."""
+    return Room(np.empty((6, RAYS)), np.empty((3, RAYS), np.int64), np.full(len(hollows), -1))
+
+
+@inner
 def cross_arc(form, entry, angle, hits, moment, incidence):
     """Reflect rays by a circular hollow: entry and angle become those of the exit, hits their number (0 if in doubt).
 
@@ -95,7 +111,7 @@ def cross_arc(form, entry, angle, hits, moment, incidence):
         entry[i] = middle + (radius * moment[i] - height * cosine) / sine
 
 
-@_compile
+@inner
 def cross_wedge(form, entry, angle, hits, vx, vy, turn):
     """Reflect rays by a wedge, with results as in `cross_arc`; the last three arrays are work space.
 
@@ -141,33 +157,50 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
         entry[i] = exit
 
 
-@_compile
-def cross(form, entry, angle, hits, room):
+def _crossings() -> tuple[Late, Late]:
+    form, work = np.empty(1), np.empty(1)
+    return Late(cross_wedge, (form, *[work] * 6)), Late(cross_arc, (form, *[work] * 5))
+
+
+WEDGES, ARCS = _crossings()
+# The slots of `cross_wedge` and `cross_arc`.
+CROSSINGS = WEDGES.slot, ARCS.slot
+
+
+@inlined
+def cross(form, entry, angle, hits, room, crossings):
     """Reflect rays by one hollow; ``room`` is work space."""
     count = entry.shape[0]
-    if form[FORM] == WEDGE:
-        cross_wedge(form, entry, angle, hits, room[0, :count], room[1, :count], room[2, :count])
+    wedge, arc = crossings
+    address = address_at(wedge if form[FORM] == WEDGE else arc)
+    first, second = room[0, :count], room[1, :count]
+    if address == 0:
+        for j in range(count):
+            hits[j] = 0.0
+    elif form[FORM] == WEDGE:
+        call_at(address, None, (form, entry, angle, hits, first, second, room[2, :count]))
     else:
-        cross_arc(form, entry, angle, hits, room[0, :count], room[1, :count])
+        call_at(address, None, (form, entry, angle, hits, first, second))
 
 
-@_compile
+@inlined
 def cell_of(x, cell):
     """Return the left end of the cell that contains x."""
     return np.floor(x / cell) * cell
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
-def trace_closed(x, theta, hollows, closed, cell, limit, results):
+@compiled
+def trace_closed(x, theta, scene, limit, results, work, crossings):
     """Trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
 
-    ``results`` are four arrays to fill: x, theta, collisions, status.
+    ``scene`` are the hollows, their closed forms, and the width of a cell. ``results`` are four arrays to fill: x,
+    theta, collisions, status. ``work`` is `room_for`, ``crossings`` is `CROSSINGS`.
     """
+    hollows, closed, cell = scene
     out_x, out_theta, bounces, status = results
-    room = np.empty((6, RAYS))
-    rays, others, met = np.empty(RAYS, np.int64), np.empty(RAYS, np.int64), np.empty(RAYS, np.int64)
+    room, heads = work.numbers, work.heads
     # linked lists of the rays of each hollow in a block: `heads` is the first ray, `others` the next
-    heads = np.full(hollows.shape[0], -1)
+    rays, others, met = work.lists[0], work.lists[1], work.lists[2]
     whole = hollows.shape[0] == 1 and hollows[0, LEFT] == 0.0 and hollows[0, RIGHT] == cell
     for first in range(0, x.shape[0], RAYS):
         count = min(RAYS, x.shape[0] - first)
@@ -179,7 +212,7 @@ def trace_closed(x, theta, hollows, closed, cell, limit, results):
                 entry[j] = starts[j] - cell_of(starts[j], cell)
             for j in range(count):
                 angle[j] = theta[first + j]
-            cross(closed[0], entry, angle, hits, room)
+            cross(closed[0], entry, angle, hits, room, crossings)
             for j in range(count):
                 entry[j] += cell_of(starts[j], cell)
             for j in range(count):
@@ -212,7 +245,7 @@ def trace_closed(x, theta, hollows, closed, cell, limit, results):
             for j in range(count):
                 entry[j] = x[rays[j]] - cell_of(x[rays[j]], cell)
                 angle[j] = theta[rays[j]]
-            cross(closed[h], entry, angle, hits, room)
+            cross(closed[h], entry, angle, hits, room, crossings)
             for j in range(count):
                 i = rays[j]
                 out_x[i], out_theta[i], bounces[i] = entry[j] + cell_of(x[i], cell), angle[j], int(hits[j])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+from ....core.compilation import jit
+
+_compile = jit()
 
 
 @_compile
@@ -15,6 +16,13 @@ def longer(array, size):
     for i in range(array.shape[0]):
         new[i] = array[i]
     return new
+
+
+@_compile
+def append(array, begin, source, count):
+    """Copy the first ``count`` entries of ``source`` to ``array``, from ``begin`` on."""
+    for i in range(count):
+        array[begin + i] = source[i]
 
 
 @_compile

@@ -25,7 +25,8 @@ from ..double_double.sides import LINE as STRAIGHT
 from .arcs import arc_time, on_arc
 from .beziers import bezier_hit
 from .lines import line_time
-from .options import allocating, compiled
+from .options import allocating, inner
+from .pointers import address_at, call_at
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 
 # A value of `Hit.doubt`: the side of the piece on which the ray starts is not resolved.
@@ -61,7 +62,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
     )  # fmt: skip
 
 
-@compiled
+@inner
 def line_nearby(tables, j, px, py, vx, vy, slack):
     """-> (t, fraction, is_clear): time to a line close by, or inf; whether the line is certainly ahead."""
     joints = tables.joints
@@ -75,7 +76,7 @@ def line_nearby(tables, j, px, py, vx, vy, slack):
     return np.inf, 0.0, False
 
 
-@compiled
+@inner
 def arc_nearby(arc, px, py, vx, vy, slack):
     """-> (t, tangent, is_clear): time to a hit on an arc close by, or inf; see `line_nearby`."""
     stretch = arc[STRETCH]
@@ -89,7 +90,7 @@ def arc_nearby(arc, px, py, vx, vy, slack):
     return t, tangent, height > wide
 
 
-@compiled
+@inner
 def piece_nearby(tables, piece, own, px, py, vx, vy, slack):
     """-> (t, s, tangent, is_clear): time to a hit on a piece close by, or inf, and the position s on the piece.
 
@@ -131,6 +132,12 @@ def hit_nearby(scope, own, px, py, vx, vy):
             t, s, tangent, is_clear = piece_nearby(tables, (kind, number), own, px, py, vx, vy, slack)
             if t < found.time:
                 hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else DOUBTFUL)
-                if is_clear or starts_in_front(tables, hit, own, px, py, vx, vy, slack):
+                if is_clear:
+                    found = hit
+                    continue
+                address = address_at(scope.slots.in_front)
+                if address == 0:
+                    return Hit(hit.time, kind, number, s, DOUBTFUL)
+                if call_at(address, is_clear, (tables, hit, own, px, py, vx, vy, slack)):
                     found = hit
     return found

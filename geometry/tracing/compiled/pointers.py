@@ -1,16 +1,23 @@
 """Calls of compiled functions by their address. Loads numba.
 
 numba copies all called functions into a function and optimises them again, at every level. A large function that is
-called from many places, or seldom, is compiled once instead and called by its address.
+called from many places, or seldom, is compiled once instead and called by its address. A function that few walls need
+is not compiled before the first call: compiled code then calls back into Python, which compiles or loads it.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import ctypes
+from collections.abc import Callable
+from typing import Any, ClassVar, TypeVar
 
+import numpy as np
+from llvmlite import ir
 from numba import typeof, types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+Result = TypeVar("Result")
 
 
 def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
@@ -19,6 +26,57 @@ def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
     function.compile(kinds)
     version = function.overloads[kinds]
     return int(version.library.get_pointer_to_function(version.fndesc.llvm_func_name))
+
+
+class Late:
+    """A function that is compiled or loaded when compiled code first calls it.
+
+    ``slot`` is the address of two numbers in memory: the address of the function, 0 before the first call, and the
+    address of the call into Python that finds it.
+
+    Compiled code cannot pass on an exception of that call, as of Ctrl-C during the compilation. `address_at` returns 0
+    then, and `checked` raises the exception.
+    """
+
+    failures: ClassVar[list[BaseException]] = []
+
+    def __init__(self, function: Any, arguments: tuple[Any, ...]) -> None:
+        self._function, self._arguments = function, arguments
+        self._callback = ctypes.CFUNCTYPE(ctypes.c_int64)(self.load)
+        self._words = np.array([0, ctypes.cast(self._callback, ctypes.c_void_p).value], np.int64)
+        self.slot = int(self._words.ctypes.data)
+
+    def load(self) -> int:
+        """Compile or load the function now; return its address, 0 if that failed."""
+        try:
+            self._words[0] = address_of(self._function, self._arguments)
+        except BaseException as reason:
+            self.failures.append(reason)
+        return int(self._words[0])
+
+
+def checked(call: Callable[[], Result]) -> Result:
+    """Return the result of a call of a compiled function; raise what went wrong when it loaded a `Late` function."""
+    result = call()
+    if Late.failures:
+        raise Late.failures.pop()
+    return result
+
+
+@intrinsic
+def address_at(context, slot):
+    """Return the address of the function of a `Late`, compiled or loaded if necessary; 0 if that failed."""
+
+    def read(context, builder, signature, values):
+        word = ir.IntType(64)
+        words = builder.inttoptr(values[0], word.as_pointer())
+        found = cgutils.alloca_once_value(builder, builder.load_atomic(words, "acquire", 8))
+        with cgutils.if_unlikely(builder, builder.icmp_unsigned("==", builder.load(found), word(0))):
+            finder = builder.load(builder.gep(words, [word(1)]))
+            builder.store(builder.call(builder.inttoptr(finder, ir.FunctionType(word, []).as_pointer()), []), found)
+        return builder.load(found)
+
+    return types.intp(types.intp), read
 
 
 @intrinsic

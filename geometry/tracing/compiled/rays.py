@@ -56,10 +56,10 @@ from .arcs import arc_incidence, arc_reflect, arc_time, near_end, on_arc_after
 from .beziers import bend_number, bezier_hit, bezier_reflect
 from .interruption import is_raised
 from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_grid
-from .nearby import DOUBTFUL, hit_nearby
+from .nearby import DOUBTFUL, hit_nearby, starts_in_front
 from .options import compiled, inlined
-from .pointers import address_of, call_at
-from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, results_for
+from .pointers import Late, address_at, address_of, call_at
+from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, results_for
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
 
@@ -100,7 +100,7 @@ def opening_at(entry, hollows):
 
 
 @inlined
-def scope_of(tables, h, nearby):
+def scope_of(tables, h, slots):
     """-> Scope: hollow number h."""
     hollow = tables.hollows[h]
     return Scope(
@@ -114,7 +114,7 @@ def scope_of(tables, h, nearby):
         (int(hollow[FIRST_ELLIPSE]), int(hollow[ELLIPSES_END])),
         (int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])),
         hollow[GRID_COLUMNS] > 0.0,
-        nearby,
+        slots,
     )
 
 
@@ -162,7 +162,10 @@ def nearest_piece(scope, own, px, py, vx, vy):
     if t < hit.time:
         hit = Hit(t, LINE, line, fraction, 0)
     if nearby or near:
-        close_by = call_at(scope.nearby, hit, (scope, own, px, py, vx, vy))
+        address = address_at(scope.slots.nearby)
+        if address == 0:
+            return Hit(hit.time, hit.kind, hit.number, hit.s, DOUBTFUL), corner
+        close_by = call_at(address, hit, (scope, own, px, py, vx, vy))
         if close_by.time < hit.time:
             hit = close_by
     return hit, corner
@@ -332,8 +335,8 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
 
 
 @compiled
-def trace_rays(x, theta, tables, limit, stop, results, nearby):
-    """Trace a block of rays into ``results``, until ``stop`` is raised; ``nearby`` is `nearby_address()`."""
+def trace_rays(x, theta, tables, limit, stop, results, slots):
+    """Trace a block of rays into ``results``, until ``stop`` is raised; ``slots`` are `SLOTS`."""
     out_x, out_theta, collisions, status = results.x, results.theta, results.collisions, results.status
     hollows, cell, labelled = tables.hollows, tables.cell, results.itinerary.shape[0] > 0
     for i in range(x.shape[0]):
@@ -347,7 +350,7 @@ def trace_rays(x, theta, tables, limit, stop, results, nearby):
         if h == TOP_CORNER:
             out_x[i], out_theta[i], collisions[i], status[i] = x[i], theta[i] - math.pi, 0, CORNER
             continue
-        scope = scope_of(tables, h, nearby)
+        scope = scope_of(tables, h, slots)
         end, vx, vy, collisions[i], status[i], label = trace_ray(
             scope, x[i] - base, theta[i], limit, labelled, results.path
         )
@@ -360,15 +363,22 @@ def trace_rays(x, theta, tables, limit, stop, results, nearby):
             results.velocity[i, POINT_X], results.velocity[i, POINT_Y] = vx, vy
 
 
-@cache
-def nearby_address() -> int:
-    """Return the address of `hit_nearby`, for all walls."""
-    scope = Scope(NO_TABLES, np.empty(0), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, 0)
-    return address_of(hit_nearby, (scope, Own(OPENING, -1, -1.0, 0.0, -1, 0), 0.0, 0.0, 0.0, 0.0))
+def _late_functions() -> tuple[Late, Late]:
+    """Return `hit_nearby` and `starts_in_front`, for all walls; few rays need them."""
+    own, numbers = Own(OPENING, -1, -1.0, 0.0, -1, 0), (0.0, 0.0, 0.0, 0.0)
+    scope = Scope(NO_TABLES, np.empty(0), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, Slots(0, 0))
+    return (
+        Late(hit_nearby, (scope, own, *numbers)),
+        Late(starts_in_front, (NO_TABLES, Hit(0.0, LINE, 0, 0.0, 0), own, *numbers, 0.0)),
+    )
+
+
+NEARBY, IN_FRONT = _late_functions()
+SLOTS = Slots(NEARBY.slot, IN_FRONT.slot)
 
 
 @cache
 def trace_rays_address() -> int:
     """Return the address of `trace_rays`, for all walls, with or without velocities and itineraries."""
     numbers, stop = np.empty(0), np.zeros(1, np.int64)
-    return address_of(trace_rays, (numbers, numbers, NO_TABLES, 1, stop, results_for(0), nearby_address()))
+    return address_of(trace_rays, (numbers, numbers, NO_TABLES, 1, stop, results_for(0), SLOTS))

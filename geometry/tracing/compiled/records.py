@@ -14,12 +14,19 @@ from ...scene.scene import Tables
 NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
 
+class Slots(NamedTuple):
+    """The slots (`Late`) of functions that few rays need: `hit_nearby` and `starts_in_front`."""
+
+    nearby: int
+    in_front: int
+
+
 class Scope(NamedTuple):
     """The hollow that contains a ray.
 
     The tables of the wall, the row of the hollow, the ends of its opening, and the slack: double precision does not
     resolve hits within the slack of a joint. Then the ranges of the hollow's joints and pieces in the tables, whether
-    its lines have a grid, and the address of `hit_nearby`.
+    its lines have a grid, and the slots of late functions.
     """
 
     tables: Tables
@@ -32,7 +39,7 @@ class Scope(NamedTuple):
     ellipses: tuple[int, int]
     beziers: tuple[int, int]
     has_grid: bool
-    nearby: int
+    slots: Slots
 
 
 class Own(NamedTuple):

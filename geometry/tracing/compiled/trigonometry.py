@@ -7,7 +7,7 @@ coefficients come from ``tests/precise_polynomials.py``; errors are below 2 ulp 
 
 from __future__ import annotations
 
-from numba import njit
+from ....core.compilation import jit
 
 # pi as the sum of two doubles
 PI, PI_REST = 3.141592653589793, 1.2246467991473532e-16
@@ -55,7 +55,7 @@ ARCSINE = (
     0.6638457554315355,
 )
 
-_compile = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+_compile = jit(forceinline=True, no_cpython_wrapper=True)
 
 
 @_compile

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ....core.compilation import jit
 from ...scene.columns import (
     CURVATURE,
     END_X,
@@ -45,7 +45,7 @@ from .arithmetic import (
     wide,
 )
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 
 
 @_compile

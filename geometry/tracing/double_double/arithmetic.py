@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from ....core.compilation import jit
 
 # Bound on the relative error of one operation: 15 u^2 < 2^-102.
 EPS_DOUBLE_DOUBLE = 2.0**-102
@@ -37,7 +37,7 @@ def _inverse_factorials() -> tuple[tuple[float, float], ...]:
 
 _INVERSE_FACTORIALS = _inverse_factorials()
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 
 
 @_compile

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ....core.compilation import jit
 from ...scene.columns import END_X, END_Y, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
 from ...scene.tolerances import NEARBY
 from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, square_root, subtract, wide
@@ -14,7 +14,7 @@ from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, 
 # Limit on bisections, more than the search for neighbouring doubles needs.
 ROOT_STEPS = 200
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 
 
 @_compile

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ....core.compilation import jit
 from .arithmetic import divide, multiply, sine_cosine, subtract, wide
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@jit()
 def crossings_modulo_two(double_height, theta):
     """Return d mod 2 for d = double_height |cot theta| < 2^53, with an error of at most about d 2^-100."""
     found = np.empty(theta.size)

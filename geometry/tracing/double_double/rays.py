@@ -25,8 +25,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ....core.compilation import jit
 from ....core.rounding import EPS
 from ...scene.columns import (
     BAND_HIGH,
@@ -93,7 +93,7 @@ LARGEST_ERROR = 2.0**-50
 # Runs up to this number of hits are traced hit by hit, as a check of `compiled/runs`; so are the last hits of a run.
 LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 
 
 @_compile

@@ -21,9 +21,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....core.checks import Floats
+from ....core.compilation import jit
 from ....core.rounding import EPS, UNIT_ROUNDOFF
 from ...scene.columns import END_X, END_Y, JOINT_X, JOINT_Y, START_X, START_Y
 from .arcs import arc_height
@@ -40,7 +40,7 @@ BEHIND_SLACKS = 4.0
 # Newton steps that project a position onto a curve within rounding of it; each step squares the error.
 STEPS = 2
 
-_compile = njit(cache=True, nogil=True, error_model="numpy")
+_compile = jit()
 
 
 class Face(NamedTuple):

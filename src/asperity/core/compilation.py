@@ -1,0 +1,143 @@
+"""The decorator of compiled functions, and the cache that stores them on disk. Loads numba.
+
+numba compiles a function when it is first called, and stores the result beside the module, else in the user's cache
+folder. If both are read-only, as in containers, it is stored in a temporary folder. A damaged file is ignored, and
+written again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import multiprocessing
+import os
+import pickle
+import stat
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from tempfile import gettempdir, mkdtemp
+from typing import Any
+
+from numba import njit
+from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, _CacheLocator
+from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
+from numba.core.serialize import dumps
+
+logger = logging.getLogger("asperity")
+
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+def jit(**options: Any) -> Callable[[Any], Any]:
+    """Return a decorator that compiles a function and stores it on disk, with ``options`` of numba's ``njit``.
+
+    Unless the options say otherwise, the function releases the lock of the interpreter, divides by zero as numpy does,
+    and has no wrapper for calls from C.
+    """
+    decorate: Any = njit(**{**OPTIONS, **options})
+
+    def compiled(function: Any) -> Any:
+        dispatcher = decorate(function)
+        # not with numba's switch that turns compilation off
+        if hasattr(dispatcher, "enable_caching"):
+            try:
+                # what the option ``cache`` does, with another cache
+                dispatcher._cache = _SafeCache(function)
+            except RuntimeError:
+                logger.warning("no folder is writable, so compiled functions are not stored; set NUMBA_CACHE_DIR")
+        return dispatcher
+
+    return compiled
+
+
+@cache
+def announce() -> None:
+    """Say once that functions are being compiled: in the log, and on a terminal."""
+    text = "asperity: compiling, once (about 10 s)"
+    logger.info(text)
+    if sys.stderr is not None and sys.stderr.isatty() and multiprocessing.parent_process() is None:
+        print(text, file=sys.stderr, flush=True)
+
+
+@cache
+def temporary_folder() -> Path:
+    """Return a folder of this user alone, because functions in it are executed; the same one in all processes."""
+    folder = Path(gettempdir()) / f"asperity-{os.getuid()}"
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        state = folder.lstat()
+        if stat.S_ISDIR(state.st_mode) and state.st_uid == os.getuid() and not state.st_mode & 0o077:
+            logger.info("compiled functions are stored in %s; to choose a folder set NUMBA_CACHE_DIR", folder)
+            return folder
+    return Path(mkdtemp(prefix="asperity-"))
+
+
+class _Temporary(SourceStamp, _CacheLocator):
+    """The last folder that is tried."""
+
+    def __init__(self, function: Any, file: str) -> None:
+        self._py_file, self._lineno = file, function.__code__.co_firstlineno
+        self._path = str(temporary_folder() / self.get_suitable_cache_subpath(file))
+
+    def get_cache_path(self) -> str:
+        return self._path
+
+    @classmethod
+    def from_function(cls, function: Any, file: str) -> Any:
+        try:
+            return super().from_function(function, file)
+        except OSError:
+            return None
+
+
+class _Checked(CompileResultCacheImpl):
+    """Stores a function with its sha256, because damaged machine code would end the process."""
+
+    _locator_classes = [*CacheImpl._locator_classes, _Temporary]  # noqa: RUF012 - numba's base class says how
+
+    def reduce(self, result: Any) -> tuple[bytes, bytes]:
+        whole = dumps(super().reduce(result))
+        return hashlib.sha256(whole).digest(), whole
+
+    def rebuild(self, context: Any, stored: tuple[bytes, bytes]) -> Any:
+        digest, whole = stored
+        if hashlib.sha256(whole).digest() != digest:
+            raise pickle.UnpicklingError("its sha256 is another one")
+        return super().rebuild(context, pickle.loads(whole))
+
+
+class _SafeCache(FunctionCache):
+    """A function's files, which are written again if they are damaged."""
+
+    _impl_class = _Checked
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        found = None
+        try:
+            found = super().load_overload(signature, context)
+        # a damaged pickle can raise anything
+        except Exception as reason:
+            self._forget(reason)
+        if found is None:
+            announce()
+        return found
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        try:
+            try:
+                super().save_overload(signature, result)
+            except OSError:
+                raise
+            except Exception as reason:
+                self._forget(reason)
+                super().save_overload(signature, result)
+        except OSError as reason:
+            logger.warning("a compiled function is not stored in %s (%s)", self.cache_path, reason)
+
+    def _forget(self, reason: Exception) -> None:
+        logger.info("a damaged file of compiled functions in %s is made again (%r)", self.cache_path, reason)
+        with suppress(OSError):
+            self.flush()

@@ -1,0 +1,191 @@
+"""Compiled functions on disk: damaged files, folders that are read-only, and what is said about it."""
+
+import importlib.util
+import logging
+import os
+import pty
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import asperity
+from asperity.core import compilation
+
+TWICE = "from asperity.core.compilation import jit\n@jit()\ndef twice(x):\n    return 2.0 * x\n"
+SOURCE = Path(asperity.__file__).parent
+
+
+@pytest.fixture
+def module(tmp_path):
+    (tmp_path / "doubling.py").write_text(TWICE)
+    return tmp_path / "doubling.py"
+
+
+def loaded(path):
+    """The compiled function of a module, as a fresh process would have it."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    found = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(found)
+    return found.twice
+
+
+def hits_after_a_call(path):
+    function = loaded(path)
+    assert function(1.5) == 3.0
+    return sum(function.stats.cache_hits.values())
+
+
+def test_a_compiled_function_is_loaded_from_disk(module):
+    assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda data: b"",
+        lambda data: data[:7],
+        lambda data: data[: len(data) // 2],
+        lambda data: data[:-1],
+        lambda data: b"nonsense",
+        lambda data: b"\x80\x04N." + data,
+    ],
+)
+def test_a_damaged_file_is_made_again(module, suffix, damage):
+    hits_after_a_call(module)
+    [file] = module.parent.rglob(f"*.{suffix}")
+    file.write_bytes(damage(file.read_bytes()))
+    assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+
+
+def test_machine_code_with_a_flipped_bit_is_not_run(module):
+    hits_after_a_call(module)
+    [file] = module.parent.rglob("*.nbc")
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(data)
+    assert [hits_after_a_call(module) for _ in range(2)] == [0, 1]
+
+
+def test_without_a_writable_folder_functions_are_compiled_nevertheless(module, monkeypatch, caplog):
+    monkeypatch.setattr(compilation._Checked, "_locator_classes", ())
+    assert [hits_after_a_call(module) for _ in range(2)] == [0, 0]
+    assert "NUMBA_CACHE_DIR" in caplog.text
+
+
+def test_a_full_disk_does_not_end_a_call(module, monkeypatch, caplog):
+    def no_space(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", no_space)
+    assert hits_after_a_call(module) == 0
+    assert "No space left on device" in caplog.text
+
+
+def test_compiling_is_announced_once_in_the_log(module, caplog):
+    compilation.announce.cache_clear()
+    with caplog.at_level(logging.INFO, "asperity"):
+        function = loaded(module)
+        function(1.5)
+        function(1)
+    assert [record.message for record in caplog.records] == ["asperity: compiling, once (about 10 s)"]
+    caplog.clear()
+    compilation.announce.cache_clear()
+    with caplog.at_level(logging.INFO, "asperity"):
+        loaded(module)(1.5)
+    assert caplog.records == []
+
+
+def test_a_folder_of_another_user_or_open_to_others_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setattr(compilation, "gettempdir", lambda: str(tmp_path))
+    compilation.temporary_folder.cache_clear()
+    own = tmp_path / f"asperity-{os.getuid()}"
+    assert compilation.temporary_folder() == own and own.stat().st_mode & 0o077 == 0
+    own.chmod(0o777)
+    compilation.temporary_folder.cache_clear()
+    try:
+        other = compilation.temporary_folder()
+        assert other != own and other.stat().st_mode & 0o077 == 0
+        other.rmdir()
+    finally:
+        compilation.temporary_folder.cache_clear()
+
+
+@pytest.fixture
+def read_only(tmp_path):
+    """A copy of the package and an environment in which only the temporary folder takes files.
+
+    Files stand where the folders for compiled functions would be, which keeps out root, too.
+    """
+    package = tmp_path / "install" / "asperity"
+    shutil.copytree(SOURCE, package, ignore=shutil.ignore_patterns("__pycache__", "*.nb[ic]"))
+    for folder in [package, *(path for path in package.rglob("*") if path.is_dir())]:
+        (folder / "__pycache__").write_text("")
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("NUMBA", "XDG"))}
+    environment |= {"HOME": "/dev/null", "TMPDIR": str(scratch), "PYTHONPATH": str(package.parent)}
+    return environment, scratch
+
+
+TRACE = "from asperity import geometry as geo; print(geo.trace(geo.flat(), [0.2], [1.0]).counts()['escaped'])"
+
+
+def test_in_a_read_only_install_functions_are_stored_in_a_temporary_folder(read_only):
+    environment, scratch = read_only
+    done = subprocess.run([sys.executable, "-c", TRACE], env=environment, capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "1", "")
+    assert list(scratch.glob(f"asperity-{os.getuid()}/*/*.nbc"))
+
+
+def test_a_terminal_shows_that_functions_are_compiled(tmp_path, module):
+    reader, writer = pty.openpty()
+    command = f"import sys; sys.path[:0] = {[str(SOURCE.parent), str(tmp_path)]}; import doubling; doubling.twice(1.0)"
+    shown = []
+    for _ in range(2):
+        done = subprocess.run([sys.executable, "-c", command], stderr=writer, timeout=300)
+        assert done.returncode == 0
+        os.write(writer, b"end\n")
+        shown.append(os.read(reader, 4096).decode().split())
+    assert shown == [["asperity:", "compiling,", "once", "(about", "10", "s)", "end"], ["end"]]
+
+
+STUDY = """
+import logging, sys
+from asperity.cli import main
+logging.basicConfig(level=logging.INFO, stream=sys.stdout)
+main(sys.argv[1:], standalone_mode=False)
+"""
+
+
+def test_after_the_warm_up_a_study_compiles_nothing():
+    environment = os.environ | {"PYTHONPATH": str(SOURCE.parent)}
+
+    def printed(*arguments):
+        done = subprocess.run(
+            [sys.executable, "-c", STUDY, *arguments], env=environment, capture_output=True, text=True, timeout=900
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert "stored in " in printed("warm-up")
+    for wall in ("focusing-arcs", "triangular-teeth"):
+        text = printed("study", wall, "--bins", "16", "--tolerance", "0.01")
+        assert "gap" in text and "compiling" not in text
+
+
+def test_ctrl_c_during_a_late_compilation_is_not_lost(monkeypatch):
+    from asperity.geometry.tracing.compiled import pointers
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(pointers, "address_of", interrupted)
+    late = pointers.Late(None, ())
+    # compiled code gets 0 from this call, and goes on
+    with pytest.raises(KeyboardInterrupt):
+        pointers.checked(lambda: late.load())
+    assert pointers.Late.failures == []
