@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 # Ratio of the changes by two successive doublings of the basis, for order 2, the lowest order of the bases.
 EARLIER_FRACTION = 0.25
+# On one matrix the distance from the law's eigenvalue is at most this many times the change from the coarser basis for
+# 97 % of 156 gaps of walls and scatterings in Legendre polynomials and bins; at most the change itself for 81 %.
+ONE_MATRIX = 3.0
 Verdict = Literal["isolated", "essential edge", "no gap", "undecided"]
 # A sampled matrix is rejected as irreversible if its antisymmetric part has a z-score above this. Under reversibility
 # the score is standard normal and exceeds 5 once in 3.5 million matrices.
@@ -82,8 +85,8 @@ class SpectrumErrors:
         Bound, to rounding, of the distance from the eigenvalue of the same rank in the matrix
         (``Spectrum.completeness``) and of the norm of S v - lambda v.
     discretisation : array
-        Change of the eigenvalue from the basis of half the size, or a quarter of the previous change if that is larger
-        (``inf`` without a coarser basis), plus the Frobenius error of an unsampled matrix.
+        Three times the change of the eigenvalue from the basis of half the size, or a quarter of the previous change if
+        that is larger (``inf`` without a coarser basis), plus the Frobenius error of an unsampled matrix.
     sampling : array
         One standard error from the randomness of the rays, an estimate; 0 for unsampled matrices.
     quantile : float
@@ -228,8 +231,11 @@ class Spectrum:
         return f"Spectrum({numbers}, verdict={self.verdict!r}, convention={self.convention!r})"
 
 
-def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
+def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) -> Spectrum:
     """The k eigenvalues of largest modulus of a matrix, sorted descending: see `spectrum`.
+
+    The changes from the coarser basis are multiplied by ``margin``; for a sequence of bases, which shows how they
+    decrease, 1 serves.
 
     Raises
     ------
@@ -246,7 +252,7 @@ def matrix_spectrum(matrix: KernelMatrix, k: int) -> Spectrum:
     # the pair of the constants, then the others
     values, vectors = np.append(first, rest.values), np.column_stack([constant, rest.vectors])
     residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
-    changes = np.append(0.0, two_grid_changes(matrix, rest))
+    changes = margin * np.append(0.0, two_grid_changes(matrix, rest))
 
     def errors_of(indices: NDArray[np.intp]) -> SpectrumErrors:
         return _errors(matrix, values[indices], vectors[:, indices], algebraic[indices], changes[indices])

@@ -17,7 +17,7 @@ from ..bounds.enclosure import as_power, enclosures
 from ..bounds.oscillations import RAYS, SIGMAS, least_quotient
 from ..bounds.separation import lambertian_fraction
 from ..bounds.trial_space import adapted_trial_space
-from ..eigenvalues.spectra import Spectrum, matrix_spectrum
+from ..eigenvalues.spectra import ONE_MATRIX, Spectrum, matrix_spectrum
 from ..essential.edge import EssentialEdge, essential_edge
 from ..essential.exact import ideal_spectrum, without_identity
 from .methods import gap_of_power, law_eigenvalues
@@ -47,7 +47,7 @@ def rough_gap(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essent
     if tolerance < ROUGH or not law.expectations(ONE_PANEL).is_traced:
         return None
     for size, matrix_error in GLANCES:
-        found = matrix_spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), EIGENVALUES)
+        found = matrix_spectrum(matrices(law, Legendre(size), FEW_RAYS, matrix_error), EIGENVALUES, margin=1.0)
         error = found.gap_error + (BEYOND_CHANGE - 1.0) * float(found.gap_errors.discretisation[0])
         how = f"algebraic + {BEYOND_CHANGE:.0f} x two-grid + {found.gap_errors.quantile:.3g} x sampling error"
         gap = isolated(found, error, how, edge, law.frame) if error <= tolerance else None
@@ -183,8 +183,8 @@ def gaps_in_both_conventions(law: Law, tolerance: float = 1e-6, rng: Rng = None)
 
 def _of_matrix(matrix: KernelMatrix) -> SpectralGap:
     found = matrix_spectrum(matrix, EIGENVALUES)
-    method = made_from(found, "algebraic + two-grid + 1.96 x sampling error")
-    evidence = ("one matrix: its basis was not refined",)
+    method = made_from(found, f"algebraic + {ONE_MATRIX:.0f} x two-grid + 1.96 x sampling error")
+    evidence = ("one matrix: its basis was not refined, and its gap is an upper bound of the law's but for its noise",)
     return SpectralGap(found.gap, found.gap_error, "estimate", method, "undecided", evidence, found.convention, found)
 
 

@@ -144,7 +144,7 @@ def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essentia
     for basis, samples in _steps(law):
         wanted = max(MATRIX_FRACTION * tolerance, TOLERANCE_AT_EDGE if near_edge else 0.0)
         matrix = matrices(law, basis, samples, wanted)
-        found = matrix_spectrum(matrix, EIGENVALUES)
+        found = matrix_spectrum(matrix, EIGENVALUES, margin=1.0)
         levels.append(found)
         evidence.append(f"{basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
         steps = Refinement(tuple(levels), _converges(levels, tolerance), tuple(evidence))
