@@ -149,7 +149,10 @@ def test_a_terminal_shows_that_functions_are_compiled(tmp_path, module):
         done = subprocess.run([sys.executable, "-c", command], stderr=writer, timeout=300)
         assert done.returncode == 0
         os.write(writer, b"end\n")
-        shown.append(os.read(reader, 4096).decode().split())
+        text = ""
+        while not text.endswith("end\r\n"):
+            text += os.read(reader, 4096).decode()
+        shown.append(text.split())
     assert shown == [["asperity:", "compiling,", "once", "(about", "10", "s)", "end"], ["end"]]
 
 
@@ -189,3 +192,17 @@ def test_ctrl_c_during_a_late_compilation_is_not_lost(monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         pointers.checked(lambda: late.load())
     assert pointers.Late.failures == []
+
+
+def test_an_inner_function_is_refused_from_python_and_called_by_compiled_ones():
+    @compilation.jit(no_cpython_wrapper=True)
+    def inner(x):
+        return 2.0 * x
+
+    @compilation.jit()
+    def outer(x):
+        return inner(x)
+
+    assert outer(1.5) == 3.0
+    with pytest.raises(TypeError, match="py_func"):
+        inner(1.5)

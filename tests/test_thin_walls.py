@@ -54,7 +54,7 @@ def test_rays_that_were_lost_or_wrong(kind, number, x, theta):
 def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
     joints, lines = np.array([[0.0, -1.0], [2.0, -1.0]]), np.array([[2.0, 0.0]])
     tables = NO_TABLES._replace(joints=joints, lines=lines)
-    time, fraction = line_time(tables, 0, (2.0, 0.0), 2.0, 0.0, 0.0, -1.0)
+    time, fraction = line_time.py_func(tables, 0, (2.0, 0.0), 2.0, 0.0, 0.0, -1.0)
     assert time == 1.0 and fraction < 0.0
 
 

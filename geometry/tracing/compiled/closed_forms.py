@@ -51,16 +51,23 @@ ROUNDER = 1.5 * 2.0**52
 
 
 class Room(NamedTuple):
-    """Work space: six arrays for the rays of a block, three lists of rays, and the first ray of each hollow (-1)."""
+    """Work space: six arrays for the rays of a block.
+
+    Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, of which ``heads``
+    is the first ray (-1 for none), ``others`` the next; and the hollows that rays meet.
+    """
 
     numbers: Floats
-    lists: NDArray[np.int64]
+    rays: NDArray[np.int64]
+    others: NDArray[np.int64]
+    met: NDArray[np.int64]
     heads: NDArray[np.int64]
 
 
 def room_for(hollows: Floats) -> Room:
     """Return the work space of `trace_closed`, for one thread."""
-    return Room(np.empty((6, RAYS)), np.empty((3, RAYS), np.int64), np.full(len(hollows), -1))
+    rays, others, met = np.empty((3, RAYS), np.int64)
+    return Room(np.empty((6, RAYS)), rays, others, met, np.full(len(hollows), -1))
 
 
 @inner
@@ -198,9 +205,7 @@ def trace_closed(x, theta, scene, limit, results, work, crossings):
     """
     hollows, closed, cell = scene
     out_x, out_theta, bounces, status = results
-    room, heads = work.numbers, work.heads
-    # linked lists of the rays of each hollow in a block: `heads` is the first ray, `others` the next
-    rays, others, met = work.lists[0], work.lists[1], work.lists[2]
+    room, rays, others, met, heads = work
     whole = hollows.shape[0] == 1 and hollows[0, LEFT] == 0.0 and hollows[0, RIGHT] == cell
     for first in range(0, x.shape[0], RAYS):
         count = min(RAYS, x.shape[0] - first)

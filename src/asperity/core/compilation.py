@@ -24,6 +24,7 @@ from typing import Any
 from numba import njit
 from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
+from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 
 logger = logging.getLogger("asperity")
@@ -41,6 +42,8 @@ def jit(**options: Any) -> Callable[[Any], Any]:
 
     def compiled(function: Any) -> Any:
         dispatcher = decorate(function)
+        if options.get("no_cpython_wrapper") and isinstance(dispatcher, CPUDispatcher):
+            dispatcher.__class__ = _Inner
         # not with numba's switch that turns compilation off
         if hasattr(dispatcher, "enable_caching"):
             try:
@@ -51,6 +54,13 @@ def jit(**options: Any) -> Callable[[Any], Any]:
         return dispatcher
 
     return compiled
+
+
+class _Inner(CPUDispatcher):
+    """A function without a wrapper for Python, whose call from there would end the process."""
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__}: only compiled functions call it; from Python call its py_func")
 
 
 @cache
