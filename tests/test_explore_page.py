@@ -1,0 +1,353 @@
+"""The page in a real browser: load, drag, change, save, wrong files, two tabs; and who may ask the server."""
+
+import asyncio
+import http.client
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from asperity import geometry as geo
+
+pytest.importorskip("panel", reason="the page needs asperity[explore]")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = [
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+]  # fmt: skip
+# Milliseconds; a machine with other work takes long.
+PATIENCE = 60_000
+# The pixel of the vertex k, and all vertices, from bokeh's own views.
+VERTEX = """k => {
+  const find = view => {
+    if (view.model.toolbar?.tools?.some(tool => tool.type == "PointDrawTool")) return view
+    for (const child of view.child_views ?? []) { const found = find(child); if (found) return found }
+    return null
+  }
+  const roots = Array.from(Bokeh.index)
+  const view = roots.map(find).find(found => found)
+  const {data} = view.model.toolbar.tools.find(tool => tool.type == "PointDrawTool").renderers[0].data_source
+  const {left, top} = view.el.getBoundingClientRect()
+  const x = Array.from(data.x), y = Array.from(data.y)
+  return {x, y, at: [left + view.frame.x_scale.compute(x[k]), top + view.frame.y_scale.compute(y[k])]}
+}"""
+
+
+class Server:
+    """`asperity explore` in a process of its own."""
+
+    def __init__(self, *arguments):
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "asperity", "explore", *arguments, "--no-browser", "--port", "0"],
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        self.lines = []
+        for line in self.process.stderr:
+            self.lines.append(line)
+            if "shows the page" in line:
+                break
+        found = re.search(r"http://127\.0\.0\.1:(\d+)/", "".join(self.lines))
+        assert found, self.lines
+        self.address, self.port = found[0], int(found[1])
+
+    def stop(self):
+        """Ctrl-C; the seconds that it took and what was printed."""
+        begun = time.monotonic()
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(20)
+        seconds = time.monotonic() - begun
+        return seconds, self.process.stderr.read()
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory):
+    return tmp_path_factory.mktemp("out") / "saved"
+
+
+@pytest.fixture(scope="module")
+def server(out):
+    with subprocess_ended(Server("triangular-teeth:angle=0.9", "--out", str(out))) as made:
+        yield made
+
+
+class subprocess_ended:
+    def __init__(self, server):
+        self.server = server
+
+    def __enter__(self):
+        return self.server
+
+    def __exit__(self, *_):
+        self.server.process.kill()
+        self.server.process.wait()
+        self.server.process.stderr.close()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="the browser is driven by playwright")
+    if CHROMIUM is None:
+        pytest.skip("no chromium is installed here")
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def page(browser, server):
+    yield from opened_tab(browser, server)
+
+
+def opened_tab(browser, server):
+    tab = browser.new_page(viewport={"width": 1400, "height": 1100})
+    tab.set_default_timeout(PATIENCE)
+    tab.requests, tab.errors = [], []
+    tab.on("request", lambda request: tab.requests.append(request.url))
+    tab.on("pageerror", lambda error: tab.errors.append(str(error)))
+    tab.goto(server.address)
+    settled(tab)
+    yield tab
+    assert tab.errors == []
+    tab.close()
+
+
+def settled(tab):
+    tab.get_by_role("status").filter(has_text=re.compile("^done$")).wait_for()
+
+
+def facts(tab):
+    return tab.locator(".asperity-facts").inner_text()
+
+
+def drag(tab, k, right, down):
+    """Drag the vertex k by so many pixels, in steps as a hand does."""
+    x, y = tab.evaluate(VERTEX, k)["at"]
+    tab.mouse.move(x, y)
+    tab.mouse.down()
+    for step in range(1, 9):
+        tab.mouse.move(x + right * step / 8, y + down * step / 8)
+        tab.wait_for_timeout(30)
+    tab.mouse.up()
+
+
+def vertices_when(tab, condition):
+    """The vertices (x, y) as soon as they meet a condition."""
+    end = time.monotonic() + 0.001 * PATIENCE
+    while True:
+        found = tab.evaluate(VERTEX, 0)
+        if condition(found["x"], found["y"]):
+            return found["x"], found["y"]
+        assert time.monotonic() < end, found
+        tab.wait_for_timeout(100)
+
+
+def test_the_page_loads_from_this_machine_alone_and_answers(page, server):
+    assert {url.split("/")[2] for url in page.requests if "//" in url} == {f"127.0.0.1:{server.port}"}
+    assert "no gap" in facts(page)
+    assert "exact" in facts(page)
+    assert page.evaluate(VERTEX, 1)["y"][1] == pytest.approx(geo.triangular_teeth(0.9).vertices[1, 1])
+
+
+def test_a_dragged_vertex_changes_wall_and_answers(page):
+    before, text = page.evaluate(VERTEX, 1), facts(page)
+    drag(page, 1, 25, -40)
+    x, _ = vertices_when(page, lambda x, y: x[1] > before["x"][1] + 0.02 and y[1] > before["y"][1] + 0.05)
+    assert (x[0], x[2]) == (0, 1)
+    page.locator(".asperity-facts").get_by_text("exact").wait_for()
+    settled(page)
+    assert facts(page) != text
+
+
+def test_answers_come_while_the_vertex_is_still_held(page):
+    text = facts(page)
+    x, y = page.evaluate(VERTEX, 1)["at"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    for step in range(1, 9):
+        page.mouse.move(x + 5 * step, y - 5 * step)
+        page.wait_for_timeout(150)
+    end = time.monotonic() + 0.001 * PATIENCE
+    while facts(page) == text:
+        assert time.monotonic() < end
+        page.wait_for_timeout(50)
+    page.mouse.up()
+
+
+def test_the_ends_of_the_period_stay_where_they_are(page):
+    drag(page, 0, 30, 30)
+    page.wait_for_timeout(300)
+    vertices_when(page, lambda x, y: (x[0], y[0]) == (0, 0))
+
+
+def test_a_tap_adds_a_vertex_to_the_nearest_side(page):
+    found = page.evaluate(VERTEX, 0)
+    (x0, y0), (x1, y1) = found["at"], page.evaluate(VERTEX, 1)["at"]
+    page.mouse.click(0.5 * (x0 + x1) - 12, 0.5 * (y0 + y1) + 6)
+    # the tap adds it at the end of the list, the page moves it into its side
+    x, _ = vertices_when(page, lambda x, _: len(x) == len(found["x"]) + 1 and x[-1] == 1)
+    assert x[1] == pytest.approx(0.25, abs=0.1)
+    assert x == sorted(x)
+
+
+def test_a_wall_that_crosses_itself_is_refused_and_the_last_answer_stays(page):
+    page.get_by_label("Wall", exact=True).select_option("rectangular-teeth")
+    vertices_when(page, lambda x, _: len(x) == 5)
+    settled(page)
+    text = facts(page)
+    (x2, _), (x4, _) = (page.evaluate(VERTEX, k)["at"] for k in (2, 4))
+    # the lower left corner of the crevice beyond its right side
+    drag(page, 2, 1.2 * (x4 - x2), -15)
+    alert = page.get_by_role("alert").inner_text()
+    assert "cross" in alert
+    assert "The last valid answer stays" in alert
+    assert len(facts(page).splitlines()) == len(text.splitlines())
+    # the vertices return to those of the last valid wall
+    x, y = vertices_when(page, lambda x, _: x[2] < x[4])
+    assert geo.Wall.from_vertices(list(zip(x, y, strict=True))).closes
+
+
+def test_another_wall_and_another_convention_change_the_gap(page):
+    page.get_by_label("Wall", exact=True).select_option("focusing-arcs")
+    page.locator(".asperity-facts").get_by_text("isolated").wait_for()
+    settled(page)
+    assert "0.63297" in facts(page)
+    page.get_by_text("specular = identity").click()
+    page.locator(".asperity-facts").get_by_text("specular convention").wait_for()
+    page.locator(".asperity-facts").get_by_text("isolated").wait_for()
+    assert "0.688" in facts(page)
+
+
+def test_the_disk_changes_the_collision(page):
+    before = facts(page)
+    slider = page.locator(".noUi-handle").nth(1)
+    slider.focus()
+    for _ in range(20):
+        slider.press("ArrowRight")
+    end = time.monotonic() + 0.001 * PATIENCE
+    while facts(page) == before:
+        assert time.monotonic() < end
+        page.wait_for_timeout(100)
+
+
+def test_a_wrong_file_is_refused_and_the_next_one_is_shown(page, tmp_path):
+    text, wrong, right = facts(page), tmp_path / "wrong.toml", tmp_path / "right.toml"
+    wrong.write_text("period = [")
+    page.locator("input[type=file]").set_input_files(wrong)
+    assert "wrong.toml" in page.get_by_role("alert").inner_text()
+    assert facts(page) == text
+    geo.focusing_arcs(0.4).save(right)
+    page.locator("input[type=file]").set_input_files(right)
+    page.locator(".asperity-facts").get_by_text("isolated").wait_for()
+    assert page.get_by_role("alert").count() == 0
+
+
+def test_what_is_saved_lies_in_the_folder_that_was_named(page, out):
+    page.get_by_role("button", name="Save the wall").click()
+    line = page.get_by_role("log").filter(has_text="wrote").inner_text()
+    assert geo.load_wall(Path(line.removeprefix("wrote "))) == geo.triangular_teeth(0.9)
+    page.get_by_role("button", name="Make the study").click()
+    page.get_by_role("log").filter(has_text="being made").wait_for()
+    page.get_by_role("log").filter(has_text="wrote").wait_for()
+    folder = Path(page.get_by_role("log").inner_text().removeprefix("wrote "))
+    assert folder.parent == out
+    assert (folder / "study.json").exists()
+    assert (folder / "kernel.npz").exists()
+
+
+def test_two_tabs_have_their_own_walls(browser, server, page):
+    for other in opened_tab(browser, server):
+        other.get_by_label("Wall", exact=True).select_option("rectangular-teeth")
+        vertices_when(other, lambda x, _: len(x) == 5)
+        assert len(page.evaluate(VERTEX, 0)["x"]) == 3
+
+
+def test_without_a_folder_the_browser_takes_wall_and_study(browser, tmp_path):
+    with subprocess_ended(Server("triangular-teeth")) as server:
+        for tab in opened_tab(browser, server):
+            with tab.expect_download() as download:
+                tab.get_by_text("Save the wall").click()
+            download.value.save_as(tmp_path / "wall.toml")
+            assert geo.load_wall(tmp_path / "wall.toml") == geo.triangular_teeth(0.7)
+            tab.get_by_role("button", name="Make the study").click()
+            with tab.expect_download() as download:
+                tab.get_by_text("Take the study").click()
+            assert download.value.suggested_filename == "triangular-teeth.zip"
+
+
+# -- who may ask
+
+
+def answer_to(server, **headers):
+    with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=60)) as connection:
+        connection.request("GET", "/", headers=headers)
+        with connection.getresponse() as response:
+            return response.status
+
+
+def test_other_hosts_and_origins_are_refused(server):
+    own = f"127.0.0.1:{server.port}"
+    assert answer_to(server) == 200
+    assert answer_to(server, Host=f"localhost:{server.port}") == 200
+    for host in ("evil.example", f"evil.example:{server.port}", "127.0.0.1", f"{own}.evil.example"):
+        assert answer_to(server, Host=host) == 403, host
+    assert answer_to(server, Origin=f"http://{own}") == 200
+    for origin in ("http://evil.example", "null", f"http://{own}.evil.example", f"https://{own}"):
+        assert answer_to(server, Origin=origin) == 403, origin
+
+
+@pytest.mark.parametrize("header", ["Origin", "Host"])
+def test_the_websocket_refuses_other_origins_and_hosts(server, header):
+    from tornado.httpclient import HTTPClientError, HTTPRequest
+    from tornado.websocket import websocket_connect
+
+    async def connect():
+        headers = {
+            "Origin": f"http://127.0.0.1:{server.port}",
+            header: {"Origin": "http://evil.example"}.get(header, "evil.example"),
+        }
+        request = HTTPRequest(f"ws://127.0.0.1:{server.port}/ws", headers=headers)
+        await websocket_connect(request, subprotocols=["bokeh", "token"])
+
+    # a thread of its own, because playwright's loop runs in this one
+    with ThreadPoolExecutor(1) as pool, pytest.raises(HTTPClientError, match="403"):
+        pool.submit(asyncio.run, connect()).result()
+
+
+def test_only_the_loopback_address_listens(server):
+    # states of sockets: the local address is hexadecimal, 0A is LISTEN
+    tables = [Path(f"/proc/net/{name}") for name in ("tcp", "tcp6")]
+    if not tables[0].exists():
+        pytest.skip("no list of sockets here")
+    lines = [line.split() for table in tables if table.exists() for line in table.read_text().splitlines()[1:]]
+    listening = [line[1] for line in lines if line[3] == "0A" and line[1].endswith(f":{server.port:04X}")]
+    assert listening == [f"0100007F:{server.port:04X}"]
+
+
+def test_ctrl_c_ends_it_at_once():
+    with subprocess_ended(Server("flat")) as server:
+        seconds, text = server.stop()
+        assert server.process.returncode == 130
+        assert text == "asperity: interrupted\n"
+        assert seconds < 5.0
+
+
+def test_a_port_in_use_and_a_wrong_wall_end_in_one_line(server):
+    for arguments, words in (
+        (["--port", str(server.port)], f"asperity: port {server.port} is in use"),
+        (["no-such-wall"], "asperity: 'no-such-wall' is neither"),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-m", "asperity", "explore", "--no-browser", *arguments],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert done.returncode == 1
+        assert done.stderr.startswith(words)
+        assert done.stderr.count("\n") == 1
