@@ -76,7 +76,7 @@ sphinx_gallery_conf = {
     "examples_dirs": ["how-to", "examples"],
     "gallery_dirs": ["generated/how-to", "generated/examples"],
     "filename_pattern": r"/how-to/",
-    "ignore_pattern": r"(gallery|true_disk_pictures)\.py$",
+    "ignore_pattern": r"(gallery|paper_figures|true_disk_pictures)\.py$",
     "within_subsection_order": "reference.StoryOrder",
     "backreferences_dir": "generated/backreferences",
     "doc_module": ("asperity",),

@@ -105,7 +105,7 @@ class Basis(ABC):
         return False
 
     def magnitudes(self) -> tuple[Floats, Floats]:
-        """Bounds of |e| and of sin(theta)^(1/2) |e| on each interval between edges, with |e|^2 the sum of e_i^2.
+        """Bounds of the root of the sum of e_i^2, and of sin(theta)^(1/2) times it, on each interval between edges.
 
         Two arrays of shape (intervals,). The default takes the largest values at the ends and at Gauss nodes.
         """

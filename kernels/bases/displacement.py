@@ -46,7 +46,7 @@ class Displacement:
         return float(np.linalg.norm(self._rows))
 
     def _size(self, cell: NDArray[np.int64], angle: Floats) -> Floats:
-        """A bound of |e| at the angles."""
+        """A bound of the root of the sum of e_i^2 at the angles."""
         if self._basis.is_partition:
             return np.asarray(self._largest[cell])
         with np.errstate(divide="ignore"):

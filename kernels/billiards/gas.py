@@ -58,7 +58,7 @@ class GasRecord(BilliardRecord):
 
     @property
     def translational_energy(self) -> Floats:
-        """The energy of the motion of all centres, m |v|^2/2, shape (events + 1,)."""
+        """The energy of the motion of all centres, m <v, v>/2, shape (events + 1,)."""
         return np.asarray(0.5 * self.disk.mass * np.sum(self.velocity[..., :2] ** 2, axis=(1, 2)))
 
     def rotational_fraction(self, burn_in: float = BURN_IN) -> Estimate:

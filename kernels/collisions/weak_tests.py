@@ -135,10 +135,10 @@ def weak_limit(
         Values of eps > 0.
     pairs : dict of (f, g), optional
         Continuous functions of states, vectorised: f(y, theta, psi), with y = (x1, alpha) of shape (n, 2). By default
-        f = g = cos(pi x1/2)^2 cos(pi alpha/2)^2 h on |x1|, |alpha| < 1, with four functions h of the angles.
+        f = g = cos(pi x1/2)^2 cos(pi alpha/2)^2 h for x1 and alpha in (-1, 1), with four functions h of the angles.
     rng : None, int or numpy.random.Generator
     window : float
-        g is taken as 0 outside of |x1|, |alpha| <= ``window``.
+        g is taken as 0 where abs(x1) or abs(alpha) exceeds ``window``.
     samples, repetitions : int
         Collisions of one repetition, rounded up to a power of two, and independent repetitions, at least 2.
 

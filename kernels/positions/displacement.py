@@ -42,7 +42,7 @@ class Displacements:
         return int(self.values.size)
 
     def exceeds(self, distance: float, scale: float = 1.0) -> Estimate:
-        """The probability that |x' - x| exceeds a distance, for the wall scaled by ``scale``.
+        """The probability that abs(x' - x) exceeds a distance, for the wall scaled by ``scale``.
 
         That it tends to 0 with the scale for every distance is the condition under which laws of walls have the form
         delta_x (x) P~. The interval is that of Wilson, plus the fraction of unresolved rays.
@@ -71,7 +71,7 @@ class Displacements:
         return float(np.quantile(self.values, probability))
 
     def tail_exponent(self, largest: int | None = None) -> Estimate:
-        """The exponent a of P(|x' - x| > d) ~ d^-a, by the estimator of Hill.
+        """The exponent a of P(abs(x' - x) > d) ~ d^-a, by the estimator of Hill.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ def displacements(wall: Wall, rays: int = 2**16, rng: Rng = None) -> Displacemen
 
     Examples
     --------
-    A floor at depth 1 displaces a ray by 2 cot(theta), so P(|x' - x| > d) = 1 - d/sqrt(4 + d^2), with tail exponent 2:
+    A floor at depth 1 displaces a ray by 2 cot(theta), so P(abs(x' - x) > d) = 1 - d/sqrt(4 + d^2), with tail exponent 2:
 
     >>> from asperity import geometry as geo, kernels as ker
     >>> floor = geo.Wall.from_vertices([(0, -1), (1, -1)])

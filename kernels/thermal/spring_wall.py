@@ -34,7 +34,7 @@ class SpringWall:
     with the given frequency. Particle and plate collide elastically, as often as they meet, until the particle leaves
     through y = 0; v1 is unchanged. The state of the plate at the entry is drawn from its Gibbs measure on z < 0. Then
     the law of the outgoing velocity satisfies detailed balance with the flux of Maxwell's distribution, of density
-    v2 exp(-m |v|^2/(2T)), exactly.
+    v2 exp(-m <v, v>/(2T)), exactly.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class SpringWall:
     Notes
     -----
     Detailed balance: the flow of plate and particle in y < 0 preserves the Liouville measure and is reversible. Its
-    return map to y = 0 preserves |v2| dv dz dw exp(-H/T), and reversing velocities inverts it. Source: S. Cook and
+    return map to y = 0 preserves abs(v2) dv dz dw exp(-H/T), and reversing velocities inverts it. Source: S. Cook and
     R. Feres, "Random billiards with wall temperature and associated Markov chains", Nonlinearity 25 (2012); cited in
     Rudzis 2022, section 1.2.6.
 
