@@ -134,7 +134,8 @@ def displacements(wall: Wall, rays: int = 2**16, rng: Rng = None) -> Displacemen
 
     Examples
     --------
-    A floor at depth 1 displaces a ray by 2 cot(theta), so P(abs(x' - x) > d) = 1 - d/sqrt(4 + d^2), with tail exponent 2:
+    A floor at depth 1 displaces a ray by 2 cot(theta), so P(abs(x' - x) > d) = 1 - d/sqrt(4 + d^2), with tail
+    exponent 2:
 
     >>> from asperity import geometry as geo, kernels as ker
     >>> floor = geo.Wall.from_vertices([(0, -1), (1, -1)])
