@@ -67,9 +67,9 @@ def phase_portrait(record: BilliardRecord, coordinates: Coordinates = "boundary"
     record : BilliardRecord
     coordinates : {"boundary", "velocity"}
         "boundary": the arc length s of the point of contact and the tangential velocity v1 over the speed; the measure
-        ds dv1 is invariant for smooth walls. "velocity": the tangential velocity and the spin, (sqrt(m) v1, sqrt(J) omega) in
-        units of sqrt(2 energy), the projection of the half sphere of outgoing velocities on the unit disk, where the
-        flux has constant density.
+        ds dv1 is invariant for smooth walls. "velocity": the tangential velocity and the spin, (sqrt(m) v1, sqrt(J)
+        omega) in units of sqrt(2 energy), the projection of the half sphere of outgoing velocities on the unit disk,
+        where the flux has constant density.
 
     Returns
     -------
