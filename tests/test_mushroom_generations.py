@@ -131,3 +131,12 @@ def test_generations_out_of_range_are_refused(arguments, words):
         geo.MushroomGenerations(*arguments)
     with pytest.raises(InputError, match="MushroomGenerations"):
         ker.MushroomLaw(geo.flat())
+
+
+def test_a_distance_has_the_error_of_the_entry_points_of_walls_with_many_pieces() -> None:
+    # the same law twice, by lookup and from 4096 entry points
+    found = ker.distance(
+        ker.MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 3)), ker.WallLaw(geo.mushrooms(0.25, 0.5, 3))
+    )
+    assert 0.0 < found.value <= found.error < 0.02
+    assert "4096 entry points" in found.method

@@ -8,11 +8,15 @@ import numpy as np
 
 from ...core.checks import Floats
 from ..bases.bins import Bins
+from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
 from ..laws.distribution import Distribution
-from ..laws.law import Combination, Composition, Law, Power, SpecularFrame, atoms_of
+from ..laws.law import ENTRY_POINTS, Combination, Composition, Law, Power, SpecularFrame, atoms_of
 from ..matrices.matrix import KernelMatrix
-from .transport import Distributions
+from .transport import Distributions, power_mean, wasserstein
+
+# Incoming angles at which the error from entry points is estimated.
+ANGLES = 64
 
 
 def outgoing_distributions(law: Law, theta: Floats, edges: Floats) -> Distributions:
@@ -47,6 +51,31 @@ def cells_error(law: Law, order: float, sup: bool) -> float:
         return 0.0
     error = float(law.last.error) / (float(np.sqrt(law.last.weights.min())) if sup else 1.0)
     return float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order)) + cells_error(law.laws[0], order, sup)
+
+
+def entry_error(law: Law, order: float, sup: bool) -> float:
+    """Error of a distance from laws whose distributions are those of equally spaced entry points.
+
+    It is the distance between the distributions of every other entry point: each half has twice the spacing of all
+    points, or half of the sample where the angles are chaotic.
+    """
+    if isinstance(law, Combination):
+        return sum(weight * entry_error(term, order, sup) for weight, term in law.terms)
+    if isinstance(law, SpecularFrame):
+        return entry_error(law.law, order, sup)
+    if isinstance(law, _OnCells):
+        return entry_error(law.laws[0], order, sup)
+    angle, edges = SINE.quantile((np.arange(ANGLES) + 0.5) / ANGLES), np.array([0.0, np.pi])
+    found = law.distribution(angle[:1], edges)
+    if found.mass.shape[1] != ENTRY_POINTS:
+        return 0.0
+    found = law.distribution(angle, edges)
+    one, other = (
+        Distributions.of_parts(edges, found.below, found.position[:, first::2], 2.0 * found.mass[:, first::2])
+        for first in (0, 1)
+    )
+    rows = wasserstein(one, other, order)
+    return float(rows.max() if sup else power_mean(rows, np.full(ANGLES, 1.0 / ANGLES), order))
 
 
 @dataclass(frozen=True, repr=False)

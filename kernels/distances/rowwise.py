@@ -11,7 +11,7 @@ from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
 from ..laws.law import ENTRY_POINTS, Law
 from ..matrices.matrix import KernelMatrix, joint_kind
-from .distributions import cells_error, on_cells, outgoing_distributions
+from .distributions import cells_error, entry_error, on_cells, outgoing_distributions
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean, wasserstein
 
@@ -32,6 +32,8 @@ MEMORY = 0.25
 SUPREMUM_FACTOR = 2.0
 # Distance of the outermost nodes of a panel from its ends, as a fraction of its width, for the supremum.
 INSET = 1e-9
+# Refinement ends when its error is this fraction of the error from entry points, which it does not change.
+SMALL_PART = 0.1
 # Rounding of some hundred sums of angles and probabilities.
 ROUNDING = 1e-13
 
@@ -43,7 +45,7 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
     """
     first, second = on_cells(first), on_cells(second)
     found: list[float] = []
-    error = np.inf
+    error, from_entries = np.inf, entry_error(first, order, sup) + entry_error(second, order, sup)
     smooth = not (_is_atomic(first) and _is_atomic(second))
     for level in count():
         low, high = _panels(first, second, level)
@@ -60,9 +62,11 @@ def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: fl
         error = float(steps[-1] if level == 1 else max(steps[-1], MEMORY * steps[-2]))
         error = (SUPREMUM_FACTOR if sup else 1.0) * error + ROUNDING
         error += sum(cells_error(law, order, sup) for law in (first, second))
-        if level >= FEWEST_LEVELS - 1 and error <= tolerance:
+        if level >= FEWEST_LEVELS - 1 and error <= max(tolerance - from_entries, SMALL_PART * from_entries):
             break
-    return Estimate(found[-1], error, "estimate", f"Gauss rules on {low.size} panels; difference of two refinements")
+    how = f"Gauss rules on {low.size} panels; difference of two refinements"
+    how += f", and {from_entries:.2g} from {ENTRY_POINTS} entry points" if from_entries else ""
+    return Estimate(found[-1], error + from_entries, "estimate", how)
 
 
 def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> Estimate:
