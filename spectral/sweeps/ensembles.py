@@ -264,8 +264,8 @@ def mean_law(
         with Checkpoint(checkpoint, _identity(job, seeds)) as store:
             return _mean(job, _all_matrices(job, seeds, store, client), seeds)
     except KeyboardInterrupt as stop:
-        where = "without a checkpoint all is lost" if checkpoint is None else f"{checkpoint} has what was finished"
-        raise KeyboardInterrupt(f"mean_law stopped; {where}; the same call goes on from there") from stop
+        stored = f"{checkpoint} has what was finished; the same call goes on from there"
+        raise KeyboardInterrupt(f"mean_law stopped; {'nothing is stored' if checkpoint is None else stored}") from stop
 
 
 def _identity(job: _Matrices, seeds: Sequence[int]) -> dict[str, Any]:
