@@ -47,7 +47,7 @@ class MushroomLaw(DrivenLaw):
     >>> import numpy as np
     >>> from asperity import geometry as geo
     >>> law = MushroomLaw(geo.MushroomGenerations(0.25, 0.5, 40))
-    >>> law.reflect(0.99999999, 1.0) == np.pi - 1.0, float(law.wall.opened) > 0.9999
+    >>> bool(law.reflect(0.99999999, 1.0) == np.pi - 1.0), float(law.wall.opened) > 0.9999
     (True, True)
     """
 
