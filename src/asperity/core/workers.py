@@ -102,19 +102,13 @@ def results(function: Callable[[Task], Result], tasks: Iterable[Task], client: A
 
 def _collected(waiting: dict[Any, Task], more: Callable[[], dict[Any, Task]]) -> Iterator[tuple[Task, Any]]:
     """The results of futures as they come; after each of them ``more`` are added."""
-    from distributed import KilledWorker, as_completed
+    from distributed import as_completed
 
     done = as_completed(list(waiting))
     # futures that are cancelled, because the scheduler is gone, do not come
     for future in done:
         if future.status == "error":
-            reason = future.exception()
-            if isinstance(reason, KilledWorker):
-                raise AsperityError(f"a task ended every worker that tried it; perhaps it needs more memory ({reason})")
-            raise AsperityError(
-                f"the workers could not run a task; they need the same environment as this process, and the modules of "
-                f"your own functions ({reason!r})"
-            )
+            raise _failure(future.exception())
         if future.status != "finished":
             break
         yield waiting.pop(future), _result(future)
@@ -125,9 +119,23 @@ def _collected(waiting: dict[Any, Task], more: Callable[[], dict[Any, Task]]) ->
         raise AsperityError(SCHEDULER_GONE)
 
 
+def _failure(reason: BaseException) -> AsperityError:
+    """The error to raise for a task that failed on the workers."""
+    from distributed import KilledWorker
+
+    if isinstance(reason, KilledWorker):
+        return AsperityError(f"a task ended every worker that tried it; perhaps it needs more memory ({reason})")
+    return AsperityError(
+        "the workers could not run a task; they need the same environment as this process, and the modules of your own "
+        f"functions ({reason!r})"
+    )
+
+
 def _result(future: Any) -> Any:
     """The result of a finished future, which is computed again if its worker has been lost with it."""
     from asyncio import CancelledError
+
+    from distributed import KilledWorker
 
     try:
         while True:
@@ -137,6 +145,9 @@ def _result(future: Any) -> Any:
                 if not future.client.nthreads():
                     words = "the tasks ended every worker, and no other has come; perhaps they need more memory"
                     raise AsperityError(words) from reason
+    except KilledWorker as reason:
+        # the task ended the other workers when it was computed again
+        raise _failure(reason) from None
     except (OSError, CancelledError) as reason:
         raise AsperityError(SCHEDULER_GONE) from reason
 
