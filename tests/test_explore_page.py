@@ -123,8 +123,8 @@ def settled(tab):
     tab.get_by_role("status").filter(has_text=re.compile("^done$")).wait_for()
 
 
-def facts(tab):
-    return tab.locator(".asperity-facts").inner_text()
+def answers(tab):
+    return tab.locator(".asperity-answers").inner_text()
 
 
 def drag(tab, k, right, down):
@@ -151,23 +151,23 @@ def vertices_when(tab, condition):
 
 def test_the_page_loads_from_this_machine_alone_and_answers(page, server):
     assert {url.split("/")[2] for url in page.requests if "//" in url} == {f"127.0.0.1:{server.port}"}
-    assert "no gap" in facts(page)
-    assert "exact" in facts(page)
+    assert "no gap" in answers(page)
+    assert "exact" in answers(page)
     assert page.evaluate(VERTEX, 1)["y"][1] == pytest.approx(geo.triangular_teeth(0.9).vertices[1, 1])
 
 
 def test_a_dragged_vertex_changes_wall_and_answers(page):
-    before, text = page.evaluate(VERTEX, 1), facts(page)
+    before, text = page.evaluate(VERTEX, 1), answers(page)
     drag(page, 1, 25, -40)
     x, _ = vertices_when(page, lambda x, y: x[1] > before["x"][1] + 0.02 and y[1] > before["y"][1] + 0.05)
     assert (x[0], x[2]) == (0, 1)
-    page.locator(".asperity-facts").get_by_text("exact").wait_for()
+    page.locator(".asperity-answers").get_by_text("exact").wait_for()
     settled(page)
-    assert facts(page) != text
+    assert answers(page) != text
 
 
 def test_answers_come_while_the_vertex_is_still_held(page):
-    text = facts(page)
+    text = answers(page)
     x, y = page.evaluate(VERTEX, 1)["at"]
     page.mouse.move(x, y)
     page.mouse.down()
@@ -175,7 +175,7 @@ def test_answers_come_while_the_vertex_is_still_held(page):
         page.mouse.move(x + 5 * step, y - 5 * step)
         page.wait_for_timeout(150)
     end = time.monotonic() + 0.001 * PATIENCE
-    while facts(page) == text:
+    while answers(page) == text:
         assert time.monotonic() < end
         page.wait_for_timeout(50)
     page.mouse.up()
@@ -201,14 +201,14 @@ def test_a_wall_that_crosses_itself_is_refused_and_the_last_answer_stays(page):
     page.get_by_label("Wall", exact=True).select_option("rectangular-teeth")
     vertices_when(page, lambda x, _: len(x) == 5)
     settled(page)
-    text = facts(page)
+    text = answers(page)
     (x2, _), (x4, _) = (page.evaluate(VERTEX, k)["at"] for k in (2, 4))
     # the lower left corner of the crevice beyond its right side
     drag(page, 2, 1.2 * (x4 - x2), -15)
     alert = page.get_by_role("alert").inner_text()
     assert "cross" in alert
     assert "The last valid answer stays" in alert
-    assert len(facts(page).splitlines()) == len(text.splitlines())
+    assert len(answers(page).splitlines()) == len(text.splitlines())
     # the vertices return to those of the last valid wall
     x, y = vertices_when(page, lambda x, _: x[2] < x[4])
     assert geo.Wall.from_vertices(list(zip(x, y, strict=True))).closes
@@ -216,36 +216,36 @@ def test_a_wall_that_crosses_itself_is_refused_and_the_last_answer_stays(page):
 
 def test_another_wall_and_another_convention_change_the_gap(page):
     page.get_by_label("Wall", exact=True).select_option("focusing-arcs")
-    page.locator(".asperity-facts").get_by_text("isolated").wait_for()
+    page.locator(".asperity-answers").get_by_text("isolated").wait_for()
     settled(page)
-    assert "0.63297" in facts(page)
+    assert "0.63297" in answers(page)
     page.get_by_text("specular = identity").click()
-    page.locator(".asperity-facts").get_by_text("specular convention").wait_for()
-    page.locator(".asperity-facts").get_by_text("isolated").wait_for()
-    assert "0.688" in facts(page)
+    page.locator(".asperity-answers").get_by_text("specular convention").wait_for()
+    page.locator(".asperity-answers").get_by_text("isolated").wait_for()
+    assert "0.688" in answers(page)
 
 
 def test_the_disk_changes_the_collision(page):
-    before = facts(page)
+    before = answers(page)
     slider = page.locator(".noUi-handle").nth(1)
     slider.focus()
     for _ in range(20):
         slider.press("ArrowRight")
     end = time.monotonic() + 0.001 * PATIENCE
-    while facts(page) == before:
+    while answers(page) == before:
         assert time.monotonic() < end
         page.wait_for_timeout(100)
 
 
 def test_a_wrong_file_is_refused_and_the_next_one_is_shown(page, tmp_path):
-    text, wrong, right = facts(page), tmp_path / "wrong.toml", tmp_path / "right.toml"
+    text, wrong, right = answers(page), tmp_path / "wrong.toml", tmp_path / "right.toml"
     wrong.write_text("period = [")
     page.locator("input[type=file]").set_input_files(wrong)
     assert "wrong.toml" in page.get_by_role("alert").inner_text()
-    assert facts(page) == text
+    assert answers(page) == text
     geo.focusing_arcs(0.4).save(right)
     page.locator("input[type=file]").set_input_files(right)
-    page.locator(".asperity-facts").get_by_text("isolated").wait_for()
+    page.locator(".asperity-answers").get_by_text("isolated").wait_for()
     assert page.get_by_role("alert").count() == 0
 
 

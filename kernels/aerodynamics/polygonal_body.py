@@ -232,14 +232,14 @@ class PolygonalBody:
             raise InputError(f"radius: expected at least {reach:g}, to contain the body, got {size:g}")
         # a little outside, so that a corner on the circle is no obstacle
         size *= 1.0 + 1e-12
-        place, theta = 2.0 * math.pi * source.random(n), SINE.sample(n, source)
-        return np.stack([place, theta], axis=1), self._through(place, theta, middle, size)
+        position, theta = 2.0 * math.pi * source.random(n), SINE.sample(n, source)
+        return np.stack([position, theta], axis=1), self._through(position, theta, middle, size)
 
-    def _through(self, place: Floats, theta: Floats, centre: Floats, radius: float) -> Floats:
-        """Polar angle and angle of exit of the particles that enter the circle at (place, theta)."""
-        start = centre + radius * np.stack([np.cos(place), np.sin(place)], axis=1)
+    def _through(self, position: Floats, theta: Floats, centre: Floats, radius: float) -> Floats:
+        """Polar angle and angle of exit of the particles that enter the circle at (position, theta)."""
+        start = centre + radius * np.stack([np.cos(position), np.sin(position)], axis=1)
         # the outer normal is 90 degrees against the clock from the clockwise tangent
-        inward = place - 0.5 * math.pi + theta
+        inward = position - 0.5 * math.pi + theta
         out = self.scatter(start, -np.stack([np.cos(inward), np.sin(inward)], axis=1))
         offset = out.position - centre
         forward = np.sum(offset * out.velocity, axis=1)

@@ -95,15 +95,15 @@ def spin_force(law: Law, spin: float, radius: float = 1.0) -> SpinForce:
     rate, size = finite_number("spin", spin), positive_number("radius", radius)
     breakpoints, left_out = law.breakpoints(BREAKPOINTS if law.exact_apply else FEW_BREAKPOINTS)
     edges = _edges(breakpoints, rate)
-    halves = np.sort(np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))))
-    coarse, fine = _forces(law, rate, edges), _forces(law, rate, halves)
+    finer = np.sort(np.concatenate((edges, 0.5 * (edges[1:] + edges[:-1]))))
+    coarse, fine = _forces(law, rate, edges), _forces(law, rate, finer)
     rounding = (1e-13 if law.exact_apply else TRACED) * (2.0 + abs(rate))
     errors = SAFETY * np.abs(fine.reshape(3, -1, 2).sum(axis=2) - coarse).sum(axis=1) + rounding
     if math.isfinite(left_out):
-        errors = errors + _grazing(left_out, rate, halves)
+        errors = errors + _grazing(left_out, rate, finer)
     fine = fine.sum(axis=1)
     scale = np.array([size, size, size * size])
-    how = f"Gauss rules of {len(edges) - 1} and {len(halves) - 1} panels"
+    how = f"Gauss rules of {len(edges) - 1} and {len(finer) - 1} panels"
     along, across, torque = (
         Estimate(float(value), float(error), "estimate", how)
         for value, error in zip(scale * fine, scale * errors, strict=True)

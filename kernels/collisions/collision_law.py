@@ -207,8 +207,8 @@ class VelocityLaw(TensorLaw):
         points = np.broadcast_to(at, (*shape, 2)).reshape(-1, 2)
         first, second = np.broadcast_to(first, shape).ravel(), np.broadcast_to(second, shape).ravel()
         value = np.empty(first.size)
-        places, index = np.unique(points, axis=0, return_inverse=True)
-        for k, point in enumerate(places):
+        points_used, index = np.unique(points, axis=0, return_inverse=True)
+        for k, point in enumerate(points_used):
             here = index.ravel() == k
             value[here] = self.apply(partial(function, point), first[here], second[here])
         return value.reshape(shape)

@@ -181,12 +181,12 @@ def weak_limit(
     source = generator(rng)
     spaces = [ConfigurationSpace(wall, disk, float(e)) for e in eps]
     runs = np.empty((len(eps), repetitions, 2, len(tested)))
-    lost, doubt = np.zeros(len(eps)), np.zeros((len(eps), len(tested)))
+    unresolved, doubt = np.zeros(len(eps)), np.zeros((len(eps), len(tested)))
     for i, space in enumerate(spaces):
         for k in range(repetitions):
             found, missing, largest = _tested_once(space, list(tested.values()), window, power, source)
             runs[i, k] = found
-            lost[i] += missing / repetitions
+            unresolved[i] += missing / repetitions
             doubt[i] += 2.0 * missing * largest / repetitions
     half = student_95(repetitions) * runs.std(axis=1, ddof=1) / math.sqrt(repetitions) + doubt[:, None]
     means = runs.mean(axis=1)
@@ -198,7 +198,7 @@ def weak_limit(
         limit=frozen(means[:, 1]),
         cylinder_error=frozen(half[:, 0]),
         limit_error=frozen(half[:, 1]),
-        unresolved=frozen(lost),
+        unresolved=frozen(unresolved),
         collisions=repetitions * 2**power,
     )
 

@@ -105,10 +105,10 @@ def _means(one: PositionLaw | Wall, orders: int, power: int, rng: np.random.Gene
     """Means of the products, shape (orders,) * 4 in the order s, theta, theta', s', and their errors."""
     if isinstance(one, PositionLaw):
         return _means_of_law(one, orders)
-    found, lost = zip(*(_means_of_rays(one, orders, power, rng) for _ in range(REPETITIONS)), strict=True)
+    found, unresolved = zip(*(_means_of_rays(one, orders, power, rng) for _ in range(REPETITIONS)), strict=True)
     runs = np.stack(found)
     error = student_95(REPETITIONS) * runs.std(axis=0, ddof=1) / math.sqrt(REPETITIONS)
-    return runs.mean(axis=0), error + 2.0 * float(np.mean(lost))
+    return runs.mean(axis=0), error + 2.0 * float(np.mean(unresolved))
 
 
 def _means_of_law(law: PositionLaw, orders: int) -> tuple[Floats, Floats]:

@@ -213,9 +213,9 @@ class SpringWall:
         source = generator(rng)
         before = self.equilibrium(n, source, hot)
         after = self.sample(before, source)
-        lost = 0.5 * (before[:, 1] ** 2 - after[:, 1] ** 2) / (hot - self.temperature)
-        error = NORMAL_95 * float(lost.std(ddof=1)) / math.sqrt(n)
-        return Estimate(float(lost.mean()), error, "estimate", f"{n} reflections")
+        energy = 0.5 * (before[:, 1] ** 2 - after[:, 1] ** 2) / (hot - self.temperature)
+        error = NORMAL_95 * float(energy.std(ddof=1)) / math.sqrt(n)
+        return Estimate(float(energy.mean()), error, "estimate", f"{n} reflections")
 
 
 def _safe_step(gap: Floats, closing: Floats, strongest: Floats) -> Floats:

@@ -293,18 +293,18 @@ def _all_matrices(
 def _mean(job: _Matrices, packed: Mapping[int, bytes | str], seeds: Sequence[int]) -> KernelMatrix:
     """The mean, added up in the order of the seeds whatever the order in which they came."""
     arrays: list[Floats] = []
-    facts: list[dict[str, Any]] = []
+    properties: list[dict[str, Any]] = []
     for seed in seeds:
         content = packed[seed]
         assert isinstance(content, bytes)
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             arrays.append(file["symmetric"])
-            facts.append({name: file[name].item() for name in file.files if name != "symmetric"})
-    frames = {fact["frame"] for fact in facts}
+            properties.append({name: file[name].item() for name in file.files if name != "symmetric"})
+    frames = {one["frame"] for one in properties}
     if len(frames) > 1:
         raise InputError("family: expected laws in one convention, got some in each; use law.in_specular_frame()")
     symmetric = np.mean(arrays, axis=0)
-    error = half_width(symmetric, arrays) + math.fsum(fact["error"] for fact in facts) / len(facts)
+    error = half_width(symmetric, arrays) + math.fsum(one["error"] for one in properties) / len(properties)
     return KernelMatrix(
         symmetric,
         job.basis,
@@ -312,8 +312,8 @@ def _mean(job: _Matrices, packed: Mapping[int, bytes | str], seeds: Sequence[int
         replicates=tuple(arrays),
         method="mean law",
         law=f"mean of {len(arrays)} of {name_of(job.family)}",
-        reversible=True if all(fact["reversible"] for fact in facts) else None,
-        mirror_symmetric=True if all(fact["mirror_symmetric"] for fact in facts) else None,
+        reversible=True if all(one["reversible"] for one in properties) else None,
+        mirror_symmetric=True if all(one["mirror_symmetric"] for one in properties) else None,
         frame=frames.pop(),
-        unresolved=math.fsum(fact["unresolved"] for fact in facts) / len(facts),
+        unresolved=math.fsum(one["unresolved"] for one in properties) / len(properties),
     )

@@ -34,8 +34,8 @@ REFINING = "refining"
 GRID = {"display": "grid", "grid-template-columns": "repeat(auto-fit, minmax(min(400px, 100%), 1fr))"}
 STYLE = """
 :host { font-family: system-ui, sans-serif; }
-.asperity-facts td { padding: 1px 10px 1px 0; vertical-align: top; }
-.asperity-facts td:first-child { color: #555; white-space: nowrap; }
+.asperity-answers td { padding: 1px 10px 1px 0; vertical-align: top; }
+.asperity-answers td:first-child { color: #555; white-space: nowrap; }
 """
 
 
@@ -103,7 +103,7 @@ class Page:
             name="Options of a profile", placeholder="seam=step,units=um/nm", sizing_mode="stretch_width"
         )
         self.status = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
-        self.facts = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
+        self.table = pn.pane.HTML("", sizing_mode="stretch_width", stylesheets=[STYLE])
         self._make_saving()
         self._make_sliders(parameters)
         self.choice.param.watch(lambda _: self._wall_chosen(), "value")
@@ -149,7 +149,7 @@ class Page:
         )  # fmt: skip
         title = pn.pane.HTML("<h2 style='margin: 4px 0'>asperity explore</h2>", stylesheets=[STYLE])
         plots = pn.Column(*panes, styles=GRID, sizing_mode="stretch_width", margin=0)
-        shown = pn.Column(self.status, self.facts, plots, styles={"flex": "5 1 300px", "min-width": "300px"}, margin=4)
+        shown = pn.Column(self.status, self.table, plots, styles={"flex": "5 1 300px", "min-width": "300px"}, margin=4)
         both = pn.FlexBox(controls, shown, align_items="flex-start", sizing_mode="stretch_width")
         return pn.Column(title, both, sizing_mode="stretch_width")
 
@@ -283,7 +283,7 @@ class Page:
         self.kernel.show(answer)
         self.spectrum.show(answer)
         self.collision.show(answer.collision)
-        self.facts.object = facts_as_html(answer)
+        self.table.object = answer_as_html(answer)
 
     def _show_status(self) -> None:
         if self.message:
@@ -350,12 +350,12 @@ def _slider(name: str, low: float, high: float, value: float) -> Any:
     )  # fmt: skip
 
 
-def facts_as_html(answer: Answer) -> str:
+def answer_as_html(answer: Answer) -> str:
     """The numbers of an answer with their errors, as a table.
 
     Examples
     --------
-    >>> "not known yet" in facts_as_html(Answer("coarse"))
+    >>> "not known yet" in answer_as_html(Answer("coarse"))
     True
     """
     gap = answer.gap
@@ -381,4 +381,4 @@ def facts_as_html(answer: Answer) -> str:
         )
     rows |= {f"{quantity}": f"refused: {html.escape(reason)}" for quantity, reason in answer.refusals}
     cells = "".join(f"<tr><td>{title}</td><td>{text}</td></tr>" for title, text in rows.items())
-    return f"<table class='asperity-facts'>{cells}</table>"
+    return f"<table class='asperity-answers'>{cells}</table>"
