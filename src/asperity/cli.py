@@ -12,11 +12,9 @@ from typing import Any
 import click
 
 from . import __version__
-from .core.errors import AccuracyError, AsperityError, FileExistsRefusal, InputError
+from .core.errors import INTERRUPTED, AccuracyError, AsperityError, FileExistsRefusal, InputError
 from .core.estimates import described
 
-# what shells report of a process that Ctrl-C ended
-INTERRUPTED = 130
 WALL_HELP = """WALL is a named wall with parameters (focusing-arcs:half_angle=0.9), a wall file (.toml), or a text file
 with the two columns x and height of a measured profile. This is mirrored to make it periodic, or repeated with
 profile.txt:seam=step; more of its parameters, joined by commas: units=um/nm, delimiter=semicolon, decimal=comma,

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+# Exit code of a command that Ctrl-C ended, as shells report it.
+INTERRUPTED = 130
+
 
 class AsperityError(Exception):
     """Base class of every exception that asperity raises on purpose."""

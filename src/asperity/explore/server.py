@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import logging
 import multiprocessing
+import os
 import signal
 import socket
 import time
@@ -13,7 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import InputError
+from ..core.errors import INTERRUPTED, InputError
 from ..geometry import WALLS, wall_from_text
 
 ADDRESS, PORT = "127.0.0.1", 5006
@@ -68,21 +69,29 @@ def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = Non
 
 
 def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Callable[[str], object]) -> None:
-    """Serve the page until Ctrl-C, which raises KeyboardInterrupt; ``say`` prints a line."""
+    """Serve the page until Ctrl-C, which ends the process, or raises KeyboardInterrupt before the page is served.
+
+    ``say`` prints a line.
+    """
     server = page_server(text, port, out)
     say("preparing; the first time this compiles for some seconds")
     _prepare(text)
     address = f"http://{ADDRESS}:{server.port}/"
+
+    def end(*_: object) -> None:
+        # what runs for the tabs that are open
+        for computation in multiprocessing.active_children():
+            computation.kill()
+        say("interrupted")
+        # an exception could be caught by a library, and libraries would wait for their threads
+        os._exit(INTERRUPTED)
+
+    signal.signal(signal.SIGINT, end)
     say(f"{address} shows the page; Ctrl-C ends it")
     server.start()
     if browser:
         server.io_loop.add_callback(webbrowser.open, address)
-    try:
-        server.io_loop.start()
-    finally:
-        # what runs for the tabs that are open
-        for computation in multiprocessing.active_children():
-            computation.kill()
+    server.io_loop.start()
 
 
 def _prepare(text: str) -> None:
