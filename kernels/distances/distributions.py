@@ -12,6 +12,7 @@ from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
 from ..laws.distribution import Distribution
 from ..laws.law import ENTRY_POINTS, Combination, Composition, Law, Power, SpecularFrame, atoms_of
+from ..laws.structure import Rules, fold
 from ..matrices.matrix import KernelMatrix
 from .transport import Distributions, power_mean, wasserstein
 
@@ -53,18 +54,25 @@ def cells_error(law: Law, order: float, sup: bool) -> float:
     return float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order)) + cells_error(law.laws[0], order, sup)
 
 
+# The parts of a law that its distributions are taken from, with their weights; of a product, those of its first factor.
+FIRST_PARTS: Rules[list[tuple[float, Law]]] = Rules(
+    lambda law: [(1.0, law)],
+    lambda terms: [(weight * own, law) for weight, parts in terms for own, law in parts],
+    lambda factors: factors[0] if factors else [],
+    lambda parts: parts,
+)
+
+
 def entry_error(law: Law, order: float, sup: bool) -> float:
     """Error of a distance from laws whose distributions are those of equally spaced entry points.
 
     It is the distance between the distributions of every other entry point: each half has twice the spacing of all
     points, or half of the sample where the angles are chaotic.
     """
-    if isinstance(law, Combination):
-        return sum(weight * entry_error(term, order, sup) for weight, term in law.terms)
-    if isinstance(law, SpecularFrame):
-        return entry_error(law.law, order, sup)
-    if isinstance(law, _OnCells):
-        return entry_error(law.laws[0], order, sup)
+    return sum(weight * _entry_error(part, order, sup) for weight, part in fold(law, FIRST_PARTS))
+
+
+def _entry_error(law: Law, order: float, sup: bool) -> float:
     angle, edges = SINE.quantile((np.arange(ANGLES) + 0.5) / ANGLES), np.array([0.0, np.pi])
     found = law.distribution(angle[:1], edges)
     if found.mass.shape[1] != ENTRY_POINTS:
