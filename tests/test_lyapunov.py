@@ -51,11 +51,14 @@ def test_the_triangular_lorentz_gas_has_the_exponent_of_published_runs():
     [
         (geo.Container.circle(1.0), SMOOTH), (geo.Container.circle(2.0), NO_SLIP),
         (geo.Container.ellipse(2.0, 1.0), SMOOTH),
+        (geo.Container.polygon([(0, 0), (3, 0), (1, 2)]), SMOOTH),
+        (geo.Container.polygon([(0, 0), (3, 0), (1, 2)]), NO_SLIP),
+        (geo.Container.polygon([(0, 0), (1, 0), (1, 1), (0, 1)]), NO_SLIP),
         (geo.Container.from_curves([geo.Segment((0, 0), (2, 0)), geo.Segment((2, 0), (2, 1)),
                                     geo.Segment((2, 1), (0, 1)), geo.Segment((0, 1), (0, 0))]), SMOOTH),
     ],
 )  # fmt: skip
-def test_integrable_tables_have_exponent_zero_within_the_error(table, law):
+def test_integrable_tables_and_polygons_have_exponent_zero_within_the_error(table, law):
     errors = []
     for collisions in (200, 800, 2400):
         found = ker.lyapunov_exponent(table, law, collisions, 60, rng=1)

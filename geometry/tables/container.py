@@ -193,6 +193,27 @@ class Container:
         # adding 0 turns -0 into 0
         return cls(corners, np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths + 0.0)
 
+    def closed(self) -> Container:
+        """Return the same region with segments for straight walls that are the sides of a convex polygon.
+
+        Walls keep their numbers. Other containers are returned as they are.
+
+        Examples
+        --------
+        >>> room = Container.polygon([(0, 0), (4, 0), (4, 3)])
+        >>> len(room.closed().curves), room.area, room.perimeter
+        (3, 6.0, 12.0)
+        """
+        following = np.roll(self.points, -1, axis=0)
+        if self.curves or len(self.points) < 3:
+            return self
+        size = float(np.abs(self.points - self.points[0]).max())
+        off = np.abs(np.sum((following - self.points) * self.normals, axis=1))
+        if np.any(off > boundary.JOIN_TOLERANCE * size):
+            return self
+        corners = [(x, y) for x, y in self.points.tolist()]
+        return Container.from_curves([Segment(p, q) for p, q in zip(corners, corners[1:] + corners[:1], strict=True)])
+
     @property
     def tangents(self) -> Floats:
         """The unit tangents (k, 2), to the right if the wall is seen below the disk."""
@@ -212,25 +233,25 @@ class Container:
 
     @property
     def area(self) -> float:
-        """The area, of a container of curves with an outer loop.
+        """The area, of a polygon or a container of curves with an outer loop.
 
         Raises
         ------
         InputError
-            If the container has straight walls without ends, or no outer loop.
+            If the container is not bounded by curves or the sides of a polygon.
         """
-        self._check_closed()
-        return math.fsum(boundary.signed_area(curve) for curve in self.curves)
+        return math.fsum(boundary.signed_area(curve) for curve in self._closed_curves())
 
     @property
     def perimeter(self) -> float:
-        """The length of all curves; a disk with specular reflection flies pi area/perimeter on average (Santalo)."""
-        self._check_closed()
-        return math.fsum(curve.length for curve in self.curves)
+        """The length of the boundary; a disk with specular reflection flies pi area/perimeter on average (Santalo)."""
+        return math.fsum(curve.length for curve in self._closed_curves())
 
-    def _check_closed(self) -> None:
-        if len(self.points) or not self._has_outer_loop:
-            raise InputError("container: expected one from curves with an outer loop, such as Container.circle()")
+    def _closed_curves(self) -> tuple[Segment | Arc, ...]:
+        table = self.closed()
+        if len(table.points) or not table._has_outer_loop:
+            raise InputError("container: expected a polygon, or curves with an outer loop, such as Container.circle()")
+        return table.curves
 
     @property
     def _has_outer_loop(self) -> bool:
