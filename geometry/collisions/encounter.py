@@ -104,7 +104,8 @@ class Encounter:
         apart = around.apart(here)
         if apart > around.margin:
             return 0.5 * apart / fastest, []
-        tolerance, step, touching = TOUCHING * around.span, around.margin / fastest, []
+        tolerance, step = TOUCHING * around.span, around.margin / fastest
+        touching: list[Contact] = []
         for pairs in self.pairs(here):
             met = pairs.real.astype(bool) & (np.abs(pairs.gap) <= tolerance) & (pairs.rate < 0.0)
             for k in np.flatnonzero(met):

@@ -235,7 +235,7 @@ def draw_shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayL
     number = -space.charts.nearest(path[0, 2] * space.scale)
     fraction = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, np.newaxis]
     legs = [space.zoomed.satellite(a + fraction * (b - a), number) for a, b in pairwise(path)]
-    ax.plot(*(np.concatenate(legs) - shift).T, color=RAY_COLOURS[1], linestyle="--", linewidth=1.4, zorder=3,
+    ax.plot(*(np.concatenate(legs) - shift).T, color=RAY_COLOURS[2], linestyle="--", linewidth=1.4, zorder=3,
             label="of the true disk")  # fmt: skip
     turn = np.linspace(0.0, 2.0 * np.pi, 2 * FLIGHT_POINTS)
     for point, reach in zip(points[1:-1], pair.reaches, strict=True):
@@ -294,7 +294,8 @@ def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | Non
               aspect="auto", interpolation="nearest")  # fmt: skip
     gap = space.gap_radius / rho
     for middle in (-0.5, 0.5):
-        ax.axhspan(middle - gap, middle + gap, color=RAY_COLOURS[4], alpha=0.25, linewidth=0)
+        label = "two satellites can be low" if middle < 0.0 else None
+        ax.axhspan(middle - gap, middle + gap, color=RAY_COLOURS[4], alpha=0.25, linewidth=0, label=label)
     ax.set_xlabel("x1 / eps")
     ax.set_ylabel("alpha / rho")
     return ax
