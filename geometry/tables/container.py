@@ -39,7 +39,7 @@ class Container:
         A point p_i on every straight wall without ends.
     normals : array_like, shape (k, 2)
         The unit normal n_i of every such wall, into the region.
-    curves : sequence of Segment and Arc, optional
+    curves : sequence of Segment, Arc and Bezier, optional
         Closed loops with the region on their left: at most one outer loop, counterclockwise, and obstacles, clockwise.
 
     Raises
@@ -67,7 +67,7 @@ class Container:
 
     points: Floats
     normals: Floats
-    curves: tuple[Segment | Arc, ...] = ()
+    curves: tuple[boundary.Piece, ...] = ()
 
     def __post_init__(self) -> None:
         points, normals = finite_array("points", self.points), finite_array("normals", self.normals)
@@ -88,20 +88,20 @@ class Container:
     @classmethod
     @explained
     def from_curves(cls, curves: Sequence[Curve]) -> Container:
-        """Return the inside of closed loops of segments and arcs, which run with the inside on their left.
+        """Return the inside of closed loops of curves, which run with the inside on their left.
 
         The outer loop is counterclockwise, and each loop around an obstacle clockwise. Every curve is a wall of its
         own, which can have its own law. The order of the loops is free.
 
         Parameters
         ----------
-        curves : sequence of Segment and Arc
+        curves : sequence of Segment, Arc and Bezier
             The curves, on which the centre of the disk is reflected.
 
         Raises
         ------
         InputError
-            If there is no curve, a curve is a Bezier curve, or the curves do not form loops as described.
+            If there is no curve, a Bezier curve has a cusp, or the curves do not form loops as described.
 
         Examples
         --------
@@ -111,6 +111,13 @@ class Container:
         >>> half = Container.from_curves([Segment((-1, 0), (1, 0)), Arc((0, 0), 1.0, 0.0, pi)])
         >>> half.area == pi / 2, half.perimeter == 2 + pi
         (True, True)
+
+        The region between a parabola and its chord, two thirds of the rectangle around it:
+
+        >>> from asperity import geometry as geo
+        >>> bowl = Container.from_curves([geo.Bezier([(-1, 1), (0, -1), (1, 1)]), Segment((1, 1), (-1, 1))])
+        >>> round(bowl.area, 12)
+        1.333333333333
         """
         if not len(tuple(curves)):
             raise InputError("curves: expected at least one curve, got none")
@@ -247,7 +254,7 @@ class Container:
         """The length of the boundary; a disk with specular reflection flies pi area/perimeter on average (Santalo)."""
         return math.fsum(curve.length for curve in self._closed_curves())
 
-    def _closed_curves(self) -> tuple[Segment | Arc, ...]:
+    def _closed_curves(self) -> tuple[boundary.Piece, ...]:
         table = self.closed()
         if len(table.points) or not table._has_outer_loop:
             raise InputError("container: expected a polygon, or curves with an outer loop, such as Container.circle()")
