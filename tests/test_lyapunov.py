@@ -144,6 +144,20 @@ def test_the_exponent_scales_like_one_over_the_table():
     assert large.value > 5.0 * large.error
 
 
+def test_a_stadium_of_bezier_curves_has_the_exponent_of_the_stadium():
+    # quarter circles by cubic curves, with radii right to 3e-4
+    k = 4.0 / 3.0 * math.tan(math.pi / 8.0)
+    quarters = []
+    for centre, turn in ((1, -math.pi / 2), (1, 0.0), (-1, math.pi / 2), (-1, math.pi)):
+        c, s = round(math.cos(turn)), round(math.sin(turn))
+        points = [(1, 0), (1, k), (k, 1), (0, 1)]
+        quarters.append(geo.Bezier([(centre + c * x - s * y, s * x + c * y) for x, y in points]))
+    sides = [geo.Segment((-1, -1), (1, -1)), geo.Segment((1, 1), (-1, 1))]
+    tables = geo.Container.from_curves([*sides, *quarters]), geo.Container.stadium(2.0, 1.0)
+    found, known = (ker.lyapunov_exponent(table, SMOOTH, 200, 60, rng=6) for table in tables)
+    assert abs(found.value - known.value) < found.error + known.error < 0.1
+
+
 def test_no_slip_reduces_the_exponent_of_chaotic_tables_but_does_not_end_it():
     # J. S. Lund, J. Murugan and J. P. Shock, Spinning billiards and chaos (arXiv 2505.15335, second version)
     for table in (geo.Container.stadium(2.0, 1.0), geo.Container.sinai(2.0, 0.5)):

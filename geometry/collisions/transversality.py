@@ -150,8 +150,8 @@ def shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike) 
     With X the largest angle of the satellite from the lowest point, velocities of unit norm and d their difference, the
     contact's velocity differs by at most e = J^(-1/2) X + (1/m + 1/J)^(1/2) d. After a flight of time t the paths are
     D <= D_0 + e t apart. With the speed U of the contact and its normal part nu they meet the piece, of curvature
-    kappa, within r = D + U s of each other, s = (D + kappa r^2)/nu, and d grows by at most 2 |n' - n|, where the
-    normals differ by |n' - n|^2 <= a^2 + (m/J)(a + X)^2, a = 1.05 kappa r. `CollisionConstants` has the paper's,
+    kappa, within r = D + U s of each other, s = (D + kappa r^2)/nu. The normals differ by at most the square root of
+    a^2 + (m/J)(a + X)^2, a = 1.05 kappa r, and d grows by at most twice that. `CollisionConstants` has the paper's,
     larger, constants. The bounds hold to rounding.
 
     Source: Rudzis 2022, section 5.3.4; the bounds here are of the same form, with the constants that each flight has.
