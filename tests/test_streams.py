@@ -76,6 +76,22 @@ def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invarian
     assert len(set(all_bits.values())) == 1
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+def test_arrays_of_zarr_give_the_bits_of_numpys_whatever_their_chunks(basis, tmp_path):
+    zarr = pytest.importorskip("zarr")
+    theta, image = pairs()
+    whole = bits(ker.estimate_stream((theta, image), basis))
+    both = zarr.open(str(tmp_path / "both"), mode="w", shape=(NUMBER, 2), chunks=(700, 2), dtype="f8")
+    both[:] = np.column_stack([theta, image])
+    columns = []
+    for name, column in (("in", theta), ("out", image)):
+        columns.append(zarr.open(str(tmp_path / name), mode="w", shape=(NUMBER,), chunks=(333,), dtype="f8"))
+        columns[-1][:] = column
+    found = [ker.estimate_stream(given, basis, checkpoint=tmp_path / "a") for given in (both, tuple(columns))]
+    assert [bits(one) for one in found] == [whole, whole]
+
+
 @pytest.mark.parametrize("basis", BASES, ids=repr)
 def test_pairs_that_do_not_follow_the_measure_are_weighted_as_in_estimate(basis):
     # the matrix of the law itself, from pairs that have another distribution
