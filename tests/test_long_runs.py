@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -91,6 +92,7 @@ def test_a_run_that_is_interrupted_goes_on_and_counts_no_ray_twice(plain, method
 
 RUN = """
 import sys
+import tracemalloc
 import numpy as np
 from asperity import kernels as ker
 from asperity.kernels.sampling import chunks
@@ -208,3 +210,21 @@ def test_the_law_of_a_disk_stores_the_rays_of_its_angle(tmp_path):
         ker.discretise(law, basis, "qmc", samples=2**10, **engine) for engine in ({}, {"checkpoint": tmp_path / "a"})
     )
     assert (tmp_path / "a").exists() and np.array_equal(plain.array, stored.array)
+
+
+@METHODS
+@pytest.mark.parametrize("basis", [BINS, ker.Legendre(5)], ids=repr)
+def test_memory_does_not_grow_with_the_rays(method, basis, tmp_path, monkeypatch):
+    monkeypatch.setattr(chunks, "RAYS_A_TASK", 2**12)
+    monkeypatch.setattr(RaySums, "chunk", 2**12)
+
+    def peak(rays):
+        tracemalloc.start()
+        ker.discretise(ker.CircularArcLaw(1.1), basis, method, samples=rays, rng=3, checkpoint=tmp_path / str(rays))
+        used = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return used
+
+    peak(2**12)
+    # the second half alone would be two megabytes
+    assert peak(2**18) < 1.05 * peak(2**17) < 1e6

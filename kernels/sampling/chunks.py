@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -49,6 +50,10 @@ class Job(Protocol):
     @property
     def tasks(self) -> int:
         """Their number."""
+
+    @property
+    def total(self) -> int:
+        """Rays of all tasks."""
 
     @property
     def tables(self) -> int:
@@ -93,22 +98,26 @@ class IndependentRays:
     rays_a_task: int = field(default_factory=lambda: RAYS_A_TASK)
     tables = 1
 
-    @property
+    @cached_property
     def chunk(self) -> int:
         """Rays of each chunk but the last of a part."""
         return RaySums(self.law, self.basis, 0).chunk
 
-    @property
+    @cached_property
     def chunks_a_task(self) -> int:
         return max(self.rays_a_task // self.chunk, 1)
 
-    @property
+    @cached_property
     def tasks_a_part(self) -> int:
         return math.ceil(self.samples / (self.chunk * self.chunks_a_task))
 
     @property
     def tasks(self) -> int:
         return self.parts * self.tasks_a_part
+
+    @property
+    def total(self) -> int:
+        return self.parts * self.samples
 
     def rays_of(self, task: int) -> int:
         whole = self.chunk * self.chunks_a_task
@@ -169,10 +178,9 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
         After Ctrl-C; it says how many rays are stored, and how to go on.
     """
     path, client = engine.get("checkpoint"), engine.get("client")
-    total = sum(map(job.rays_of, range(job.tasks)))
     if path is None and client is None and sums.basis.is_partition:
         # without further tables, which can be large
-        with progress_bar(total) as bar:
+        with progress_bar(job.total) as bar:
             for task in range(job.tasks):
                 job.add_to(sums, job.first_table(task), task)
                 bar.update(job.rays_of(task))
@@ -181,12 +189,12 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
     try:
         with ExitStack() as stack:
             store = None if path is None else stack.enter_context(Checkpoint(path, _identity(job)))
-            bar = stack.enter_context(progress_bar(total))
+            bar = stack.enter_context(progress_bar(job.total))
             run.all_tasks(store, stack.enter_context(connected(client)), bar)
     except KeyboardInterrupt as stop:
         lost = "without a checkpoint they are lost"
         how = lost if path is None else f"{path} has them: give the same call"
-        raise KeyboardInterrupt(f"stopped after {run.rays_done} of {total} rays; {how}") from stop
+        raise KeyboardInterrupt(f"stopped after {run.rays_done} of {job.total} rays; {how}") from stop
     sums.tables[:], sums.unresolved = run.state.tables, run.state.unresolved
 
 

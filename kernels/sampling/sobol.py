@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -111,18 +112,22 @@ class SobolRays:
     rays_a_task: int = field(default_factory=lambda: chunks.RAYS_A_TASK)
     tables = PARTS
 
-    @property
+    @cached_property
     def chunk(self) -> int:
         """Points of a chunk, at most."""
         return max(RaySums(self.law, self.basis, 0).chunk // PARTS, 1)
 
-    @property
+    @cached_property
     def points_a_task(self) -> int:
         return self.chunk * max(self.rays_a_task // (PARTS * self.chunk), 1)
 
     @property
     def tasks(self) -> int:
         return -(-self.end // self.points_a_task) - self.start // self.points_a_task
+
+    @property
+    def total(self) -> int:
+        return PARTS * (self.end - self.start)
 
     def range_of(self, task: int) -> tuple[int, int]:
         """The first point of a task, and the one after its last."""
