@@ -186,11 +186,23 @@ def test_real_sums_wait_for_those_before_them(method, monkeypatch):
 
     whole = found()
 
-    def backwards(function, tasks, client):
+    def backwards(function, tasks, client, backlog):
         return [(task, function(task)) for task in reversed(list(tasks))]
 
     monkeypatch.setattr(chunks, "results", backwards)
     assert found().symmetric.tobytes() == whole.symmetric.tobytes()
+
+
+def test_large_results_are_asked_for_in_small_numbers(workers):
+    law = ker.CircularArcLaw(1.1)
+
+    def backlog(basis, client):
+        job = chunks.IndependentRays(law, basis, (1, 2), 2**20, 1)
+        return chunks._Run(job, None)._backlog(client)
+
+    # of 8 n^2 bytes a quarter of a gigabyte, and two for each of two workers
+    assert backlog(ker.Bins(64), workers) == 2000 and backlog(ker.Bins(1024), workers) == 2**28 // 2**23 + 4
+    assert backlog(ker.Bins(8192), workers) == 4
 
 
 def test_long_runs_need_rays_of_one_law(tmp_path):

@@ -18,7 +18,7 @@ from ...core.checkpoints import Checkpoint
 from ...core.checks import Floats
 from ...core.long_runs import Engine
 from ...core.version import __version__
-from ...core.workers import connected, results
+from ...core.workers import BACKLOG, connected, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import DrivenLaw, Law, entry_inside
@@ -31,6 +31,8 @@ RAYS_A_TASK = 2**22
 # Seconds between two states of a checkpoint.
 STORED_EVERY = 5.0
 STATE = "state"
+# Bytes of results that wait on the workers at most, beyond two for each worker.
+MOST_WAITING = 2**28
 
 # Sums of some consecutive tables, and the number of rays that did not escape.
 Sums = tuple[NDArray[Any], int]
@@ -242,12 +244,17 @@ class _Run:
     def rays_done(self) -> int:
         return sum(map(self.job.rays_of, np.flatnonzero(self.state.done).tolist()))
 
+    def _backlog(self, workers: Any) -> int:
+        """Tasks at a time: results are matrices, and can come faster than they are added."""
+        size = 8 * self.job.tables * self.job.basis.size**2
+        return min(BACKLOG, MOST_WAITING // size + 2 * (0 if workers is None else len(workers.nthreads())))
+
     def all_tasks(self, store: Checkpoint | None, workers: Any, bar: Any) -> None:
         for _, content in () if store is None else store.parts():
             self.state = _State.unpacked(content)
         bar.update(self.rays_done)
         rest = np.flatnonzero(~self.state.done).tolist()
-        found: Iterable[tuple[int, Sums]] = results(_Task(self.job).sums, rest, workers)
+        found: Iterable[tuple[int, Sums]] = results(_Task(self.job).sums, rest, workers, self._backlog(workers))
         stored = time.monotonic()
         try:
             for task, own in found if self.job.basis.is_partition else _in_order(found, rest):
