@@ -231,6 +231,19 @@ def test_the_command_writes_means_and_all_walls_and_goes_on(tmp_path):
     assert run(*asked).exit_code == 0 and (tmp_path / "table.csv").read_bytes() == before
 
 
+def test_the_command_writes_the_mean_law_and_replaces_it_by_force_only(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    first = run(*GENTLE, "--bins", 4, "--out", tmp_path)
+    assert first.exit_code == 0, first.output
+    family = partial(geo.random_wall, geo.HeightCorrelation(0.3), 8, rms_slope=0.1)
+    known, found = spec.mean_law(family, 6, ker.Bins(4), 1e-3, rng=0), ker.load_matrix(tmp_path / "mean-law.npz")
+    assert np.array_equal(found.symmetric, known.symmetric) and found.error == known.error
+    other = [*GENTLE, "--bins", 5, "--out", tmp_path]
+    refused = run(*other)
+    assert refused.exit_code == 1 and "basis: 'Bins(4)' there, 'Bins(5)' here" in refused.stderr
+    assert run(*other, "--force").exit_code == 0 and ker.load_matrix(tmp_path / "mean-law.npz").basis == ker.Bins(5)
+
+
 @pytest.mark.parametrize(
     ("changed", "words"),
     [

@@ -15,6 +15,7 @@ from .ensembles import Ensemble
 from .table import FILES, SweepTable
 
 CHECKPOINT, PICTURE, PARQUET, MEANS = "sweep.checkpoint", "table.png", "table.parquet", "means.csv"
+MEAN_LAW, LAW_CHECKPOINT = "mean-law.npz", "mean-law.checkpoint"
 
 
 def checkpoint_in(folder: Path, *, overwrite: bool) -> Path:
@@ -29,13 +30,13 @@ def checkpoint_in(folder: Path, *, overwrite: bool) -> Path:
         If the folder cannot be made.
     """
     checkpoint = folder / CHECKPOINT
-    results = [name for name in (*FILES, PICTURE, PARQUET, MEANS) if (folder / name).exists()]
+    results = [name for name in (*FILES, PICTURE, PARQUET, MEANS, MEAN_LAW) if (folder / name).exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if overwrite:
             # opened first: a sweep that still runs in the folder is not robbed of its checkpoint
             with Checkpoint(checkpoint, {}, overwrite=True):
-                for name in (*results, CHECKPOINT):
+                for name in (*results, CHECKPOINT, LAW_CHECKPOINT):
                     (folder / name).unlink(missing_ok=True)
     except OSError as reason:
         raise InputError(f"{folder}: cannot write there ({reason}); choose another folder") from reason

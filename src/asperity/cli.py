@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -218,11 +219,17 @@ def _run_in_folder(
         raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
     checkpoint = checkpoint_in(out, overwrite=force)
     quantities = [name.strip() for name in asked.pop("quantity").split(",")]
-    try:
+    with _ending_at_ctrl_c():
         return run(quantities=quantities, checkpoint=checkpoint, client=scheduler or workers, progress=True, **asked)
+
+
+@contextmanager
+def _ending_at_ctrl_c() -> Iterator[None]:
+    """Say what Ctrl-C stopped, and end the program at once: libraries would wait for their threads."""
+    try:
+        yield
     except KeyboardInterrupt as stop:
         click.echo(f"asperity: {stop}", err=True)
-        # at once: libraries would wait for their threads
         os._exit(INTERRUPTED)
 
 
@@ -267,25 +274,28 @@ def sweep_walls(
 @click.option("--smooth", is_flag=True, help="Join the heights by cubics: polygons have no spectral gap.")
 @click.option("--walls", default=100, show_default=True, type=click.IntRange(min=4), help="Number of walls.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random generator.")
+@click.option("--bins", type=click.IntRange(min=1), help="Also write the mean law on so many bins, as mean-law.npz.")
 @with_engine
-def ensemble(spectrum: str, walls: int, seed: int, out: Path, **given: Any) -> None:
+def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, **given: Any) -> None:
     """Compute mean and spread of quantities over random walls with normal heights.
 
     SPECTRUM is gaussian:length=NUMBER or exponential:length=NUMBER, the correlation function of the heights, or
     self-affine:hurst=NUMBER with longest=NUMBER and shortest=NUMBER, the ends of its wave lengths, or without. Needs
     asperity[profiles].
 
-    The folder gets means.csv, and table.csv, table.json and with asperity[studies] table.parquet, in which each wall
-    has the seed that makes it again. A run that was stopped, by Ctrl-C or otherwise, goes on when the same command is
-    given again.
+    The folder gets means.csv, with --bins the mean law, and table.csv, table.json and with asperity[studies]
+    table.parquet, in which each wall has the seed that makes it again. A run that was stopped, by Ctrl-C or otherwise,
+    goes on when the same command is given again.
 
     \b
     Examples:
       asperity ensemble gaussian:length=0.3 --points 12 --rms-slope 0.1 --smooth --quantity gap_specular --out gaussian
       asperity ensemble self-affine:hurst=0.8 --rms-slope 0.2 --quantity resistance,accommodation --out affine
     """
+    from .kernels import Bins
     from .spectral import ensemble as over_random_walls
-    from .spectral.sweeps.folder import means_in_words, save_ensemble
+    from .spectral import mean_law
+    from .spectral.sweeps.folder import LAW_CHECKPOINT, MEAN_LAW, means_in_words, save_ensemble
     from .spectral.sweeps.named_families import RandomFamily, spectrum_from_text
 
     kind = {name: given.pop(name) for name in ("points", "rms_slope", "rms_height", "period", "smooth")}
@@ -296,6 +306,14 @@ def ensemble(spectrum: str, walls: int, seed: int, out: Path, **given: Any) -> N
     click.echo(means_in_words(found))
     for path in save_ensemble(found, out):
         click.echo(f"wrote {path}")
+    if bins is not None:
+        with _ending_at_ctrl_c():
+            law = mean_law(
+                family, walls, Bins(bins), given["tolerance"], rng=seed, checkpoint=out / LAW_CHECKPOINT,
+                client=given["scheduler"] or given["workers"],
+            )  # fmt: skip
+        law.save(out / MEAN_LAW, overwrite=True)
+        click.echo(f"mean law on {bins} bins, Frobenius error {float(law.error):.2g}\nwrote {out / MEAN_LAW}")
 
 
 @main.command(epilog=WALL_HELP)
