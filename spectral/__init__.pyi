@@ -14,6 +14,8 @@ from .consequences.mixing import MixingTime as MixingTime
 from .consequences.mixing import mixing_time as mixing_time
 from .consequences.momentum_accommodation import Accommodation as Accommodation
 from .consequences.momentum_accommodation import accommodation as accommodation
+from .consequences.random_flights import ChannelPaths as ChannelPaths
+from .consequences.random_flights import channel_paths as channel_paths
 from .eigenvalues.sparse import LeadingEigenvalues as LeadingEigenvalues
 from .eigenvalues.sparse import leading_eigenvalues as leading_eigenvalues
 from .eigenvalues.spectra import Spectrum as Spectrum
