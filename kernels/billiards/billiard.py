@@ -214,10 +214,9 @@ class _Disks:
                 if here.size:
                     point = self.container.touch(k, located[here])
                     located[here] = point.position
-                    own = law
-                    if isinstance(own, CollisionAlongWall):
-                        own = Located(own, own.coordinate(self.container, k, point.position))
-                    moving[here] = reflected(point.tangent, own, moving[here], rng)
+                    if isinstance(law, CollisionAlongWall):
+                        law = Located(law, law.coordinate(self.container, k, point.position))
+                    moving[here] = reflected(point.tangent, law, moving[here], rng)
             states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
         columns = [np.stack(column) for column in zip(*states, strict=True)]
         return {
