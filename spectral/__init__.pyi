@@ -1,3 +1,5 @@
+from .bounds.curvature import GapBounds as GapBounds
+from .bounds.curvature import curvature_gap_bounds as curvature_gap_bounds
 from .bounds.enclosure import Enclosure as Enclosure
 from .bounds.enclosure import Enclosures as Enclosures
 from .bounds.enclosure import enclosures as enclosures
