@@ -54,7 +54,18 @@ def test_the_variance_of_the_limit_in_a_straight_channel_is_half_of_the_diffusiv
     assert sum(abs(float(one) - exact) <= one.error for one in found) >= 13
     values = np.array([float(one) for one in found])
     assert abs(values.mean() - exact) < 0.15 * exact
-    assert np.mean([one.error for one in found]) < 0.5 * exact
+    assert np.mean([one.error for one in found]) < 0.7 * exact
+
+
+def test_the_error_holds_where_flights_under_way_matter_more_than_sampling():
+    exact, rows = 2.0 / math.pi, []
+    for seed in range(12):
+        found = spec.channel_paths(ker.lambertian(), [50, 200, 800], 4000, seed).limit_variance()
+        rows.append((float(found), found.error))
+    values, errors = np.array(rows).T
+    assert np.sum(np.abs(values - exact) <= errors) >= 10
+    # without the part for these flights the sampling errors alone would be exceeded too often
+    assert abs(values.mean() - exact) < 0.12
 
 
 def mean_square_of_diffuse_walls(time, radius, speed):

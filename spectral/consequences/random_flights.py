@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,9 @@ from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .channel import MOST_CROSSINGS, SMALLEST
 from .diffusion import Arrangement, check_arrangement
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Groups of particles, left out one by one, for the standard error of a function of means.
 GROUPS = 32
@@ -77,7 +81,9 @@ class ChannelPaths:
         It is half of `diffusivity`, although E[X_t^2] grows like D t ln t: half of this comes from few flights that are
         longer than t^(1/2). The slope of -2 ln E[cos(l X_t)]/(l^2 t) in ln t with l = c t^(-1/2), a weighted least
         squares line through all times. The error is a half width of 95 % from leaving out each of 32 groups of
-        particles, plus the amount by which the slope of the later half of the times differs beyond its sampling error.
+        particles, plus the amount by which the slope of the later half of the times differs beyond its sampling error,
+        plus the change of the slope by an unknown term of relative size (speed t/radius)^(-1/2), which flights cause
+        that are under way at t.
 
         Raises
         ------
@@ -101,8 +107,29 @@ class ChannelPaths:
         noise = math.sqrt((GROUPS - 1) / GROUPS * float(np.sum((difference - difference.mean()) ** 2)))
         quantile = student_95(GROUPS)
         excess = max(abs(float(whole[1] - whole[0])) - quantile * noise, 0.0)
-        error = quantile * float(spread[0]) + excess
+        # at t the flights that are under way change the variance by a part of the order of (speed t/radius)^(-1/2)
+        first, last = self.times[[0, -1]] * self.speed / self.radius
+        under_way = 2.0 * abs(float(whole[0])) * (first**-0.5 - last**-0.5) / math.log(last / first)
+        error = quantile * float(spread[0]) + excess + under_way
         return Estimate(float(whole[0]), error, "estimate", f"characteristic function of {len(wave)} paths")
+
+    def draw(self, variance: Estimate | float, ax: Axes | None = None) -> Axes:
+        """Draw a histogram of the last positions over their scale, with the normal density of a variance.
+
+        The scale is t^(1/2) in a bent channel and (t ln t)^(1/2) in a straight one, with t in units of radius/speed.
+        """
+        from matplotlib import pyplot
+
+        axes = pyplot.subplots()[1] if ax is None else ax
+        time = float(self.times[-1])
+        growth = math.log(time * self.speed / self.radius) if math.isinf(self.bend) else 1.0
+        width = math.sqrt(float(variance))
+        at = np.linspace(-4.0 * width, 4.0 * width, 201)
+        scaled = self.positions[:, -1] / math.sqrt(time * growth)
+        axes.hist(scaled, bins=np.linspace(at[0], at[-1], 41).tolist(), density=True, color="0.8")
+        axes.plot(at, np.exp(-0.5 * (at / width) ** 2) / (width * math.sqrt(2.0 * math.pi)), color="C0")
+        axes.set_xlabel(r"$X_t/\sqrt{t}$" if growth == 1.0 else r"$X_t/\sqrt{t\,\ln t}$")
+        return axes
 
     def _slopes(self, means: Floats, scale: float) -> Floats:
         """Slopes in ln t over all times and over the later half, shape (rows, 2), from means of cosines."""
