@@ -213,7 +213,7 @@ def channel_paths(
     check_arrangement(arrangement)
     check_memory("particles", "all positions", 2 * moments.size * whole_number("particles", particles, 2))
     half, pace = positive_number("radius", radius), positive_number("speed", speed)
-    middle = float(bend)
+    middle = math.inf if isinstance(bend, float) and bend == math.inf else positive_number("bend", bend)
     if not middle > half:
         raise InputError(f"bend: expected a number greater than the radius {half:g}, got {bend!r}")
     paper = law.in_specular_frame() if law.frame == "specular" else law
