@@ -24,7 +24,6 @@ from .named import (
     rectangular_teeth,
     triangular_teeth,
 )
-from .retroreflectors import notched_angle, tube
 from .wall import Wall, load_wall
 
 
@@ -74,8 +73,6 @@ _ENTRIES = (
         stem_aspect=0.5,
         generations=1,
     ),
-    _entry("notched-angle", notched_angle, "a wedge with steps: nearly retroreflecting", angle=0.4, notches=20),
-    _entry("tube", tube, "a shaft with thin plates: nearly retroreflecting", plates=6, height=0.2, spacing=1.0),
     _entry("koch", koch, "Koch's curve turned downwards", generations=4),
 )
 
