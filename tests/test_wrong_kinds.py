@@ -247,10 +247,12 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
 # They hold what the library found, take no arguments, or are bases and protocols; `verify` has its own fuzz.
 LEFT_OUT = {
     "Accommodation", "AngularMeasure", "Basis", "BestHollow", "BilliardRecord", "BodyForce", "BoundaryStates",
-    "BranchLaw", "ChannelPaths", "Conductance", "Container", "Convergence", "ConvergenceStep", "Curve", "CylinderCollision",
+    "BranchLaw", "ChannelPaths", "Conductance", "Container", "Convergence", "ConvergenceStep", "Curve",
+    "CylinderCollision",
     "Defect", "Dichotomy", "DifferenceTest", "Diffusivity", "Displacements", "Distance", "DrivenLaw", "Enclosure",
     "Enclosures", "Ensemble", "EnsembleRow", "EssentialEdge", "ExchangeHollow", "ExitTimes", "ExtremalResistance",
-    "Extremum", "FittedOrder", "GapBounds", "GasRecord", "Generations", "HilbertSchmidtNorm", "Hollow", "LaplacianComparison",
+    "Extremum", "FittedOrder", "GapBounds", "GasRecord", "Generations", "HilbertSchmidtNorm", "Hollow",
+    "LaplacianComparison",
     "Law", "LeadingEigenvalues", "LeastResistanceLaw", "LimitStudy", "Machine", "MethodFacts", "MixingTime",
     "ModifiedCollision", "NamedWall", "PairCollision", "Reflector", "RigidCollision", "Scattering", "SpectralGap",
     "Spectrum", "SpectrumErrors", "SpinForce", "Status", "SweepRow", "SweepTable", "SymmetryDefect", "Trace",
