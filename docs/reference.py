@@ -45,6 +45,7 @@ STORY = (
     "a_disk",
     "no_slip_billiards",
     "knudsen_diffusion",
+    "retroreflectors",
     "two_laws_compared",
     "the_least_resistance",
     "a_wall_for_a_law",

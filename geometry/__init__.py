@@ -44,6 +44,7 @@ from .walls.named import (
     triangular_teeth,
 )
 from .walls.random_heights import HeightCorrelation, SelfAffine, random_wall
+from .walls.retroreflectors import notched_angle, tube
 from .walls.wall import Wall, load_wall
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ __all__ = [
     "load_wall",
     "mushrooms",
     "nested_reflection",
+    "notched_angle",
     "plane_crossing",
     "plane_crossing_differential",
     "random_wall",
@@ -110,6 +112,7 @@ __all__ = [
     "trace",
     "trajectory",
     "triangular_teeth",
+    "tube",
     "verify",
     "wall_from_text",
 ]

@@ -20,6 +20,7 @@ from .bases.measure import SINE_SQUARED as SINE_SQUARED
 from .bases.measure import AngularMeasure as AngularMeasure
 from .bases.panels import Panels as Panels
 from .bases.tensor import TensorBasis as TensorBasis
+from .billiards.along_walls import CollisionAlongWall as CollisionAlongWall
 from .billiards.billiard import BilliardRecord as BilliardRecord
 from .billiards.billiard import Reflector as Reflector
 from .billiards.billiard import play as play
@@ -47,6 +48,7 @@ from .collisions.weak_tests import weak_limit as weak_limit
 from .discretisation.discretisation import discretise as discretise
 from .distances.distances import Distance as Distance
 from .distances.distances import distance as distance
+from .distances.retroreflectors import retroreflection_distance as retroreflection_distance
 from .distances.two_sample import DifferenceTest as DifferenceTest
 from .distances.two_sample import difference_test as difference_test
 from .distances.wall_sequences import Convergence as Convergence

@@ -1,3 +1,5 @@
+from .bounds.curvature import GapBounds as GapBounds
+from .bounds.curvature import curvature_gap_bounds as curvature_gap_bounds
 from .bounds.enclosure import Enclosure as Enclosure
 from .bounds.enclosure import Enclosures as Enclosures
 from .bounds.enclosure import enclosures as enclosures
@@ -14,6 +16,8 @@ from .consequences.mixing import MixingTime as MixingTime
 from .consequences.mixing import mixing_time as mixing_time
 from .consequences.momentum_accommodation import Accommodation as Accommodation
 from .consequences.momentum_accommodation import accommodation as accommodation
+from .consequences.random_flights import ChannelPaths as ChannelPaths
+from .consequences.random_flights import channel_paths as channel_paths
 from .eigenvalues.sparse import LeadingEigenvalues as LeadingEigenvalues
 from .eigenvalues.sparse import leading_eigenvalues as leading_eigenvalues
 from .eigenvalues.spectra import Spectrum as Spectrum

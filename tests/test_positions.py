@@ -158,6 +158,18 @@ def test_an_asteroid_field_displaces_rays_without_bound_and_closed_walls_do_not(
         closed.tail_exponent()
 
 
+def test_displacements_of_open_walls_vanish_with_the_scale_like_their_tail():
+    """P(scale abs(x' - x) > d) tends to 0 for every d, like the power of the scale that is the exponent of the tail."""
+    field = ker.displacements(asteroids(), 100_000, rng=RNG)
+    tail = field.tail_exponent()
+    for distance in (0.5, 1.0):
+        coarse, fine = (field.exceeds(distance, scale) for scale in (0.2, 0.04))
+        rate = np.log(float(coarse) / float(fine)) / np.log(5.0)
+        noise = (coarse.error / float(coarse) + fine.error / float(fine)) / np.log(5.0)
+        assert abs(rate - float(tail)) < noise + tail.error < 0.9
+        assert float(fine) + fine.error < 0.2 * float(coarse)
+
+
 def test_wrong_arguments_are_refused():
     with pytest.raises(InputError, match="begin at height 0"):
         geo.join_walls([FLOOR])

@@ -344,6 +344,10 @@ class Container:
             length[here] = ends[k] + boundary.length_at(curve, points[here])
         return length
 
+    def length_on(self, wall: int, position: Floats) -> Floats:
+        """Return the arc lengths (n,) of points (n, 2) from the start of a curve, whose number is ``wall``."""
+        return boundary.length_at(self.curves[wall - len(self.points)], position)
+
     def _ends(self) -> Floats:
         """The arc lengths at the ends of the curves, 0 before the first."""
         if len(self.points):

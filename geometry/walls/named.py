@@ -177,6 +177,8 @@ def elliptical_arcs(half_angle: float, disk: Disk) -> Wall:
 def double_parabola() -> Wall:
     """Return Plakhov's double parabola x = y^2/4, x = 1 - y^2/4, which nearly retroreflects.
 
+    As a retroreflector it is known as the helmet: each parabola has its focus at the vertex of the other.
+
     Examples
     --------
     >>> double_parabola().depth == math.sqrt(2.0)

@@ -18,6 +18,7 @@ from ..collisions.collision_law import CollisionLaw
 from ..collisions.satellite_law import SatelliteLaw
 from ..laws.law import Law
 from ..walls.identity import law_digest, wall_digest
+from .along_walls import CollisionAlongWall, Located
 
 if TYPE_CHECKING:
     from ...geometry import Container, Disk
@@ -94,7 +95,7 @@ class BilliardRecord:
 @explained
 def play(
     container: Container,
-    laws: Reflector | Sequence[Reflector],
+    laws: Reflector | CollisionAlongWall | Sequence[Reflector | CollisionAlongWall],
     position: ArrayLike,
     velocity: ArrayLike,
     collisions: int,
@@ -110,7 +111,8 @@ def play(
     laws : Reflector or sequence of Reflector
         One law for all walls or one per wall, all for the same disk: ``no_slip(disk)``, ``smooth(disk)``,
         ``CollisionLaw.from_wall(wall, disk)`` for a rough wall, ``CollisionLaw(law, disk)`` for a law of angles. Each
-        law is applied in coordinates in which its wall is below the disk.
+        law is applied in coordinates in which its wall is below the disk. ``CollisionAlongWall(law, disk)`` is for a
+        wall whose roughness changes along it.
     position : array_like, shape (n, 2) or (2,)
         Initial centres, inside the container.
     velocity : array_like, shape (n, 3) or (3,)
@@ -157,7 +159,7 @@ def play(
     root = tuple(int(word) for word in generator(rng).integers(0, 2**63, size=2))
     whole_number("collisions", collisions, 1)
     check_memory("collisions", "the record", 8 * collisions)
-    each = laws_of_walls(container, laws)
+    each = _laws_at_positions(container, laws)
     disk = each[0].disk
     located, moving = _starts(container, position, velocity)
     job = _Disks(container, tuple(each), located, moving, collisions, root)
@@ -175,7 +177,7 @@ class _Disks:
     """Disks in a container, ``TOGETHER`` of them at a time; what a worker is sent."""
 
     container: Container
-    laws: tuple[Reflector, ...]
+    laws: tuple[Reflector | CollisionAlongWall, ...]
     position: Floats
     velocity: Floats
     collisions: int
@@ -212,6 +214,8 @@ class _Disks:
                 if here.size:
                     point = self.container.touch(k, located[here])
                     located[here] = point.position
+                    if isinstance(law, CollisionAlongWall):
+                        law = Located(law, law.coordinate(self.container, k, point.position))
                     moving[here] = reflected(point.tangent, law, moving[here], rng)
             states.append((time.copy(), located.copy(), angle.copy(), moving.copy(), last.copy()))
         columns = [np.stack(column) for column in zip(*states, strict=True)]
@@ -221,13 +225,29 @@ class _Disks:
         }  # fmt: skip
 
 
-def _told(law: Reflector) -> str:
+def _told(law: Reflector | CollisionAlongWall) -> str:
     """What tells a collision law from others."""
+    if isinstance(law, CollisionAlongWall):
+        return digest(law.disk, law.law.edges, [law_digest(part) for part in law.law.laws])
     if isinstance(law, CollisionLaw):
         return digest(law.disk, law_digest(law.law))
     if isinstance(law, SatelliteLaw):
         return digest(law.disk, wall_digest(law.wall), law.scale, law.spacing)
     return repr(law)
+
+
+def _laws_at_positions(
+    container: Container, laws: Reflector | CollisionAlongWall | Sequence[Reflector | CollisionAlongWall]
+) -> list[Reflector | CollisionAlongWall]:
+    """Return the law of every wall, as `laws_of_walls` does, which may depend on the position."""
+    each = list(laws) if isinstance(laws, Sequence) else [laws] * container.wall_count
+    # the first collision law of each piece stands for all of them: they have the same disk
+    plain = [law.parts[0] if isinstance(law, CollisionAlongWall) else law for law in each]
+    laws_of_walls(container, plain)
+    for k, law in enumerate(each):
+        if isinstance(law, CollisionAlongWall):
+            law.check_wall(container, k)
+    return each
 
 
 def laws_of_walls(container: Container, laws: Reflector | Sequence[Reflector]) -> list[Reflector]:

@@ -122,7 +122,7 @@ class PositionLaw:
 
     def at(self, x: float) -> Law:
         """P~(x, .)."""
-        return self.laws[int(self._interval(finite_array("x", x)))]
+        return self.laws[int(self.interval(finite_array("x", x)))]
 
     def mean(self) -> Combination:
         """The law for x uniform on the piece: the mixture of all laws by their lengths."""
@@ -133,7 +133,7 @@ class PositionLaw:
         """Draw an outgoing angle for every state (x, theta); the arrays broadcast. The position stays x."""
         at, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
         source = generator(rng)
-        where, outgoing = self._interval(at), np.empty(at.shape)
+        where, outgoing = self.interval(at), np.empty(at.shape)
         for k, law in enumerate(self.laws):
             here = where == k
             if here.any():
@@ -145,14 +145,14 @@ class PositionLaw:
         """The expectation E[f(x', Theta') | x, theta] of a vectorised f(x, theta), with x' = x."""
         at, incoming = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
         flat, value = at.ravel(), np.empty(at.size)
-        where, directions = self._interval(flat), incoming.ravel()
+        where, directions = self.interval(flat), incoming.ravel()
         for position in np.unique(flat):
             here = flat == position
             law = self.laws[int(where[here][0])]
             value[here] = law.apply(partial(function, position), directions[here])
         return value.reshape(at.shape)
 
-    def _interval(self, x: Floats) -> NDArray[np.intp]:
+    def interval(self, x: Floats) -> NDArray[np.intp]:
         """The index of the interval of every position; raises InputError outside of the piece."""
         outside = (x < self.edges[0]) | (x > self.edges[-1])
         if np.any(outside):

@@ -1,0 +1,297 @@
+"""Paths X_t of particles in a straight or bent channel, and the variance of both central limit theorems."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, positive_number, whole_number
+from ...core.errors import InputError
+from ...core.estimates import NORMAL_95, Estimate, student_95
+from ...core.kinds import explained
+from ...kernels import Law
+from ...kernels.bases.measure import SINE
+from .channel import MOST_CROSSINGS, SMALLEST
+from .diffusion import Arrangement, check_arrangement
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Groups of particles, left out one by one, for the standard error of a function of means.
+GROUPS = 32
+# Times from which a rate and its drift, or a slope, can be taken.
+FEWEST_TIMES = 3
+
+
+@dataclass(frozen=True)
+class ChannelPaths:
+    """Positions along a channel of particles that start at 0 on a wall, with the invariant distribution of angles.
+
+    Attributes
+    ----------
+    times : array, shape (n,)
+        Increasing.
+    positions : array, shape (particles, n)
+        X_t, in a bent channel the arc length along its middle line.
+    radius, speed : float
+        Half the width of the channel, and the speed of the particles.
+    bend : float
+        Radius of the middle line; inf for a straight channel.
+    """
+
+    times: Floats
+    positions: Floats
+    radius: float
+    speed: float
+    bend: float
+
+    @property
+    def mean_squares(self) -> Floats:
+        """E[X_t^2], shape (n,)."""
+        return np.asarray(np.mean(self.positions**2, axis=0))
+
+    def variance_rate(self) -> Estimate:
+        r"""The variance of the limit of X_t/t^(1/2) in a bent channel, lim E[X_t^2]/t.
+
+        The increase of E[X_t^2] between the middle and the last of the times. The error is a 95 % half width of the
+        sampling error, plus the amount by which the rate before the middle differs beyond its sampling error.
+
+        Raises
+        ------
+        InputError
+            In a straight channel, where this limit is infinite.
+        """
+        if math.isinf(self.bend):
+            raise InputError("bend: expected a bent channel; flights in a straight one have no variance")
+        middle = len(self.times) // 2
+        squares = self.positions[:, [0, middle, -1]] ** 2
+        rates = np.diff(squares, axis=1) / np.diff(self.times[[0, middle, -1]])
+        value, drift = rates[:, 1], rates[:, 1] - rates[:, 0]
+        half, half_of_drift = (NORMAL_95 * float(one.std(ddof=1)) / math.sqrt(len(one)) for one in (value, drift))
+        excess = max(abs(float(drift.mean())) - half_of_drift, 0.0)
+        return Estimate(float(value.mean()), half + excess, "estimate", f"{len(value)} paths to t = {self.times[-1]:g}")
+
+    def limit_variance(self) -> Estimate:
+        r"""The variance of the limit of X_t/(t ln t)^(1/2) in a straight channel.
+
+        It is half of `diffusivity`, although E[X_t^2] grows like D t ln t: half of this comes from few flights that are
+        longer than t^(1/2). The slope of -2 ln E[cos(l X_t)]/(l^2 t) in ln t with l = c t^(-1/2), a weighted least
+        squares line through all times. The error is a half width of 95 % from leaving out each of 32 groups of
+        particles, plus the amount by which the slope of the later half of the times differs beyond its sampling error,
+        plus the change of the slope by an unknown term of relative size (speed t/radius)^(-1/2), which flights cause
+        that are under way at t.
+
+        Raises
+        ------
+        InputError
+            In a bent channel, where this limit is 0, or with fewer than 320 particles.
+        """
+        if math.isfinite(self.bend):
+            raise InputError("bend: expected a straight channel; in a bent one the limit of X_t/(t ln t)^(1/2) is 0")
+        if len(self.positions) < 10 * GROUPS:
+            raise InputError(f"particles: expected at least {10 * GROUPS}, got {len(self.positions)}")
+        # of the order of the inverse typical size of X_t/t^(1/2) at the last time
+        scale = math.sqrt(self.times[-1]) / float(np.median(np.abs(self.positions[:, -1])))
+        wave = np.cos(scale / np.sqrt(self.times) * self.positions)
+        group = np.arange(len(wave)) % GROUPS
+        sums = np.stack([wave[group == k].sum(axis=0) for k in range(GROUPS)])
+        counts = np.bincount(group)
+        left = self._slopes((sums.sum(axis=0) - sums) / (len(wave) - counts)[:, None], scale)
+        whole = self._slopes(wave.mean(axis=0)[None], scale)[0]
+        spread = np.sqrt((GROUPS - 1) / GROUPS * np.sum((left - left.mean(axis=0)) ** 2, axis=0))
+        difference = left[:, 1] - left[:, 0]
+        noise = math.sqrt((GROUPS - 1) / GROUPS * float(np.sum((difference - difference.mean()) ** 2)))
+        quantile = student_95(GROUPS)
+        excess = max(abs(float(whole[1] - whole[0])) - quantile * noise, 0.0)
+        # at t the flights that are under way change the variance by a part of the order of (speed t/radius)^(-1/2)
+        first, last = self.times[[0, -1]] * self.speed / self.radius
+        under_way = 2.0 * abs(float(whole[0])) * (first**-0.5 - last**-0.5) / math.log(last / first)
+        error = quantile * float(spread[0]) + excess + under_way
+        return Estimate(float(whole[0]), error, "estimate", f"characteristic function of {len(wave)} paths")
+
+    def draw(self, variance: Estimate | float, ax: Axes | None = None) -> Axes:
+        """Draw a histogram of the last positions over their scale, with the normal density of a variance.
+
+        The scale is t^(1/2) in a bent channel and (t ln t)^(1/2) in a straight one, with t in units of radius/speed.
+        """
+        from matplotlib import pyplot
+
+        axes = pyplot.subplots()[1] if ax is None else ax
+        time = float(self.times[-1])
+        growth = math.log(time * self.speed / self.radius) if math.isinf(self.bend) else 1.0
+        width = math.sqrt(float(variance))
+        at = np.linspace(-4.0 * width, 4.0 * width, 201)
+        scaled = self.positions[:, -1] / math.sqrt(time * growth)
+        axes.hist(scaled, bins=np.linspace(at[0], at[-1], 41).tolist(), density=True, color="0.8")
+        axes.plot(at, np.exp(-0.5 * (at / width) ** 2) / (width * math.sqrt(2.0 * math.pi)), color="C0")
+        axes.set_xlabel(r"$X_t/\sqrt{t}$" if growth == 1.0 else r"$X_t/\sqrt{t\,\ln t}$")
+        return axes
+
+    def _slopes(self, means: Floats, scale: float) -> Floats:
+        """Slopes in ln t over all times and over the later half, shape (rows, 2), from means of cosines."""
+        if np.any(means <= 0.0):
+            raise InputError("particles: too few to measure the characteristic function; pass more")
+        growth, level = -2.0 * np.log(means) / scale**2, np.log(self.times)
+        found = []
+        for first in (0, min(len(level) // 2, len(level) - 2)):
+            at = level[first:] - level[first:].mean()
+            found.append(growth[:, first:] @ at / (at @ at))
+        return np.stack(found, axis=1)
+
+
+@explained
+def channel_paths(
+    law: Law,
+    times: ArrayLike,
+    particles: int = 4096,
+    rng: Rng = None,
+    *,
+    radius: float = 1.0,
+    speed: float = 1.0,
+    bend: float = math.inf,
+    arrangement: Arrangement = "mirror",
+) -> ChannelPaths:
+    r"""Simulate the flights of particles between two rough walls.
+
+    Parameters
+    ----------
+    law : Law
+        The law of both walls, in either convention.
+    times : array_like, shape (n,)
+        At least three increasing positive times.
+    particles : int
+    rng : None, int or numpy.random.Generator
+    radius, speed : float
+        Half the width of the channel, and the speed of the particles.
+    bend : float
+        Radius of the middle line of a channel between two concentric circles, greater than ``radius``; by default the
+        channel is straight.
+    arrangement : {"mirror", "half-turn"}
+        The upper or outer wall is the mirror image of the other one, or is rotated by pi.
+
+    Returns
+    -------
+    ChannelPaths
+
+    Raises
+    ------
+    InputError
+        If an argument is not as described, or a particle makes more than 10^6 flights.
+
+    Notes
+    -----
+    In a straight channel flights have infinite variance, and X_t/(t ln t)^(1/2) tends to a normal variable. In a bent
+    one no flight is longer than the tangent of the inner circle, and X_t/t^(1/2) does. A particle starts on each of
+    the walls with a probability proportional to its length.
+
+    Source: Rudzis 2022, section 1.2.6; T. Chumley, R. Feres and H.-K. Zhang, Multiscale Model. Simul. 11 (2013) 1179,
+    for the straight channel.
+
+    Examples
+    --------
+    >>> from asperity import kernels as ker, spectral as spec
+    >>> straight = spec.channel_paths(ker.lambertian(), [50, 200, 800], 4000, rng=1)
+    >>> found = straight.limit_variance()
+    >>> abs(float(found) - 0.5 * float(spec.diffusivity(ker.lambertian()))) < found.error
+    True
+
+    Particles between smooth walls keep their direction:
+
+    >>> smooth = spec.channel_paths(ker.specular(), [1.0, 2.0, 4.0], 3, rng=0)
+    >>> bool(np.allclose(smooth.positions[:, 2], 4.0 * smooth.positions[:, 0]))
+    True
+    """
+    if not isinstance(law, Law):
+        raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
+    moments = finite_array("times", times).ravel()
+    if moments.size < FEWEST_TIMES or moments[0] <= 0.0 or np.any(np.diff(moments) <= 0.0):
+        raise InputError(f"times: expected at least {FEWEST_TIMES} increasing positive times, got {times!r}")
+    check_arrangement(arrangement)
+    check_memory("particles", "all positions", 2 * moments.size * whole_number("particles", particles, 2))
+    half, pace = positive_number("radius", radius), positive_number("speed", speed)
+    middle = math.inf if isinstance(bend, float) and bend == math.inf else positive_number("bend", bend)
+    if not middle > half:
+        raise InputError(f"bend: expected a number greater than the radius {half:g}, got {bend!r}")
+    paper = law.in_specular_frame() if law.frame == "specular" else law
+    channel = _Channel(half, middle, -1.0 if arrangement == "half-turn" else 1.0)
+    positions = _simulated(paper, channel, pace * moments, particles, generator(rng))
+    return ChannelPaths(frozen(moments), frozen(positions), half, pace, middle)
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """Flights between two walls: number 0 is the lower or inner one, number 1 the other.
+
+    ``direction`` is the angle in (0, pi) between the direction of flight and the walls where the flight begins; its
+    cosine is positive in the direction of the channel.
+    """
+
+    half: float
+    bend: float
+    # sign of the x axis of the upper wall's frame in the channel
+    upper: float
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether the walls are lines."""
+        return math.isinf(self.bend)
+
+    def framed(self, angle: Floats, wall: Floats) -> Floats:
+        """The angle in the frame of the wall, from that in the channel, and the other way round."""
+        return np.where((wall > 0) & (self.upper < 0.0), math.pi - angle, angle)
+
+    def flight(self, direction: Floats, wall: Floats) -> tuple[Floats, Floats, Floats]:
+        """Length of the flight, the wall at its end, and the angle of the same direction with this wall."""
+        sine, cosine = np.sin(direction), np.cos(direction)
+        if self.is_straight:
+            return 2.0 * self.half / sine, 1.0 - wall, direction
+        inner, outer = self.bend - self.half, self.bend + self.half
+        start, end = np.where(wall > 0, outer, inner), np.where(wall > 0, inner, outer)
+        # distance of the line from the centre is start * cosine; at the other wall the angle has this cosine
+        level = start * cosine / end
+        passes = (wall > 0) & (np.abs(level) >= 1.0)
+        level = np.clip(level, -1.0, 1.0)
+        rise = end * np.sqrt((1.0 - level) * (1.0 + level))
+        length = np.where(passes, 2.0 * outer * sine, np.abs(rise - start * sine))
+        return length, np.where(passes, wall, 1.0 - wall), np.where(passes, direction, np.arccos(level))
+
+    def advance(self, direction: Floats, wall: Floats, length: Floats) -> Floats:
+        """The increase of X along a part of this length of a flight."""
+        along, up = length * np.cos(direction), length * np.sin(direction)
+        if self.is_straight:
+            return along
+        radial = np.where(wall > 0, self.bend + self.half - up, self.bend - self.half + up)
+        return np.asarray(self.bend * np.arctan2(along, radial))
+
+
+def _simulated(law: Law, channel: _Channel, paths: Floats, particles: int, rng: np.random.Generator) -> Floats:
+    """Positions (particles, n) after these lengths of path."""
+    positions = np.empty((particles, paths.size))
+    going = np.arange(particles)
+    share = 0.5 if channel.is_straight else 0.5 * (1.0 + channel.half / channel.bend)
+    wall = (rng.random(particles) < share).astype(np.float64)
+    x, run, reached = np.zeros(particles), np.zeros(particles), np.zeros(particles, dtype=np.int64)
+    direction = channel.framed(SINE.sample(particles, rng), wall)
+    for _ in range(MOST_CROSSINGS):
+        length, after, arriving = channel.flight(direction, wall)
+        passing = np.flatnonzero(run + length >= paths[reached])
+        while passing.size:
+            part = paths[reached[passing]] - run[passing]
+            here = x[passing] + channel.advance(direction[passing], wall[passing], part)
+            positions[going[passing], reached[passing]] = here
+            reached[passing] += 1
+            passing = passing[reached[passing] < paths.size]
+            passing = passing[(run + length)[passing] >= paths[reached[passing]]]
+        stays = reached < paths.size
+        if not stays.any():
+            return positions
+        x = (x + channel.advance(direction, wall, length))[stays]
+        run, going, reached, wall = (run + length)[stays], going[stays], reached[stays], after[stays]
+        incoming = math.pi - channel.framed(arriving[stays], wall)
+        outgoing = law.sample(np.clip(incoming, SMALLEST, math.pi - SMALLEST), rng)
+        direction = channel.framed(outgoing, wall)
+    raise InputError(f"law: {law!r} keeps {len(x)} particles in flight after {MOST_CROSSINGS} collisions")

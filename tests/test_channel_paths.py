@@ -1,0 +1,168 @@
+"""Paths in a channel: flights in Cartesian coordinates, and the variances of both central limit theorems."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad, simpson
+from scipy.stats import kstest
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.errors import InputError
+
+LEANING = ker.PolygonLaw(geo.Wall.from_vertices([(0, 0), (0.2, -0.5), (1, 0)]))
+
+
+def rate_of_diffuse_walls(bend, half):
+    """Successive flights are uncorrelated: the mean square of one, by polar angles of chords, over its mean time."""
+    a, b = bend - half, bend + half
+    cut = math.acos(a / b)
+    inner, _ = quad(lambda t: (math.acos(a * math.cos(t) / b) - t) ** 2 * math.sin(t), 0.0, 0.5 * math.pi)
+    around, _ = quad(lambda t: 4.0 * t * t * math.sin(t), 0.0, cut)
+    across, _ = quad(lambda t: (math.acos(min(1.0, b * math.cos(t) / a)) - t) ** 2 * math.sin(t), cut, 0.5 * math.pi)
+    # mean flight: pi times the area over the perimeter
+    return bend**2 * (a * inner + b * (around + across)) / (a + b) / (math.pi * half)
+
+
+def test_the_rate_in_a_bent_channel_is_that_of_uncorrelated_flights_and_its_error_holds():
+    exact = rate_of_diffuse_walls(3.0, 1.0)
+    found = [
+        spec.channel_paths(ker.lambertian(), [20, 60, 120], 400, seed, bend=3.0).variance_rate() for seed in range(100)
+    ]
+    hits = sum(abs(float(one) - exact) <= one.error for one in found)
+    assert hits >= 88
+    values = np.array([float(one) for one in found])
+    assert abs(values.mean() - exact) <= 4.0 * values.std() / 10.0
+    assert np.mean([one.error for one in found]) < 2.0 * 1.96 * values.std()
+
+
+def test_positions_in_a_bent_channel_over_their_scale_are_normal():
+    found = spec.channel_paths(ker.lambertian(), [100, 200, 400], 4000, 5, bend=2.0)
+    scaled = found.positions[:, -1] / math.sqrt(400.0 * rate_of_diffuse_walls(2.0, 1.0))
+    assert kstest(scaled, "norm").pvalue > 1e-3
+    assert kstest(1.15 * scaled, "norm").pvalue < 1e-3
+
+
+@pytest.mark.parametrize("law", [ker.lambertian(), ker.maxwell(0.5)])
+def test_the_variance_of_the_limit_in_a_straight_channel_is_half_of_the_diffusivity(law):
+    exact = 0.5 * float(spec.diffusivity(law))
+    found = [spec.channel_paths(law, np.geomspace(50, 1000, 5), 640, seed).limit_variance() for seed in range(16)]
+    assert sum(abs(float(one) - exact) <= one.error for one in found) >= 13
+    values = np.array([float(one) for one in found])
+    assert abs(values.mean() - exact) < 0.15 * exact
+    assert np.mean([one.error for one in found]) < 0.7 * exact
+
+
+def test_the_error_holds_where_flights_under_way_matter_more_than_sampling():
+    exact, rows = 2.0 / math.pi, []
+    for seed in range(12):
+        found = spec.channel_paths(ker.lambertian(), [50, 200, 800], 4000, seed).limit_variance()
+        rows.append((float(found), found.error))
+    values, errors = np.array(rows).T
+    assert np.sum(np.abs(values - exact) <= errors) >= 10
+    # without the part for these flights the sampling errors alone would be exceeded too often
+    assert abs(values.mean() - exact) < 0.12
+
+
+def mean_square_of_diffuse_walls(time, radius, speed):
+    """Uncorrelated flights begin at the rate speed/(pi radius); each counts as far as it has come."""
+    theta = (np.arange(2000) + 0.5) * 0.5 * math.pi / 2000
+    weight = np.sin(theta) * 0.5 * math.pi / 2000
+    duration = 2.0 * radius / (speed * np.sin(theta))
+
+    def reached(after):
+        return float(np.sum(weight * (np.cos(theta) * speed * np.minimum(duration, after)) ** 2))
+
+    # Simpson's rule in the square root of the time, as short times matter most
+    root = np.linspace(0.0, math.sqrt(time), 401)
+    total = float(simpson([2.0 * u * reached(u * u) for u in root], x=root))
+    return reached(time) + total * speed / (math.pi * radius)
+
+
+def test_the_mean_square_in_a_straight_channel_grows_twice_as_fast_as_the_variance_of_the_limit():
+    times = np.array([25.0, 100.0, 400.0])
+    found = spec.channel_paths(ker.lambertian(), times, 8000, 3, radius=0.5, speed=2.0)
+    expected = np.array([mean_square_of_diffuse_walls(time, 0.5, 2.0) for time in times])
+    spread = (found.positions**2).std(axis=0) / math.sqrt(8000)
+    assert np.all(np.abs(found.mean_squares - expected) < 4.0 * spread + 0.01 * expected)
+    slopes = np.diff(expected / times) / np.diff(np.log(times))
+    assert abs(slopes[-1] * math.pi / (4.0 * 0.5 * 2.0) - 1.0) < 0.05
+
+
+def paths_in_the_plane(law, bend, upper, time, n, rng):
+    """X_t by vectors in the plane, for channels around the origin."""
+    outer = rng.random(n) < 0.5 * (1.0 + 1.0 / bend)
+    place = np.stack([np.zeros(n), np.where(outer, bend + 1.0, bend - 1.0)], axis=1)
+    angle = np.arccos(1.0 - 2.0 * rng.random(n))
+    turned, left = np.zeros(n), np.full(n, time)
+    while True:
+        normal = place / np.hypot(*place.T)[:, None] * np.where(outer, -1.0, 1.0)[:, None]
+        # the channel runs clockwise
+        along = np.stack([place[:, 1], -place[:, 0]], axis=1) / np.hypot(*place.T)[:, None]
+        tangent = along * np.where(outer, upper, 1.0)[:, None]
+        u = np.cos(angle)[:, None] * tangent + np.sin(angle)[:, None] * normal
+        best, other = np.full(n, np.inf), outer.copy()
+        for radius, which in ((bend - 1.0, False), (bend + 1.0, True)):
+            b, c = np.sum(place * u, axis=1), np.sum(place**2, axis=1) - radius**2
+            root = b * b - c
+            for sign in (-1.0, 1.0):
+                t = np.where(root > 0.0, -b + sign * np.sqrt(np.maximum(root, 0.0)), np.inf)
+                nearer = (t > 1e-7) & (t < best)
+                best, other = np.where(nearer, t, best), np.where(nearer, which, other)
+        step = np.minimum(best, left)
+        after = place + step[:, None] * u
+        turned -= np.arctan2(place[:, 0] * after[:, 1] - place[:, 1] * after[:, 0], np.sum(place * after, axis=1))
+        left = left - step
+        if not np.any(left > 0.0):
+            return bend * turned
+        place, outer = np.where((left > 0.0)[:, None], after, place), np.where(left > 0.0, other, outer)
+        normal = place / np.hypot(*place.T)[:, None] * np.where(outer, -1.0, 1.0)[:, None]
+        along = np.stack([place[:, 1], -place[:, 0]], axis=1) / np.hypot(*place.T)[:, None]
+        tangent = along * np.where(outer, upper, 1.0)[:, None]
+        level = np.sum(-u * tangent, axis=1)
+        incoming = np.where(left > 0.0, np.arccos(np.clip(level, -1.0, 1.0)), 1.0)
+        angle = law.sample(np.clip(incoming, 1e-12, np.pi - 1e-12), rng)
+
+
+@pytest.mark.parametrize(("arrangement", "upper"), [("mirror", 1.0), ("half-turn", -1.0)])
+def test_paths_agree_with_vectors_in_the_plane(arrangement, upper):
+    """A law without mirror symmetry tells both arrangements from each other."""
+    n, time = 20_000, 12.0
+    plain = paths_in_the_plane(LEANING, 2.5, upper, time, n, np.random.default_rng(1))
+    found = spec.channel_paths(LEANING, [1.0, 2.0, time], n, 2, bend=2.5, arrangement=arrangement).positions[:, -1]
+    for power in (1, 2, 3):
+        one, two = plain**power, found**power
+        assert abs(one.mean() - two.mean()) < 4.0 * np.hypot(one.std(), two.std()) / math.sqrt(n)
+    if arrangement == "half-turn":
+        # a rotation by half a turn exchanges the straight walls, not the bent ones
+        straight = spec.channel_paths(LEANING, [1.0, 2.0, time], n, 3, arrangement=arrangement).positions[:, -1]
+        assert abs(straight.mean()) < 4.0 * straight.std() / math.sqrt(n)
+
+
+def test_retroreflected_particles_stay_on_one_chord():
+    found = spec.channel_paths(ker.retroreflection(), [5.0, 50.0, 500.0], 500, 0, bend=2.0)
+    # the longest chord touches the inner circle
+    assert np.all(np.abs(found.positions) <= 2.0 * 2.0 * math.acos(1.0 / 3.0) + 1e-9)
+
+
+def test_wrong_arguments_are_refused():
+    law = ker.lambertian()
+    with pytest.raises(InputError, match="expected a law"):
+        spec.channel_paths("lambertian", [1, 2, 3])
+    with pytest.raises(InputError, match="increasing positive times"):
+        spec.channel_paths(law, [1, 2])
+    with pytest.raises(InputError, match="greater than the radius"):
+        spec.channel_paths(law, [1, 2, 3], bend=1.0)
+    with pytest.raises(InputError, match="arrangement"):
+        spec.channel_paths(law, [1, 2, 3], arrangement="shifted")
+    straight = spec.channel_paths(law, [1, 2, 3], 10, 0)
+    with pytest.raises(InputError, match="at least 320"):
+        straight.limit_variance()
+    with pytest.raises(InputError, match="bent channel"):
+        straight.variance_rate()
+    with pytest.raises(InputError, match="straight channel"):
+        spec.channel_paths(law, [1, 2, 3], 10, 0, bend=3.0).limit_variance()
