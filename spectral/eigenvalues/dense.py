@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
-from .completeness import Deflated, margin_below, norm_beyond
+from .completeness import Deflated, block_norm_beyond, margin_below, norm_beyond
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -32,6 +32,8 @@ GUARDS = 6
 SEARCHES, MORE_VALUES = 2, 8
 # Distance from the last value to the threshold of the proof, in backward errors n u of a factorisation.
 CLEARANCE = 2.0
+# Norms of blocks overestimate by more than this factor; they are tried where the known values leave so much room.
+BLOCK_ROOM = 2.0
 
 
 def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
@@ -202,16 +204,20 @@ def _without_others(matrix: Deflated, found: _Pairs, k: int, which: Which) -> Ex
         # the largest value is always wanted, even if it is not among the k largest moduli
         last = float(np.sort(np.abs(chosen))[-min(k, len(chosen))])
         ends = {1.0: min(last, float(chosen[0])), -1.0: last}
+    thresholds = {sign: end + joint + CLEARANCE * rounding for sign, end in ends.items()}
+    nearest, how = min(thresholds.values()), "Frobenius norms"
     others, reach = norm_beyond(matrix, values), {}
-    for sign, end in ends.items():
-        threshold = end + joint + CLEARANCE * rounding
+    if others > nearest and nearest >= BLOCK_ROOM * np.abs(values).min():
+        others, how = block_norm_beyond(matrix, vectors, values), "norms of blocks"
+    if others > nearest:
+        how = "Cholesky factorisations"
+    for sign, threshold in thresholds.items():
         margin = 0.0 if others <= threshold else margin_below(matrix, sign, vectors, values, threshold)
         if margin is None:
             return f"a Cholesky factorisation did not rule out others beyond {sign * threshold:.12g}"
         reach[sign] = threshold + margin
     upper = np.maximum(reach[1.0] - chosen[:top], 0.0)
     lower = np.maximum(reach.get(-1.0, 0.0) + chosen[top:], 0.0)
-    how = "Frobenius norms" if others <= min(ends.values()) else "Cholesky factorisations"
     sides = f"above {reach[1.0]:.12g}" + (f" or below {-reach[-1.0]:.12g}" if -1.0 in reach else "")
     return ExtremalEigenvalues(
         chosen, vectors[:, indices], top, residuals[indices], 2.0 * joint + np.concatenate([upper, lower]),
