@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Two tiles with this many rows and columns fit in the cache.
 TILE = 256
+# Rows with some thousand columns that fit in the cache.
+ROWS_AT_ONCE = 32
 Which = Literal["largest", "moduli"]
 _Pairs = tuple[Floats, Floats]
 # LAPACK's complete solver is used below this size and above this fraction of the spectrum, where it takes no longer.
@@ -53,12 +55,49 @@ def off_constants(array: Floats, constant: Floats) -> tuple[Floats, Floats]:
 
 def compressed(array: Floats, embedding: csr_array[Any]) -> Floats:
     """The symmetric part of E A E^T for a sparse E of shape (m, n): the form of A on the rows of E."""
+    pairs = _of_pairs(embedding)
+    if pairs is not None:
+        return symmetric_half(_on_pairs(array, *pairs))
     rows = embedding @ array
     found = np.empty((len(rows), len(rows)))
     for start in range(0, len(rows), TILE):
         # tile by tile, because a product with a transpose would read memory across the rows
         found[:, start : start + TILE] = embedding @ np.ascontiguousarray(rows[start : start + TILE].T)
     return symmetric_half(found)
+
+
+def _of_pairs(embedding: csr_array[Any]) -> tuple[slice, slice, Floats] | None:
+    """The columns of the first and second entries as slices, and the entries, if each row has two evenly spaced ones.
+
+    Bins joined with their neighbours and functions joined with their mirror images are such embeddings.
+    """
+    rows = embedding.shape[0]
+    if embedding.nnz != 2 * rows or rows < 2 or np.any(np.diff(embedding.indptr) != 2):
+        return None
+    where = np.asarray(embedding.indices, dtype=np.int64).reshape(rows, 2).T
+    steps = [np.diff(one) for one in where]
+    if any(step[0] == 0 or np.any(step != step[0]) for step in steps):
+        return None
+    first, second = (
+        slice(int(one[0]), None if end < 0 else end, int(step[0]))
+        for one, step in zip(where, steps, strict=True)
+        for end in [int(one[-1] + np.sign(step[0]))]
+    )
+    return first, second, np.asarray(embedding.data, dtype=np.float64).reshape(rows, 2)
+
+
+def _on_pairs(array: Floats, first: slice, second: slice, weights: Floats) -> Floats:
+    """E A E^T for an E with the given columns and entries, some rows at a time, which fit in the cache."""
+    one, other = weights.T
+    above, below = array[first], array[second]
+    found = np.empty((len(weights), len(weights)))
+    for start in range(0, len(weights), ROWS_AT_ONCE):
+        here = slice(start, start + ROWS_AT_ONCE)
+        rows = one[here, None] * above[here]
+        rows += other[here, None] * below[here]
+        np.multiply(rows[:, first], one, out=found[here])
+        found[here] += rows[:, second] * other
+    return found
 
 
 def symmetric_half(array: Floats) -> Floats:
