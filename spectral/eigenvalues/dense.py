@@ -165,12 +165,13 @@ def extremal(array: Floats, constant: Floats | None, k: int, which: Which = "mod
 
     Notes
     -----
-    Lanczos computes values and vectors, which are then deflated. A Cholesky factorisation of sigma - S, with sigma just
-    beyond the last value, proves that no other eigenvalue is above sigma; sigma + S proves the same for the lower end.
-    This takes a tenth of the time of LAPACK's solver, which is used if Lanczos does not converge. With the vectors V
-    and R = S V - V diag(values), the eigenvalues of S are by Weyl within \|R\| of the values and of the spectrum of the
-    compression to the complement of V, whose upper end is at most sigma plus a margin of rounding. A cluster may be
-    cut: its unlisted eigenvalues are not larger than the listed ones.
+    Lanczos computes values and vectors, which are then deflated. What is left has a norm below sigma, just beyond the
+    last value, by its Frobenius norm or, as for noise of sampling, by the norms of its blocks. Otherwise a Cholesky
+    factorisation of sigma - S proves that no other eigenvalue is above sigma; sigma + S proves the same for the lower
+    end. This takes a tenth of the time of LAPACK's solver, which is used if Lanczos does not converge. With the vectors
+    V and R = S V - V diag(values), the eigenvalues of S are by Weyl within \|R\| of the values and of the spectrum of
+    the compression to the complement of V, whose upper end is at most sigma plus a margin of rounding. A cluster may
+    be cut: its unlisted eigenvalues are not larger than the listed ones.
     """
     size = len(array)
     if size < SMALL or k > LARGEST_FRACTION * size:
