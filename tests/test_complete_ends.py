@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.linalg import qr
+from scipy.sparse import csr_array
 
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.spectral.eigenvalues.completeness import Deflated, margin_below, norm_beyond
-from asperity.spectral.eigenvalues.dense import end_values, extremal
+from asperity.spectral.eigenvalues.dense import compressed, end_values, extremal
+from asperity.spectral.eigenvalues.parity import parity_basis
 
 SIZE = 600
 RNG = np.random.default_rng(7)
@@ -137,3 +139,14 @@ def test_the_leading_eigenvalues_of_mirror_symmetric_laws_are_labelled():
     found = spec.leading_eigenvalues(matrix, 4)
     assert np.allclose(found.values, 0.5 ** np.arange(4.0), rtol=0.0, atol=1e-9)
     assert found.complete and found.parity == ("even", "odd", "even", "odd")
+
+
+@pytest.mark.parametrize("size", [2, 3, 64, 65, 100])
+def test_matrices_are_compressed_by_pairs_as_by_the_products(size):
+    """Joined bins and functions of a parity: E A E^T, and its symmetric part, of dense arrays."""
+    array = np.random.default_rng(size).normal(size=(size, size))
+    basis = ker.Bins(size)
+    halves = parity_basis(basis, ker.maxwell(0.5))
+    for embedding in (csr_array(basis.coarsened()[1]), *(half.T.tocsr() for half in halves)):
+        form = embedding.toarray() @ array @ embedding.toarray().T
+        np.testing.assert_allclose(compressed(array, embedding), 0.5 * (form + form.T), rtol=0, atol=1e-14)

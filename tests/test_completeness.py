@@ -8,7 +8,8 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from asperity.spectral.eigenvalues.completeness import Deflated, margin_below, norm_beyond
+from asperity.spectral.eigenvalues.completeness import Deflated, block_norm_beyond, margin_below, norm_beyond
+from asperity.spectral.eigenvalues.dense import extremal
 
 U = 2.0**-53
 RNG = np.random.default_rng(11)
@@ -203,3 +204,65 @@ def test_values_that_rounding_makes_too_large_leave_the_bound_of_rounding():
     exact = np.sqrt(2.0 * 4.0 * U * 0.3125)
     assert norm_beyond(matrix, np.array([0.5, 0.25 * (1.0 + 1e-9)])) == pytest.approx(exact, rel=1e-12, abs=0.0)
     assert norm_beyond(matrix, np.array([1.0, 0.5])) == pytest.approx(exact, rel=1e-12, abs=0.0)
+
+
+# ---- norms of blocks ----------------------------------------------------------------------------------------------
+def noisy(size: int, spikes: list[float], noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Symmetric noise whose spectrum ends near +-``noise``, plus the spikes, and the directions of the spikes."""
+    rng = np.random.default_rng(size)
+    vectors = np.linalg.qr(rng.normal(size=(size, len(spikes))))[0]
+    rough = rng.normal(size=(size, size)) * noise / np.sqrt(8.0 * size)
+    return (vectors * np.asarray(spikes)) @ vectors.T + rough + rough.T, vectors
+
+
+@pytest.mark.parametrize("deflated", CASES.values(), ids=CASES)
+@pytest.mark.parametrize("scale", [1.0, 1e-160, 1e-100, 1e120])
+@pytest.mark.parametrize("size", [7, 513, 1100])
+def test_norms_of_blocks_bound_what_is_left(size, scale, deflated):
+    array, _ = noisy(size, [1.0, -0.8, 0.6], 0.1)
+    array *= scale
+    constant = np.full(size, 1.0 / np.sqrt(size)) if deflated else None
+    off = np.eye(size) - (np.outer(constant, constant) if deflated else 0.0)
+    values, vectors = np.linalg.eigh(off @ array @ off)
+    listed = np.argsort(-np.abs(values))[:3]
+    rest = float(np.sort(np.abs(values))[-4])
+    bound = block_norm_beyond(Deflated.of(array, constant), vectors[:, listed], values[listed])
+    # a few blocks of noise overestimate its norm by the eighth root of 14 times their size over 2, and by their number
+    assert rest <= bound <= (6.0 if scale > 1e-150 else 1000.0) * rest
+
+
+@pytest.mark.parametrize("left_out", [0, 1, 2])
+@pytest.mark.parametrize("where", [slice(0, 1), slice(500, 530), slice(0, 1100)], ids=["entry", "corner", "all"])
+def test_norms_of_blocks_never_hide_an_eigenvalue_that_is_not_listed(left_out, where):
+    spikes = [0.9, -0.7, 0.3]
+    array, _ = noisy(1100, [], 1e-3)
+    rng = np.random.default_rng(3)
+    for value in spikes:
+        direction = np.zeros(1100)
+        direction[where] = rng.normal(size=len(direction[where]))
+        array += value * np.outer(direction, direction) / (direction @ direction)
+    values, vectors = np.linalg.eigh(array)
+    order = np.argsort(-np.abs(values))[:3]
+    listed = np.delete(order, left_out)
+    hidden = abs(values[order[left_out]])
+    assert block_norm_beyond(Deflated.of(array, None), vectors[:, listed], values[listed]) >= hidden
+
+
+def test_blocks_of_extreme_shapes_are_bounded_in_exact_arithmetic():
+    """Rank one blocks attain the bound: no rounding may carry it below the norm."""
+    for size in (1, 2, 30, 512):
+        for scale in (1e-300, 1e-30, 1.0, 1e100):
+            array = np.full((size, size), scale)
+            bound = block_norm_beyond(Deflated.of(array, None), *nothing(size))
+            assert size * scale <= bound <= size * scale * (1.0 + 1e-2)
+
+
+@pytest.mark.parametrize("twin", [False, True], ids=["simple", "double"])
+def test_sampled_matrices_are_proved_complete_by_norms_of_blocks(twin):
+    array, _ = noisy(1100, [0.8, 0.8 if twin else -0.7, *0.5 * 0.7 ** np.arange(9.0)], 0.06)
+    array = 0.5 * (array + array.T)
+    found = extremal(array, None, 2)
+    exact = np.linalg.eigvalsh(array)
+    expected = np.sort(exact[np.argsort(-np.abs(exact))[:2]])[::-1]
+    assert "norms of blocks" in found.method and found.errors.max() < 1e-11
+    assert np.all(np.abs(found.values - expected) <= found.errors)

@@ -153,6 +153,40 @@ def test_specular_channels_are_refused():
         spec.diffusivity(ker.lambertian(), arrangement="glide")
 
 
+# without a closed form
+TWO_DEPTHS = geo.Wall.from_vertices([(0, 0), (0, -0.3), (0.4, -0.3), (0.4, -0.7), (0.9, -0.7), (0.9, 0), (1, 0)])
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ker.RectangularTeethLaw(1.0),
+        ker.WallLaw(geo.rectangular_teeth(2.0)),
+        ker.RectangularTeethLaw(1.0) @ ker.RectangularTeethLaw(0.5),
+        0.5 * ker.specular() + 0.5 * ker.retroreflection(),
+        ker.retroreflection().in_specular_frame(),
+        ker.WallLaw(TWO_DEPTHS),
+    ],
+    ids=repr,
+)  # fmt: skip
+def test_walls_that_keep_the_sine_of_every_angle_have_no_diffusivity(law):
+    assert np.ptp(np.sin(law.sample(np.full(50, 0.7), np.random.default_rng(0)))) < 1e-14
+    with pytest.raises(InputError, match="equally long"):
+        spec.diffusivity(law)
+
+
+def test_half_rectangular_teeth_in_a_diffuse_wall_have_the_mean_of_their_diffusivities():
+    """Between two diffuse reflections d is kept, so eta is the mean of (2 + c)/(2 - c) for c = 1 - q, uniform."""
+    found = spec.diffusivity(0.5 * ker.RectangularTeethLaw(1.0) + 0.5 * ker.lambertian())
+    assert abs(found.eta - (4.0 * np.log(2.0) - 1.0)) <= found.eta_error < 10.0
+
+
+def test_a_diffusivity_that_the_limit_at_grazing_does_not_bound_is_refused():
+    with pytest.raises(AccuracyError, match="does not bound") as caught:
+        spec.diffusivity(0.9 * ker.RectangularTeethLaw(1.0) + 0.1 * ker.lambertian())
+    assert 0.1 < caught.value.defect < 2.0
+
+
 # ---- large matrices ---------------------------------------------------------------------------------------------
 def wells(barriers: np.ndarray, inside: int):
     """A chain of wells of ``inside`` states, hopping at rate 1/4 in them and at the rates ``barriers`` between them."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
+from asperity import kernels as ker
 from asperity.errors import AccuracyError, InputError
 from asperity.kernels import Combination
 from asperity.kernels.bases.measure import SINE
@@ -119,3 +120,35 @@ def test_rays_that_do_not_escape_are_sent_back_and_reported() -> None:
 def test_a_wall_law_wants_a_wall() -> None:
     with pytest.raises(InputError, match="expected a Wall"):
         WallLaw("koch")  # type: ignore[arg-type]
+
+
+# ---- expectations under walls with many pieces ---------------------------------------------------------------------
+def _rough(points: int) -> geo.Wall:
+    """A profile whose slopes are independent: its rays visit many valleys."""
+    steps = np.random.default_rng(0).normal(size=points + 1)
+    return geo.Wall.from_profile(np.linspace(0.0, 1.0, points + 1), 0.1 * np.cumsum(steps) / np.sqrt(points))
+
+
+@pytest.mark.parametrize(
+    ("wall", "reached"), [(geo.mushrooms(0.25, 0.5, 3), 1e-4), (geo.koch(4), 1e-4), (_rough(1000), 0.3)],
+    ids=["mushrooms", "koch", "rough"],
+)  # fmt: skip
+def test_means_over_walls_with_many_pieces_have_the_error_of_their_conditionals(wall, reached):
+    # the midpoint sums over 256 entry points were wrong by .03
+    law, theta = ker.WallLaw(wall), np.array([0.3, 1.6, 2.5])
+    assert law.exact_law is None and len(wall.pieces) > 64
+    entry = (np.arange(2**16) + 0.5) / 2**16
+    cosines = np.cos(law.reflect(entry[:, None], theta))
+    doubt = np.abs(cosines[::2].mean(axis=0) - cosines[1::2].mean(axis=0))
+    error = law.conditionals(theta, 1e-4).error
+    assert np.all(np.abs(law.apply(np.cos, theta) - cosines.mean(axis=0)) <= error + doubt)
+    assert error.max() < reached and doubt.max() < 3e-3
+
+
+def test_means_over_resolved_polygons_with_many_pieces_are_exact():
+    law, theta = ker.WallLaw(_rough(75)), np.array([0.3, 1.6, 2.5])
+    assert len(law.wall.pieces) == 150 and law.exact_law is not None and law.closed_form is None
+    probability, outgoing = law.exact_law.branches(theta)
+    expected = np.sum(probability * np.cos(outgoing), axis=-1)
+    np.testing.assert_allclose(law.apply(np.cos, theta), expected, rtol=0, atol=1e-13)
+    assert np.all(np.abs(law.conditionals(theta).mean(np.cos) - expected) <= law.conditionals(theta).error)

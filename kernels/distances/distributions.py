@@ -7,17 +7,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...core.checks import Floats
+from ..bases.basis import AngleFunction
 from ..bases.bins import Bins
 from ..bases.measure import SINE
 from ..discretisation.discretisation import discretise
 from ..laws.distribution import Distribution
 from ..laws.law import ENTRY_POINTS, Combination, Composition, Law, Power, SpecularFrame, atoms_of
-from ..laws.structure import Rules, fold
 from ..matrices.matrix import KernelMatrix
 from .transport import Distributions, power_mean, wasserstein
 
-# Incoming angles at which the error from entry points is estimated.
+# Incoming angles at which the error from entry points is estimated, and the number of cells for products.
 ANGLES = 64
+# Incoming angle at which laws are tested for densities and entry points; the result does not depend on it.
+PROBE = 1.0
 
 
 def outgoing_distributions(law: Law, theta: Floats, edges: Floats) -> Distributions:
@@ -42,10 +44,13 @@ def on_cells(law: Law) -> Law:
 def cells_error(law: Law, order: float, sup: bool) -> float:
     """Error of a distance from the matrices that replace the later factors of products.
 
-    The Frobenius errors of the last matrices used enter as in `resampling.matrices_error`.
+    The Frobenius errors of the last matrices used enter as in `resampling.matrices_error`; they bound total variations,
+    which further factors do not increase. W_p^p is convex in both measures, so the p-th powers of the errors of the
+    terms of a sum are averaged.
     """
     if isinstance(law, Combination):
-        return sum(weight * cells_error(term, order, sup) for weight, term in law.terms)
+        errors = np.array([cells_error(term, order, sup) for _, term in law.terms])
+        return float(power_mean(errors, np.array([weight for weight, _ in law.terms]), order))
     if isinstance(law, SpecularFrame):
         return cells_error(law.law, order, sup)
     if not isinstance(law, _OnCells) or law.last is None:
@@ -54,36 +59,56 @@ def cells_error(law: Law, order: float, sup: bool) -> float:
     return float(np.pi * min(0.5 * error, 1.0) ** (1.0 / order)) + cells_error(law.laws[0], order, sup)
 
 
-# The parts of a law that its distributions are taken from, with their weights; of a product, those of its first factor.
-FIRST_PARTS: Rules[list[tuple[float, Law]]] = Rules(
-    lambda law: [(1.0, law)],
-    lambda terms: [(weight * own, law) for weight, parts in terms for own, law in parts],
-    lambda factors: factors[0] if factors else [],
-    lambda parts: parts,
-)
-
-
 def entry_error(law: Law, order: float, sup: bool) -> float:
     """Error of a distance from laws whose distributions are those of equally spaced entry points.
 
-    It is the distance between the distributions of every other entry point: each half has twice the spacing of all
-    points, or half of the sample where the angles are chaotic.
+    It is the distance between the laws with every other entry point: each half has twice the spacing of all points, or
+    half of the sample where the angles are chaotic. The law is one that `on_cells` returned.
     """
-    return sum(weight * _entry_error(part, order, sup) for weight, part in fold(law, FIRST_PARTS))
-
-
-def _entry_error(law: Law, order: float, sup: bool) -> float:
-    angle, edges = SINE.quantile((np.arange(ANGLES) + 0.5) / ANGLES), np.array([0.0, np.pi])
-    found = law.distribution(angle[:1], edges)
-    if found.mass.shape[1] != ENTRY_POINTS:
+    if not _has_entry_points(law):
         return 0.0
-    found = law.distribution(angle, edges)
-    one, other = (
-        Distributions.of_parts(edges, found.below, found.position[:, first::2], 2.0 * found.mass[:, first::2])
-        for first in (0, 1)
-    )
+    angle, edges = SINE.quantile((np.arange(ANGLES) + 0.5) / ANGLES), np.linspace(0.0, np.pi, ANGLES + 1)
+    one, other = (outgoing_distributions(_with_half(law, first), angle, edges) for first in (0, 1))
     rows = wasserstein(one, other, order)
     return float(rows.max() if sup else power_mean(rows, np.full(ANGLES, 1.0 / ANGLES), order))
+
+
+def _has_entry_points(law: Law) -> bool:
+    """Whether a distribution of the law, or of the first factor of a product, is that of entry points."""
+    if isinstance(law, Combination):
+        return any(_has_entry_points(term) for weight, term in law.terms if weight > 0.0)
+    if isinstance(law, (SpecularFrame, Composition)):
+        return _has_entry_points(law.law if isinstance(law, SpecularFrame) else law.laws[0])
+    return bool(law.distribution(np.array([PROBE]), np.array([0.0, np.pi])).mass.shape[1] == ENTRY_POINTS)
+
+
+def _with_half(law: Law, first: int) -> Law:
+    """The law with every other entry point."""
+    if isinstance(law, Combination):
+        return Combination(tuple((weight, _with_half(term, first)) for weight, term in law.terms))
+    if isinstance(law, SpecularFrame):
+        return SpecularFrame(_with_half(law.law, first))
+    if isinstance(law, Composition):
+        return _OnCells((_with_half(law.laws[0], first), *law.laws[1:]))
+    return _HalfOfEntries(law, first) if _has_entry_points(law) else law
+
+
+@dataclass(frozen=True, repr=False)
+class _HalfOfEntries(Law):
+    """The distributions of a law from every other one of its entry points; nothing else is asked of it."""
+
+    law: Law
+    first: int
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        found = self.law.distribution(theta, edges)
+        return Distribution(found.below, found.position[:, self.first :: 2], 2.0 * found.mass[:, self.first :: 2])
+
+    def _sample(self, theta: Floats, rng: np.random.Generator) -> Floats:
+        return self.law.sample(theta, rng)
+
+    def _apply(self, function: AngleFunction, theta: Floats) -> Floats:
+        return self.law.apply(function, theta)
 
 
 @dataclass(frozen=True, repr=False)

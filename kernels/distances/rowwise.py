@@ -11,7 +11,7 @@ from ...core.estimates import Estimate
 from ..bases.measure import SINE, gauss_on_intervals
 from ..laws.law import ENTRY_POINTS, Law
 from ..matrices.matrix import KernelMatrix, joint_kind
-from .distributions import cells_error, entry_error, on_cells, outgoing_distributions
+from .distributions import PROBE, cells_error, entry_error, on_cells, outgoing_distributions
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
 from .transport import power_mean, wasserstein
 
@@ -20,8 +20,6 @@ from .transport import power_mean, wasserstein
 NODES, PANELS, BREAKPOINTS, CELLS = 4, 12, 24, 64
 # Limit on the angles times cells of a level, a few seconds of work; FEW_ATOMS is added to the cells.
 MOST_CORNERS, FEW_ATOMS = 2**22, 32
-# Incoming angle at which laws are tested for densities; the result does not depend on it.
-PROBE = 1.0
 # Corners in memory at a time. Each angle counts with at least MOST_ATOMS, the atoms of walls with many pieces.
 CORNERS_AT_ONCE, MOST_ATOMS = 2**21, ENTRY_POINTS
 FEWEST_LEVELS = 3

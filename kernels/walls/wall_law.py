@@ -44,6 +44,8 @@ MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
 FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
 # `apply` integrates trigonometric polynomials of this degree to this fraction of their sup norm.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
+# The tolerance for walls with many pieces, some ten milliseconds for an angle.
+MANY_TOLERANCE = 1e-4
 # Error of the distribution function at the edges of cells.
 CELL_TOLERANCE = 1e-9
 
@@ -54,7 +56,11 @@ class WallLaw(DrivenLaw):
     """The law P~ of a wall, for rays that enter at a uniform point of the period.
 
     `reflect` and `reflect_with_status` trace rays. `sample` and `apply` use the closed form if there is one and trace
-    rays otherwise. `branches`, `breakpoints` and `discretise` use the exact law if there is one.
+    rays otherwise; `apply` of a wall with more than 64 pieces uses the exact law if there is one. `branches`,
+    `breakpoints` and `discretise` use the exact law if there is one.
+
+    The wanted error of a traced `apply` is 1e-8 times the sup norm of the function, and 1e-4 with more than 64 pieces.
+    Rough walls may not reach it; the error reached is that of `conditionals`.
 
     Parameters
     ----------
@@ -198,10 +204,12 @@ class WallLaw(DrivenLaw):
     def apply(self, function: AngleFunction, theta: ArrayLike) -> Floats:
         if self.closed_form is not None:
             return self.closed_form.apply(function, theta)
-        incoming = angles("theta", theta)
-        if incoming.size == 0 or not is_few(self.wall):
+        incoming, few = angles("theta", theta), is_few(self.wall)
+        if incoming.size == 0:
             return super().apply(function, incoming)
-        mean = self.conditionals(incoming).mean(function)
+        if not few and self.exact_law is not None:
+            return self.exact_law.apply(function, incoming)
+        mean = self.conditionals(incoming, APPLY_TOLERANCE if few else MANY_TOLERANCE).mean(function)
         return mean.reshape(incoming.shape + mean.shape[1:])
 
     def conditionals(
@@ -209,7 +217,8 @@ class WallLaw(DrivenLaw):
     ) -> AdaptiveConditionals:
         """Conditional distributions by tracing, each with its error.
 
-        ``conditionals.mean(f)`` equals `apply` of f, and ``conditionals.error`` is its error.
+        ``conditionals.mean(f)`` is a traced `apply` of f, and ``conditionals.error`` is its error; the tolerance of
+        `apply` is 1e-4 for walls with more than 64 pieces.
 
         Parameters
         ----------

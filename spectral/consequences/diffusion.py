@@ -8,11 +8,14 @@ from typing import Literal
 import numpy as np
 
 from ...core.checks import Floats, positive_number
-from ...core.errors import InputError
+from ...core.errors import AccuracyError, InputError
 from ...core.estimates import ErrorKind, Estimate
 from ...core.kinds import explained
 from ...core.rounding import EPS
-from ...kernels import Law
+from ...kernels import Law, PolygonLaw, RectangularTeethLaw, WallLaw
+from ...kernels.laws.law import IsometryLaw
+from ...kernels.laws.structure import holds_of_all
+from ...kernels.walls.repeated_teeth import RepeatedTeethLaw
 from ..essential.edge import grazing_symbol
 from ..essential.exact import ideal_spectrum
 
@@ -23,6 +26,8 @@ ARRANGEMENTS: tuple[Arrangement, ...] = ("mirror", "half-turn")
 DIRECTION = np.array([1.0, -1.0])
 # A persistence within this distance of 1 counts as 1: the particle never reverses its direction.
 BALLISTIC = 1e-12
+# With a larger error of the persistence it is not known whether the particle reverses its direction.
+LARGEST_DOUBT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,11 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     Raises
     ------
     InputError
-        If the law preserves the direction of grazing rays, like specular reflection: D is infinite.
+        If the law preserves the direction of grazing rays, like specular reflection: D is infinite. If every ray leaves
+        at its own or at the mirrored angle, as at rectangular teeth: the length of all flights of a particle is then
+        the same, so that the particles do not share one diffusivity.
+    AccuracyError
+        If the limit at grazing is not known well enough to bound D; ``defect`` is the error of zeta.
 
     Notes
     -----
@@ -103,20 +112,43 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
     step = _step(symbol.matrix, arrangement)
     zeta = float(0.5 * DIRECTION @ step @ DIRECTION)
     doubt = 2.0 * symbol.entry_error
-    if abs(np.linalg.eigvals(step)).max() >= 1.0 - BALLISTIC and zeta > 1.0 - doubt - BALLISTIC:
+    known = doubt <= LARGEST_DOUBT
+    if known and abs(np.linalg.eigvals(step)).max() >= 1.0 - BALLISTIC and zeta > 1.0 - doubt - BALLISTIC:
         raise InputError(
             f"law: {law!r} keeps the direction of grazing flights (zeta = {zeta:.6g}), so the diffusivity is infinite; "
             "expected a law that turns them round at times, as a mixture with lambertian() does"
         )
+    if holds_of_all(law, _keeps_sines):
+        raise InputError(
+            f"law: {law!r} reflects every ray at its own angle to the wall, so that all flights of a particle are "
+            "equally long and the particles have no common diffusivity; expected a law that changes angles, as a "
+            "mixture with lambertian() does"
+        )
+    exact = ideal_spectrum(law) is not None
+    if not exact and zeta + doubt >= 1.0 - BALLISTIC:
+        raise AccuracyError(
+            f"law: the limit of grazing rays under {law!r} is known to {doubt:.2g} only (zeta = {zeta:.3g}), which "
+            "does not bound the diffusivity; deep hollows with vertical sides turn these rays round or not with every "
+            "change of the angle. exit_times(law, ...) simulates the times to leave a channel",
+            doubt,
+        )
     eta = _eta(step)
     # from the derivative of (1 + zeta)/(1 - zeta) at the worst end of the interval of zeta
     eta_error = 2.0 * doubt / max(1.0 - zeta - doubt, BALLISTIC) ** 2
-    exact = ideal_spectrum(law) is not None
     kind: ErrorKind = "bound" if exact else "estimate"
     if exact:
         eta_error = 8.0 * EPS * (1.0 + eta) / (1.0 - zeta)
     method = f"persistence of grazing flights, upper wall as {arrangement}"
     return Diffusivity(eta * scale, eta_error * scale, kind, method, eta, eta_error, zeta, doubt, arrangement)
+
+
+def _keeps_sines(law: Law) -> bool:
+    """Whether a law is known to consist of theta' = theta and theta' = pi - theta."""
+    if isinstance(law, (WallLaw, PolygonLaw)):
+        wall = law.wall
+        steps = [np.subtract(piece.end, piece.start) for loop in (wall.pieces, *wall.islands) for piece in loop]
+        return wall.is_polygonal and all(np.count_nonzero(step) == 1 for step in steps)
+    return isinstance(law, (IsometryLaw, RectangularTeethLaw, RepeatedTeethLaw))
 
 
 def _step(symbol: Floats, arrangement: Arrangement) -> Floats:

@@ -254,8 +254,13 @@ def matrix_spectrum(matrix: KernelMatrix, k: int, margin: float = ONE_MATRIX) ->
     residuals, algebraic = np.append(defect, rest.residuals), np.append(defect, rest.errors)
     changes = margin * np.append(0.0, two_grid_changes(matrix, rest))
 
+    total = _errors(matrix, values, vectors, algebraic, changes)
+
     def errors_of(indices: NDArray[np.intp]) -> SpectrumErrors:
-        return _errors(matrix, values[indices], vectors[:, indices], algebraic[indices], changes[indices])
+        algebraic, discretisation, sampling = (
+            frozen(part[indices]) for part in (total.algebraic, total.discretisation, total.sampling)
+        )
+        return SpectrumErrors(algebraic, discretisation, sampling, total.quantile)
 
     # without a second function the gap is 1 by convention, with unknown error
     unknown = frozen([np.inf])

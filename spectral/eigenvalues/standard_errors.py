@@ -48,15 +48,17 @@ def _count_variances(matrix: KernelMatrix, vectors: Floats) -> Floats:
     counts = np.asarray(matrix.counts, dtype=np.float64)
     weights = np.asarray(matrix.weights)
     phi = vectors / np.sqrt(weights)[:, None]
+    # one product for the means of phi and of its square, before any division of the counts
+    means = counts @ np.column_stack([phi, phi**2, np.ones(len(phi))])
+    first, square, totals = means[:, : phi.shape[1]], means[:, phi.shape[1] : -1], means[:, -1]
     if matrix.symmetrised:
-        fractions = counts / counts.sum()
-        mean = np.sum(phi * (fractions @ phi), axis=0)
-        spread = np.sum(phi**2 * (fractions @ phi**2), axis=0) - mean**2
-        return np.asarray(np.maximum(spread, 0.0) / counts.sum())
-    totals = np.maximum(counts.sum(axis=1), 1.0)
-    fractions = counts / totals[:, None]
-    spread = np.maximum(fractions @ phi**2 - (fractions @ phi) ** 2, 0.0)
-    return np.asarray(((weights[:, None] * phi) ** 2 * spread / totals[:, None]).sum(axis=0))
+        number = totals.sum()
+        mean = np.sum(phi * first, axis=0) / number
+        spread = np.sum(phi**2 * square, axis=0) / number - mean**2
+        return np.asarray(np.maximum(spread, 0.0) / number)
+    totals = np.maximum(totals, 1.0)[:, None]
+    spread = np.maximum(square / totals - (first / totals) ** 2, 0.0)
+    return np.asarray(((weights[:, None] * phi) ** 2 * spread / totals).sum(axis=0))
 
 
 @explained
