@@ -31,6 +31,18 @@ def test_rows_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(toler
     assert np.all(np.abs(rows.mean(np.cos) - exact) <= rows.error + 1e-13)
 
 
+@pytest.mark.parametrize("half_angle", [0.5, 1.2, 1.5])
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-7, 1e-10])
+def test_cell_masses_of_a_focusing_arc_lie_within_their_errors_of_the_closed_form(tolerance, half_angle) -> None:
+    """Functions that jump at the edges: the change of cell counts as error although the angle hardly changes."""
+    edges = np.linspace(0.0, np.pi, 18)
+    rows = adaptive_conditionals(geo.focusing_arcs(half_angle), ANGLES, tolerance, 0, edges[1:-1])
+    masses = rows.mean(lambda angle: (np.digitize(angle, edges[1:-1])[:, None] == np.arange(17)).astype(float))
+    exact = ker.CircularArcLaw(half_angle).conditional_masses(ANGLES, edges)
+    assert np.all(rows.error <= 2.0 * tolerance)
+    assert np.all(np.abs(masses - exact).sum(axis=1) <= rows.error + 1e-12)
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
 def test_the_first_moment_of_a_focusing_arc_lies_within_its_error(tolerance: float) -> None:
     matrix, error, _ = traced_matrix(ARCS, ker.Legendre(2), Budget(tolerance))

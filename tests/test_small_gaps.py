@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -129,6 +131,62 @@ def test_a_vertical_side_of_a_shallow_hollow_is_looked_at_from_its_own_scale():
     limits = [grazing_symbol(ker.WallLaw(wall)) for wall in walls.values()]
     roots = [limit.root for limit in limits]
     assert all(limit.error < 1e-3 for limit in limits) and roots == sorted(roots, reverse=True)
+
+
+def open_wall(lowered, *island):
+    """An island over a floor; the wall does not close."""
+    path = [piece.moved(0.0, -lowered) for piece in island]
+    return geo.Wall([geo.Segment((0.0, -0.5 - lowered), (1.0, -0.5 - lowered))], islands=[path])
+
+
+BALL = (geo.Arc((0.4, -0.2), 0.2, 0.0, -2.0 * np.pi),)
+SLANTED = tuple(geo.Segment(*ends) for ends in pairwise([(0.3, -0.3), (0.3, 0.0), (0.7, -0.1), (0.3, -0.3)]))
+POST = tuple(geo.Segment(*ends) for ends in pairwise([(0.4, -0.2), (0.4, 0.0), (0.6, 0.0), (0.6, -0.2), (0.4, -0.2)]))
+
+
+@pytest.mark.parametrize("island", [BALL, SLANTED], ids=["ball", "slanted"])
+def test_the_depth_of_a_wall_with_islands_does_not_change_its_grazing_limit(island):
+    limits = [grazing_limit(ker.WallLaw(open_wall(lowered, *island))) for lowered in (0.0, 0.1, 3.0)]
+    for limit in limits[1:]:
+        assert limit.resolved and limit.error < 1e-3
+        assert np.all(np.abs(limit.matrix - limits[0].matrix) <= limit.entry_error + limits[0].entry_error)
+    # plain rays from y = 0, which pass some thousand cells
+    x = (np.arange(2000) + 0.5) / 2000
+    traced = geo.trace(open_wall(0.1, *island), x, np.full(x.size, 1e-4))
+    ratio = np.sin(1e-4) / np.sin(traced.theta)
+    near = traced.theta < 0.5 * np.pi
+    means = np.array([ratio[near].sum(), ratio[~near].sum()]) / x.size
+    assert traced.escaped.all() and np.all(np.abs(means - limits[1].matrix[0]) < 0.02)
+
+
+def test_grazing_rays_that_do_not_come_out_of_a_wall_with_islands_leave_its_limit_unknown():
+    """Between upright posts the rays have 1/theta reflections: retroreflecting the lost ones would give a limit."""
+    assert not grazing_limit(ker.WallLaw(open_wall(0.0, *POST))).resolved
+
+
+class Losing(ker.InvolutionLaw):
+    """Specular reflection, with a fraction of 1/4 of the rays that do not escape and count as retroreflected."""
+
+    def random_map(self):
+        return lambda x, theta: (np.where(x < 0.25, theta, np.pi - theta), x >= 0.25)
+
+
+def test_grazing_rays_that_do_not_escape_count_as_error(monkeypatch):
+    from asperity.spectral.essential import grazing
+
+    monkeypatch.setattr(grazing, "DrivenLaw", Losing)
+    limit = grazing_limit(Losing(lambda theta: np.pi - theta))
+    assert 0.25 <= limit.error < 0.3
+
+
+def test_the_edge_of_an_isometric_law_needs_no_grazing_rays(monkeypatch):
+    from asperity.spectral.essential import edge
+
+    monkeypatch.setattr(edge, "grazing_limit", lambda law: pytest.fail("grazing rays were traced"))
+    law = ker.WallLaw(open_wall(0.0, *POST))
+    for mixed in (law, 0.5 * law + 0.5 * ker.specular(), (law @ ker.TriangularTeethLaw(0.7)).in_specular_frame()):
+        found = essential_edge(mixed)
+        assert found.low == found.high == 1.0 and found.kind == "bound" and found.reasons
 
 
 def test_a_limit_above_the_norm_is_no_limit(monkeypatch):

@@ -123,6 +123,11 @@ class Law(ABC):
         return None
 
     @property
+    def replacement(self) -> Law | None:
+        """The same law as a simpler one by which `fold` replaces it: the closed form, or a sum of simpler laws."""
+        return self.closed_form
+
+    @property
     def exact_law(self) -> Law | None:
         """The closed form, or else the same law as a table of isometries, whose computation may take a second."""
         return self.closed_form

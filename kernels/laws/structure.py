@@ -41,7 +41,7 @@ class Rules(Generic[Fact]):
 
 
 def fold(law: Law, rules: Rules[Fact]) -> Fact:
-    """The fact of a law computed from the facts of its parts; a law with a closed form is replaced by that form.
+    """The fact of a law computed from the facts of its parts; a law with a ``replacement`` is replaced by it.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def fold(law: Law, rules: Rules[Fact]) -> Fact:
         return rules.whole(law, rules.chain([fold(law.law, rules)] * law.exponent))
     if isinstance(law, SpecularFrame):
         return rules.whole(law, rules.mirrored(fold(law.law, rules)))
-    return rules.leaf(law) if law.closed_form is None else fold(law.closed_form, rules)
+    return rules.leaf(law) if law.replacement is None else fold(law.replacement, rules)
 
 
 def is_compound(law: Law) -> bool:

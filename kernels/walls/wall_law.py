@@ -42,6 +42,9 @@ MOST_PIECES, MOST_BEAMS, EXACT_ENOUGH = 1024, 100_000, 1e-6
 # Walls with more than FEW_PIECES pieces are tried with fewer beams first. These suffice if they leave at most RESOLVED,
 # as most rough profiles of 40 to 800 pieces do with 50 beams per piece.
 FEW_PIECES, FEW_BEAMS, BEAMS_A_PIECE, RESOLVED = 32, 10_000, 50, 1e-11
+# A wall whose hollows include more different curved ones without closed form is not taken apart: sampling each of them
+# would take longer than sampling the wall.
+MOST_CURVED = 4
 # `apply` integrates trigonometric polynomials of this degree to this fraction of their sup norm.
 APPLY_TOLERANCE, APPLY_DEGREE = 1e-8, 8
 # The tolerance for walls with many pieces, some ten milliseconds for an angle.
@@ -74,7 +77,11 @@ class WallLaw(DrivenLaw):
         differ. Hollows are recognised by their shape, not by the wall's constructor.
     exact_law : Law or None
         The closed form, or else the `PolygonLaw` of a polygonal wall that closes and is resolved within about a
-        second. Computed on first use.
+        second, or else the sum of the exact laws of the hollows, if each has one. Computed on first use.
+    replacement : Law or None
+        The closed form; or, of a wall that closes with curved and several different hollows, the sum of the laws of its
+        hollows and flat tops, weighted by their fractions of the period. `discretise` and other functions use it, so
+        each hollow is computed by its own best method: polygonal hollows exactly.
     mirror_symmetric : bool or None
         True if the wall's cell or its closed form is mirror-symmetric, otherwise None (not known).
 
@@ -127,9 +134,19 @@ class WallLaw(DrivenLaw):
         return _closed_form(self.wall)
 
     @cached_property
+    def replacement(self) -> Law | None:
+        return self.closed_form or _taken_apart(self.wall)
+
+    @cached_property
     def exact_law(self) -> Law | None:
         if self.closed_form is not None:
             return self.closed_form
+        if isinstance(self.replacement, Combination):
+            laws = [
+                (weight, law.exact_law if isinstance(law, WallLaw) else law) for weight, law in self.replacement.terms
+            ]
+            exact = tuple((weight, law) for weight, law in laws if law is not None)
+            return Combination(exact) if len(exact) == len(laws) else None
         wall = self.wall
         if not (wall.is_polygonal and wall.closes and len(wall.pieces) <= MOST_PIECES):
             return None
@@ -171,12 +188,13 @@ class WallLaw(DrivenLaw):
         return None if self.exact_law is None else self.exact_law.isometry_table()
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        """The distributions of the exact law, or else by quadrature in the entry point, with flat tops as atoms.
+        """The distributions of the exact law or of the hollows, or else by quadrature in the entry point.
 
-        The quadrature is adaptive for walls with few pieces and equally spaced for others.
+        Flat tops are atoms. The quadrature is adaptive for walls with few pieces and equally spaced for others.
         """
-        if self.exact_law is not None:
-            return self.exact_law.distribution(theta, edges)
+        known = self.exact_law or self.replacement
+        if known is not None:
+            return known.distribution(theta, edges)
         if not is_few(self.wall):
             return super().distribution(theta, edges)
         found = WallConditionals(self.wall, 0, edges[1:-1])(theta, CELL_TOLERANCE)
@@ -191,9 +209,15 @@ class WallLaw(DrivenLaw):
         return Distribution(below, (np.pi - theta)[:, None], flat[:, None])
 
     def expectations(self, basis: Basis) -> Expectations:
-        """Expectations of the exact law; else by adaptive quadrature in the entry point, or `apply` for many pieces."""
-        if self.exact_law is not None:
-            return self.exact_law.expectations(basis)
+        """Expectations of the exact law or of the hollows; else by adaptive quadrature in the entry point.
+
+        The hollows must all have errors in this basis. Walls with many pieces use `apply`.
+        """
+        mixture = self.exact_law or self.replacement
+        if mixture is not None:
+            found = mixture.expectations(basis)
+            if found.has_errors or self.closed_form is not None or self.is_polygonal:
+                return found
         if not is_few(self.wall):
             return ByApply(basis, self.apply, self.evaluations, traced=True)
         return TracedExpectations(basis, self.wall)
@@ -270,14 +294,48 @@ def _closed_form(wall: Wall) -> Law | None:
         if isinstance(law, RectangularTeethLaw):
             level, width = level - width, 2.0 * width
         terms[law] = terms.get(law, 0.0) + width
-    if level < -ROUNDED * wall.period:
+    return _joined(terms, level, wall.period)
+
+
+def _joined(terms: dict[Law, float], level: float, period: float) -> Law | None:
+    """The mixture of laws by their widths and of specular reflection by the width ``level``; None if it is negative."""
+    if level < -ROUNDED * period:
         return None
-    if level > ROUNDED * wall.period:
+    if level > ROUNDED * period:
         terms[specular()] = level
     if len(terms) == 1:
         return next(iter(terms))
     total = math.fsum(terms.values())
     return Combination(tuple((width / total, law) for law, width in terms.items()))
+
+
+def _taken_apart(wall: Wall) -> Law | None:
+    """The mixture of the laws of a wall's hollows, of straight ones in one law; None for walls of one kind of hollow.
+
+    Also None if hollows that are wider than their openings do not have room side by side.
+    """
+    if not wall.closes or wall.is_polygonal or len(wall.hollows) < 2:
+        return None
+    from ...geometry.cells.hollow_shape import distinct_hollows, side_by_side
+
+    wall = wall.cell
+    kinds = [(set(shape.kinds) == {"Segment"}, hollows) for shape, hollows in distinct_hollows(wall)]
+    if len(kinds) < 2:
+        return None
+    terms: dict[Law, float] = {}
+    level, curved = wall.period, 0
+    groups = [[hollow for straight, hollows in kinds if straight for hollow in hollows]]
+    for hollows in filter(None, groups + [hollows for straight, hollows in kinds if not straight]):
+        straight = hollows is groups[0]
+        law = None if straight else _of_hollow(wall, hollows[0])
+        width = math.fsum(hollow.width for hollow in hollows)
+        if law is None:
+            alone = side_by_side(wall, hollows if straight else hollows[:1])
+            width *= alone.period / math.fsum(hollow.width for hollow in (hollows if straight else hollows[:1]))
+            law, curved = WallLaw(alone), curved + (not straight)
+        terms[law] = terms.get(law, 0.0) + width
+        level -= width
+    return _joined(terms, level, wall.period) if curved <= MOST_CURVED else None
 
 
 def _of_hollow(wall: Wall, hollow: Hollow) -> Law | None:

@@ -91,7 +91,7 @@ def essential_edge(law: Law) -> EssentialEdge:
     >>> essential_edge(0.25 * ker.lambertian() + 0.75 * ker.TriangularTeethLaw(0.7)).value
     0.75
     """
-    part = _taken_apart(law)
+    part = fold(law, ISOMETRIES) if made_of_isometries(law) else _taken_apart(law)
     matrix = part.grazing
     root = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T))[-1])
     low = min(max(part.modulus[0], root - part.error), 1.0)
@@ -118,9 +118,8 @@ def _leaf(law: Law) -> _Part:
         return _Part((0.0, 0.0), np.zeros((2, 2)), 0.0, 0.0, True, (f"{law!r} is compact",))
     if made_of_isometries(law):
         limit = _ideal_limit(law) if isinstance(law, IsometryLaw) else grazing_limit(law)
-        # an isometric law has the edge 1; its grazing limit matters in sums with other laws only
-        note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
-        return _Part((1.0, 1.0), limit.matrix, limit.error, limit.entry_error, True, (note,), 1.0)
+        # the grazing limit of an isometric law matters in sums with other laws only
+        return replace(_isometric(law), grazing=limit.matrix, error=limit.error, entry_error=limit.entry_error)
     limit = grazing_limit(law)
     errors = (limit.error, limit.entry_error)
     how = f"-> {limit.root:.8f} +- {limit.error:.1g} as theta -> 0 or pi"
@@ -146,6 +145,12 @@ def _leaf(law: Law) -> _Part:
                 f"has a spectrum up to {reach}"
             )
     return _Part(modulus, limit.matrix, *errors, False, tuple(notes), fraction)
+
+
+def _isometric(law: Law) -> _Part:
+    """The part of an isometric law, which has the edge 1, without its grazing limit."""
+    note = f"{law!r} is made of isometries theta' = +-theta + const: cos(n theta) is nearly kept for suitable n"
+    return _Part((1.0, 1.0), np.zeros((2, 2)), 0.0, 0.0, True, (note,), 1.0)
 
 
 def _ideal_limit(law: IsometryLaw) -> GrazingLimit:
@@ -195,3 +200,7 @@ def _product(first: _Part, second: _Part) -> _Part:
 
 def _in_other_frame(part: _Part) -> _Part:
     return replace(part, grazing=part.grazing @ SWAP)
+
+
+# The rules for laws made of isometries only, whose grazing limits are not needed.
+ISOMETRIES = Rules(_isometric, _mixture, _chain, _in_other_frame)

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
+from ...geometry import trace
 from ...kernels import CircularArcLaw, DensityLaw, DrivenLaw, Law, WallLaw
 from ...kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
 from ...kernels.laws.law import entry_inside
@@ -39,6 +40,13 @@ SWAP = np.array([[0.0, 1.0], [1.0, 0.0]])
 REMEMBERED = 32
 # Relative accuracy of an outgoing angle of the size of the incoming one.
 ANGLE_ROUNDING = 4e-15
+# An integral is not refined if more than this fraction of the rays does not escape.
+MOST_LOST = 1e-3
+# Rays of a wall that does not close pass a number of cells, or are reflected a number of times, that may grow like
+# 1/theta. An angle at which PROBES rays have on average more than MOST_PASSED of both is not tried, nor a smaller one.
+PROBES, MOST_PASSED = 16, 1000
+# A wall that does not close is raised until it touches y = 0, up to this multiple of its size for rounding.
+CLEARANCE = 64.0 * EPS
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,9 @@ def grazing_limit(law: Law) -> GrazingLimit:
 
     *Other ends, other laws.* The angles are powers of ten, from 1e-3 on, times the length of the straight part of the
     side over the opening. The limit is found by Aitken's extrapolation. Its error is the change of the last value by
-    the extrapolation plus the errors of the quadratures. A limit above the norm of a law is rejected.
+    the extrapolation plus the errors of the quadratures and the fractions of rays that did not escape. A limit above
+    the norm of a law is rejected. A wall that does not close is raised until its highest point has y = 0, which does
+    not change its law; otherwise rays would first pass a number of cells proportional to 1/theta.
 
     Examples
     --------
@@ -121,8 +131,18 @@ def _limit_of_wall(law: CircularArcLaw | WallLaw) -> GrazingLimit:
     if isinstance(law, CircularArcLaw):
         return _limit(law, Grazed(scale=1.0))
     # the cell has the same law, and its entry points refer to its hollows
-    cell = law.wall.cell
+    cell = law.wall.cell if law.wall.closes else raised(law.wall)
     return _limit(law if cell is law.wall else WallLaw(cell), grazed(cell))
+
+
+def raised(wall: Wall) -> Wall:
+    """A wall with islands moved up until its highest point has y = 0; its law, with x uniform, is the same."""
+    highest = max(float(piece.box[3]) for path in (wall.pieces, *wall.islands) for piece in path)
+    rise = -highest - CLEARANCE * (wall.period + wall.depth)
+    if rise <= 0.0:
+        return wall
+    paths = [[piece.moved(0.0, rise) for piece in path] for path in (wall.pieces, *wall.islands)]
+    return type(wall)(paths[0], wall.period, paths[1:])
 
 
 def grazed(wall: Wall) -> Grazed:
@@ -180,6 +200,8 @@ def _limit(law: Law, where: Grazed) -> GrazingLimit:
         return GrazingLimit(where.flat * SWAP, 0.0, 0.0)
     limits: list[list[tuple[Floats, float]]] = []
     for angle in (1.0 if where.scale is None else where.scale) * ANGLES:
+        if isinstance(law, WallLaw) and not law.wall.closes and _passed(law.wall, angle) > MOST_PASSED:
+            break
         limits.append([_at_angle(law, angle, end, where.parts[end]) for end in (0, 1)])
         converged = len(limits) >= FEWEST_ANGLES and where.scale is not None
         last = limits[-FEWEST_ANGLES:]
@@ -193,7 +215,16 @@ def _limit(law: Law, where: Grazed) -> GrazingLimit:
     return GrazingLimit(np.minimum(matrix, NORM), UNKNOWN, UNKNOWN, False)
 
 
+def _passed(wall: Wall, angle: float) -> float:
+    """The mean number of cells passed plus reflections of a few rays at this angle."""
+    x = wall.period * (np.arange(PROBES) + 0.5) / PROBES
+    traced = trace(wall, x, np.full(PROBES, angle))
+    return float(np.mean(traced.collisions + np.abs(traced.x - x) / wall.period))
+
+
 def _extrapolated(limits: list[list[tuple[Floats, float]]]) -> GrazingLimit:
+    if len(limits) < 2:
+        return GrazingLimit(np.zeros((2, 2)), UNKNOWN, UNKNOWN)
     values = np.array([[pair[end][0] for end in (0, 1)] for pair in limits])
     noise = np.array([max(pair[0][1], pair[1][1]) for pair in limits])
     # in deep hollows the smallest angles may be inaccurate: only the most accurate values are used
@@ -201,6 +232,8 @@ def _extrapolated(limits: list[list[tuple[Floats, float]]]) -> GrazingLimit:
     values, noise = values[known], noise[known]
     matrix, sums = values[-1], values.sum(axis=2)
     if len(values) < 3:
+        if len(values) < 2:
+            return GrazingLimit(matrix, UNKNOWN, UNKNOWN)
         spread = float(noise[-1] + np.ptp(values, axis=0).max())
         return GrazingLimit(matrix, float(noise[-1] + np.ptp(sums)), spread)
     limit = _aitken(sums[-3], sums[-2], sums[-1], float(noise[-3:].max()))
@@ -234,8 +267,15 @@ def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float]
 
     reflect = law.random_map() if isinstance(law, DrivenLaw) else None
     if reflect is not None:
-        found = [_entry_integral(lambda x: ratio(reflect(x, np.full(x.shape, theta))[0]), *part) for part in parts]
-        value, error = sum((part[0] for part in found), np.zeros(2)), sum(part[1] for part in found)
+
+        def integrand(x: Floats) -> Floats:
+            outgoing, escaped = reflect(x, np.full(x.shape, theta))
+            lost = np.zeros(x.shape) if escaped is None else 1.0 - escaped
+            return np.concatenate((ratio(outgoing), lost[:, None]), axis=-1)
+
+        found = [_entry_integral(integrand, *part) for part in parts]
+        value, error = sum((part[0] for part in found), np.zeros(3)), sum(part[1] for part in found)
+        value, error = value[:2], error + float(value[2])
     else:
         value, error = law.apply(ratio, np.array([theta]))[0], 0.0
         if isinstance(law, DensityLaw):
@@ -244,25 +284,29 @@ def _at_angle(law: Law, angle: float, end: int, parts: tuple[tuple[float, float]
 
 
 def _entry_integral(function: Callable[[Floats], Floats], first: float, last: float) -> tuple[Floats, float]:
-    """The integral over entry points in (first, last) of a piecewise analytic function, and its error."""
+    """The integral over entry points in (first, last) of a piecewise analytic function, and its error.
+
+    The values are two ratios, whose integrals have this error, and the indicator of lost rays. If many rays are lost,
+    the integral is not refined.
+    """
     edges = np.linspace(first, last, FIRST_PANELS + 1)
     low, high = edges[:-1], edges[1:]
-    total, converged, rays = np.zeros(2), 0.0, 0
+    total, converged, rays = np.zeros(3), 0.0, 0
     while low.size:
         half = 0.5 * (high - low)
         x = (0.5 * (low + high))[:, None] + half[:, None] * NODES
-        values = function(entry_inside(x.ravel())).reshape(*x.shape, 2)
+        values = function(entry_inside(x.ravel())).reshape(*x.shape, 3)
         rays += x.size
         integral = half[:, None] * np.einsum("k,pkj->pj", KRONROD, values)
-        error = half * np.abs(np.einsum("k,pkj->pj", KRONROD - GAUSS, values)).sum(axis=1)
+        error = half * np.abs(np.einsum("k,pkj->pj", KRONROD - GAUSS, values[..., :2])).sum(axis=1)
         done = (error <= QUADRATURE_TOLERANCE * half) | (half <= NARROWEST)
-        if rays > MOST_RAYS:
+        if rays > MOST_RAYS or total[2] + integral[:, 2].sum() > MOST_LOST:
             done[:] = True
         total = total + integral[done].sum(axis=0)
         converged += float(error[done].sum())
         middle = 0.5 * (low + high)
         low, high = np.concatenate([low[~done], middle[~done]]), np.concatenate([middle[~done], high[~done]])
-    if converged <= 1e-6:
+    if converged <= 1e-6 or total[2] > MOST_LOST:
         return total, converged
     return _lattice_integral(function, first, last, total, converged)
 
@@ -274,6 +318,6 @@ def _lattice_integral(
     shift = (np.arange(LATTICES) + 0.5) / LATTICES * np.sqrt(2.0) % 1.0
     points = (np.arange(LATTICE_POINTS) + shift[:, None]) / LATTICE_POINTS
     values = function(entry_inside(first + (last - first) * points.ravel()))
-    means = (last - first) * values.reshape(LATTICES, LATTICE_POINTS, 2).mean(axis=1)
-    spread = 2.0 * float(means.sum(axis=1).std(ddof=1)) / np.sqrt(LATTICES)
+    means = (last - first) * values.reshape(LATTICES, LATTICE_POINTS, 3).mean(axis=1)
+    spread = 2.0 * float(means[:, :2].sum(axis=1).std(ddof=1)) / np.sqrt(LATTICES)
     return (means.mean(axis=0), spread) if spread < converged else (total, converged)

@@ -1,7 +1,7 @@
 """Compiled search for the entry points at which the itinerary changes, at one incoming angle.
 
 At one incoming angle the map x -> theta' is analytic between changes of the itinerary. The search keeps a chain of
-samples, each with the label of its itinerary. In each round, every gap between samples of different labels is halved.
+samples, each with the label of its itinerary. In each round, every gap between samples of different labels is divided.
 
 The constants of one angle are in a `Task`, the samples in a `Chain`.
 """
@@ -32,6 +32,9 @@ MOST_SAMPLES = 1 << 13
 MOST_ROUNDS = 200
 # Gaps with an error below this fraction of the worst gap's wait for a later round.
 WORST_FRACTION = 0.1
+# Distance beyond the interpolated position of an edge, as a multiple of the squared width of the gap over the opening:
+# above the error of the interpolation where the outgoing angle has a curvature of at most 16 slopes over the opening.
+BEYOND_EDGE = 2.0
 # Labels below this number are statuses of rays that did not escape.
 FIRST_LABEL = np.uint64(4)
 
@@ -135,6 +138,20 @@ def trace_block(entries, task):
 
 
 @inlined
+def cell_of(out, edges):
+    """Return the number of edges below an outgoing angle."""
+    # instead of np.searchsorted, which would double the time of compilation of this file
+    cell, high = np.int64(0), np.int64(edges.shape[0])
+    while cell < high:
+        middle = (cell + high) // 2
+        if edges[middle] < out:
+            cell = middle + 1
+        else:
+            high = middle
+    return cell
+
+
+@inlined
 def outcome(k, x, task):
     """-> (angle, label): the outgoing angle of ray k of the block, which entered at x, and its label.
 
@@ -148,16 +165,7 @@ def outcome(k, x, task):
         return task.theta, np.uint64(results.status[k])
     # clipped for a ray along y = 0 within rounding
     out = min(max(math.atan2(results.velocity[k, POINT_Y], results.velocity[k, POINT_X]), 0.0), math.pi)
-    cell = np.int64(0)
-    # instead of np.searchsorted, which would double the time of compilation of this file
-    high = edges.shape[0]
-    while cell < high:
-        middle = (cell + high) // 2
-        if edges[middle] < out:
-            cell = middle + 1
-        else:
-            high = middle
-    return out, HASH_FACTOR * (results.itinerary[k] + np.uint64(16)) + np.uint64(cell)
+    return out, HASH_FACTOR * (results.itinerary[k] + np.uint64(16)) + np.uint64(cell_of(out, edges))
 
 
 @inlined
@@ -176,9 +184,14 @@ def is_spent(task):
 
 
 @inlined
-def spread(first, second, degree):
-    """Return the largest difference of cos(angle), cos(k angle) and sin(k angle), k = ``degree``."""
-    k = max(degree, 1)
+def spread(first, second, task):
+    """Return the largest difference of cos(angle), cos(k angle) and sin(k angle), k = ``task.degree``.
+
+    It is 2 if an edge lies between the angles: there a function of sup norm 1 may jump by so much.
+    """
+    k, edges = max(task.degree, 1), task.setting.edges
+    if cell_of(first, edges) != cell_of(second, edges):
+        return 2.0
     return max(
         abs(math.cos(first) - math.cos(second)),
         max(abs(math.cos(k * first) - math.cos(k * second)), abs(math.sin(k * first) - math.sin(k * second))),
@@ -191,7 +204,7 @@ def undecided(before, task, chain):
     xs, outs, _, follow, _, _ = chain
     after = follow[before]
     width, whole = xs[after] - xs[before], task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
-    return 0.5 * width * (spread(outs[before], outs[after], task.degree) + math.sqrt(width / whole))
+    return 0.5 * width * (spread(outs[before], outs[after], task) + math.sqrt(width / whole))
 
 
 @inlined
@@ -204,11 +217,34 @@ def insert(x, before, count, task, chain):
     follow[before] = count
 
 
+@inlined
+def division(i, j, number, task, chain):
+    """Return the position in the gap from sample i to sample j at which round ``number`` divides it.
+
+    Between samples of one itinerary in neighbouring cells the outgoing angle is smooth. The position is then that of
+    the edge by linear interpolation, moved towards the middle by more than its error, so that both ends of the gap
+    approach the edge and the width falls quadratically. Every third round, and other gaps, are divided in the middle.
+    """
+    xs, outs, labels, _, _, _ = chain
+    edges, hollow = task.setting.edges, task.setting.hollow
+    width, middle = xs[j] - xs[i], 0.5 * (xs[i] + xs[j])
+    step = np.int64(labels[j] - labels[i])
+    if number % 3 == 2 or (step != 1 and step != -1) or outs[i] == outs[j]:
+        return middle
+    cell = cell_of(min(outs[i], outs[j]), edges)
+    if cell == edges.shape[0]:
+        return middle
+    x = xs[i] + width * (edges[cell] - outs[i]) / (outs[j] - outs[i])
+    margin = max(BEYOND_EDGE * width * width / (hollow[RIGHT] - hollow[LEFT]), 4.0 * EPS * abs(middle))
+    x += margin if x < middle else -margin
+    return x if xs[i] < x < xs[j] else middle
+
+
 @inner
 def halve_gaps(task, chain, count, gap_count, goal, most):
-    """Halve gaps until the sum of their errors is at most ``goal``; return the number of samples."""
+    """Divide gaps until the sum of their errors is at most ``goal``; return the number of samples."""
     xs, _, labels, follow, gaps, fresh = chain
-    for _ in range(MOST_ROUNDS):
+    for number in range(MOST_ROUNDS):
         total, worst = 0.0, 0.0
         for g in range(gap_count):
             matter = undecided(gaps[g], task, chain)
@@ -231,7 +267,7 @@ def halve_gaps(task, chain, count, gap_count, goal, most):
             if narrow or count >= most or is_spent(task):
                 continue
             k = count
-            insert(0.5 * (xs[i] + xs[j]), i, k, task, chain)
+            insert(division(i, j, number, task, chain), i, k, task, chain)
             count += 1
             moved = True
             if labels[k] != labels[i]:

@@ -71,7 +71,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
     lows, highs, names = pieces
-    hollow, degree = task.setting.hollow, task.degree
+    hollow = task.setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
     task.segments[0] = 0
@@ -82,7 +82,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     node[1], mass[1] = outs[last], right - xs[last]
     filled, number, unresolved = np.int64(2), np.int64(0), 0.0
     error = ROUNDING * whole
-    error += mass[0] * spread(outs[0], outs[1], degree) + mass[1] * spread(outs[last], outs[last - 1], degree)
+    error += mass[0] * spread(outs[0], outs[1], task) + mass[1] * spread(outs[last], outs[last - 1], task)
     i = np.int64(0)
     while i >= 0:
         j = i
@@ -114,7 +114,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
             else:
                 mass[filled - 1] += width
                 error += width
-            error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], degree)
+            error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], task)
         i = following
     return filled, error, unresolved, number, rays + count
 
