@@ -7,6 +7,10 @@ from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
+from sphinx.addnodes import toctree
+from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
+
 import asperity
 from asperity.ledger import entries
 from asperity.ledger.text import page_of
@@ -97,6 +101,22 @@ warnings.filterwarnings("ignore", message="FigureCanvasAgg is non-interactive")
 
 # the name of a field, such as "value", may also be that of attributes of several classes
 suppress_warnings = ["ref.python"]
+
+# Pages that list many others: the bar at the side of every page ends with them.
+LISTS = ("api/generated/task-", "decisions/index", "checks/index")
+
+
+def end_the_side_bar(app: Sphinx, env: BuildEnvironment) -> None:
+    """Take the entries of the lists out of the navigation tree, which every page repeats."""
+    for page in env.tocs:
+        if page.startswith(LISTS):
+            for entries in list(env.tocs[page].findall(toctree)):
+                entries.parent.remove(entries)
+
+
+def setup(app: Sphinx) -> None:
+    app.connect("env-updated", end_the_side_bar)
+
 
 # single backticks in docstrings are names
 default_role = "py:obj"

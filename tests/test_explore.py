@@ -294,3 +294,24 @@ def test_the_name_and_parameters_of_a_wall_are_told_apart(tmp_path):
 def test_questions_are_values():
     question = Question(TEETH, "teeth")
     assert replace(question, foreshortened=True) != question == Question(TEETH, "teeth")
+
+
+@pytest.mark.parametrize("name", geo.WALLS)
+def test_the_first_answer_takes_at_most_0_3_seconds_of_the_processor(name):
+    question = Question(geo.WALLS[name].build(), name)
+    seconds = []
+    # the first run compiles
+    for _ in range(3):
+        start = time.process_time()
+        first_answer(question)
+        seconds.append(time.process_time() - start)
+    assert min(seconds) <= 0.3
+
+
+def test_the_legend_of_the_collision_is_above_the_bars():
+    from asperity.explore.drawing import CollisionFigure
+
+    figure = CollisionFigure()
+    figure.show(first_answer(Question(geo.flat(), "flat")).collision)
+    assert [entry.label.value for entry in figure.plot.legend[0].items] == ["smooth disk", "no-slip disk"]
+    assert figure.plot.legend[0] in figure.plot.above

@@ -15,7 +15,7 @@ from asperity import spectral as spec
 # Arcs from shallow to semicircular. With ``checkpoint=`` each finished point is stored in a file, with ``client=``
 # several processes compute.
 
-grid = {"half_angle": np.linspace(0.3, np.pi / 2, 7)}
+grid = {"half_angle": np.linspace(0.3, np.pi / 2, 5)}
 table = spec.sweep(geo.focusing_arcs, grid, "gap", tolerance=1e-3)
 for row in table.rows:
     print(f"{row.point['half_angle']:.3f}: gap {row.value:.4f}, error {row.error:.0e}, {row.verdict}")

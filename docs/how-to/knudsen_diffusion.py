@@ -34,7 +34,7 @@ for name, diffusivity in found.items():
 # :math:`L`. So :math:`L^2/(D_0\tau)` against :math:`\ln L` has the slope :math:`\eta`. The dashed lines have the slopes
 # above and go through the last points: for Maxwell's law the slope is reached slowly.
 
-lengths = 10.0 * 2.0 ** np.arange(0, 5.5, 0.5)
+lengths = 10.0 * 2.0 ** np.arange(0, 4.5, 0.5)
 fig, ax = plt.subplots(layout="constrained")
 for k, name in enumerate(("diffuse", "semicircles", "Maxwell, half diffuse")):
     times = spec.exit_times(laws[name], lengths, 1000, rng=5)

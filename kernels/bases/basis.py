@@ -35,6 +35,14 @@ class Basis(ABC):
         return False
 
     @property
+    def is_polynomial(self) -> bool:
+        """Whether the functions are polynomials in cos(theta) of the degrees 0, ..., n - 1 on the whole of (0, pi).
+
+        Edges then divide quadratures only, and integrals need no cuts at them.
+        """
+        return False
+
+    @property
     def local_part(self) -> Basis:
         """The basis of those functions that vanish outside one interval between edges; by default the whole basis."""
         return self

@@ -54,6 +54,10 @@ class Legendre(Basis):
         object.__setattr__(self, "weight", measure_by_name(weight).name)
 
     @property
+    def is_polynomial(self) -> bool:
+        return True
+
+    @property
     def measure(self) -> AngularMeasure:
         return measure_by_name(self.weight)
 

@@ -15,7 +15,6 @@ from ..bases.basis import Basis
 from ..bases.bins import Bins
 from ..bases.directions import Directions
 from ..bases.intervals import bisected
-from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals, gauss_rule
 from ..laws.density import DensityLaw, cut_by_edges
 from ..laws.involution import InvolutionLaw, jumps_of_map
@@ -215,7 +214,7 @@ def _map_levels(map_angle: Callable[[Floats], Floats], basis: Basis, edges: Floa
     while pieces == 4 or pieces * edges.size * basis.nodes_per_interval <= MOST_MAP_POINTS:
         fraction = np.arange(pieces) / pieces
         fine = np.concatenate(((edges[:-1, None] + fraction * np.diff(edges)[:, None]).ravel(), [np.pi]))
-        if not isinstance(basis, Legendre):
+        if not basis.is_polynomial:
             fine = np.unique(np.concatenate((fine, _crossings(map_angle, basis, fine))))
         if basis.is_partition:
             angle, _ = gauss_rule(fine, 1)

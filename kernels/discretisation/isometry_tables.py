@@ -14,7 +14,6 @@ from ..bases.assembly import add_masses, add_products, largest_square_sum
 from ..bases.basis import Basis
 from ..bases.displacement import Displacement
 from ..bases.intervals import between_cuts, edges_inside
-from ..bases.legendre import Legendre
 from ..bases.measure import gauss_on_intervals
 from ..bases.panels import Panels
 from ..laws.isometry_table import IsometryTable
@@ -67,7 +66,7 @@ def table_matrix(table: IsometryTable, basis: Basis) -> tuple[Floats, float]:
     """
     total, displacement = np.zeros((basis.size, basis.size)), Displacement(basis)
     _add_table(table, basis, total, displacement)
-    if isinstance(basis, Legendre):
+    if basis.is_polynomial:
         # Polynomials are smooth, so only the ends of pieces are cuts.
         for end, density in ((table.low, table.start), (table.high, table.end)):
             image = table.images(end)
@@ -101,7 +100,7 @@ def _add_table(table: IsometryTable, basis: Basis, total: Floats, displacement: 
         middle = 0.5 * (low + high)
         density, image = table.density(middle, piece), table.images(middle, piece)
         source, target = basis.index(middle), basis.index(image)
-        if not isinstance(basis, Legendre):
+        if not basis.is_polynomial:
             displacement.add(middle, image, density, source, target)
         if basis.is_partition:
             # The integral of a sinusoid is its value in the middle times 2 sin(width/2).
@@ -112,7 +111,7 @@ def _add_table(table: IsometryTable, basis: Basis, total: Floats, displacement: 
 
 def add_mirrored_edges(basis: Basis, displacement: Displacement) -> None:
     """Add the cuts of a mirror, whose images of the basis's edges are rounded; polynomials have no edges."""
-    if isinstance(basis, Legendre):
+    if basis.is_polynomial:
         return
     mirror = IsometryTable.flat(1.0)
     piece, low, high = _cut(mirror, basis, np.arange(mirror.low.size))
@@ -127,7 +126,7 @@ def _cut(table: IsometryTable, basis: Basis, piece: NDArray[np.int64]) -> tuple[
     low, high = table.low[piece], table.high[piece]
     owner, cut = [piece, piece], [low, high]
     bounds = [(low, high, np.ones(piece.size), np.zeros(piece.size))]
-    if not isinstance(basis, Legendre):
+    if not basis.is_polynomial:
         # Polynomials are smooth, so their images need no cuts.
         sign, offset = table.sign[piece], table.offset[piece]
         ends = sign * low + offset, sign * high + offset
@@ -157,7 +156,7 @@ def _add_nodes(
 
 def _nodes(basis: Basis, width: Floats) -> NDArray[np.int64]:
     """Number of Gauss nodes for pieces of the given widths."""
-    if isinstance(basis, Legendre):
+    if basis.is_polynomial:
         return _nodes_for((basis.size + 1) * width)
     if isinstance(basis, Panels):
         # By Markov's inequality a polynomial of degree d on a panel of width W grows at most by exp(2 d^2 w / W). On

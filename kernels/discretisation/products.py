@@ -266,7 +266,7 @@ def _on_panels(factor: Factor, panels: Panels, budget: Budget) -> tuple[Floats, 
 def _nodes(basis: Basis, panels: Panels) -> int:
     """Number of Gauss nodes on a panel for products of a basis function and a function of the panels."""
     widest = float(np.diff(panels.edges).max())
-    return panels.nodes_per_interval + (int(np.ceil(0.5 * basis.n * widest)) if isinstance(basis, Legendre) else 0)
+    return panels.nodes_per_interval + (int(np.ceil(0.5 * basis.size * widest)) if basis.is_polynomial else 0)
 
 
 def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
@@ -282,5 +282,5 @@ def _first_edges(laws: Sequence[Law], basis: Basis) -> Floats:
     found = np.unique(np.clip(np.concatenate(special), 0.0, np.pi))
     found = found[np.append(True, np.diff(found) > SAME_EDGE)]
     found[-1] = np.pi
-    widest = min(WIDEST, OSCILLATION / basis.n) if isinstance(basis, Legendre) else WIDEST
+    widest = min(WIDEST, OSCILLATION / basis.size) if basis.is_polynomial else WIDEST
     return split(found, widest)

@@ -105,7 +105,7 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     close, rays near grazing pass arbitrarily many cells; on three walls with islands sampled rays were better.
     """
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
-    cells = 1 if isinstance(basis, Legendre) else len(basis.edges) - 1
+    cells = 1 if basis.is_polynomial else len(basis.edges) - 1
     predicted = ANGLES_A_PIECE * SEGMENTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
     overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
     return bool(wall.closes) and not overhangs and predicted <= MOST_SEGMENTS
@@ -122,7 +122,7 @@ def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, flo
     which shows other errors. The errors of the expectations, which may all have one sign, are added linearly.
     """
     inner, fraction = basis, 1.0
-    if isinstance(basis, Legendre) and basis.size < FEWEST_FUNCTIONS:
+    if basis.is_polynomial and basis.size < FEWEST_FUNCTIONS:
         inner = Legendre(FEWEST_FUNCTIONS)
         fraction = min(SPREAD_MARGIN * max(basis.size - 1, 1) / (FEWEST_FUNCTIONS - 1), 1.0)
     scaled = replace(budget, tolerance=budget.tolerance / fraction, fallback=budget.fallback / fraction)
@@ -148,7 +148,7 @@ class _Integrator:
         self.best: tuple[Floats, float] = np.zeros((basis.size, basis.size)), float("inf")
         self.halved = bool(wall.is_mirror_symmetric) and is_mirror_symmetric(basis)
         inside, degree, least = np.empty(0), 1, 0
-        if isinstance(basis, Legendre):
+        if basis.is_polynomial:
             degree = max(1, basis.size - 1)
             self.scale = float(basis.size)
         else:

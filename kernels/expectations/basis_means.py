@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
 from ..bases.basis import AngleFunction, Basis
-from ..bases.legendre import Legendre
 from ..bases.measure import gauss_rule
 from ..bases.mirror import reflection_matrix
 from ..bases.panels import Panels
@@ -174,7 +173,7 @@ def height_of(basis: Basis, vectors: Floats) -> float:
     edges = basis.edges
     ends = np.concatenate((np.nextafter(edges[:-1], np.pi), np.nextafter(edges[1:], 0.0)))
     angle = np.append(gauss_rule(edges, HEIGHT_PROBES)[0], ends)
-    if isinstance(basis, Legendre):
+    if basis.is_polynomial:
         angle = np.append(angle, gauss_rule(edges, basis.nodes_per_interval)[0])
     return float(np.abs(basis.evaluate(angle) @ vectors).max())
 

@@ -12,7 +12,6 @@ from ...core.checks import Floats, angles, finite_number, instance
 from ...core.errors import InputError
 from ...geometry import Wall
 from ..bases.basis import AngleFunction
-from ..bases.legendre import Legendre
 from ..expectations.basis_means import Expectations, means_of_basis
 from .hollow_conditionals import NO_LIMIT, HollowConditionals
 
@@ -221,7 +220,7 @@ class TracedExpectations(Expectations):
     def _rows(self) -> WallConditionals:
         basis = self.basis
         inside, degree, level = np.empty(0), max(1, basis.size - 1), 0
-        if not isinstance(basis, Legendre):
+        if not basis.is_polynomial:
             inside = basis.edges[1:-1]
             degree, level = (0, 0) if basis.is_partition else (1, PANEL_LEVEL)
         return WallConditionals(self.wall, degree, inside, level)

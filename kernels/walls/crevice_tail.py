@@ -14,7 +14,6 @@ import numpy as np
 
 from ...core.checks import Floats
 from ..bases.basis import Basis
-from ..bases.legendre import Legendre
 from ..bases.measure import SINE, gauss_on_intervals
 from ..bases.panels import Panels
 
@@ -66,7 +65,7 @@ def first_crossing(basis: Basis) -> int:
 
 def _stiffness(basis: Basis) -> int:
     """The number of basis functions that are polynomials in cos(theta) on all of (0, pi)."""
-    return basis.size if isinstance(basis, Legendre) else basis.polynomials_besides
+    return basis.size if basis.is_polynomial else basis.polynomials_besides
 
 
 def crevice_nodes(
@@ -130,7 +129,7 @@ def _cells(basis: Basis) -> tuple[Floats, int, int]:
     """Angles below pi/2 at which blocks are cut, and the additional nodes for blocks and half periods."""
     number = int(np.ceil(np.pi * _stiffness(basis) / WIDEST))
     regular = np.linspace(0.0, np.pi, number + 1)[1 : (number + 1) // 2]
-    if isinstance(basis, Legendre):
+    if basis.is_polynomial:
         return regular, MORE_BLOCK_NODES, MORE_HALF_NODES
     both = np.unique(np.concatenate([regular, basis.edges, np.pi - basis.edges]))
     cells = both[(both > 0.0) & (both < 0.5 * np.pi)]

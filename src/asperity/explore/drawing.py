@@ -279,8 +279,9 @@ class CollisionFigure:
             # a span has no entry in the legend; a line without points has
             plot.line([np.nan], [np.nan], line_color=colour, line_width=2, line_dash=dash, legend_label=f"{name} disk")
             self._marks[name] = mark
-        plot.legend.location = "top_left"
-        plot.legend.background_fill_alpha = 0.6
+        # beside the bars, not over them
+        plot.add_layout(plot.legend[0], "above")
+        plot.legend.orientation = "horizontal"
         plot.xaxis.axis_label = "outgoing v1 (radius / time)"
         plot.yaxis.axis_label = "probability per bin"
         plot.y_range.start = 0.0
