@@ -14,7 +14,8 @@ from pathlib import Path
 from asperity import __version__
 from asperity.bench.run import DATA, BenchRun
 
-from .pages import BENCHMARKS, STABILITY, pictures, write_between_marks
+from .pages import BENCHMARKS, STABILITY, pictures, with_picture, write_between_marks
+from .pieces import PICTURE, SPEEDS_OF_PIECES
 from .sections import SECTIONS, section_text, write_section
 
 # File with the options of an unfinished run.
@@ -53,6 +54,8 @@ def main() -> None:
         if options.write and name == "standard" and data.exists():
             run = BenchRun.of_json(data.read_text(encoding="utf-8"))
             page += ["### Pictures", *pictures(run, options.out / name)]
+        if options.write and name == "peers":
+            page[-1] = with_picture(page[-1], options.out / name / PICTURE, SPEEDS_OF_PIECES)
     text = "\n\n".join(page)
     print(text, stability, sep="\n\n")
     if options.write:

@@ -1,7 +1,7 @@
-/* Reflects rays from triangular teeth with Embree, one rtcIntersect1 a ray segment, in one thread, as C is used with it.
+/* Reflects rays from a polygon with Embree, one rtcIntersect1 a ray segment, in one thread, as C is used with it.
  *
- * embree_peer RAYS: reads from RAYS the number of corners, the number of rays (int32), the corners (x, y), the entry
- * points and the incoming angles (float32); writes the outgoing angles (NaN: lost) over the incoming ones and prints
+ * embree_peer RAYS: reads from RAYS the number of corners, the number of rays (int32), the step off a surface, the
+ * corners (x, y), the entry points and the incoming angles (float32); writes the outgoing angles (NaN: lost) over the incoming ones and prints
  * the seconds of the better of three runs and Embree's version.
  */
 #include <embree3/rtcore.h>
@@ -13,11 +13,10 @@
 #include <time.h>
 
 #define DEPTH 10.0f
-#define STEP 1e-6f
 #define MOST_BOUNCES 100
 #define RUNS 3
 
-static float reflected(RTCScene scene, float x, float theta) {
+static float reflected(RTCScene scene, float step, float x, float theta) {
   struct RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   float px = x, py = 0.0f, vx = -cosf(theta), vy = -sinf(theta);
@@ -34,7 +33,7 @@ static float reflected(RTCScene scene, float x, float theta) {
     float twice = 2.0f * (vx * nx + vy * ny) / (nx * nx + ny * ny), far = found.ray.tfar;
     px += far * vx, py += far * vy;
     vx -= twice * nx, vy -= twice * ny;
-    px += STEP * vx, py += STEP * vy;
+    px += step * vx, py += step * vy;
   }
   return NAN;
 }
@@ -44,6 +43,8 @@ int main(int argc, char **argv) {
   int32_t count[2];
   if (!file || fread(count, sizeof *count, 2, file) != 2) return 1;
   int corners = count[0], rays = count[1];
+  float step;
+  if (fread(&step, sizeof step, 1, file) != 1) return 1;
   float *corner = malloc(2 * corners * sizeof *corner), *x = malloc(rays * sizeof *x);
   float *theta = malloc(rays * sizeof *theta), *out = malloc(rays * sizeof *out);
   if (fread(corner, sizeof *corner, 2 * corners, file) != (size_t)(2 * corners)) return 1;
@@ -70,7 +71,7 @@ int main(int argc, char **argv) {
   for (int run = 0; run < RUNS; run++) {
     struct timespec start, end;
     clock_gettime(CLOCK_MONOTONIC, &start);
-    for (int i = 0; i < rays; i++) out[i] = reflected(scene, x[i], theta[i]);
+    for (int i = 0; i < rays; i++) out[i] = reflected(scene, step, x[i], theta[i]);
     clock_gettime(CLOCK_MONOTONIC, &end);
     double seconds = (end.tv_sec - start.tv_sec) + 1e-9 * (end.tv_nsec - start.tv_nsec);
     if (seconds < best) best = seconds;

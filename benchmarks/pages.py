@@ -39,3 +39,12 @@ def pictures(run: BenchRun, folder: Path) -> list[str]:
             shutil.copyfile(folder / name, PICTURES / name)
             lines.append(f"![Error against run time: {scene}](benchmark-pictures/{name})")
     return lines
+
+
+def with_picture(text: str, picture: Path, what: str) -> str:
+    """Copy a picture into the documentation; return the text with a line that shows it, if there is one."""
+    if not picture.exists():
+        return text
+    PICTURES.mkdir(exist_ok=True)
+    shutil.copyfile(picture, PICTURES / picture.name)
+    return f"{text}\n\n![{what}](benchmark-pictures/{picture.name})"

@@ -19,6 +19,7 @@ from asperity.bench.running.timing import least_time
 from asperity.core.tables import table
 
 from .metastable import WELLS, Solution, metastable_table
+from .pieces import PICTURE, draw_pieces, measure_pieces, pieces_table
 
 WORKER = Path(__file__).with_name("peer_worker.py")
 # Name in `peer_worker`: precision and requirement. Embree is a system package, such as libembree-dev in Debian; its
@@ -32,7 +33,7 @@ INTRODUCTION = (
     "goes into moving particles between cells."
 )
 # Limits of single commands, and of all commands together.
-MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 60.0, 190.0
+MAKE_SECONDS, INSTALL_SECONDS, RUN_SECONDS, ALL_SECONDS = 60.0, 120.0, 40.0, 190.0
 # Short timeouts, so that pip fails soon without an index.
 PIP = ("--quiet", "--disable-pip-version-check", "--prefer-binary", "--timeout", "10", "--retries", "1")
 RAYS, REPEATS, ANGLE = 2**17, 3, 0.7
@@ -45,7 +46,9 @@ def peer_tables(folder: Path) -> str:
     peers = PeerEnvironment(folder / "environment")
     folder.mkdir(parents=True, exist_ok=True)
     wells = metastable_table({"deeptime": lambda matrix: _deeptime_wells(folder, peers, matrix)})
-    return "\n\n".join([INTRODUCTION, _tracers(folder, peers), _chains(folder, peers), wells])
+    pieces = measure_pieces(folder, peers, TRACERS)
+    draw_pieces(pieces, folder / PICTURE)
+    return "\n\n".join([INTRODUCTION, _tracers(folder, peers), pieces_table(pieces), _chains(folder, peers), wells])
 
 
 class PeerEnvironment:

@@ -11,8 +11,10 @@ from .cells.measured import Profile
 from .cells.profile import read_profile
 from .collisions.configuration_space import ConfigurationSpace
 from .collisions.cylinder import CylinderCollision, ModifiedCollision, collide_cylinder, collide_modified
-from .collisions.pair import PairCollision, SatelliteDisk, collide_pair
+from .collisions.pair import PairCollision, collide_pair
 from .collisions.rigid import RigidCollision, collide
+from .collisions.rim_on_wall import collide_rim
+from .collisions.transversality import CollisionConstants, Shadow, good_fraction, shadow
 from .curves.arc import Arc
 from .curves.bezier import Bezier
 from .curves.curve import Curve
@@ -20,7 +22,8 @@ from .curves.segment import Segment
 from .disk.charts import RollingCharts, plane_crossing, plane_crossing_differential
 from .disk.disk import Disk
 from .disk.inner_disk import InnerDisk
-from .plotting.collisions import collision_path, draw_collision, draw_configurations
+from .disk.rim import SatelliteDisk
+from .plotting.collisions import collision_path, draw_collision, draw_configurations, draw_shadow
 from .plotting.walls import draw_wall
 from .scene.plan import TracePlan
 from .tables.container import Container
@@ -51,6 +54,7 @@ __all__ = [
     "Arc",
     "Bezier",
     "BoundaryStates",
+    "CollisionConstants",
     "ConfigurationSpace",
     "Container",
     "Curve",
@@ -69,6 +73,7 @@ __all__ = [
     "SatelliteDisk",
     "Segment",
     "SelfAffine",
+    "Shadow",
     "Status",
     "Trace",
     "TracePlan",
@@ -78,15 +83,18 @@ __all__ = [
     "collide_cylinder",
     "collide_modified",
     "collide_pair",
+    "collide_rim",
     "collision_path",
     "dispersing_arcs",
     "double_parabola",
     "draw_collision",
     "draw_configurations",
+    "draw_shadow",
     "draw_wall",
     "elliptical_arcs",
     "flat",
     "focusing_arcs",
+    "good_fraction",
     "join_walls",
     "koch",
     "load_wall",
@@ -97,6 +105,7 @@ __all__ = [
     "random_wall",
     "read_profile",
     "rectangular_teeth",
+    "shadow",
     "symbolic",
     "trace",
     "trajectory",

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.errors import InputError
+from asperity.geometry.tables.boundary import arrival
 from asperity.kernels.billiards.equilibrium import equilibrium_starts
 
 DISK = geo.Disk(1.0, 0.6)
@@ -185,8 +186,10 @@ def test_curves_that_bound_no_table_are_refused():
     with pytest.raises(InputError, match="cross themselves"):
         points = [(0, 0), (1, 1), (1, 0), (0, 1)]
         geo.Container.from_curves([geo.Segment(points[k], points[(k + 1) % 4]) for k in range(4)])
-    with pytest.raises(InputError, match="Segments and Arcs"):
-        geo.Container.from_curves([geo.Bezier([(0, 0), (1, 1), (2, 0)])])
+    with pytest.raises(InputError, match="Segments, Arcs and Beziers"):
+        geo.Container.from_curves([(0, 0)])
+    with pytest.raises(InputError, match="without cusps"):
+        geo.Container.from_curves([geo.Bezier([(0, 0), (1, 1), (0, 0)])])
     with pytest.raises(InputError, match="at least one curve"):
         geo.Container.from_curves([])
     with pytest.raises(InputError, match="almost straight"):
@@ -196,3 +199,71 @@ def test_curves_that_bound_no_table_are_refused():
         _ = geo.Container.strip().area
     with pytest.raises(InputError, match=r"\(0, 0\.5\)"):
         geo.Container.sinai(1.0, 0.5)
+
+
+def bowl() -> geo.Container:
+    """The region between the parabola y = x^2 and its chord."""
+    return geo.Container.from_curves([geo.Bezier([(-1, 1), (0, -1), (1, 1)]), geo.Segment((1, 1), (-1, 1))])
+
+
+def test_rays_along_the_axis_of_a_parabola_pass_through_its_focus():
+    record = ker.play(bowl(), ker.smooth(geo.Disk()), np.stack([np.linspace(-0.9, 0.9, 7), np.ones(7) * 0.95], axis=1),
+                      np.tile([0.0, -1.0, 0.0], (7, 1)), 2)  # fmt: skip
+    start, way = record.position[1], record.velocity[1][:, :2]
+    away = np.array([0.0, 0.25]) - start
+    np.testing.assert_allclose(start[:, 1], start[:, 0] ** 2, atol=1e-15)
+    np.testing.assert_allclose(away[:, 0] * way[:, 1] - away[:, 1] * way[:, 0], 0.0, atol=1e-14)
+
+
+def test_a_straight_bezier_curve_is_a_segment_and_a_raised_parabola_the_parabola():
+    # the degree is raised by one, the points are moved along the segment
+    raised = geo.Bezier([(-1, 1), (-1 / 3, -1 / 3), (1 / 3, -1 / 3), (1, 1)])
+    other = geo.Container.from_curves([raised, geo.Bezier([(1, 1), (0.3, 1), (-1, 1)])])
+    rng = np.random.default_rng(4)
+    position, angle = (
+        np.stack([rng.uniform(-0.3, 0.3, 200), rng.uniform(0.3, 0.9, 200)], axis=1),
+        rng.uniform(0, 7, 200),
+    )
+    velocity = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    assert other.area == pytest.approx(4 / 3, rel=1e-14)
+    assert other.perimeter == pytest.approx(bowl().perimeter, rel=1e-12)
+    paths = [ker.play(table, ker.smooth(geo.Disk()), position, velocity, 6) for table in (bowl(), other)]
+    np.testing.assert_array_equal(paths[0].wall, paths[1].wall)
+    np.testing.assert_allclose(paths[0].position, paths[1].position, atol=1e-8)
+
+
+def test_flights_to_bezier_curves_end_where_a_fine_polyline_is_first_crossed():
+    curve = geo.Bezier([(0.2, 1), (-1.5, 1), (0.1, 0), (-1, -0.4)])
+    line = curve.point(np.linspace(0, 1, 20_001))
+    rng = np.random.default_rng(5)
+    position, angle = rng.uniform(-1.5, 1.5, (300, 2)), rng.uniform(0, 2 * np.pi, 300)
+    velocity = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    reached = 0
+    for front in (True, False):
+        found = arrival(curve, position, velocity, np.zeros(300, dtype=bool), 1e-12, front)
+        for x, v, time in zip(position, velocity, found, strict=True):
+            side = (line - x)[:, 0] * v[1] - (line - x)[:, 1] * v[0]
+            k = np.flatnonzero(side[:-1] * side[1:] <= 0.0)
+            part = side[k] / (side[k] - side[k + 1])
+            times = (line[k] + part[:, None] * (line[k + 1] - line[k]) - x) @ v
+            # on the left of the curve in front, in its direction of travel
+            towards = (line[k + 1] - line[k]) @ np.array([v[1], -v[0]])
+            good = times[(times > 0.0) & ((towards < 0.0) == front)]
+            assert (len(good) == 0) == math.isinf(time)
+            if len(good):
+                assert math.isclose(good.min(), time, abs_tol=1e-6)
+                reached += 1
+    assert reached > 60
+
+
+def test_tangents_and_curvatures_of_bezier_walls_are_derivatives():
+    table = geo.Container.from_curves([
+        geo.Bezier([(0, -1), (1.5, -1.2), (1.8, 0.6), (0.2, 1)]), geo.Segment((0.2, 1), (0, -1)),
+    ])  # fmt: skip
+    s, h = np.linspace(0.1, 2.3, 12), 1e-5
+    ends = [table.touch(0, table.point_at(s + sign * h)[0]) for sign in (-1, 0, 1)]
+    slope = (ends[2].position - ends[0].position) / (2 * h)
+    turned = (ends[2].tangent - ends[0].tangent) / (2 * h)
+    np.testing.assert_allclose(slope, ends[1].tangent, atol=1e-8)
+    left = np.stack([-ends[1].tangent[:, 1], ends[1].tangent[:, 0]], axis=1)
+    np.testing.assert_allclose(turned, ends[1].curvature[:, None] * left, atol=1e-6)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from functools import partial
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from asperity import AsperityError, Estimate, InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.cli import main
 from asperity.spectral.sweeps.quantities import name_of
+from asperity.spectral.sweeps.row import COLUMNS
 from asperity.spectral.sweeps.statistics import mean_estimate, spread_estimate
 
 # Of 400 trials 95 % succeed, give or take four standard deviations.
@@ -83,14 +88,43 @@ def test_fewer_realisations_are_the_first_of_more():
     assert len({row.value for row in many}) == 9
 
 
-def test_a_refused_realisation_leaves_no_error():
-    with pytest.raises(AsperityError, match="the law of rng="):
-        spec.mean_law(sometimes_refused, 20, ker.Bins(2))
-    row = spec.ensemble(sometimes_refused, 20).of("gap")
-    assert row.mean.value == 0.5 and row.mean.error == row.spread.error == np.inf
-    assert 0 < row.refused < 20 and "were refused" in row.mean.method
-    nothing = spec.ensemble(lambda rng: ker.maxwell(2.0), 5).of("gap")
+def partly_refused(rng):
+    """Gaps uniform in [0.2, 0.8], of which those above 0.5 are refused: the others have mean 0.35."""
+    gap = np.random.default_rng(rng).uniform(0.2, 0.8)
+    return ker.maxwell(2.0 if gap > 0.5 else gap)
+
+
+@pytest.mark.filterwarnings("ignore:mean and spread of gap are over those that were not")
+def test_where_walls_are_refused_the_mean_is_that_of_the_others_and_its_error_covers_it():
+    means, spreads = [], []
+    for trial in range(TRIALS):
+        row = spec.ensemble(partly_refused, 24, rng=[trial, 3]).of("gap")
+        assert row.refused + int(row.mean.method.split()[2]) == row.realisations == 24
+        means.append(abs(row.mean.value - 0.35) <= row.mean.error)
+        spreads.append(abs(row.spread.value - 0.3 / np.sqrt(12.0)) <= row.spread.error)
+        # it is not that of all walls, and does not say so
+        assert row.mean.method.endswith("realisations that were not refused, of 24")
+    assert LEAST <= np.mean(means) <= MOST and np.mean(spreads) >= LEAST
+
+
+def test_refused_realisations_are_told_with_their_number_and_reason():
+    reason = r"\d+ of 20 realisations were refused, the first because of: diffuse_fraction: expected"
+    with pytest.warns(UserWarning, match=reason) as told:
+        row = spec.ensemble(sometimes_refused, 20).of("gap")
+    assert told[0].filename == __file__
+    assert row.mean.value == 0.5 and row.mean.error < 1e-12 and 0 < row.refused < 17
+    with pytest.warns(UserWarning, match=rf"mean law is that of those that were not: {reason}") as told:
+        mean = spec.mean_law(sometimes_refused, 20, ker.Bins(2))
+    assert told[0].filename == __file__ and f"{20 - row.refused} of 20 not refused" in mean.law
+    np.testing.assert_allclose(mean.symmetric, ker.discretise(ker.maxwell(0.5), ker.Bins(2)).symmetric, atol=1e-15)
+
+
+def test_three_accepted_walls_have_no_mean():
+    with pytest.warns(UserWarning, match="5 of 5 realisations"):
+        nothing = spec.ensemble(lambda rng: ker.maxwell(2.0), 5).of("gap")
     assert np.isnan(nothing.mean.value) and nothing.mean.error == np.inf and nothing.refused == 5
+    with pytest.raises(AsperityError, match=r"5 of 5 laws were refused, that of rng=\d+ because of: diffuse_fraction"):
+        spec.mean_law(lambda rng: ker.maxwell(2.0), 5, ker.Bins(2))
 
 
 def test_the_error_of_a_mean_law_covers_the_law():
@@ -105,10 +139,7 @@ def test_the_error_of_a_mean_law_covers_the_law():
     np.testing.assert_allclose(np.mean(found.replicates, axis=0), found.symmetric, atol=1e-15)
 
 
-@pytest.mark.parametrize("client", [None, 2])
-def test_a_stopped_mean_law_goes_on_to_the_same_bits(client, tmp_path, monkeypatch):
-    if client:
-        pytest.importorskip("distributed")
+def test_a_stopped_mean_law_goes_on_to_the_same_bits(tmp_path):
     whole = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1)
     calls = []
 
@@ -121,7 +152,7 @@ def test_a_stopped_mean_law_goes_on_to_the_same_bits(client, tmp_path, monkeypat
     stops.__module__, stops.__qualname__ = half_diffuse.__module__, half_diffuse.__qualname__
     with pytest.raises(KeyboardInterrupt, match="the same call goes on"):
         spec.mean_law(stops, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a")
-    again = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a", client=client)
+    again = spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, checkpoint=tmp_path / "a")
     assert again.symmetric.tobytes() == whole.symmetric.tobytes() and again.error == whole.error
     with pytest.raises(InputError, match="seed"):
         spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=2, checkpoint=tmp_path / "a")
@@ -170,3 +201,73 @@ def test_too_few_realisations_are_refused():
         spec.ensemble(half_diffuse, 3)
     with pytest.raises(InputError, match="basis"):
         spec.mean_law(half_diffuse, 5, 8)
+
+
+# ---- the command line -------------------------------------------------------------------------------------------
+GENTLE = ["ensemble", "gaussian:length=0.3", "--points", 8, "--rms-slope", 0.1, "--walls", 6, "--tolerance", 1e-3]
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def test_the_command_writes_means_and_all_walls_and_goes_on(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    asked = [*GENTLE, "--quantity", "resistance,gap", "--seed", 4, "--out", tmp_path]
+    first = run(*asked)
+    assert first.exit_code == 0, first.output
+    family = partial(geo.random_wall, geo.HeightCorrelation(0.3), 8, rms_slope=0.1)
+    found = spec.ensemble(family, 6, ["resistance", "gap"], 1e-3, rng=4)
+    means = list(csv.DictReader(io.StringIO((tmp_path / "means.csv").read_text())))
+    assert [row["quantity"] for row in means] == ["resistance", "gap"]
+    assert float(means[0]["mean"]) == found.of("resistance").mean.value
+    assert float(means[0]["spread_error"]) == found.of("resistance").spread.error
+    assert "6 walls, 0 of them refused" in first.stdout and found.to_csv() == (tmp_path / "means.csv").read_text()
+    walls = list(csv.DictReader(io.StringIO((tmp_path / "table.csv").read_text())))
+    # the columns of a sweep, with the seed that makes the wall again
+    assert list(walls[0]) == ["rng", *COLUMNS]
+    assert [float(row["value"]) for row in walls] == [row.value for row in found.table.rows]
+    before = (tmp_path / "table.csv").read_bytes()
+    assert run(*asked).exit_code == 0 and (tmp_path / "table.csv").read_bytes() == before
+
+
+def test_the_command_writes_the_mean_law_and_replaces_it_by_force_only(tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    first = run(*GENTLE, "--bins", 4, "--out", tmp_path)
+    assert first.exit_code == 0, first.output
+    family = partial(geo.random_wall, geo.HeightCorrelation(0.3), 8, rms_slope=0.1)
+    known, found = spec.mean_law(family, 6, ker.Bins(4), 1e-3, rng=0), ker.load_matrix(tmp_path / "mean-law.npz")
+    assert np.array_equal(found.symmetric, known.symmetric) and found.error == known.error
+    other = [*GENTLE, "--bins", 5, "--out", tmp_path]
+    refused = run(*other)
+    assert refused.exit_code == 1 and "basis: 'Bins(4)' there, 'Bins(5)' here" in refused.stderr
+    assert run(*other, "--force").exit_code == 0 and ker.load_matrix(tmp_path / "mean-law.npz").basis == ker.Bins(5)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (["--rms-slope", 0.2], "Differences: family"),
+        (["--seed", 1], "Differences: first wall"),
+        (["--walls", 7], "grid.rng"),
+        (["--rms-height", 0.2], "expected one of rms_slope and rms_height"),
+    ],
+)
+def test_the_folder_of_another_ensemble_is_refused_with_the_difference(changed, words, tmp_path):
+    pytest.importorskip("SurfaceTopography")
+    assert run(*GENTLE, "--out", tmp_path).exit_code == 0
+    found = run(*GENTLE, *changed, "--out", tmp_path)
+    assert found.exit_code == 1 and words in found.stderr
+    if words.startswith("Diff"):
+        assert run(*GENTLE, *changed, "--out", tmp_path, "--force").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    "spectrum",
+    ["gaussian", "gaussian:length=short", "white:length=1", "gaussian:length=1,length=2", "self-affine:longest=1",
+     "gaussian:hurst=0.5"],
+)  # fmt: skip
+def test_other_spectra_are_refused_with_those_that_there_are(spectrum, tmp_path):
+    found = run("ensemble", spectrum, "--rms-slope", 0.1, "--out", tmp_path / "a")
+    assert found.exit_code == 1 and "self-affine:hurst=NUMBER,longest=NUMBER" in found.stderr
+    assert not (tmp_path / "a").exists()

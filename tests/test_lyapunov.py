@@ -51,11 +51,14 @@ def test_the_triangular_lorentz_gas_has_the_exponent_of_published_runs():
     [
         (geo.Container.circle(1.0), SMOOTH), (geo.Container.circle(2.0), NO_SLIP),
         (geo.Container.ellipse(2.0, 1.0), SMOOTH),
+        (geo.Container.polygon([(0, 0), (3, 0), (1, 2)]), SMOOTH),
+        (geo.Container.polygon([(0, 0), (3, 0), (1, 2)]), NO_SLIP),
+        (geo.Container.polygon([(0, 0), (1, 0), (1, 1), (0, 1)]), NO_SLIP),
         (geo.Container.from_curves([geo.Segment((0, 0), (2, 0)), geo.Segment((2, 0), (2, 1)),
                                     geo.Segment((2, 1), (0, 1)), geo.Segment((0, 1), (0, 0))]), SMOOTH),
     ],
 )  # fmt: skip
-def test_integrable_tables_have_exponent_zero_within_the_error(table, law):
+def test_integrable_tables_and_polygons_have_exponent_zero_within_the_error(table, law):
     errors = []
     for collisions in (200, 800, 2400):
         found = ker.lyapunov_exponent(table, law, collisions, 60, rng=1)
@@ -139,6 +142,20 @@ def test_the_exponent_scales_like_one_over_the_table():
     assert abs(small.value - 7.0 * large.value) < small.error + 7.0 * large.error
     # L. A. Bunimovich: the stadium is hyperbolic
     assert large.value > 5.0 * large.error
+
+
+def test_a_stadium_of_bezier_curves_has_the_exponent_of_the_stadium():
+    # quarter circles by cubic curves, with radii right to 3e-4
+    k = 4.0 / 3.0 * math.tan(math.pi / 8.0)
+    quarters = []
+    for centre, turn in ((1, -math.pi / 2), (1, 0.0), (-1, math.pi / 2), (-1, math.pi)):
+        c, s = round(math.cos(turn)), round(math.sin(turn))
+        points = [(1, 0), (1, k), (k, 1), (0, 1)]
+        quarters.append(geo.Bezier([(centre + c * x - s * y, s * x + c * y) for x, y in points]))
+    sides = [geo.Segment((-1, -1), (1, -1)), geo.Segment((1, 1), (-1, 1))]
+    tables = geo.Container.from_curves([*sides, *quarters]), geo.Container.stadium(2.0, 1.0)
+    found, known = (ker.lyapunov_exponent(table, SMOOTH, 200, 60, rng=6) for table in tables)
+    assert abs(found.value - known.value) < found.error + known.error < 0.1
 
 
 def test_no_slip_reduces_the_exponent_of_chaotic_tables_but_does_not_end_it():

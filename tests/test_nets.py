@@ -11,7 +11,7 @@ from asperity import kernels as ker
 from asperity.errors import InputError
 from asperity.kernels.bases.mirror import reflection_matrix
 from asperity.kernels.sampling import rays as ray_sums
-from asperity.kernels.sampling.sobol import PARTS, SOBOL_BITS, SobolSampler
+from asperity.kernels.sampling.sobol import PARTS, SOBOL_BITS, SobolSampler, SobolSequence
 
 TEETH = ker.TriangularTeethLaw(1.1)
 BASES = [ker.Bins(16), ker.Bins(9), ker.Legendre(6), ker.Panels(np.linspace(0.0, np.pi, 5), 2)]
@@ -67,7 +67,7 @@ def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at
     net, twin = (SobolSampler(law, basis, np.random.default_rng(5)) for _ in range(2))
     for look in looks:
         net.sampled(look, symmetrise=False)
-    digits = [[int(place * 2**SOBOL_BITS) for place in point] for point in twin.sequence.random(net.sums.each)]
+    digits = twin.sequence.block(0, net.sums.each).tolist()
     assert PARTS * net.sums.each >= max(looks) and len({tuple(shift) for shift in net.shifts.tolist()}) == PARTS
     for table, shift, beyond in zip(net.sums.tables, net.shifts.tolist(), net.beyond, strict=True):
         shifted = [[number ^ by for number, by in zip(point, shift, strict=True)] for point in digits]
@@ -81,12 +81,30 @@ def test_parts_of_a_net_are_digital_shifts_of_one_sequence_whatever_is_traced_at
 def test_each_part_is_a_net(rays):
     # of 2^k points of a (0, k, 2)-net one is in every dyadic rectangle of that area, in any shape
     net = SobolSampler(Bounce(mirror_symmetric=None), ker.Bins(2), np.random.default_rng(6))
-    digits = (net.sequence.random(rays) * 2.0**SOBOL_BITS).astype(np.uint64)
+    digits = net.sequence.block(0, rays)
     for shift in net.shifts:
         x, y = ((digits ^ shift) * 2.0**-SOBOL_BITS).T
         for width in 2 ** np.arange(rays.bit_length()):
             cells = np.floor(x * width) * (rays // width) + np.floor(y * (rays // width))
             assert np.array_equal(np.sort(cells), np.arange(rays))
+
+
+def test_the_points_are_those_of_scipy_in_the_order_of_gray():
+    from scipy.stats.qmc import Sobol
+
+    for seed in range(5):
+        sequence = SobolSequence.of(np.random.default_rng(seed))
+        theirs = Sobol(2, bits=SOBOL_BITS, rng=np.random.default_rng(seed)).random(1024) * 2.0**SOBOL_BITS
+        n = np.arange(1024)
+        assert np.array_equal(sequence.block(0, 1024)[n ^ (n >> 1)], theirs)
+
+
+@pytest.mark.parametrize("number", [1, 4, 64])
+def test_a_block_is_the_same_whatever_block_it_is_in(number):
+    sequence = SobolSequence.of(np.random.default_rng(7))
+    whole = sequence.block(2**31 + 2**10, 2**10)
+    blocks = [sequence.block(2**31 + 2**10 + start, number) for start in range(0, 2**10, number)]
+    assert np.array_equal(np.concatenate(blocks), whole) and len(np.unique(whole, axis=0)) == 2**10
 
 
 def test_more_rays_than_a_net_has_are_refused_before_the_first_is_traced():

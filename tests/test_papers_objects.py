@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import doctest
 import importlib.util
+import inspect
+import math
 import re
 from pathlib import Path
 
@@ -58,6 +61,78 @@ def test_every_name_of_the_table_exists(name, capsys):
     for part in parts[1:]:
         # fields of dataclasses without default are no attributes of the class
         assert hasattr(found, part) or part in found.__dataclass_fields__, name
+
+
+TEETH, DISK = geo.triangular_teeth(math.pi / 2), geo.Disk(1.0, 1 / 3)
+SPACE = geo.ConfigurationSpace(TEETH, DISK, 1e-9)
+CHARTS = geo.RollingCharts(math.pi / 2)
+TOUCHED = [[0.25, 0.5, 0.0]]
+
+
+def shadowed():
+    return geo.shadow(SPACE, [0.2e-9, 0.0], [0.0, -1.0, 0.0])
+
+
+# Of objects without example in their docstring: a computation whose answer is known.
+WORKS = {
+    "geo.BoundaryStates": lambda: geo.billiard_map(geo.Container.circle(), [0.0], [math.pi / 2]).s[0] - math.pi < 1e-12,
+    "geo.ConfigurationSpace.contains": lambda: SPACE.contains([[0, 0, 0], [0, -1e-10, 0]]).tolist() == [True, False],
+    "geo.ConfigurationSpace.cylinder_contains":
+        lambda: SPACE.cylinder_contains([[0, 0, 0], [0, -1e-10, 0]]).tolist() == [True, False],
+    "geo.ConfigurationSpace.gap_radius":
+        lambda: math.isclose(2 * math.sin(SPACE.spacing / 2) * math.sin(SPACE.gap_radius), 0.5e-9),
+    "geo.ConfigurationSpace.inner_disk": lambda: SPACE.inner_disk.is_clear,
+    "geo.ConfigurationSpace.is_single": lambda: SPACE.is_single([0.0, SPACE.spacing / 2]).tolist() == [True, False],
+    "geo.Disk.foreshortening": lambda: DISK.foreshortening == 0.5,
+    "geo.Disk.frame": lambda: np.allclose(DISK.inner(DISK.frame[:, None], DISK.frame), np.eye(3)),
+    "geo.Disk.inner": lambda: DISK.inner([1, 0, 3], [1, 0, 3]) == 4.0,
+    "geo.Disk.rolling_momentum": lambda: DISK.rolling_momentum([1, 0, 3]) == 0.0,
+    "geo.Hollow": lambda: TEETH.hollows == (geo.Hollow(0.0, 1.0, 0, 2),),
+    "geo.RigidCollision": lambda: geo.collide(DISK, geo.flat(), 0.01, [[0.5, 0]], [[0, -1, 0]]).contacts[0] == 1,
+    "geo.RollingCharts.bend": lambda: CHARTS.bend(TOUCHED).tolist() == TOUCHED,
+    "geo.RollingCharts.contact": lambda: CHARTS.contact(TOUCHED).tolist() == [[0.25, 0.5]],
+    "geo.RollingCharts.roll_linear": lambda: CHARTS.roll_linear([1.0, 0.5], 0.25).tolist() == [0.75, 0.5, 0.25],
+    "geo.RollingCharts.straighten": lambda: CHARTS.straighten(TOUCHED).tolist() == TOUCHED,
+    "geo.Shadow.error": lambda: 0.0 < shadowed().error < 1e-6,
+    "geo.Shadow.is_licit": lambda: shadowed().is_licit,
+    "geo.Shadow.radii": lambda: math.isclose(shadowed().radii[0], 0.2, rel_tol=1e-9),
+    "geo.Shadow.reaches": lambda: len(shadowed().reaches) == len(shadowed().sines),
+    "geo.Status": lambda: geo.trace(geo.flat(), 0.5, 1.0).status == geo.Status.ESCAPED,
+    "geo.Trace": lambda: geo.trace(geo.flat(), 0.5, 1.0).theta == math.pi - 1.0,
+    "geo.Wall.islands": lambda: geo.flat().islands == (),
+    "ker.GasRecord": lambda: ker.play_gas(
+        geo.Container.polygon([(0, 0), (9, 0), (9, 9), (0, 9)]), ker.PairLaw(ker.specular(), DISK), [[2, 2], [6, 6]],
+        [[1, 0, 0], [0, 0, 0]], 3, rng=0).time.shape == (4, 2),
+    "ker.KernelMatrix.symmetry_defect":
+        lambda: ker.discretise(ker.lambertian(), ker.Bins(8)).symmetry_defect().value < 1e-14,
+    "ker.Composition": lambda: isinstance(ker.lambertian() @ ker.specular(), ker.Composition),
+    "ker.Power": lambda: isinstance(ker.lambertian() ** 3, ker.Power),
+    "ker.SINE_SQUARED": lambda: math.isclose(ker.SINE_SQUARED.mass(0.0, math.pi / 2), 0.5),
+    "ker.Law": lambda: isinstance(ker.specular() @ ker.specular(), ker.Law),
+}  # fmt: skip
+
+
+def documentation(name: str) -> str:
+    """The docstring of an object of the table; of a property, its own."""
+    room, *parts = name.split(".")
+    found = ROOMS[room]
+    for part in parts:
+        found = inspect.getattr_static(found, part, None) if inspect.isclass(found) else getattr(found, part)
+    return inspect.getdoc(found) or ""
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if not name.startswith("asperity ")])
+def test_every_object_of_the_table_works(name):
+    # the examples of docstrings are run as tests of their modules
+    if name in WORKS:
+        assert WORKS[name]()
+        return
+    examples = doctest.DocTestParser().get_examples(documentation(name))
+    assert name.split(".")[-1] in " ".join(example.source for example in examples), name
+
+
+def test_objects_that_work_by_their_examples_have_no_second_check():
+    assert set(WORKS) <= set(NAMES)
 
 
 def test_a_name_that_does_not_exist_would_be_found():

@@ -182,3 +182,44 @@ def test_a_killed_and_an_interrupted_process_go_on_to_the_same_bits(tmp_path):
     done, _ = started(tmp_path / "stopped").communicate()
     assert done.splitlines()[-1] == whole.splitlines()[-1]
     assert done.count("part") == 12 + 2 - parts
+
+
+OTHERS = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from test_parts_of_runs import RUNS, bits
+from asperity.core import checkpoints, long_runs
+from asperity.kernels.billiards import billiard
+billiard.TOGETHER, checkpoints.MOMENT = 8, 0.0
+original = long_runs._Packed.part
+def told(self, number):
+    print("part", flush=True)
+    return original(self, number)
+long_runs._Packed.part = told
+RUNS[sys.argv[2]][0](checkpoint="a")
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes are ended differently here")
+@pytest.mark.parametrize("name", ["play", "limit_study"])
+def test_what_a_killed_process_stored_is_gone_on_with_to_the_same_bits(name, tmp_path, monkeypatch):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([SOURCE, os.environ.get("PYTHONPATH", "")])}
+    command = [sys.executable, "-c", OTHERS, str(Path(__file__).parent), name]
+    with subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, text=True) as process:
+        for _ in range(4):
+            assert process.stdout.readline() == "part\n"
+        process.kill()
+    from asperity.core import long_runs
+
+    run, parts = RUNS[name]
+    made, original = [], long_runs._Packed.part
+
+    def told(self, number):
+        made.append(number)
+        return original(self, number)
+
+    monkeypatch.setattr(long_runs._Packed, "part", told)
+    again = bits(run(checkpoint=tmp_path / "a"))
+    # three parts are stored, the fourth and later ones are or were lost
+    assert len(made) <= parts - 3
+    assert again == bits(run())

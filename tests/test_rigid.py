@@ -163,7 +163,7 @@ def test_the_two_sides_of_a_sharp_peak_are_told_apart_next_to_its_tip():
 def test_a_root_that_is_too_many_steps_away_is_not_called_none():
     motion = flight.py_func(0.0, -1.0, 0.0, 0.1)
     span, path = Span(0.0, 1e9, (0.0, 0.0)), Path(0.0, 0.0, (0.0, 1.0), motion, 1e-15)
-    arguments = (1.0, False, None, (3.0 * ROOT_STEPS, 0.0, 1.0, 0.0, 1.0), span, path)
+    arguments = (1.0, False, None, (3.0 * ROOT_STEPS, 0.0, 1.0, 0.0, 1.0), None, span, path)
     near, _, found = next_root(*arguments, 1.0)
     assert near == ROOT_STEPS and found == geo.Status.BOUNCE_LIMIT
     at, _, found = next_root(*arguments, 10.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from benchmarks.scaling import Costs, processor_seconds, report, returned, simulate
+from benchmarks.scaling import WORKERS, Costs, of_times, processor_seconds, report, returned, simulate
 
 pytest.importorskip("simpy")
 
@@ -39,6 +39,14 @@ def test_tasks_in_this_process_cost_little():
     assert processor_seconds(lambda task: returned(8, task), 200, None) < 1e-3
 
 
-def test_the_report_has_a_row_for_each_simulated_run():
-    text = report(Costs(1e-3, 2e-3, 32768), {"this process": 1.0, "1 workers": 3.0, "2 workers": 1.6})
-    assert text.count("\n| ") == 17 and "1.88 times as fast" in text and "at most 333 tasks a second" in text
+def test_the_report_says_what_the_measurements_mean():
+    times = {
+        "rays": 64.0, "rays, checkpoint": 64.64, "rays, 1": 65.28, "rays, 2": 34.0, "arcs, 1": 20.0, "arcs, 2": 10.5,
+    }  # fmt: skip
+    text = report(Costs(1e-3, 2e-3, 32768), of_times(times, 128, 50))
+    assert "1.92 times as fast" in text and "1.90 times as fast" in text and "at most 333 tasks a second" in text
+    # 1.28 s more in 128 tasks, and 0.64 s with a checkpoint
+    assert "takes 10.0 ms more on a worker than in a loop, 1 % of a task of a second" in text
+    assert "with a checkpoint 5.0 ms more" in text
+    assert "need tasks of 3.0 s" in text and "A million points take 0.8 h" in text and "2.4e+06 tasks, 2.0 h" in text
+    assert text.count("\n| ") == 1 + len(WORKERS)

@@ -6,7 +6,9 @@ import os
 import subprocess
 import sys
 import tracemalloc
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -74,6 +76,66 @@ def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invarian
         found |= {"hdf5": file["pairs"], "hdf5, two": (file["in"], file["out"])}
         all_bits = {name: bits(ker.estimate_stream(one, basis, invariant=invariant)) for name, one in found.items()}
     assert len(set(all_bits.values())) == 1
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+def test_arrays_of_zarr_give_the_bits_of_numpys_whatever_their_chunks(basis, tmp_path):
+    zarr = pytest.importorskip("zarr")
+    theta, image = pairs()
+    whole = bits(ker.estimate_stream((theta, image), basis))
+    both = zarr.open(str(tmp_path / "both"), mode="w", shape=(NUMBER, 2), chunks=(700, 2), dtype="f8")
+    both[:] = np.column_stack([theta, image])
+    columns = []
+    for name, column in (("in", theta), ("out", image)):
+        columns.append(zarr.open(str(tmp_path / name), mode="w", shape=(NUMBER,), chunks=(333,), dtype="f8"))
+        columns[-1][:] = column
+    found = [ker.estimate_stream(given, basis, checkpoint=tmp_path / "a") for given in (both, tuple(columns))]
+    assert [bits(one) for one in found] == [whole, whole]
+
+
+@pytest.fixture(scope="module")
+def workers():
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+        yield client
+
+
+@pytest.mark.parametrize("invariant", [False, True])
+@pytest.mark.parametrize("basis", BASES, ids=repr)
+def test_the_bits_do_not_depend_on_the_workers(basis, invariant, workers, tmp_path, monkeypatch):
+    given = pairs(invariant=invariant)
+    whole = bits(ker.estimate_stream(given, basis, invariant=invariant))
+    assert bits(ker.estimate_stream(given, basis, invariant=invariant, client=workers)) == whole
+    # a stream that stops after five blocks, while later ones are with the workers, goes on here
+    made, original = [], streams._Sums._merge
+
+    def stops(self, other):
+        made.append(other)
+        if len(made) == 6:
+            raise KeyboardInterrupt
+        original(self, other)
+
+    monkeypatch.setattr(streams._Sums, "_merge", stops)
+    asked = {"basis": basis, "invariant": invariant, "checkpoint": tmp_path / "a"}
+    with pytest.raises(KeyboardInterrupt, match=rf"a has {5 * BLOCK} of them: give the same call"):
+        ker.estimate_stream(chunks(*given, 97), client=workers, **asked)
+    assert bits(ker.estimate_stream(chunks(*given, 301), **asked)) == whole
+
+
+def test_blocks_that_come_early_wait(monkeypatch):
+    whole = bits(ker.estimate_stream(pairs(), BASES[1]))
+
+    def backwards(function, tasks, client, backlog):
+        return [(task, function(task)) for task in reversed(list(tasks))]
+
+    @contextmanager
+    def no_workers(client):
+        yield SimpleNamespace(nthreads=dict)
+
+    monkeypatch.setattr(streams, "results", backwards)
+    monkeypatch.setattr(streams, "connected", no_workers)
+    assert bits(ker.estimate_stream(pairs(), BASES[1])) == whole
 
 
 @pytest.mark.parametrize("basis", BASES, ids=repr)

@@ -6,16 +6,19 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from asperity import AsperityError, Estimate
 from asperity import kernels as ker
 from asperity import spectral as spec
-from asperity.spectral.sweeps.folder import wall_by_name
+from asperity.core.workers import connected
+from asperity.spectral.sweeps.named_families import wall_by_name
 
 distributed = pytest.importorskip("distributed")
 
@@ -41,6 +44,10 @@ def slowly(law):
     return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
 
 
+def half_diffuse(rng):
+    return ker.maxwell(np.random.default_rng(rng).uniform(0.2, 0.8))
+
+
 def without_seconds(table):
     return [replace(row, seconds=0.0) for row in table.rows]
 
@@ -50,27 +57,36 @@ def undisturbed():
     return without_seconds(spec.sweep(ker.maxwell, GRID, [slowly, "gap"]))
 
 
-def test_the_table_does_not_depend_on_the_number_of_workers(undisturbed):
-    for workers in (1, 3):
-        table = spec.sweep(ker.maxwell, GRID, [slowly, "gap"], client=workers)
-        assert without_seconds(table) == undisturbed
+@pytest.fixture(scope="module")
+def workers():
+    with connected(2) as client:
+        yield client
 
 
-def test_traced_walls_have_the_same_bits_on_workers():
+def test_the_table_does_not_depend_on_the_workers(undisturbed, workers):
+    table = spec.sweep(ker.maxwell, GRID, [slowly, "gap"], client=workers)
+    assert without_seconds(table) == undisturbed
+
+
+def test_traced_walls_have_the_same_bits_on_workers(workers):
     grid = {"wall": ["dispersing-arcs:curvature=0.5", "mushrooms:generations=1"]}
-    alone, together = (spec.sweep(wall_by_name, grid, "resistance", 1e-3, client=client) for client in (None, 2))
+    alone, together = (spec.sweep(wall_by_name, grid, "resistance", 1e-3, client=client) for client in (None, workers))
     assert [row.message for row in alone.rows] == [row.message for row in together.rows]
     assert without_seconds(alone) == without_seconds(together)
 
 
-def test_the_points_that_are_chosen_do_not_depend_on_the_workers():
+def test_the_points_that_are_chosen_do_not_depend_on_the_workers(workers):
     grid = {"diffuse_fraction": spec.Between(0.01, 0.9, points=10)}
-    alone, together = (spec.sweep(ker.maxwell, grid, slowly, client=client) for client in (None, 2))
+    alone, together = (spec.sweep(ker.maxwell, grid, slowly, client=client) for client in (None, workers))
     assert without_seconds(alone) == without_seconds(together)
 
 
-def test_a_killed_worker_is_replaced_and_its_points_computed_again(undisturbed, tmp_path):
-    killed = []
+def test_a_mean_law_has_the_same_bits_on_workers(workers):
+    alone, together = (spec.mean_law(half_diffuse, 12, ker.Bins(4), rng=1, client=client) for client in (None, workers))
+    assert alone.symmetric.tobytes() == together.symmetric.tobytes() and alone.error == together.error
+
+
+def test_a_killed_worker_is_replaced_and_its_points_computed_again(undisturbed, workers, tmp_path):
 
     def murderous(law):
         # the first point to come here ends its worker
@@ -79,9 +95,8 @@ def test_a_killed_worker_is_replaced_and_its_points_computed_again(undisturbed, 
         except FileExistsError:
             return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
         os.kill(os.getpid(), signal.SIGKILL)
-        killed.append(law)
 
-    table = spec.sweep(ker.maxwell, GRID, murderous, client=2)
+    table = spec.sweep(ker.maxwell, GRID, murderous, client=workers)
     assert (tmp_path / "done").exists()
     values = [row.value for row in undisturbed if row.quantity == "slowly"]
     assert [row.value for row in table.rows] == values
@@ -112,28 +127,40 @@ def test_a_lost_scheduler_ends_the_sweep_which_then_goes_on(undisturbed, tmp_pat
     )
     (tmp_path / "cluster.py").write_text(program)
 
+    computed = tmp_path / "computed"
+
     def slowly(law):
         # by value: the scheduler has no module of these tests
         time.sleep(0.08)
+        with computed.open("a") as file:
+            file.write("point\n")
         return Estimate(law.terms[0][0] ** 0.5, 1e-16, "estimate", "slowly")
 
     with started("cluster.py", cwd=tmp_path) as cluster:
         assert cluster.stdout is not None
         address = cluster.stdout.readline().strip()
         # the scheduler is killed while the sweep waits for results
-        killer = subprocess.Popen(
-            [sys.executable, "-c", f"import os, time; time.sleep(1.5); os.kill({cluster.pid}, 9)"]
-        )
+        killer = threading.Thread(target=killed_after, args=(cluster, computed, 10))
+        killer.start()
         try:
             with pytest.raises(AsperityError, match="the scheduler is gone"):
                 spec.sweep(ker.maxwell, GRID, [slowly, "gap"], client=address, checkpoint=tmp_path / "a")
         finally:
-            killer.wait()
             cluster.kill()
+            killer.join()
     with Stored(tmp_path / "a") as stored:
         assert 0 < len(stored) < len(FRACTIONS)
     table = spec.sweep(ker.maxwell, GRID, [slowly, "gap"], checkpoint=tmp_path / "a")
     assert without_seconds(table) == undisturbed
+
+
+def killed_after(process, told, lines):
+    """Kill a process once a file has so many lines: later than the first points are stored."""
+    while process.poll() is None:
+        if told.exists() and told.read_text().count("\n") >= lines:
+            process.kill()
+            return
+        time.sleep(0.02)
 
 
 class Stored:
@@ -182,8 +209,14 @@ def test_a_killed_process_goes_on_with_the_same_bits(undisturbed, tmp_path):
     assert out.splitlines()[-1] == repr([(row.value, row.error, row.quantity) for row in undisturbed])
 
 
-@pytest.mark.parametrize("workers", [[], ["--workers", "2"]])
-def test_ctrl_c_ends_the_command_within_a_second_and_says_how_to_go_on(tmp_path, workers):
+SWEPT = ["sweep", "focusing-arcs", "--over", "half_angle=0.1:1.5:400"]
+RANDOM = ["ensemble", "gaussian:length=0.3", "--points", "40", "--rms-slope", "0.5", "--walls", "400"]
+
+
+@pytest.mark.parametrize("command", [SWEPT, [*SWEPT, "--workers", "2"], RANDOM], ids=lambda words: words[-1])
+def test_ctrl_c_ends_the_command_within_a_second_and_says_how_to_go_on(tmp_path, command):
+    if command == RANDOM:
+        pytest.importorskip("SurfaceTopography")
     (tmp_path / "long.py").write_text(
         "import signal, runpy, sys\n"
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
@@ -191,8 +224,8 @@ def test_ctrl_c_ends_the_command_within_a_second_and_says_how_to_go_on(tmp_path,
         "    sys.argv[0] = 'asperity'\n"
         "    runpy.run_module('asperity', run_name='__main__')\n"
     )
-    command = ["long.py", "sweep", "focusing-arcs", "--over", "half_angle=0.1:1.5:400", "--quantity", "resistance,gap"]
-    with started(*command, "--tolerance", "1e-3", *workers, "--out", "a", cwd=tmp_path) as process:
+    asked = ["long.py", *command, "--quantity", "resistance,gap", "--tolerance", "1e-3", "--out", "a"]
+    with started(*asked, cwd=tmp_path) as process:
         try:
             deadline = time.time() + 120.0
             while time.time() < deadline and not has_points(tmp_path / "a" / "sweep.checkpoint"):

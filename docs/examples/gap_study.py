@@ -3,8 +3,9 @@
 
 Gaps of focusing arcs and of dispersing bumps against their parameter: beside published values, and beside 4 h.
 
-h is the mean squared slope, and 4 h the gap of shallow walls. The gaps are those of the specular convention, which
-publications have. ``python docs/examples/gap_study.py FOLDER`` prints both tables and draws gaps against h.
+h is the mean squared slope, and 4 h the gap of shallow walls, beside which stands their tangential accommodation, the
+Rayleigh quotient of cos theta. The gaps are those of the specular convention, which publications have.
+``python docs/examples/gap_study.py FOLDER`` prints both tables and draws gaps against h.
 """
 
 from __future__ import annotations
@@ -21,8 +22,8 @@ CURVATURES = (0.1, 0.2, 1 / 3, 0.5, 1.0)
 # Family and parameter, gap with all its digits, half a unit of the last of them, source.
 PUBLISHED = (("dispersing", 1 / 3, 0.0373, 5e-5, "Feres and Zhang 2010"),)
 
-# Parameter, gap, its error, and gap/(4 h).
-Rows = list[tuple[float, float, float, float]]
+# Parameter, gap, its error, gap/(4 h), and the tangential accommodation.
+Rows = list[tuple[float, float, float, float, float]]
 
 
 def main(
@@ -35,11 +36,16 @@ def main(
     found = {}
     for name, (family, parameter, values) in families.items():
         checkpoint = None if folder is None else folder / f"{name}.sweep"
-        table = spec.sweep(family, {parameter: values}, "gap_specular", tolerance, checkpoint=checkpoint, progress=True)
+        table = spec.sweep(
+            family, {parameter: values}, ["gap_specular", "accommodation"], tolerance, checkpoint=checkpoint,
+            progress=True,
+        )  # fmt: skip
+        pairs = zip(table.of("gap_specular"), table.of("tangential_accommodation"), strict=True)
         found[name] = [
-            (value := float(row.point[parameter]), row.value, row.error, row.value / (4.0 * flatness(name, value)))
-            for row in table.rows
-        ]
+            (value := float(row.point[parameter]), row.value, row.error, row.value / (4.0 * flatness(name, value)),
+             other.value)
+            for row, other in pairs
+        ]  # fmt: skip
     if folder is not None:
         draw(found, folder / "gap-study.png")
     return found
@@ -57,7 +63,7 @@ def beside_published(found: dict[str, Rows]) -> list[tuple[str, float, float, fl
     return [
         (name, parameter, published, rounding, gap, gap - published, error, source)
         for name, parameter, published, rounding, source in PUBLISHED
-        for value, gap, error, _ in found[name]
+        for value, gap, error, *_ in found[name]
         if value == parameter
     ]
 
@@ -86,10 +92,12 @@ def tables(found: dict[str, Rows]) -> str:
         wall = f"{name}, {parameter:.4g}"
         lines.append(f"| {wall} | {published} ± {rounding:g} | {source} | {gap:.7f} | {difference:.1e} | {error:.1e} |")
     for name, rows in found.items():
-        lines += ["", f"| {name} | h | gap | error | gap/(4h) |", "|---|---|---|---|---|"]
-        for parameter, gap, error, ratio in rows:
+        lines += ["", f"| {name} | h | gap | error | gap/(4h) | accommodation |", "|---|---|---|---|---|---|"]
+        for parameter, gap, error, ratio, tangential in rows:
             slope = flatness(name, parameter)
-            lines.append(f"| {parameter:.4g} | {slope:.6f} | {gap:.8f} | {error:.1e} | {ratio:.4f} |")
+            lines.append(
+                f"| {parameter:.4g} | {slope:.6f} | {gap:.8f} | {error:.1e} | {ratio:.4f} | {tangential:.6f} |"
+            )
     return "\n".join(lines)
 
 

@@ -18,7 +18,10 @@ from matplotlib.figure import Figure
 from asperity import geometry as geo
 from asperity import kernels as ker
 
-BLUE, RED, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "0.5"
+# Blue: rays and paths of the model, specular where two kinds are told apart. Red: retroreflected rays. Green: disks and
+# satellites, and their paths. Purple: normals, measured lengths and marks.
+BLUE, RED, GREEN, PURPLE, GREY = "#0072B2", "#D55E00", "#009E73", "#9B4F96", "0.5"
+DARK_GREEN = "#00523B"
 SOLID = "0.82"
 DPI = 110
 
@@ -50,11 +53,13 @@ def angle_mark(ax: Axes, corner: np.ndarray, size: float, start: float, end: flo
 
 def solid_wall(ax: Axes, wall: geo.Wall, cells: range, floor: float, scale: float = 1.0, level: float = 0.0) -> None:
     """Draw the cells of a wall, enlarged by ``scale``, with its tops at ``level``."""
-    line = scale * wall.outline(1e-3 * wall.period)
-    for k in cells:
-        x, y = line[:, 0] + k * scale * wall.period, line[:, 1] + level
-        ax.fill_between(x, y, floor, color=SOLID, linewidth=0, zorder=2)
-        ax.plot(x, y, color="black", linewidth=1.1, zorder=2.5)
+    line = scale * wall.outline(1e-4 * wall.period)[:-1]
+    x = np.concatenate(
+        [line[:, 0] + k * scale * wall.period for k in cells] + [[(cells[-1] + 1) * scale * wall.period]]
+    )
+    y = np.concatenate([np.tile(line[:, 1], len(cells)), line[:1, 1]]) + level
+    ax.fill_between(x, y, floor, color=SOLID, linewidth=0, zorder=2)
+    ax.plot(x, y, color="black", linewidth=1.1, zorder=2.5)
 
 
 def asperities_on_two_bodies() -> Figure:
@@ -63,7 +68,7 @@ def asperities_on_two_bodies() -> Figure:
     whole, near = figure.subplots(1, 2, width_ratios=[1.2, 1])
     angle = np.linspace(0, 2 * np.pi, 6001)
     for ax in (whole, near):
-        for centre, radius, colour, teeth in (((-1.04, 0.0), 1.0, BLUE, 90), ((0.86, 0.0), 0.8, RED, 64)):
+        for centre, radius, colour, teeth in (((-1.04, 0.0), 1.0, GREEN, 90), ((0.86, 0.0), 0.8, DARK_GREEN, 64)):
             wave = np.abs((angle * teeth / (2 * np.pi)) % 1.0 - 0.5)
             r = radius * (1.0 - 0.06 * wave * 2.0 * np.pi / teeth * 10.0)
             x, y = centre[0] + r * np.cos(angle), centre[1] + r * np.sin(angle)
@@ -72,8 +77,8 @@ def asperities_on_two_bodies() -> Figure:
         ax.set_aspect("equal")
         ax.set_xticks([])
         ax.set_yticks([])
-    arrow(whole, np.array([-1.04, 0.0]), np.array([-0.4, 0.12]), BLUE)
-    arrow(whole, np.array([0.86, 0.0]), np.array([0.4, -0.08]), RED)
+    arrow(whole, np.array([-1.04, 0.0]), np.array([-0.4, 0.12]), GREEN)
+    arrow(whole, np.array([0.86, 0.0]), np.array([0.4, -0.08]), DARK_GREEN)
     near.set_xlim(-0.2, 0.2)
     near.set_ylim(-0.2, 0.2)
     whole.indicate_inset_zoom(near, edgecolor="black")
@@ -90,8 +95,8 @@ def reflection_by_a_wall() -> Figure:
     geo.draw_wall(wall, entry, theta, ax=ax)
     for x, angle, text in ((entry, theta, "θ"), (float(ray.x), float(ray.theta), "θ'")):
         angle_mark(ax, np.array([x, 0.0]), 0.08, 0.0, angle, text)
-    ax.text(entry, -0.05, "x", ha="center", va="top")
-    ax.text(float(ray.x), -0.05, "x'", ha="center", va="top")
+    ax.text(entry - 0.03, 0.02, "x", ha="right")
+    ax.text(float(ray.x) - 0.04, 0.02, "x'", ha="right")
     return figure
 
 
@@ -128,6 +133,9 @@ def outcomes_of_rectangular_teeth() -> Figure:
         outgoing = points[-1] + 0.45 * np.array([math.cos(float(ray.theta)), math.sin(float(ray.theta))])
         path = np.vstack([incoming, points, outgoing])
         ax.plot(path[:, 0], path[:, 1], color=colour, linewidth=0.9)
+    for colour, text in ((BLUE, "specular"), (RED, "retroreflected")):
+        ax.plot([], [], color=colour, label=text)
+    ax.legend(loc="lower right", frameon=False)
     chances, _ = ker.RectangularTeethLaw(0.8).branches(theta)
     ax.set_xlim(-0.6, 1.6)
     ax.set_title(f"θ = {theta}: probabilities " + " and ".join(f"{p:.3f}" for p in sorted(np.ravel(chances))))
@@ -144,20 +152,24 @@ def unfolded_crevice() -> Figure:
     for k in range(-last + 1, 2):
         ax.plot([k, k], [0, -2 * depth], color="black", linewidth=1.2)
     ax.plot([1 - last, 1], [-depth, -depth], color=GREY, linestyle="--", linewidth=1)
-    ax.plot([0, 1], [0, 0], color=GREEN, linewidth=2.5)
+    ax.plot([0, 1], [0, 0], color=GREY, linestyle=":", linewidth=1)
+    ax.text(1.08, 0.0, "opening", va="center")
     ax.plot([1 - last, 1], [-2 * depth, -2 * depth], color=GREY, linestyle=":", linewidth=1)
     split = shift % 1.0
-    for low, high, colour in ((0.0, split, RED), (split, 1.0, BLUE)):
+    for low, high in ((0.0, split), (split, 1.0)):
         hits = math.floor(shift - low) + 1 if low < split else math.floor(shift)
+        outcome, colour = ("specular", BLUE) if hits % 2 == 0 else ("retroreflected", RED)
         ax.fill([low, high, high - shift, low - shift], [0, 0, -2 * depth, -2 * depth], color=colour, alpha=0.25)
         # the middle of the band would meet a corner of the bottom
         middle = 0.4 * low + 0.6 * high
         traced = int(geo.trace(notch, middle, theta).collisions) - 1
-        outcome = "specular" if traced % 2 == 0 else "retroreflected"
         assert traced == hits
         ax.plot([middle, middle - shift], [0, -2 * depth], color=colour, linewidth=1.2)
         ax.text(middle, 0.08, f"{hits}", color=colour, ha="center", va="bottom")
-        ax.text(middle - shift, -2 * depth - 0.1, f"{hits} sides:\n{outcome}", color=colour, ha="center", va="top")
+        side = "right" if low < split else "left"
+        ends = f"{hits} side{'s' * (hits > 1)}:\n{outcome}"
+        ax.text(0.5 * (low + high) - shift + (0.05 if side == "left" else 0.0), -2 * depth - 0.1, ends, color=colour,
+                ha=side, va="top")  # fmt: skip
     ax.text(1.08, -depth, "bottom", va="center")
     return figure
 
@@ -178,7 +190,7 @@ def unfolded_teeth() -> Figure:
     sides = range(hits + 1)
     for k in sides:
         a, b = turned(ends[0], k), turned(ends[1], k)
-        ax.fill(*np.array([apex, a, b]).T, facecolor=BLUE if k else GREEN, alpha=0.12)
+        ax.fill(*np.array([apex, a, b]).T, facecolor=GREY, alpha=0.12 if k else 0.3)
         ax.plot(*np.array([apex, a]).T, color="black", linewidth=1)
         ax.plot(*np.array([apex, b]).T, color="black", linewidth=1)
         ax.plot(*np.array([a, b]).T, color=GREY, linestyle="--", linewidth=1)
@@ -189,8 +201,8 @@ def unfolded_teeth() -> Figure:
     a, b = turned(ends[0], hits), turned(ends[1], hits)
     time = np.linalg.solve(np.stack([along, a - b], axis=1), a - start)[0]
     path = np.array([start - 0.5 * along, start + (time + 0.5) * along])
-    ax.plot(*path.T, color=RED, linewidth=1.4)
-    arrow(ax, path[1] - 0.1 * along, path[1], RED)
+    ax.plot(*path.T, color=BLUE, linewidth=1.4)
+    arrow(ax, path[1] - 0.1 * along, path[1], BLUE)
     ax.set_title(f"apex angle {psi}, θ = {theta}: {hits} hits")
     return figure
 
@@ -212,12 +224,14 @@ def arcs_with_letters() -> Figure:
         ax.plot([centre[0], end[0]], [centre[1], end[1]], color=GREY, linewidth=0.9, linestyle="--")
     ax.plot(*centre, "ko", markersize=3)
     ax.text(centre[0] + 0.02, centre[1] + 0.03, "C")
-    ax.text(0.22, 0.5 * centre[1] + 0.05, "R")
+    ax.text(0.5 * centre[0], 0.5 * centre[1] + 0.03, "R", ha="right", va="bottom")
     angle_mark(ax, centre, 0.14, -0.5 * math.pi, -0.5 * math.pi + xi, "ξ")
     for number, point in enumerate(points[1:-1], start=1):
-        ax.plot(*point, "o", color=RED, markersize=4)
+        ax.plot(*point, "o", color=PURPLE, markersize=4, zorder=3)
         gamma = math.atan2(point[0] - centre[0], centre[1] - point[1])
-        ax.text(*(point + 0.13 * (point - centre)), f"γ{number} = {gamma:.2f}", color=RED, ha="center", va="center")
+        where = point + np.array([0.08, 0.0]) if gamma > 0.5 else point + 0.13 * (point - centre)
+        place = "left" if gamma > 0.5 else "center"
+        ax.text(*where, f"γ{number} = {gamma:.2f}", color=PURPLE, ha=place, va="center", zorder=3)
     ax.text(entry, 0.03, "X", ha="center")
     ax.set_xlim(-0.1, 1.35)
     return figure
@@ -227,7 +241,7 @@ def generations_of_mushrooms() -> Figure:
     """Mushrooms with stems of a third of their width, two generations: the flat tops become hollow (section 2.2.4)."""
     figure = Figure(figsize=(6.5, 3.8), layout="constrained")
     ax = figure.subplots()
-    geo.draw_wall(geo.mushrooms(0.33, 0.4, 2), [0.42, 0.55], [1.0, 1.9], ax=ax)
+    geo.draw_wall(geo.mushrooms(0.33, 0.4, 2), 0.42, 1.0, ax=ax)
     opened = [geo.MushroomGenerations(0.33, 0.4, g).opened for g in (1, 2, 10)]
     ax.set_title("open after 1, 2, 10 generations: " + ", ".join(f"{p:.3f}" for p in opened))
     return figure
@@ -257,13 +271,13 @@ def disk_above_a_wall() -> Figure:
     # the charts measure heights from the tops
     dots = np.array([charts.satellite(np.array([0.0, 0.0, alpha]), k) for k in range(count)])
     dots[:, 1] -= 0.98
-    ax.plot(*dots.T, "o", color=BLUE, markersize=5)
+    ax.plot(*dots.T, "o", color=GREEN, markersize=5)
     ax.plot(0, 0.02, "k.", markersize=4)
-    ax.plot([0, dots[0, 0]], [0.02, dots[0, 1]], color=BLUE, linewidth=1)
+    ax.plot([0, dots[0, 0]], [0.02, dots[0, 1]], color=GREEN, linewidth=1)
     ax.plot([0, 0], [0.02, -0.98], color=GREY, linewidth=1, linestyle=":")
     angle_mark(ax, np.array([0.0, 0.02]), 0.6, -0.5 * math.pi, -0.5 * math.pi + alpha, "α")
-    ax.text(dots[0, 0] + 0.03, dots[0, 1] + 0.07, "S0", color=BLUE)
-    ax.text(dots[1, 0] + 0.03, dots[1, 1] + 0.05, "S1", color=BLUE)
+    ax.text(dots[0, 0] + 0.03, dots[0, 1] + 0.07, "S0", color=GREEN)
+    ax.text(dots[1, 0] + 0.03, dots[1, 1] + 0.05, "S1", color=GREEN)
     ax.text(-0.06, 0.06, "(x₁, x₂)", ha="right")
     ax.set_xlim(-1.15, 1.15)
     return figure
@@ -284,13 +298,13 @@ def impulse_at_a_contact() -> Figure:
     middle = contact + lever
     base = math.atan2(-lever[1], -lever[0])
     ax.plot(middle[0] + radius * np.cos(base + t), middle[1] + radius * np.sin(base + t), color=GREY, linestyle="--")
-    arrow(ax, contact, contact + 0.9 * normal, RED)
-    arrow(ax, contact, contact + 0.97 * lever, BLUE)
-    ax.plot(*contact, "o", color=BLUE, markersize=7)
+    arrow(ax, contact, contact + 0.9 * normal, PURPLE)
+    arrow(ax, contact, contact + 0.97 * lever, GREEN)
+    ax.plot(*contact, "o", color=GREEN, markersize=7)
     first, second = math.atan2(normal[1], normal[0]), math.atan2(lever[1], lever[0])
     angle_mark(ax, contact, 0.55, first, second, "β")
-    ax.text(*(contact + 0.95 * normal + [0.06, 0]), "k", color=RED)
-    ax.text(*(contact + 0.75 * lever + [-0.1, 0]), "x - σ", color=BLUE, ha="right")
+    ax.text(*(contact + 0.95 * normal + [0.06, 0]), "k", color=PURPLE)
+    ax.text(*(contact + 0.75 * lever + [-0.1, 0]), "x - σ", color=GREEN, ha="right")
     ax.text(contact[0] + 0.06, contact[1] - 0.2, "σ")
     return figure
 
@@ -306,18 +320,18 @@ def velocity_coordinates() -> Figure:
     disk = geo.Disk(1.0, 0.5)
     w = disk.from_angles(1.0, 0.9)
     a, up, roll = (float(disk.inner(w, row)) for row in np.asarray(disk.frame))
-    ax.quiver(0, 0, 0, a, roll, up, color=RED, arrow_length_ratio=0.08)
-    ax.text(1.05 * a, 1.05 * roll, 1.08 * up, "w", color=RED)
+    ax.quiver(0, 0, 0, a, roll, up, color=BLUE, arrow_length_ratio=0.08)
+    ax.text(1.05 * a, 1.05 * roll, 1.08 * up, "w", color=BLUE)
     for x, y, z, text in ((1.2, 0, 0, "χ⊥"), (0, 1.2, 0, "χ"), (0, 0, 1.2, "e₂")):
         ax.quiver(0, 0, 0, x, y, z, color="black", arrow_length_ratio=0.06, linewidth=1)
         ax.text(1.06 * x, 1.06 * y, 1.06 * z, text)
     t = np.linspace(0, 1.0, 30)
-    ax.plot(0.45 * np.cos(t), 0 * t, 0.45 * np.sin(t), color=BLUE)
-    ax.text(0.52 * math.cos(0.5), 0, 0.52 * math.sin(0.5), "θ", color=BLUE)
+    ax.plot(0.45 * np.cos(t), 0 * t, 0.45 * np.sin(t), color=GREY)
+    ax.text(0.52 * math.cos(0.5), 0, 0.52 * math.sin(0.5), "θ", color=GREY)
     t = np.linspace(0, 0.9, 30)
     side = math.cos(1.0), math.sin(1.0)
-    ax.plot(0.6 * side[0] * np.sin(t), 0.6 * np.cos(t), 0.6 * side[1] * np.sin(t), color=GREEN)
-    ax.text(0.66 * side[0] * math.sin(0.4), 0.66 * math.cos(0.4), 0.66 * side[1] * math.sin(0.4), "ψ", color=GREEN)
+    ax.plot(0.6 * side[0] * np.sin(t), 0.6 * np.cos(t), 0.6 * side[1] * np.sin(t), color=GREY)
+    ax.text(0.66 * side[0] * math.sin(0.4), 0.66 * math.cos(0.4), 0.66 * side[1] * math.sin(0.4), "ψ", color=GREY)
     ax.set_axis_off()
     ax.view_init(22, -30)
     ax.set_box_aspect((1, 1, 0.6))
@@ -329,7 +343,8 @@ def configuration_space() -> Figure:
     figure = Figure(figsize=(6.5, 4.2), layout="constrained")
     spacing = 2 * math.pi / 12
     space = geo.ConfigurationSpace(geo.triangular_teeth(1.2), geo.Disk(1.0, 1.0), spacing / 14.5, spacing)
-    geo.draw_configurations(space, -0.6, ax=figure.subplots())
+    ax = geo.draw_configurations(space, -0.6, ax=figure.subplots())
+    ax.legend(loc="upper right")
     return figure
 
 
@@ -339,16 +354,17 @@ def rolling_about_a_satellite() -> Figure:
     spacing = 2 * math.pi / 14
     charts = geo.RollingCharts(spacing)
     t = np.linspace(0, 2 * np.pi, 300)
-    for alpha, colour in ((-0.2, BLUE), (0.0, GREY), (0.2, RED)):
+    for alpha, colour in ((-0.2, "#7FCDB7"), (0.0, GREEN), (0.2, DARK_GREEN)):
         x1, x2, turn = charts.roll(np.zeros(2), alpha)
-        ax.plot(x1 + np.cos(t), x2 + 1.0 + np.sin(t), color=colour, linewidth=1, linestyle="--")
+        ax.plot(x1 + np.cos(t), x2 + 1.0 + np.sin(t), color=colour, linewidth=1, linestyle="--", label=f"α = {alpha:g}")
         for k in (-1, 0, 1):
             dot = charts.satellite(np.array([x1, x2, turn]), k)
             ax.plot(*dot, "o", color=colour, markersize=5 if k else 7)
         ax.plot(x1, x2 + 1.0, ".", color=colour)
     ax.plot([-1.3, 1.3], [0, 0], color="black", linewidth=1)
     ax.text(0.0, -0.12, "S₀", ha="center")
-    ax.set_xlim(-1.3, 1.3)
+    ax.legend(loc="upper left", frameon=False)
+    ax.set_xlim(-2.1, 1.3)
     ax.set_ylim(-0.25, 1.25)
     return figure
 
@@ -360,9 +376,9 @@ def foreshortening() -> Figure:
     first, second = figure.subplots(1, 2, sharey=True)
     for ax, factor, title in ((first, 1.0, "the wall"), (second, disk.foreshortening, "along χ")):
         line = wall.outline(1e-3)
-        for k in range(-1, 3):
-            ax.fill_between(factor * (line[:, 0] + k), line[:, 1], -1.1, color=SOLID, linewidth=0)
-            ax.plot(factor * (line[:, 0] + k), line[:, 1], color="black", linewidth=1.1)
+        x, y = np.concatenate([line[:-1, 0] + k for k in range(-1, 4)]), np.tile(line[:-1, 1], 5)
+        ax.fill_between(factor * x, y, -1.1, color=SOLID, linewidth=0)
+        ax.plot(factor * x, y, color="black", linewidth=1.1)
         arrow(ax, np.array([0.0, 0.08]), np.array([factor, 0.08]), style="<|-|>")
         ax.text(0.5 * factor, 0.14, "ε" if factor == 1.0 else f"{factor:.3f} ε", ha="center")
         ax.set_aspect("equal")
@@ -387,54 +403,37 @@ def two_satellites_at_a_tooth() -> Figure:
     ax.axhline(level, color=GREY, linestyle=":", linewidth=1)
     t = np.linspace(-1.0, 1.0, 100)
     ax.plot(np.sin(t), -np.cos(t), color=GREY, linestyle="--", linewidth=1)
-    ax.fill(*np.vstack([[0.0, 0.0], dots]).T, color=BLUE, alpha=0.12)
-    ax.plot(*np.vstack([[0.0, 0.0], dots, [0.0, 0.0]]).T, color=BLUE, linewidth=1.2)
-    ax.plot(*dots.T, "o", color=BLUE, markersize=7)
+    ax.fill(*np.vstack([[0.0, 0.0], dots]).T, color=GREEN, alpha=0.12)
+    ax.plot(*np.vstack([[0.0, 0.0], dots, [0.0, 0.0]]).T, color=GREEN, linewidth=1.2)
+    ax.plot(*dots.T, "o", color=GREEN, markersize=7)
     angle_mark(ax, np.zeros(2), 0.25, -0.5 * math.pi + angles[1], -0.5 * math.pi + angles[0], "ρ")
     for k in range(2):
-        ax.text(*(0.5 * dots[k] + [0.05 * (-1) ** k, 0.0]), "1", ha="center", color=BLUE)
+        ax.text(*(0.5 * dots[k] + [0.05 * (-1) ** k, 0.0]), "1", ha="center", color=GREEN)
     drop = 2.0 * math.sin(0.5 * rho) * math.sin(0.5 * rho - alpha)
     assert math.isclose(dots[1, 1] - dots[0, 1], drop, rel_tol=1e-12)
-    ax.plot([0.62, 0.62], dots[::-1, 1], color=RED)
-    ax.plot([dots[0, 0], 0.65], [dots[0, 1]] * 2, color=RED, linewidth=0.6)
-    ax.plot([dots[1, 0], 0.65], [dots[1, 1]] * 2, color=RED, linewidth=0.6)
-    ax.text(0.65, dots[:, 1].mean(), "2 sin(ρ/2) sin(ρ/2 - |α|)", color=RED, va="center")
+    ax.plot([0.62, 0.62], dots[::-1, 1], color=PURPLE)
+    ax.plot([dots[0, 0], 0.65], [dots[0, 1]] * 2, color=PURPLE, linewidth=0.6)
+    ax.plot([dots[1, 0], 0.65], [dots[1, 1]] * 2, color=PURPLE, linewidth=0.6)
+    ax.text(0.69, dots[:, 1].mean(), "2 sin(ρ/2) sin(ρ/2 - |α|)", color=PURPLE, va="center")
     low = dots.mean(axis=0)
-    ax.text(low[0], low[1] - 0.05, "2 sin(ρ/2)", color=BLUE, ha="center", va="top")
+    ax.text(low[0], low[1] - 0.12, "2 sin(ρ/2)", color=GREEN, ha="center", va="top")
     ax.set_xlim(-0.95, 1.5)
-    ax.set_ylim(lowest - 0.05, 0.1)
+    ax.set_ylim(lowest - 0.16, 0.1)
     return figure
 
 
 def radius_of_transversality() -> Figure:
-    """A ray with the widest tube in which parallel rays meet the same pieces, away from corners (section 5.3.4)."""
-    figure, ax = canvas(6.0, 4.4)
-    wall, entry, theta = geo.triangular_teeth(1.3), 0.84, 1.25
-    points = geo.trajectory(wall, entry, theta)
-    corners = wall.vertices
-    solid_wall(ax, wall, range(-1, 2), -0.75)
-    radius = min(_clearance(a, b, corner) for a, b in pairwise(points) for corner in corners)
-    rays = geo.trace(wall, [entry - 0.999 * radius / math.sin(theta), entry + 0.999 * radius / math.sin(theta)], theta)
-    assert set(rays.collisions.tolist()) == {len(points) - 2}
-    out = float(geo.trace(wall, entry, theta).theta)
-    start = points[0] + 0.4 * np.array([math.cos(theta), math.sin(theta)])
-    path = np.vstack([start, points, points[-1] + 0.4 * np.array([math.cos(out), math.sin(out)])])
-    for a, b in pairwise(path):
-        along = (b - a) / np.linalg.norm(b - a)
-        side = radius * np.array([-along[1], along[0]])
-        ax.fill(*np.array([a + side, b + side, b - side, a - side]).T, color=BLUE, alpha=0.2, linewidth=0)
-    ax.plot(*path.T, color=BLUE, linewidth=1.3, zorder=3)
-    ax.plot(*corners.T, "o", color=RED, markersize=5, zorder=3)
-    ax.set_xlim(-0.4, 1.4)
-    ax.set_ylim(-0.75, 0.45)
-    ax.set_title(f"radius {radius:.4f} periods")
+    """Bands within the radius of transversality of each flight, and the contacts of the true disk (section 5.3.4)."""
+    figure = Figure(figsize=(6.0, 4.6), layout="constrained")
+    ax = figure.subplots()
+    disk = geo.Disk(1.0, 1.0)
+    space = geo.ConfigurationSpace(geo.triangular_teeth(1.3), disk, 3e-5)
+    state = [0.5 * space.scale, 0.2 * space.spacing], -disk.from_angles(1.25, 1.2)
+    pair = geo.shadow(space, *state)
+    geo.draw_shadow(space, *state, ax=ax)
+    radii = ", ".join(f"{radius:.3f}" for radius in pair.radii)
+    ax.set_title(f"radii {radii}; velocities differ by less than {pair.error:.3f}")
     return figure
-
-
-def _clearance(a: np.ndarray, b: np.ndarray, corner: np.ndarray) -> float:
-    """Distance of a corner from the line through two points."""
-    along = (b - a) / np.linalg.norm(b - a)
-    return abs(float(along[0] * (corner[1] - a[1]) - along[1] * (corner[0] - a[0])))
 
 
 def projected_segments() -> Figure:
@@ -443,7 +442,7 @@ def projected_segments() -> Figure:
     disk, wall = geo.Disk(1.0, 1.0), geo.triangular_teeth(1.3)
     entry, velocity = 0.62, -disk.from_angles(1.25, 0.6)
     solid_wall(ax, wall, range(-1, 2), -0.75)
-    for scale, colour, style in ((0.2, RED, "-"), (0.05, BLUE, "-"), (1e-9, "black", "--")):
+    for scale, colour, style in ((0.2, GREEN, "-"), (0.05, DARK_GREEN, "-"), (1e-9, BLUE, "--")):
         path = geo.collision_path(disk, wall, scale, [scale * entry, 0.0], velocity)
         charts = geo.ConfigurationSpace(wall, disk, scale).zoomed
         legs = [a + np.linspace(0, 1, 40)[:, None] * (b - a) for a, b in pairwise(path)]

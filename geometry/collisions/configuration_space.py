@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,6 +104,33 @@ class ConfigurationSpace:
         """Return whether alpha is in Z, where only one satellite can touch; Z is 1 - 2 delta_0/rho of all angles."""
         bar = self.charts.residual(alpha)
         return np.asarray(np.abs(bar) <= 0.5 * self.spacing - self.gap_radius)
+
+    @explained
+    def good_half_width(self, length: float = 1.0) -> float:
+        """Return how far alpha may be from multiples of rho in the set Xi, in units of ``scale`` (section 5.3.5).
+
+        From such an angle log(1/rho)/(4 log log(1/rho)) flights of length L log(1/rho), with L = ``length`` in units of
+        the wall, end before a second satellite comes below the tops. The angles are nearly all if the scale is small,
+        and none if the number is negative. The half-width that is printed is negative for all rho < 1.
+
+        Raises
+        ------
+        InputError
+            If ``length`` is not positive, or the spacing is not less than exp(-e), so that log log(1/rho) is below 1.
+
+        Examples
+        --------
+        >>> from asperity import geometry as geo
+        >>> space = ConfigurationSpace(geo.triangular_teeth(1.2), Disk(), scale=1e-9)
+        >>> round(space.good_half_width() / (0.5 * space.spacing / space.scale), 3)
+        0.977
+        """
+        flight = positive_number("length", length)
+        if not self.spacing < math.exp(-math.e):
+            raise InputError(
+                f"spacing: expected less than exp(-e) = 0.066, got {self.spacing:.6g}; take a smaller scale"
+            )
+        return float(rolling.good_half_width(self.scale, self.depth, self.spacing, flight))
 
     def contains(self, configuration: ArrayLike) -> NDArray[np.bool_]:
         """Return whether configurations (..., 3) are in M: no satellite is in the interior of the solid.

@@ -121,3 +121,14 @@ def gap_radius(depth: Any, spacing: Any, xp: Any = np) -> Any:
     4.1, Claim 4.2.1).
     """
     return xp.asin(depth / (2 * xp.sin(spacing / 2)))
+
+
+def good_half_width(scale: Any, depth: Any, spacing: Any, length: Any) -> Any:
+    """Return the half-width of the angles of the set Xi in units of ``scale`` (section 5.3.5, corrected).
+
+    A first flight of length L log(1/rho) + 1 and log(1/rho)/(4 log log(1/rho)) more of length L log(1/rho), which begin
+    at such an angle, end before a second satellite comes below the tops.
+    """
+    ell = np.log(1 / spacing)
+    free = (spacing / 2 - gap_radius(depth, spacing)) / scale
+    return free - (length * ell + 1) - length * ell**2 / (4 * np.log(ell))

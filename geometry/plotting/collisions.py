@@ -13,9 +13,10 @@ from ...core.errors import InputError
 from ...core.kinds import explained
 from ..collisions.configuration_space import ConfigurationSpace
 from ..collisions.rigid import collide
+from ..collisions.transversality import shadow
 from ..disk.disk import Disk
 from ..walls.wall import Wall
-from .walls import LEVEL, RAY_COLOURS, SOLID
+from .walls import LEVEL, OUTLINE_TOLERANCE, RAY_COLOURS, SOLID
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -179,6 +180,79 @@ def _draw_rims(ax: Axes, space: ConfigurationSpace, path: Floats, numbers: Float
 
 
 @explained
+def draw_shadow(space: ConfigurationSpace, position: ArrayLike, velocity: ArrayLike, ax: Axes | None = None) -> Axes:
+    """Draw the contact's path on the cylinder with the radius of transversality, and the path of the true contact.
+
+    Parameters
+    ----------
+    space : ConfigurationSpace
+    position, velocity : array_like, shapes (2,) and (3,)
+        As in `shadow`.
+    ax : matplotlib Axes, optional
+        By default the axes of a new figure.
+
+    Returns
+    -------
+    matplotlib Axes
+        Lengths are in units of the wall. Each flight on the cylinder has a band as wide as its radius on both sides.
+        Rings have the proved distances of the contacts. The true path is that of the satellite that begins lowest.
+
+    Raises
+    ------
+    InputError
+        As in `shadow` and `collision_path`.
+
+    Examples
+    --------
+    >>> from asperity import geometry as geo
+    >>> space = geo.ConfigurationSpace(geo.triangular_teeth(1.2), geo.Disk(), scale=1e-9)
+    >>> draw_shadow(space, [0.2e-9, 0.0], [0.0, -1.0, 0.0]).get_legend().get_texts()[0].get_text()
+    'on the cylinder'
+    """
+    pair = shadow(space, position, velocity)
+    path = collision_path(space.disk, space.wall, space.scale, position, velocity, space.spacing) / space.scale
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.figure(layout="constrained").subplots()
+    wall = space.wall
+    # the hollow is drawn in the cell that begins at 0
+    shift = np.array([np.floor(pair.points[-2, 0] / wall.period) * wall.period, 0.0])
+    points = pair.points - shift + np.array(wall.origin)
+    left, right = np.floor(points[1:, 0].min() / wall.period), np.ceil(points[1:, 0].max() / wall.period)
+    cells = np.arange(left - 1, right + 1) * wall.period
+    line = wall.outline(OUTLINE_TOLERANCE * wall.period)[:-1]
+    outline = np.concatenate([line + np.array([cell, 0.0]) for cell in cells])
+    floor = wall.origin[1] - 1.4 * wall.depth - 0.05 * wall.period
+    ax.fill_between(outline[:, 0], outline[:, 1], floor, color=SOLID, linewidth=0, zorder=1.2)
+    ax.plot(outline[:, 0], outline[:, 1], color="black", linewidth=1.2, zorder=2)
+    for (first, last), radius in zip(pairwise(points), pair.radii, strict=True):
+        along = (last - first) / max(float(np.hypot(*(last - first))), np.finfo(float).tiny)
+        side = radius * np.array([-along[1], along[0]])
+        corners = np.array([first + side, last + side, last - side, first - side])
+        ax.fill(*corners.T, color=RAY_COLOURS[0], alpha=0.15, linewidth=0, zorder=1.0)
+    ax.plot(*points.T, color=RAY_COLOURS[0], linewidth=1.2, zorder=3, label="on the cylinder")
+    number = -space.charts.nearest(path[0, 2] * space.scale)
+    fraction = np.linspace(0.0, 1.0, FLIGHT_POINTS)[:, np.newaxis]
+    legs = [space.zoomed.satellite(a + fraction * (b - a), number) for a, b in pairwise(path)]
+    ax.plot(*(np.concatenate(legs) - shift).T, color=RAY_COLOURS[2], linestyle="--", linewidth=1.4, zorder=3,
+            label="of the true disk")  # fmt: skip
+    turn = np.linspace(0.0, 2.0 * np.pi, 2 * FLIGHT_POINTS)
+    for point, reach in zip(points[1:-1], pair.reaches, strict=True):
+        if np.isfinite(reach):
+            ring = point + reach * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+            ax.plot(*ring.T, color="black", linewidth=0.8, zorder=3)
+    ax.axhline(0.0, color=LEVEL, linewidth=0.8, linestyle=":")
+    ax.set_xlim(points[1:, 0].min() - 0.5 * wall.period, points[1:, 0].max() + 0.5 * wall.period)
+    ax.set_ylim(floor, wall.origin[1] + 0.6 * max(wall.depth, 0.5 * wall.period))
+    ax.set_aspect("equal")
+    ax.legend(loc="upper left", frameon=False)
+    ax.set_xlabel("x (length units of the wall)")
+    ax.set_ylabel("height above the tops")
+    return ax
+
+
+@explained
 def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | None = None) -> Axes:
     """Draw the section of the configuration space at one ``height`` of the lowest satellite.
 
@@ -220,7 +294,8 @@ def draw_configurations(space: ConfigurationSpace, height: float, ax: Axes | Non
               aspect="auto", interpolation="nearest")  # fmt: skip
     gap = space.gap_radius / rho
     for middle in (-0.5, 0.5):
-        ax.axhspan(middle - gap, middle + gap, color=RAY_COLOURS[4], alpha=0.25, linewidth=0)
+        label = "two satellites can be low" if middle < 0.0 else None
+        ax.axhspan(middle - gap, middle + gap, color=RAY_COLOURS[4], alpha=0.25, linewidth=0, label=label)
     ax.set_xlabel("x1 / eps")
     ax.set_ylabel("alpha / rho")
     return ax

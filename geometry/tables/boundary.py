@@ -1,4 +1,4 @@
-"""The boundary of a billiard table: closed loops of segments and arcs, and the flight to the next of them."""
+"""The boundary of a billiard table: closed loops of curves, and the flight to the next of them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,13 @@ from ...core.checks import Floats, shortened
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..curves.arc import Arc
+from ..curves.bezier import Bezier
+from ..curves.curvature import largest_curvature
 from ..curves.curve import Curve
 from ..curves.segment import Segment
+from . import splines
+
+Piece = Segment | Arc | Bezier
 
 # Distance, relative to the size of the table, up to which the end of one curve is the start of the next. Ends that are
 # computed from angles and lengths have a few rounding errors.
@@ -42,15 +47,14 @@ def size_of(curves: Sequence[Curve]) -> float:
     return float(np.hypot(*(high - low)))
 
 
-def checked_curves(curves: Sequence[Curve]) -> tuple[Segment | Arc, ...]:
-    """Return the curves as a tuple; raise an InputError if there are none, or one is no Segment and no Arc."""
-    pieces: list[Segment | Arc] = []
+def checked_curves(curves: Sequence[Curve]) -> tuple[Piece, ...]:
+    """Return the curves as a tuple; raise an InputError if one is of another kind, or has a cusp."""
+    pieces: list[Piece] = []
     for index, piece in enumerate(curves):
-        if not isinstance(piece, (Segment, Arc)):
-            raise InputError(
-                f"curves: expected Segments and Arcs, got {shortened(piece)} at index {index}; replace another curve "
-                "by the segments of curve.flattened(tolerance)"
-            )
+        if not isinstance(piece, (Segment, Arc, Bezier)):
+            raise InputError(f"curves: expected Segments, Arcs and Beziers, got {shortened(piece)} at index {index}")
+        if isinstance(piece, Bezier) and not math.isfinite(largest_curvature(piece)[0]):
+            raise InputError(f"curves: expected Bezier curves without cusps, got {piece} at index {index}; split it")
         pieces.append(piece)
     if not pieces:
         return ()
@@ -64,7 +68,7 @@ def checked_curves(curves: Sequence[Curve]) -> tuple[Segment | Arc, ...]:
     return tuple(pieces)
 
 
-def loops_of(curves: Sequence[Segment | Arc]) -> list[list[int]]:
+def loops_of(curves: Sequence[Piece]) -> list[list[int]]:
     """Return the closed loops of the curves, each as indices in the order of travel.
 
     Raises
@@ -105,17 +109,19 @@ def loops_of(curves: Sequence[Segment | Arc]) -> list[list[int]]:
     return loops
 
 
-def signed_area(curve: Segment | Arc) -> float:
+def signed_area(curve: Piece) -> float:
     """Return (1/2) of the integral of x dy - y dx along the curve."""
     if isinstance(curve, Segment):
         (x0, y0), (x1, y1) = curve.start, curve.end
         return 0.5 * (x0 * y1 - x1 * y0)
+    if isinstance(curve, Bezier):
+        return splines.signed_area(curve)
     (cx, cy), (a, b), (t0, t1) = curve.center, curve.semi_axes, (curve.start_angle, curve.end_angle)
     rise, run = math.sin(t1) - math.sin(t0), math.cos(t1) - math.cos(t0)
     return 0.5 * (a * b * (t1 - t0) + cx * b * rise - cy * a * run)
 
 
-def check_nesting(curves: Sequence[Segment | Arc], loops: Sequence[Sequence[int]]) -> None:
+def check_nesting(curves: Sequence[Piece], loops: Sequence[Sequence[int]]) -> None:
     """Raise an InputError unless the loops bound one region, on the left of every curve."""
     from shapely import LinearRing, Polygon
 
@@ -157,7 +163,7 @@ class Touch:
 
 
 def arrival(
-    curve: Segment | Arc, position: Floats, velocity: Floats, own: NDArray[np.bool_], slack: float, front: bool = True
+    curve: Piece, position: Floats, velocity: Floats, own: NDArray[np.bool_], slack: float, front: bool = True
 ) -> Floats:
     """Return the times (n,) at which moving points reach the curve from its left, inf where they do not.
 
@@ -173,6 +179,8 @@ def arrival(
     turn = 1.0 if front else -1.0
     if isinstance(curve, Segment):
         return _arrival_at_segment(curve, position, velocity, own, slack, turn)
+    if isinstance(curve, Bezier):
+        return splines.arrival(curve, position, velocity, own, slack, turn)
     return _arrival_at_arc(curve, position, velocity, own, slack, turn)
 
 
@@ -227,11 +235,13 @@ def _within_span(curve: Arc, unit: Floats, slack: float) -> NDArray[np.bool_]:
     return np.asarray((swept <= span + slack) | (swept >= FULL_CIRCLE - slack))
 
 
-def touch(curve: Segment | Arc, position: Floats) -> Touch:
+def touch(curve: Piece, position: Floats) -> Touch:
     """Return points (n, 2) that are on the curve up to rounding, moved onto it, with tangents and curvatures."""
     if isinstance(curve, Segment):
         tangent = np.broadcast_to(curve.tangent(0.0), position.shape)
         return Touch(position, tangent, np.zeros(len(position)))
+    if isinstance(curve, Bezier):
+        return Touch(*splines.touch(curve, position))
     a, b = curve.semi_axes
     axes, center = np.array([a, b]), np.array(curve.center)
     unit = (position - center) / axes
@@ -241,11 +251,13 @@ def touch(curve: Segment | Arc, position: Floats) -> Touch:
     return Touch(center + axes * unit, tangent / speed[:, None], curve.direction * a * b / speed**3)
 
 
-def length_at(curve: Segment | Arc, position: Floats) -> Floats:
+def length_at(curve: Piece, position: Floats) -> Floats:
     """Return the arc lengths (n,) from the start of a curve to points (n, 2) on it."""
     if isinstance(curve, Segment):
         along = (position - np.array(curve.start)) @ curve.tangent(0.0)
         return np.asarray(np.clip(along, 0.0, curve.length))
+    if isinstance(curve, Bezier):
+        return splines.length_to(curve, splines.parameter_of(curve, position))
     unit = (position - np.array(curve.center)) / np.array(curve.semi_axes)
     span = abs(curve.end_angle - curve.start_angle)
     swept = curve.direction * (np.arctan2(unit[:, 1], unit[:, 0]) - curve.start_angle) % FULL_CIRCLE
@@ -254,8 +266,10 @@ def length_at(curve: Segment | Arc, position: Floats) -> Floats:
     return _length_swept(curve, swept)
 
 
-def point_at_length(curve: Segment | Arc, length: Floats) -> Floats:
+def point_at_length(curve: Piece, length: Floats) -> Floats:
     """Return the points (n, 2) at these arc lengths (n,) from the start of a curve."""
+    if isinstance(curve, Bezier):
+        return splines.point_at_length(curve, length)
     if isinstance(curve, Segment) or curve.is_circular:
         return curve.point(length / curve.length)
     low, high = np.zeros_like(length), np.full_like(length, abs(curve.end_angle - curve.start_angle))
@@ -281,7 +295,7 @@ def _length_swept(curve: Arc, swept: Floats) -> Floats:
     return np.asarray(long * np.abs(ellipeinc(start + curve.direction * swept, m) - ellipeinc(start, m)))
 
 
-def is_on(curve: Segment | Arc, position: Floats, slack: float) -> NDArray[np.bool_]:
+def is_on(curve: Piece, position: Floats, slack: float) -> NDArray[np.bool_]:
     """Return whether points (n, 2) are on the curve, up to ``slack``."""
     if isinstance(curve, Segment):
         along = curve.tangent(0.0)
@@ -289,13 +303,15 @@ def is_on(curve: Segment | Arc, position: Floats, slack: float) -> NDArray[np.bo
         at = relative @ along
         near = np.abs(relative @ np.array([-along[1], along[0]])) <= slack
         return np.asarray(near & (at >= -slack) & (at <= curve.length + slack))
+    if isinstance(curve, Bezier):
+        return np.asarray(np.hypot(*(splines.touch(curve, position)[0] - position).T) <= slack)
     axes = np.array(curve.semi_axes)
     unit = (position - np.array(curve.center)) / axes
     near = np.abs(np.hypot(unit[:, 0], unit[:, 1]) - 1.0) * float(axes.min()) <= slack
     return np.asarray(near & _within_span(curve, unit, slack / float(axes.min())))
 
 
-def on_the_left(curves: Sequence[Segment | Arc], position: Floats, bounded: bool) -> NDArray[np.bool_]:
+def on_the_left(curves: Sequence[Piece], position: Floats, bounded: bool) -> NDArray[np.bool_]:
     """Return whether points (n, 2) are on the left of the loops: the first curve in sight is seen from its left.
 
     ``bounded`` tells that there is an outer loop, so that a point which sees no curve is outside.

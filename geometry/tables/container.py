@@ -39,7 +39,7 @@ class Container:
         A point p_i on every straight wall without ends.
     normals : array_like, shape (k, 2)
         The unit normal n_i of every such wall, into the region.
-    curves : sequence of Segment and Arc, optional
+    curves : sequence of Segment, Arc and Bezier, optional
         Closed loops with the region on their left: at most one outer loop, counterclockwise, and obstacles, clockwise.
 
     Raises
@@ -67,7 +67,7 @@ class Container:
 
     points: Floats
     normals: Floats
-    curves: tuple[Segment | Arc, ...] = ()
+    curves: tuple[boundary.Piece, ...] = ()
 
     def __post_init__(self) -> None:
         points, normals = finite_array("points", self.points), finite_array("normals", self.normals)
@@ -88,20 +88,20 @@ class Container:
     @classmethod
     @explained
     def from_curves(cls, curves: Sequence[Curve]) -> Container:
-        """Return the inside of closed loops of segments and arcs, which run with the inside on their left.
+        """Return the inside of closed loops of curves, which run with the inside on their left.
 
         The outer loop is counterclockwise, and each loop around an obstacle clockwise. Every curve is a wall of its
         own, which can have its own law. The order of the loops is free.
 
         Parameters
         ----------
-        curves : sequence of Segment and Arc
+        curves : sequence of Segment, Arc and Bezier
             The curves, on which the centre of the disk is reflected.
 
         Raises
         ------
         InputError
-            If there is no curve, a curve is a Bezier curve, or the curves do not form loops as described.
+            If there is no curve, a Bezier curve has a cusp, or the curves do not form loops as described.
 
         Examples
         --------
@@ -111,6 +111,13 @@ class Container:
         >>> half = Container.from_curves([Segment((-1, 0), (1, 0)), Arc((0, 0), 1.0, 0.0, pi)])
         >>> half.area == pi / 2, half.perimeter == 2 + pi
         (True, True)
+
+        The region between a parabola and its chord, two thirds of the rectangle around it:
+
+        >>> from asperity import geometry as geo
+        >>> bowl = Container.from_curves([geo.Bezier([(-1, 1), (0, -1), (1, 1)]), Segment((1, 1), (-1, 1))])
+        >>> round(bowl.area, 12)
+        1.333333333333
         """
         if not len(tuple(curves)):
             raise InputError("curves: expected at least one curve, got none")
@@ -193,6 +200,27 @@ class Container:
         # adding 0 turns -0 into 0
         return cls(corners, np.stack([-edges[:, 1], edges[:, 0]], axis=1) / lengths + 0.0)
 
+    def closed(self) -> Container:
+        """Return the same region with segments for straight walls that are the sides of a convex polygon.
+
+        Walls keep their numbers. Other containers are returned as they are.
+
+        Examples
+        --------
+        >>> room = Container.polygon([(0, 0), (4, 0), (4, 3)])
+        >>> len(room.closed().curves), room.area, room.perimeter
+        (3, 6.0, 12.0)
+        """
+        following = np.roll(self.points, -1, axis=0)
+        if self.curves or len(self.points) < 3:
+            return self
+        size = float(np.abs(self.points - self.points[0]).max())
+        off = np.abs(np.sum((following - self.points) * self.normals, axis=1))
+        if np.any(off > boundary.JOIN_TOLERANCE * size):
+            return self
+        corners = [(x, y) for x, y in self.points.tolist()]
+        return Container.from_curves([Segment(p, q) for p, q in zip(corners, corners[1:] + corners[:1], strict=True)])
+
     @property
     def tangents(self) -> Floats:
         """The unit tangents (k, 2), to the right if the wall is seen below the disk."""
@@ -212,25 +240,25 @@ class Container:
 
     @property
     def area(self) -> float:
-        """The area, of a container of curves with an outer loop.
+        """The area, of a polygon or a container of curves with an outer loop.
 
         Raises
         ------
         InputError
-            If the container has straight walls without ends, or no outer loop.
+            If the container is not bounded by curves or the sides of a polygon.
         """
-        self._check_closed()
-        return math.fsum(boundary.signed_area(curve) for curve in self.curves)
+        return math.fsum(boundary.signed_area(curve) for curve in self._closed_curves())
 
     @property
     def perimeter(self) -> float:
-        """The length of all curves; a disk with specular reflection flies pi area/perimeter on average (Santalo)."""
-        self._check_closed()
-        return math.fsum(curve.length for curve in self.curves)
+        """The length of the boundary; a disk with specular reflection flies pi area/perimeter on average (Santalo)."""
+        return math.fsum(curve.length for curve in self._closed_curves())
 
-    def _check_closed(self) -> None:
-        if len(self.points) or not self._has_outer_loop:
-            raise InputError("container: expected one from curves with an outer loop, such as Container.circle()")
+    def _closed_curves(self) -> tuple[boundary.Piece, ...]:
+        table = self.closed()
+        if len(table.points) or not table._has_outer_loop:
+            raise InputError("container: expected a polygon, or curves with an outer loop, such as Container.circle()")
+        return table.curves
 
     @property
     def _has_outer_loop(self) -> bool:

@@ -179,7 +179,7 @@ class _Flight:
         length, self.theta = finite_array("s", s), angles("theta", theta).copy()
         if length.ndim != 1 or self.theta.shape != length.shape:
             raise InputError(f"s, theta: expected two arrays of shape (n,), got {length.shape}, {self.theta.shape}")
-        self.container = container
+        self.container = container = container.closed()
         self.position, self.wall = container.point_at(length)
         self.length = container.length_at(self.position, self.wall)
         n = len(length)

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...geometry.curves.bezier import Bezier
 from ...geometry.curves.segment import Segment
+from ...geometry.tables.boundary import Piece, point_at_length
 
 if TYPE_CHECKING:
-    from ...geometry import Arc, Container, Disk
+    from ...geometry import Container, Disk
 
 
 def equilibrium_starts(
@@ -45,8 +47,10 @@ def equilibrium_starts(
     return position, np.concatenate([plane, omega[:, None]], axis=1), wall.astype(np.int64)
 
 
-def _uniform_points(curve: Segment | Arc, count: int, rng: np.random.Generator) -> Floats:
+def _uniform_points(curve: Piece, count: int, rng: np.random.Generator) -> Floats:
     """Points on a curve, uniform in arc length: by rejection where the parameter is no arc length."""
+    if isinstance(curve, Bezier):
+        return point_at_length(curve, rng.uniform(0.0, curve.length, count))
     if isinstance(curve, Segment) or curve.is_circular:
         return curve.point(rng.random(count))
     a, b = curve.semi_axes

@@ -50,7 +50,7 @@ def lyapunov_exponent(
     Parameters
     ----------
     container : Container
-        From curves with an outer loop.
+        A polygon, or curves with an outer loop.
     laws : CollisionLaw or sequence of CollisionLaw
         ``smooth(disk)`` or ``no_slip(disk)``, one for all walls or one per wall.
     collisions : int
@@ -66,7 +66,8 @@ def lyapunov_exponent(
         The mean growth of the logarithm of a perturbation, divided by the mean time. The error is the half width of
         95 % from the independent trajectories, plus half of the difference to the exponent between 1/16 and 1/4 of the
         collisions. The second part is larger than an exponent that vanishes in the limit because perturbations grow
-        like a power of the time. If the table is not ergodic the value is the mean over the energy surface.
+        like a power of the time, as in polygons, smooth or no-slip. If the table is not ergodic the value is the mean
+        over the energy surface.
 
     Raises
     ------
@@ -97,6 +98,7 @@ def lyapunov_exponent(
     (True, True)
     """
     instance("container", container, Container, "geo.Container.stadium()")
+    container = container.closed()
     each = laws_of_walls(container, laws)
     matrices = [_velocity_matrix(law) for law in each]
     whole_number("collisions", collisions, LEAST_COLLISIONS)

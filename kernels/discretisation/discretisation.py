@@ -25,7 +25,7 @@ from ..laws.tensor_law import TensorLaw
 from ..matrices.matrix import KernelMatrix
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 from ..sampling.sobol import PARTS
-from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SEED_WITHOUT_RNG, Budget, MethodName
+from .method import MOST_SEGMENTS, QUICK_SEGMENTS, SAMPLING, SEED_WITHOUT_RNG, Budget, MethodName
 from .methods import recipe
 
 
@@ -73,13 +73,14 @@ def discretise(
         Whether each ray counts in both directions, for sampled matrices of reversible laws. The flux is then symmetric,
         and rows of ``array`` sum to 1 only within the sampling error.
     checkpoint : path, optional
-        A file in which the sums are stored every few seconds, for ``"monte-carlo"``. The same call with the same file
-        continues the run; the file of other rays is refused, and the message names the difference.
+        A file in which the sums are stored every few seconds, for ``"monte-carlo"``, and for ``"qmc"`` of a law driven
+        by one uniform number. The same call with the same file continues the run; the file of other rays is refused,
+        and the message names the difference.
     client : int, str or distributed.Client, optional
         For the same: a number of workers on this machine, the address of a scheduler, or a client of dask.distributed.
         The matrix is the same to the last bit without checkpoint and workers, for any number of workers and any number
-        of restarts: a chunk of rays depends only on its number, counts are integers, and in bases without cells sums
-        are added in the order of the chunks.
+        of restarts: a chunk of rays depends only on its number, which for ``"qmc"`` is its place in the sequence,
+        counts are integers, and in bases without cells sums are added in the order of the chunks.
 
     Returns
     -------
@@ -144,7 +145,15 @@ def discretise(
     if isinstance(law, TensorLaw):
         return law.matrix_on(
             _checked_pair(basis),
-            partial(discretise, method=method, tolerance=tolerance, samples=samples, rng=rng, symmetrise=symmetrise),
+            partial(
+                discretise,
+                method=method,
+                tolerance=tolerance,
+                samples=samples,
+                rng=rng,
+                symmetrise=symmetrise,
+                **engine,
+            ),
         )
     if not isinstance(law, Law):
         raise InputError(f"law: expected a law such as WallLaw(wall), got {law!r}")
@@ -163,8 +172,8 @@ def discretise(
     source = generator(rng, SEED_WITHOUT_RNG)
     if symmetrise and not law.reversible:
         raise InputError(f"symmetrise: {law!r} is not known to be reversible, so its rays must not be turned round")
-    if engine and method != "monte-carlo":
-        raise InputError(f"method: checkpoint and client need 'monte-carlo', got {method!r}")
+    if engine and method not in SAMPLING:
+        raise InputError(f"method: checkpoint and client need 'monte-carlo' or 'qmc', got {method!r}")
     # Quadrature requested by name may take some seconds.
     segments = MOST_SEGMENTS if method == "quadrature" else QUICK_SEGMENTS
     budget = Budget(tolerance, number, segments, rng=source, symmetrise=symmetrise, engine=engine or None)

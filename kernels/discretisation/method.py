@@ -20,6 +20,8 @@ from ..matrices.matrix import KernelMatrix, frobenius_error
 from ..sampling.monte_carlo import DEFAULT_SAMPLES
 
 MethodName = Literal["auto", "exact", "quadrature", "qmc", "monte-carlo"]
+# The methods whose rays can be stored on the way and traced by workers.
+SAMPLING: tuple[MethodName, ...] = ("qmc", "monte-carlo")
 
 # Limits on the ray segments of traced conditional distributions of one matrix: some seconds of work; without an
 # explicit request for quadrature, the time of two million rays.

@@ -51,6 +51,11 @@ def recipe(law: Law, wanted: MethodName) -> Callable[[Basis, Budget], KernelMatr
         if wanted != "auto" and not found.has(wanted, basis):
             names = ", ".join(_names(found, basis))
             raise InputError(f"method: {law!r} has no method {wanted!r}; it has {names}")
+        if budget.engine and (isinstance(found, _Sum) or not found.has_whole(wanted, basis)):
+            raise InputError(
+                f"method: checkpoint and client take rays of one kind, and {wanted!r} computes {law!r} from its parts; "
+                "use 'monte-carlo'"
+            )
         return found.matrix(wanted, basis, budget)
 
     return made
@@ -74,6 +79,10 @@ class _Law:
 
     def has(self, wanted: MethodName, basis: Basis) -> bool:
         return self._method(wanted, basis) is not None or (self.parts is not None and self.parts.has(wanted, basis))
+
+    def has_whole(self, wanted: MethodName, basis: Basis) -> bool:
+        """Whether a method takes the law, not its parts."""
+        return self._method(wanted, basis) is not None
 
     def without_rays(self, basis: Basis) -> bool:
         if self.parts is not None:

@@ -39,7 +39,7 @@ class MonteCarlo:
 
 def sobol_matrix(sampler: SobolSampler, basis: Basis, budget: Budget) -> KernelMatrix:
     """The matrix from at least ``budget.rays`` rays of the sampler, which continues its Sobol sequence."""
-    found = sampler.sampled(budget.rays, symmetrise=budget.symmetrise)
+    found = sampler.sampled(budget.rays, symmetrise=budget.symmetrise, engine=budget.engine)
     return _sampled("qmc", found, basis, budget, f"spread of {PARTS} scrambled sequences")
 
 

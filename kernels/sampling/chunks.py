@@ -1,13 +1,15 @@
-"""Independent rays in chunks that depend on their number alone, counted by any workers and stored on the way."""
+"""Rays in chunks that depend on their numbers alone, counted by any workers and stored on the way."""
 
 from __future__ import annotations
 
 import io
 import math
 import time
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +18,7 @@ from ...core.checkpoints import Checkpoint
 from ...core.checks import Floats
 from ...core.long_runs import Engine
 from ...core.version import __version__
-from ...core.workers import connected, results
+from ...core.workers import BACKLOG, connected, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import DrivenLaw, Law, entry_inside
@@ -26,30 +28,117 @@ from .rays import RaySums, progress_bar
 # Rays of a task for a worker, a second of work or a few. Counts in cells do not depend on it; sums of real numbers are
 # added task by task, so that it is a constant.
 RAYS_A_TASK = 2**22
-# Seconds between two states of a checkpoint, of n^2 counts each.
+# Seconds between two states of a checkpoint.
 STORED_EVERY = 5.0
 STATE = "state"
+# Bytes of results that wait on the workers at most, beyond two for each worker.
+MOST_WAITING = 2**28
+
+# Sums of some consecutive tables, and the number of rays that did not escape.
+Sums = tuple[NDArray[Any], int]
+
+
+class Job(Protocol):
+    """Rays in tasks; it is sent to workers."""
+
+    @property
+    def law(self) -> Law:
+        """The law."""
+
+    @property
+    def basis(self) -> Basis:
+        """The basis."""
+
+    @property
+    def tasks(self) -> int:
+        """Their number."""
+
+    @property
+    def total(self) -> int:
+        """Rays of all tasks."""
+
+    @property
+    def tables(self) -> int:
+        """Number of consecutive tables to which each task adds."""
+
+    def rays_of(self, task: int) -> int:
+        """Rays of one task."""
+
+    def first_table(self, task: int) -> int:
+        """The first table to which a task adds."""
+
+    def add_to(self, sums: RaySums, first: int, task: int) -> None:
+        """Add the rays of a task to the tables from ``first`` on."""
+
+    def identity(self) -> dict[str, Any]:
+        """What tells the rays from others of this law and basis, in plain JSON values."""
 
 
 @dataclass(frozen=True)
-class RayChunks:
-    """The rays of a law with incoming angles from the invariant measure, chunk by chunk.
+class IndependentRays:
+    """Independent rays of a law with incoming angles from the invariant measure, chunk by chunk.
 
     Attributes
     ----------
     law : Law
+    basis : Basis
     root : tuple of int
         The seed.
-    chunk : int
-        Rays of each chunk but the last.
+    samples : int
+        Rays of each part.
+    parts : int
+        Tables, one for each part.
+    rays_a_task : int
+        Rounded to whole chunks.
     """
 
     law: Law
+    basis: Basis
     root: tuple[int, ...]
-    chunk: int
+    samples: int
+    parts: int
+    rays_a_task: int = field(default_factory=lambda: RAYS_A_TASK)
+    tables = 1
+
+    @cached_property
+    def chunk(self) -> int:
+        """Rays of each chunk but the last of a part."""
+        return RaySums(self.law, self.basis, 0).chunk
+
+    @cached_property
+    def chunks_a_task(self) -> int:
+        return max(self.rays_a_task // self.chunk, 1)
+
+    @cached_property
+    def tasks_a_part(self) -> int:
+        return math.ceil(self.samples / (self.chunk * self.chunks_a_task))
+
+    @property
+    def tasks(self) -> int:
+        return self.parts * self.tasks_a_part
+
+    @property
+    def total(self) -> int:
+        return self.parts * self.samples
+
+    def rays_of(self, task: int) -> int:
+        whole = self.chunk * self.chunks_a_task
+        return min(whole, self.samples - task % self.tasks_a_part * whole)
+
+    def first_table(self, task: int) -> int:
+        return task // self.tasks_a_part
+
+    def add_to(self, sums: RaySums, first: int, task: int) -> None:
+        part, own = divmod(task, self.tasks_a_part)
+        chunk, rays = self.chunk, self.rays_of(task)
+        for number, start in enumerate(range(0, rays, chunk)):
+            index = own * self.chunks_a_task + number
+            theta, outgoing, escaped = self.rays(part, index, min(chunk, rays - start))
+            sums.add(first, theta, outgoing)
+            sums.count_unresolved(escaped)
 
     def rays(self, part: int, index: int, number: int) -> tuple[Floats, Floats, NDArray[np.bool_] | None]:
-        """Incoming and outgoing angles of so many rays, and which of them escaped, if the law tells."""
+        """Incoming and outgoing angles of the rays of a chunk, and which of them escaped, if the law tells."""
         own = np.random.default_rng([*self.root, part, index])
         theta = SINE.sample(number, own)
         # the map of a driven law tells besides which rays escaped
@@ -60,110 +149,76 @@ class RayChunks:
         outgoing, escaped = reflect(entry_inside(own.random(theta.shape)), theta)
         return theta, outgoing, escaped
 
-
-@dataclass(frozen=True)
-class _Counting:
-    """What a worker is sent: it counts the rays of some chunks in cells."""
-
-    chunks: RayChunks
-    basis: Basis
-    samples: int
-    chunks_a_task: int
-
-    @property
-    def tasks(self) -> int:
-        """Their number."""
-        return math.ceil(self.samples / (self.chunks.chunk * self.chunks_a_task))
-
-    def rays_of(self, task: int) -> int:
-        """Rays of one task."""
-        whole = self.chunks.chunk * self.chunks_a_task
-        return min(whole, self.samples - task * whole)
-
-    def counted(self, task: int) -> tuple[NDArray[np.int64], int]:
-        """Counts in cells, and the rays that did not escape."""
-        sums = RaySums(self.chunks.law, self.basis, 1)
-        chunk, rays = self.chunks.chunk, self.rays_of(task)
-        for number, start in enumerate(range(0, rays, chunk)):
-            index = task * self.chunks_a_task + number
-            theta, outgoing, escaped = self.chunks.rays(0, index, min(chunk, rays - start))
-            sums.add(0, theta, outgoing)
-            sums.count_unresolved(escaped)
-        return sums.tables[0], sums.unresolved
+    def identity(self) -> dict[str, Any]:
+        return {
+            "computation": "independent rays", "rays": self.samples, "seed": list(self.root), "chunk": self.chunk,
+            "chunks a task": self.chunks_a_task,
+        }  # fmt: skip
 
 
 @dataclass(frozen=True)
-class _Summing:
-    """What a worker is sent: it adds e_i(theta) e_j(theta') over the rays of some chunks of one part."""
+class _Task:
+    """What a worker is sent."""
 
-    chunks: RayChunks
-    basis: Basis
-    samples: int
-    chunks_a_task: int
+    job: Job
 
-    @property
-    def tasks_a_part(self) -> int:
-        """Number of tasks of each part."""
-        return math.ceil(self.samples / (self.chunks.chunk * self.chunks_a_task))
-
-    def rays_of(self, task: int) -> int:
-        """Rays of one task."""
-        whole = self.chunks.chunk * self.chunks_a_task
-        return min(whole, self.samples - task % self.tasks_a_part * whole)
-
-    def summed(self, task: int) -> tuple[Floats, int]:
-        """Sums over the rays, and the rays that did not escape."""
-        sums = RaySums(self.chunks.law, self.basis, 1)
-        part, own = divmod(task, self.tasks_a_part)
-        chunk, rays = self.chunks.chunk, self.rays_of(task)
-        for number, start in enumerate(range(0, rays, chunk)):
-            index = own * self.chunks_a_task + number
-            theta, outgoing, escaped = self.chunks.rays(part, index, min(chunk, rays - start))
-            sums.add(0, theta, outgoing)
-            sums.count_unresolved(escaped)
-        return sums.tables[0], sums.unresolved
+    def sums(self, task: int) -> Sums:
+        """The sums of one task."""
+        sums = RaySums(self.job.law, self.job.basis, self.job.tables)
+        self.job.add_to(sums, 0, task)
+        return sums.tables, sums.unresolved
 
 
-def count_long(sums: RaySums, chunks: RayChunks, engine: Engine) -> None:
-    """Add the rays of all parts of ``sums``: in cells exact counts, in other bases sums in the order of the chunks.
+def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
+    """Add the rays of all tasks to ``sums``: in cells exact counts, in other bases sums in the order of the tasks.
 
     Raises
     ------
     InputError
         If the checkpoint is of other rays or cannot be written.
+    KeyboardInterrupt
+        After Ctrl-C; it says how many rays are stored, and how to go on.
     """
-    together = max(RAYS_A_TASK // chunks.chunk, 1)
-    job = (_Counting if sums.basis.is_partition else _Summing)(chunks, sums.basis, sums.each, together)
-    path = engine.get("checkpoint")
-    with ExitStack() as stack:
-        store = None if path is None else stack.enter_context(Checkpoint(path, _identity(job)))
-        if isinstance(job, _Counting):
-            _run(job, sums, store, engine.get("client"))
-        else:
-            _run_in_order(job, sums, store, engine.get("client"))
+    path, client = engine.get("checkpoint"), engine.get("client")
+    if path is None and client is None and sums.basis.is_partition:
+        # without further tables, which can be large
+        with progress_bar(job.total) as bar:
+            for task in range(job.tasks):
+                job.add_to(sums, job.first_table(task), task)
+                bar.update(job.rays_of(task))
+        return
+    run = _Run(job, _State(np.zeros(job.tasks, dtype=bool), sums.tables, sums.unresolved))
+    try:
+        with ExitStack() as stack:
+            store = None if path is None else stack.enter_context(Checkpoint(path, _identity(job)))
+            bar = stack.enter_context(progress_bar(job.total))
+            run.all_tasks(store, stack.enter_context(connected(client)), bar)
+    except KeyboardInterrupt as stop:
+        lost = "without a checkpoint they are lost"
+        how = lost if path is None else f"{path} has them: give the same call"
+        raise KeyboardInterrupt(f"stopped after {run.rays_done} of {job.total} rays; {how}") from stop
+    sums.tables[:], sums.unresolved = run.state.tables, run.state.unresolved
 
 
-def _identity(job: _Counting | _Summing) -> dict[str, Any]:
+def _identity(job: Job) -> dict[str, Any]:
     # task by task the checkpoint says what is done: so their size belongs to it
-    return {
-        "computation": "independent rays", "version": __version__, "law": law_digest(job.chunks.law),
-        "basis": repr(job.basis), "rays": job.samples, "seed": list(job.chunks.root), "chunk": job.chunks.chunk,
-        "chunks a task": job.chunks_a_task,
-    }  # fmt: skip
+    told = {"version": __version__, "law": law_digest(job.law), "basis": repr(job.basis)}
+    return {**told, **job.identity()}
 
 
 class _State(NamedTuple):
-    """What is counted so far: replaced as a whole, so that an interrupt leaves counts and tasks in agreement."""
+    """What is counted so far: replaced as a whole, so that an interrupt leaves sums and tasks in agreement."""
 
     done: NDArray[np.bool_]
-    counts: NDArray[np.int64]
+    tables: NDArray[Any]
     unresolved: int
 
-    def after(self, task: int, counts: NDArray[np.int64], unresolved: int) -> _State:
-        """With the result of a task."""
-        done = self.done.copy()
+    def after(self, task: int, first: int, found: Sums) -> _State:
+        """With the sums of a task."""
+        done, tables = self.done.copy(), self.tables.copy()
         done[task] = True
-        return _State(done, self.counts + counts, self.unresolved + unresolved)
+        tables[first : first + len(found[0])] += found[0]
+        return _State(done, tables, self.unresolved + found[1])
 
     def packed(self) -> bytes:
         """As a file of numpy's, without pickle."""
@@ -175,56 +230,50 @@ class _State(NamedTuple):
     def unpacked(content: bytes) -> _State:
         """The state that `packed` gave."""
         with np.load(io.BytesIO(content), allow_pickle=False) as known:
-            return _State(known["done"], known["counts"], int(known["unresolved"]))
+            return _State(known["done"], known["tables"], int(known["unresolved"]))
 
 
-def _run(job: _Counting, sums: RaySums, store: Checkpoint | None, client: Any) -> None:
-    known = [] if store is None else [_State.unpacked(content) for _, content in store.parts()]
-    state = known[0] if known else _State(np.zeros(job.tasks, dtype=bool), sums.tables[0], 0)
-    stored = time.monotonic()
-    try:
-        with connected(client) as workers, progress_bar(job.samples) as bar:
-            bar.update(sum(job.rays_of(task) for task in np.flatnonzero(state.done).tolist()))
-            for task, found in results(job.counted, np.flatnonzero(~state.done).tolist(), workers):
-                state = state.after(task, *found)
-                bar.update(job.rays_of(task))
+@dataclass
+class _Run:
+    """A run through the tasks that are not done."""
+
+    job: Job
+    state: _State
+
+    @property
+    def rays_done(self) -> int:
+        return sum(map(self.job.rays_of, np.flatnonzero(self.state.done).tolist()))
+
+    def _backlog(self, workers: Any) -> int:
+        """Tasks at a time: results are matrices, and can come faster than they are added."""
+        size = 8 * self.job.tables * self.job.basis.size**2
+        return min(BACKLOG, MOST_WAITING // size + 2 * (0 if workers is None else len(workers.nthreads())))
+
+    def all_tasks(self, store: Checkpoint | None, workers: Any, bar: Any) -> None:
+        for _, content in () if store is None else store.parts():
+            self.state = _State.unpacked(content)
+        bar.update(self.rays_done)
+        rest = np.flatnonzero(~self.state.done).tolist()
+        found: Iterable[tuple[int, Sums]] = results(_Task(self.job).sums, rest, workers, self._backlog(workers))
+        stored = time.monotonic()
+        try:
+            for task, own in found if self.job.basis.is_partition else _in_order(found, rest):
+                self.state = self.state.after(task, self.job.first_table(task), own)
+                bar.update(self.job.rays_of(task))
                 if store is not None and time.monotonic() - stored > STORED_EVERY:
-                    store.put(STATE, state.packed(), now=True)
+                    store.put(STATE, self.state.packed(), now=True)
                     stored = time.monotonic()
-    finally:
-        if store is not None:
-            store.put(STATE, state.packed(), now=True)
-    sums.tables[0], sums.unresolved = state.counts, state.unresolved
+        finally:
+            if store is not None:
+                store.put(STATE, self.state.packed(), now=True)
 
 
-def _run_in_order(job: _Summing, sums: RaySums, store: Checkpoint | None, client: Any) -> None:
-    """Real sums are added in the order of the tasks; a result that comes too early waits for those before it."""
-    done, tasks = 0, len(sums.tables) * job.tasks_a_part
-
-    def keep() -> None:
-        if store is not None:
-            file = io.BytesIO()
-            np.savez(file, done=done, tables=sums.tables, unresolved=sums.unresolved)
-            store.put(STATE, file.getvalue(), now=True)
-
-    for _, content in () if store is None else store.parts():
-        with np.load(io.BytesIO(content), allow_pickle=False) as known:
-            done, sums.unresolved = int(known["done"]), int(known["unresolved"])
-            sums.tables[:] = known["tables"]
-    stored = time.monotonic()
-    early: dict[int, tuple[Floats, int]] = {}
-    with connected(client) as workers, progress_bar(len(sums.tables) * job.samples) as bar:
-        bar.update(sum(map(job.rays_of, range(done))))
-        for task, found in results(job.summed, range(done, tasks), workers):
-            early[task] = found
-            while done in early:
-                table, unresolved = early.pop(done)
-                sums.tables[done // job.tasks_a_part] += table
-                sums.unresolved += unresolved
-                bar.update(job.rays_of(done))
-                done += 1
-            if time.monotonic() - stored > STORED_EVERY:
-                keep()
-                stored = time.monotonic()
-    # not after an interrupt, which may come between table and number
-    keep()
+def _in_order(found: Iterable[tuple[int, Sums]], tasks: Iterable[int]) -> Iterator[tuple[int, Sums]]:
+    """Results in the order of the tasks: one that comes too early waits for those before it."""
+    early: dict[int, Sums] = {}
+    coming = iter(found)
+    for task in tasks:
+        while task not in early:
+            other, own = next(coming)
+            early[other] = own
+        yield task, early.pop(task)

@@ -7,7 +7,7 @@ import numpy as np
 from ...core.long_runs import Engine
 from ..bases.basis import Basis
 from ..laws.law import Law
-from .chunks import RayChunks, count_long
+from .chunks import IndependentRays, count_long
 from .counts import BATCHES, LARGEST_REPLICATES, SampledArray
 from .rays import RaySums
 from .sobol import PARTS
@@ -35,6 +35,5 @@ def independent_rays(
     parts = 1 if basis.is_partition else BATCHES if most >= BATCHES else PARTS
     sums = RaySums(law, basis, parts)
     sums.each = max(-(-samples // parts), 1)
-    chunks = RayChunks(law, root, sums.chunk)
-    count_long(sums, chunks, engine or {})
+    count_long(sums, IndependentRays(law, basis, root, sums.each, parts), engine or {})
     return sums.array(symmetrise=symmetrise)

@@ -1,25 +1,171 @@
-"""Rays from scrambled Sobol sequences that can be continued."""
+"""Rays from scrambled Sobol sequences that can be continued, and begun at any point."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ...core.long_runs import Engine
 from ..bases.angles import clipped_inside
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..bases.mirror import is_mirror_symmetric
 from ..laws.law import Law, entry_inside
+from . import chunks
+from .chunks import count_long
 from .counts import SampledArray
-from .rays import RaySums, progress_bar
+from .rays import RaySums
 
 # Replicates of a Sobol sequence whose spread gives the error; eight determine the spread within a quarter. With more
 # replicates each would have fewer rays and be less accurate.
 PARTS = 8
-# Binary digits of the sequences; the time of scrambling grows like their square. The digits beyond are one random shift
-# of all points, so that points hit a corner at a dyadic position only by chance.
+# Binary digits of the sequences. The digits beyond are one random shift of all points, so that points hit a corner at a
+# dyadic position only by chance.
 SOBOL_BITS = 32
+
+Digits = NDArray[np.uint64]
+
+
+@dataclass(frozen=True, eq=False)
+class SobolSequence:
+    """A scrambled Sobol sequence in two dimensions, of which any block of points is computed by itself.
+
+    The digits of point n are a matrix modulo 2 times those of n, plus a shift. The matrices are those of Sobol, the
+    identity and Pascal's triangle, times random lower triangular ones (Matousek, J. Complexity 14 (1998) 527). scipy
+    draws the same points from the same generator, in another order within blocks of 2^k, and one after the other: it
+    would need seconds to reach the end of a long sequence.
+
+    Attributes
+    ----------
+    columns : ndarray of shape (2, SOBOL_BITS)
+        Of the matrices, as whole numbers.
+    shift : ndarray of shape (2,)
+    """
+
+    columns: Digits
+    shift: Digits
+
+    @staticmethod
+    def of(rng: np.random.Generator) -> SobolSequence:
+        """The sequence of a generator."""
+        from scipy.linalg import pascal
+
+        own = rng.spawn(1)[0]
+        bits = np.arange(SOBOL_BITS, dtype=np.uint64)
+        shift = own.integers(2, size=(2, SOBOL_BITS), dtype=np.uint32) @ (np.uint64(1) << bits)
+        scramble = np.tril(own.integers(2, size=(2, SOBOL_BITS, SOBOL_BITS), dtype=np.uint32), -1).astype(np.int64)
+        scramble += np.eye(SOBOL_BITS, dtype=np.int64)
+        plain = np.stack([np.eye(SOBOL_BITS), pascal(SOBOL_BITS, kind="upper") % 2]).astype(np.int64)
+        digits = (scramble @ plain) % 2
+        columns = np.swapaxes(digits, 1, 2).astype(np.uint64) @ (np.uint64(1) << bits[::-1])
+        return SobolSequence(columns, shift)
+
+    def block(self, start: int, number: int) -> Digits:
+        """Points ``start`` to ``start + number - 1``, shape (number, 2); a power of two that divides ``start``."""
+        first = self.shift.copy()
+        for bit in range(start.bit_length()):
+            if start >> bit & 1:
+                first ^= self.columns[:, bit]
+        found = first[None]
+        for bit in range(number.bit_length() - 1):
+            found = np.concatenate([found, found ^ self.columns[:, bit]])
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class SobolRays:
+    """Rays ``start`` to ``end - 1`` of each of eight shifted Sobol sequences, in tasks.
+
+    Attributes
+    ----------
+    law : Law
+    basis : Basis
+    sequence : SobolSequence
+    shifts, beyond : ndarray of shape (PARTS, 2)
+        Of the digits of each part, and of the digits beyond.
+    seed : tuple of int
+        Which tells sequence and shifts from others.
+    halved : bool
+        Whether all rays have theta < pi/2.
+    start, end : int
+        Powers of two; ``start`` may be 0.
+    rays_a_task : int
+        Rounded to whole chunks.
+    """
+
+    law: Law
+    basis: Basis
+    sequence: SobolSequence
+    shifts: Digits
+    beyond: Floats
+    seed: tuple[int, ...]
+    halved: bool
+    start: int
+    end: int
+    rays_a_task: int = field(default_factory=lambda: chunks.RAYS_A_TASK)
+    tables = PARTS
+
+    @cached_property
+    def chunk(self) -> int:
+        """Points of a chunk, at most."""
+        return max(RaySums(self.law, self.basis, 0).chunk // PARTS, 1)
+
+    @cached_property
+    def points_a_task(self) -> int:
+        return self.chunk * max(self.rays_a_task // (PARTS * self.chunk), 1)
+
+    @property
+    def tasks(self) -> int:
+        return -(-self.end // self.points_a_task) - self.start // self.points_a_task
+
+    @property
+    def total(self) -> int:
+        return PARTS * (self.end - self.start)
+
+    def range_of(self, task: int) -> tuple[int, int]:
+        """The first point of a task, and the one after its last."""
+        low = (self.start // self.points_a_task + task) * self.points_a_task
+        return max(self.start, low), min(self.end, low + self.points_a_task)
+
+    def rays_of(self, task: int) -> int:
+        low, high = self.range_of(task)
+        return PARTS * (high - low)
+
+    def first_table(self, task: int) -> int:
+        return 0
+
+    def add_to(self, sums: RaySums, first: int, task: int) -> None:
+        reflect = self.law.random_map()
+        assert reflect is not None  # checked by the sampler
+        for start, number in _balanced(*self.range_of(task), self.chunk):
+            points = (self.sequence.block(start, number) ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS
+            x, u = np.moveaxis(points + self.beyond[:, None], -1, 0)
+            theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
+            outgoing, escaped = reflect(entry_inside(x), theta)
+            sums.count_unresolved(escaped)
+            for part in range(PARTS):
+                sums.add(first + part, theta[part], outgoing[part])
+
+    def identity(self) -> dict[str, Any]:
+        return {
+            "computation": "scrambled Sobol sequences", "rays": PARTS * self.end, "seed": list(self.seed),
+            "chunk": self.chunk, "points a task": self.points_a_task,
+        }  # fmt: skip
+
+
+def _balanced(low: int, high: int, most: int) -> Iterator[tuple[int, int]]:
+    """Begins and lengths of blocks: the sequence is balanced in powers of two that divide the begin."""
+    while low < high:
+        number = min(most, high - low, low or high)
+        yield low, number
+        low += number
 
 
 class SobolSampler:
@@ -44,28 +190,30 @@ class SobolSampler:
     """
 
     def __init__(self, law: Law, basis: Basis, rng: np.random.Generator) -> None:
-        from scipy.stats.qmc import Sobol
-
-        reflect = law.random_map()
-        if reflect is None:
+        if law.random_map() is None:
             raise InputError(
                 f"method: {law!r} is not driven by a uniform number, so it has no 'qmc'; use 'monte-carlo'"
             )
-        self.reflect = reflect
         self.sums = RaySums(law, basis, PARTS)
         self.halved = law.mirror_symmetric is True and is_mirror_symmetric(basis)
-        source = np.random.default_rng(rng.integers(0, 2**63, size=2))
-        self.sequence = Sobol(2, scramble=True, bits=SOBOL_BITS, rng=source)
+        self.seed = tuple(int(word) for word in rng.integers(0, 2**63, size=2))
+        source = np.random.default_rng(self.seed)
+        self.sequence = SobolSequence.of(source)
         self.shifts = source.integers(0, 2**SOBOL_BITS, size=(PARTS, 2), dtype=np.uint64)
         self.beyond = source.random((PARTS, 2)) * 2.0**-SOBOL_BITS
 
-    def sampled(self, samples: int, *, symmetrise: bool) -> tuple[SampledArray, int, float]:
+    def sampled(
+        self, samples: int, *, symmetrise: bool, engine: Engine | None = None
+    ) -> tuple[SampledArray, int, float]:
         """The matrix from at least ``samples`` rays, rounded up to 8 times a power of two; see `RaySums.array`.
+
+        With an ``engine`` its workers trace the rays and its checkpoint stores the sums, which are the same to the last
+        bit: a block of the sequence depends only on its place.
 
         Raises
         ------
         InputError
-            If the sequence has fewer points.
+            If the sequence has fewer points, or the checkpoint is of other rays or cannot be written.
         """
         each = 1 << (max(-(-samples // PARTS), 1) - 1).bit_length()
         if each > 1 << SOBOL_BITS:
@@ -73,22 +221,11 @@ class SobolSampler:
             raise InputError(
                 f"samples: a Sobol sequence has at most {most} rays, got {samples}; use method 'monte-carlo'"
             )
-        with progress_bar(PARTS * max(each - self.sums.each, 0)) as bar:
-            while self.sums.each < each:
-                # The sequence is balanced in powers of two.
-                number = min(max(self.sums.chunk // PARTS, 1), each - self.sums.each, self.sums.each or each)
-                self._add(number)
-                self.sums.each += number
-                bar.update(PARTS * number)
+        if each > self.sums.each:
+            rays = SobolRays(
+                self.sums.law, self.sums.basis, self.sequence, self.shifts, self.beyond, self.seed, self.halved,
+                self.sums.each, each,
+            )  # fmt: skip
+            count_long(self.sums, rays, engine or {})
+            self.sums.each = each
         return self.sums.array(symmetrise=symmetrise, mirrored=self.halved)
-
-    def _add(self, number: int) -> None:
-        """Add ``number`` rays to every part."""
-        digits = (self.sequence.random(number) * 2.0**SOBOL_BITS).astype(np.uint64)
-        points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS + self.beyond[:, None]
-        x, u = np.moveaxis(points, -1, 0)
-        theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
-        outgoing, escaped = self.reflect(entry_inside(x), theta)
-        self.sums.count_unresolved(escaped)
-        for part in range(PARTS):
-            self.sums.add(part, theta[part], outgoing[part])

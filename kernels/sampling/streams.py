@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from ...core.errors import InputError
 from ...core.kinds import explained
 from ...core.long_runs import digest
 from ...core.version import __version__
+from ...core.workers import connected, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
@@ -30,6 +31,11 @@ BLOCK = 2**20
 # Seconds between two states of a checkpoint.
 STORED_EVERY = 5.0
 STATE = "state"
+# Blocks that are on their way to or at a worker.
+BLOCKS_A_WORKER = 3
+
+# Its number, and the incoming and outgoing angles.
+Block: TypeAlias = tuple[int, Floats, Floats]
 
 
 @explained
@@ -40,6 +46,7 @@ def estimate_stream(
     *,
     invariant: bool = True,
     checkpoint: str | Path | None = None,
+    client: Any = None,
 ) -> KernelMatrix:
     """Estimate the matrix of a law from more pairs (theta, theta') than memory holds.
 
@@ -57,13 +64,17 @@ def estimate_stream(
     checkpoint : path, optional
         A file in which the sums are stored every few seconds. The same call, with the same pairs from the first on,
         goes on with it: arrays are read from where they were, an iterable is advanced to there.
+    client : int, str or distributed.Client, optional
+        As of `discretise`: this process reads the stream, and workers count or add up its blocks. That is of use where
+        this takes longer than to send a block, so for many functions of a basis without cells.
 
     Returns
     -------
     KernelMatrix
-        The same to the last bit for any size of the chunks, and however often it was stopped. In a basis of cells it is
-        that of `estimate` on all pairs if these follow the measure; else the two differ by rounding, or by the blocks
-        in which pairs are weighted. Memory is that of the matrix, once for cells, else 32 times, and of a block.
+        The same to the last bit for any size of the chunks and any workers, and however often it was stopped. In a
+        basis of cells it is that of `estimate` on all pairs if these follow the measure; else the two differ by
+        rounding, or by the blocks in which pairs are weighted. Memory is that of the matrix, once for cells, else 32
+        times, and of a block; with workers of three blocks, and as many such sums, for each of them.
 
     Raises
     ------
@@ -87,7 +98,7 @@ def estimate_stream(
     sums = _Sums.empty(basis, bool(invariant))
     try:
         if checkpoint is None:
-            sums.add_all(source, basis, None)
+            sums.add_all(source, basis, None, client)
         else:
             first = source.first()
             identity = {
@@ -95,7 +106,7 @@ def estimate_stream(
                 "invariant": sums.invariant, "pairs": source.size, "block": BLOCK, "first pairs": digest(*first),
             }  # fmt: skip
             with Checkpoint(checkpoint, identity) as store:
-                sums.add_all(source, basis, store)
+                sums.add_all(source, basis, store, client)
     except KeyboardInterrupt as stop:
         lost = "without a checkpoint their sums are lost"
         how = lost if checkpoint is None else f"{checkpoint} has {sums.stored} of them: give the same call"
@@ -126,20 +137,48 @@ class _Sums:
             np.zeros((batches, basis.size, basis.size)), np.zeros(batches),
         )  # fmt: skip
 
-    def add_all(self, source: _Source, basis: Basis, store: Checkpoint | None) -> None:
+    def add_all(self, source: _Source, basis: Basis, store: Checkpoint | None, client: Any) -> None:
         """Add all pairs of a source, or those that the checkpoint does not have; block by block."""
         if store is not None:
             for _, content in store.parts():
                 self._set(content)
+        blocks = (
+            (number, angles("theta_in", theta), angles("theta_out", image))
+            for number, (theta, image) in enumerate(source.blocks(self.number))
+        )
         stored = time.monotonic()
-        for theta, image in source.blocks(self.number):
-            self._add(angles("theta_in", theta), angles("theta_out", image), basis)
-            if store is not None and time.monotonic() - stored > STORED_EVERY:
-                self._store(store)
-                stored = time.monotonic()
+        with connected(client) as workers:
+            for _ in self._add_each(blocks, basis, workers):
+                if store is not None and time.monotonic() - stored > STORED_EVERY:
+                    self._store(store)
+                    stored = time.monotonic()
         # not after an interrupt, which may leave half a block in the sums
         if store is not None:
             self._store(store)
+
+    def _add_each(self, blocks: Iterator[Block], basis: Basis, workers: Any) -> Iterator[None]:
+        """Add the blocks in their order; one that workers have too early waits for those before it."""
+        if workers is None:
+            for _, theta, image in blocks:
+                self._add(theta, image, basis)
+                yield
+            return
+        backlog = BLOCKS_A_WORKER * max(len(workers.nthreads()), 1)
+        early: dict[int, _Sums] = {}
+        done = 0
+        for (number, *_), own in results(_Adding(basis, self.invariant).sums, blocks, workers, backlog):
+            early[number] = own
+            while done in early:
+                self._merge(early.pop(done))
+                done += 1
+                yield
+
+    def _merge(self, other: _Sums) -> None:
+        self.totals += other.totals
+        self.counts += other.counts
+        self.tables += other.tables
+        self.masses += other.masses
+        self.number += other.number
 
     def _add(self, theta: Floats, image: Floats, basis: Basis) -> None:
         bins, batches = bins_of_test(basis), len(self.tables)
@@ -178,6 +217,21 @@ class _Sums:
         with np.load(io.BytesIO(content), allow_pickle=False) as known:
             self.number, self.totals, self.counts = int(known["number"]), known["totals"], known["counts"]
             self.tables, self.masses, self.stored = known["tables"], known["masses"], self.number
+
+
+@dataclass(frozen=True)
+class _Adding:
+    """What a worker is sent."""
+
+    basis: Basis
+    invariant: bool
+
+    def sums(self, block: Block) -> _Sums:
+        """The sums of one block."""
+        _, theta, image = block
+        found = _Sums.empty(self.basis, self.invariant)
+        found._add(theta, image, self.basis)
+        return found
 
 
 class _Source:

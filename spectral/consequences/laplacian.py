@@ -116,7 +116,7 @@ def _slope_sum(wall: Any, chords: int) -> tuple[float, float]:
     """The integral of the squared slope of the chords of a wall's pieces, and the largest slope."""
     total, steepest = 0.0, 0.0
     for piece in wall.pieces:
-        points = np.array([piece.point(t) for t in np.linspace(0.0, 1.0, chords + 1)])
+        points = piece.point(np.linspace(0.0, 1.0, chords + 1))
         run, rise = np.diff(points, axis=0).T
         if np.any(run <= 0.0):
             return np.inf, np.inf

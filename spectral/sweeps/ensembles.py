@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import math
+import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +26,7 @@ from ...kernels.sampling.counts import half_width
 from .quantities import UserQuantity, name_of
 from .running import Family, law_of, sweep
 from .statistics import FEWEST, mean_estimate, spread_estimate
-from .table import SweepTable
+from .table import SweepTable, csv_text
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -43,8 +45,9 @@ class EnsembleRow:
     ----------
     quantity : str
     mean, spread : Estimate
-        Expected value and standard deviation over the random walls. Where a realisation was refused their errors are
-        ``inf``, because the walls that remain are a selection.
+        Expected value and standard deviation over the random walls that are not refused, which are all of them if
+        ``refused`` is 0. Otherwise they are conditional, ``method`` says so, and their errors say nothing of the
+        refused walls, whose values are not known and can differ in any manner.
     realisations, refused : int
         Number of all realisations, and of those without a value.
     """
@@ -54,6 +57,14 @@ class EnsembleRow:
     spread: Estimate
     realisations: int
     refused: int
+
+
+MEANS = ("quantity", "mean", "mean_error", "spread", "spread_error", "realisations", "refused")
+
+
+def _cells(row: EnsembleRow) -> list[str | float | int]:
+    mean, spread = row.mean, row.spread
+    return [row.quantity, mean.value, mean.error, spread.value, spread.error, row.realisations, row.refused]
 
 
 @dataclass(frozen=True)
@@ -92,16 +103,13 @@ class Ensemble:
         InputError
             If pandas is not installed.
         """
-        found: DataFrame = data_frame({
-            "quantity": [row.quantity for row in self.rows],
-            "mean": [row.mean.value for row in self.rows],
-            "mean_error": [row.mean.error for row in self.rows],
-            "spread": [row.spread.value for row in self.rows],
-            "spread_error": [row.spread.error for row in self.rows],
-            "realisations": [row.realisations for row in self.rows],
-            "refused": [row.refused for row in self.rows],
-        })  # fmt: skip
+        cells = [_cells(row) for row in self.rows]
+        found: DataFrame = data_frame({name: [row[k] for row in cells] for k, name in enumerate(MEANS)})
         return found
+
+    def to_csv(self) -> str:
+        """The same lines as CSV, numbers with all their digits."""
+        return csv_text(MEANS, [_cells(row) for row in self.rows])
 
 
 @explained
@@ -134,12 +142,18 @@ def ensemble(
     -------
     Ensemble
         The error of a mean is the half width of 95 % over the realisations plus the mean of their own errors. Walls
-        that are too rare to be among the realisations are not in it.
+        that are too rare to be among the realisations are not in it. Of quantities that are refused for some walls it
+        is the mean over the others; see `EnsembleRow`.
 
     Raises
     ------
     InputError
         As `sweep`, and if there are fewer than four realisations.
+
+    Warns
+    -----
+    UserWarning
+        If realisations were refused: how many, and why the first of them.
 
     Examples
     --------
@@ -156,7 +170,11 @@ def ensemble(
         family, {SEED: _seeds(rng, number)}, quantities, tolerance, checkpoint=checkpoint, client=client,
         progress=progress,
     )  # fmt: skip
-    return Ensemble(table, tuple(_row(table, name) for name in table.quantities))
+    rows = tuple(_row(table, name) for name in table.quantities)
+    most = max(rows, key=lambda row: row.refused)
+    reason = next((row.message for row in table.of(most.quantity) if row.value is None), "")
+    _warn_of_refused(f"mean and spread of {most.quantity} are over", most.refused, number, reason)
+    return Ensemble(table, rows)
 
 
 def _seeds(rng: Rng, number: int) -> list[int]:
@@ -177,10 +195,16 @@ def _row(table: SweepTable, quantity: str) -> EnsembleRow:
     mean, spread = mean_estimate(values, errors), spread_estimate(values, errors)
     if refused:
         mean, spread = (
-            Estimate(one.value, math.inf, one.kind, f"{one.method}, {refused} others were refused")
-            for one in (mean, spread)
+            replace(one, method=f"{one.method} that were not refused, of {len(rows)}") for one in (mean, spread)
         )
     return EnsembleRow(quantity, mean, spread, len(rows), refused)
+
+
+def _warn_of_refused(what: str, refused: int, realisations: int, reason: str) -> None:
+    if refused:
+        words = f"{refused} of {realisations} realisations were refused, the first because of: {reason}"
+        # of the user's line, beyond `explained`
+        warnings.warn(f"{what} those that were not: {words}", stacklevel=4)
 
 
 @dataclass(frozen=True)
@@ -233,14 +257,20 @@ def mean_law(
     KernelMatrix
         Its error is the 95 % quantile of the Frobenius distance from the expected matrix, by the spread of the
         realisations, plus the mean of their own errors. ``replicates`` are the matrices of the realisations, from
-        which `bootstrap_intervals` takes the errors of eigenvalues.
+        which `bootstrap_intervals` takes the errors of eigenvalues. Where realisations were refused it is the mean
+        over the others, and ``law`` says of how many.
 
     Raises
     ------
     InputError
         As `ensemble`.
     AsperityError
-        If the law of a realisation is refused, which would leave a selection of the walls. The message has its seed.
+        If the laws of all realisations but three or fewer are refused. The message has the seed of the first.
+
+    Warns
+    -----
+    UserWarning
+        If realisations were refused: how many, and why the first of them.
 
     Examples
     --------
@@ -259,13 +289,22 @@ def mean_law(
     job = _Matrices(family, basis, positive_number("tolerance", tolerance))
     seeds = _seeds(rng, number)
     try:
-        if checkpoint is None:
-            return _mean(job, _all_matrices(job, seeds, None, client), seeds)
-        with Checkpoint(checkpoint, _identity(job, seeds)) as store:
-            return _mean(job, _all_matrices(job, seeds, store, client), seeds)
+        with ExitStack() as stack:
+            store = None
+            if checkpoint is not None:
+                store = stack.enter_context(Checkpoint(checkpoint, _identity(job, seeds)))
+            packed = _all_matrices(job, seeds, store, client)
     except KeyboardInterrupt as stop:
         stored = f"{checkpoint} has what was finished; the same call goes on from there"
         raise KeyboardInterrupt(f"mean_law stopped; {'nothing is stored' if checkpoint is None else stored}") from stop
+    refused = {seed: reason for seed in seeds if isinstance(reason := packed[seed], str)}
+    seed, first = next(iter(refused.items()), (0, ""))
+    if number - len(refused) < FEWEST:
+        raise AsperityError(
+            f"family: {len(refused)} of {number} laws were refused, that of rng={seed} because of: {first}"
+        )
+    _warn_of_refused("the mean law is that of", len(refused), number, f"{first} (rng={seed})")
+    return _mean(job, packed, seeds)
 
 
 def _identity(job: _Matrices, seeds: Sequence[int]) -> dict[str, Any]:
@@ -282,8 +321,6 @@ def _all_matrices(
     found = {} if store is None else {int(key): value for key, value in store.parts()}
     with connected(client) as workers:
         for seed, packed in results(job.packed, [seed for seed in seeds if seed not in found], workers):
-            if isinstance(packed, str):
-                raise AsperityError(f"family: the law of rng={seed} was refused, and with it the mean: {packed}")
             found[seed] = packed
             if store is not None:
                 store.put(str(seed), packed)
@@ -296,10 +333,12 @@ def _mean(job: _Matrices, packed: Mapping[int, bytes | str], seeds: Sequence[int
     properties: list[dict[str, Any]] = []
     for seed in seeds:
         content = packed[seed]
-        assert isinstance(content, bytes)
+        if isinstance(content, str):
+            continue
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             arrays.append(file["symmetric"])
             properties.append({name: file[name].item() for name in file.files if name != "symmetric"})
+    of = f"{len(arrays)} of {len(seeds)} not refused" if len(arrays) < len(seeds) else f"{len(arrays)}"
     frames = {one["frame"] for one in properties}
     if len(frames) > 1:
         raise InputError("family: expected laws in one convention, got some in each; use law.in_specular_frame()")
@@ -311,7 +350,7 @@ def _mean(job: _Matrices, packed: Mapping[int, bytes | str], seeds: Sequence[int
         Estimate(error, error, "estimate", f"spread of {len(arrays)} realisations"),
         replicates=tuple(arrays),
         method="mean law",
-        law=f"mean of {len(arrays)} of {name_of(job.family)}",
+        law=f"mean of {of} of {name_of(job.family)}",
         reversible=True if all(one["reversible"] for one in properties) else None,
         mirror_symmetric=True if all(one["mirror_symmetric"] for one in properties) else None,
         frame=frames.pop(),

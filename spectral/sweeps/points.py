@@ -19,6 +19,8 @@ Value: TypeAlias = float | int | str
 Point: TypeAlias = dict[str, Value]
 # Points that are asked for at a time by the adaptive sweep, whatever the number of workers: so the points are the same.
 TOGETHER = 4
+# Loss of `adaptive` below which no point is added.
+RESOLUTION = 0.01
 
 # Yields points that can be computed side by side, and is sent the first quantity at each of them.
 Plan: TypeAlias = Generator[list[Point], Sequence[float], None]
@@ -49,7 +51,7 @@ class Between:
     low: float
     high: float
     points: int = 50
-    resolution: float = 0.01
+    resolution: float = RESOLUTION
 
     def __post_init__(self) -> None:
         if finite_number("low", self.low) >= finite_number("high", self.high):

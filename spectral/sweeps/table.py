@@ -122,12 +122,8 @@ class SweepTable:
 
     def to_csv(self) -> str:
         """The table as CSV: numbers with all their digits, refused values empty."""
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow([*self.parameters, *COLUMNS])
-        for row in self.rows:
-            writer.writerow([_cell(cell) for cell in (*row.point.values(), *row.cells())])
-        return text.getvalue()
+        rows = [(*row.point.values(), *row.cells()) for row in self.rows]
+        return csv_text([*self.parameters, *COLUMNS], rows)
 
     def to_json(self) -> str:
         """The table as JSON, which `of_json` reads."""
@@ -217,8 +213,14 @@ class SweepTable:
         return refined_extremum(self.of(name), self.parameters, self.solve, largest, evaluations)
 
 
-def _cell(cell: Any) -> str:
-    return "" if cell is None else repr(cell) if isinstance(cell, float) else str(cell)
+def csv_text(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """A table as CSV: numbers with all their digits, None as nothing."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(names)
+    for row in rows:
+        writer.writerow([repr(float(cell)) if isinstance(cell, float) else cell for cell in row])
+    return text.getvalue()
 
 
 def _needs(library: str, method: str) -> InputError:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +61,7 @@ def main() -> None:
       asperity study my-wall.toml --out my-study
       asperity gap dispersing-arcs:curvature=0.333333 --specular
       asperity sweep focusing-arcs --over half_angle=0.2:1.5:50 --out arcs
+      asperity ensemble gaussian:length=0.3 --points 12 --rms-slope 0.1 --smooth --quantity gap_specular --out gaussian
     """
 
 
@@ -188,18 +191,59 @@ def walls(out: Path | None, force: bool) -> None:
         click.echo(f"wrote {out}")
 
 
+def with_engine(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of commands that compute many walls into a folder."""
+    for option in (
+        click.option("--force", is_flag=True, help="Replace other results in the folder; by default a run goes on."),
+        click.option("--scheduler", help="Address of a dask scheduler, whose workers are used."),
+        click.option("--workers", type=click.IntRange(min=1), help="So many processes on this machine."),
+        click.option(
+            "--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder for the tables."
+        ),
+        click.option("--tolerance", default=1e-6, show_default=True, help="Error asked of each quantity."),
+        click.option(
+            "--quantity", default="gap", show_default=True, help="gap, gap_specular, slem, ..., joined by commas."
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def _run_in_folder(
+    run: Callable[..., Any], out: Path, force: bool, workers: int | None, scheduler: str | None, **asked: Any
+) -> Any:
+    """What a sweep or an ensemble finds, with its checkpoint in the folder; Ctrl-C ends the program at once."""
+    from .spectral.sweeps.folder import checkpoint_in
+
+    if workers is not None and scheduler is not None:
+        raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
+    checkpoint = checkpoint_in(out, overwrite=force)
+    quantities = [name.strip() for name in asked.pop("quantity").split(",")]
+    with _ending_at_ctrl_c():
+        return run(quantities=quantities, checkpoint=checkpoint, client=scheduler or workers, progress=True, **asked)
+
+
+@contextmanager
+def _ending_at_ctrl_c() -> Iterator[None]:
+    """Say what Ctrl-C stopped, and end the program at once: libraries would wait for their threads."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        click.echo(f"asperity: {stop}", err=True)
+        os._exit(INTERRUPTED)
+
+
 @main.command(name="sweep", epilog=WALL_HELP)
 @click.argument("walls", nargs=-1, required=True, metavar="WALL...")
 @click.option("--over", multiple=True, help="NAME=LOW:HIGH:POINTS or NAME=VALUE,VALUE; several are multiplied.")
 @click.option("--zip", "zipped", is_flag=True, help="Take the k-th values of all --over together instead.")
 @click.option("--adaptive", is_flag=True, help="Put the points of LOW:HIGH:POINTS where the first quantity bends.")
-@click.option("--quantity", default="gap", show_default=True, help="gap, gap_specular, slem, ..., joined by commas.")
-@click.option("--tolerance", default=1e-6, show_default=True, help="Error asked of each quantity.")
-@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False), help="Folder for the tables.")
-@click.option("--workers", type=click.IntRange(min=1), help="So many processes on this machine.")
-@click.option("--scheduler", help="Address of a dask scheduler, whose workers are used.")
-@click.option("--force", is_flag=True, help="Replace another sweep in the folder; by default a sweep goes on.")
-def sweep_walls(walls: tuple[str, ...], workers: int | None, scheduler: str | None, out: Path, **asked: Any) -> None:
+@click.option("--resolution", type=float, help="With --adaptive: enough at this loss, 0.01 by default.")
+@with_engine
+def sweep_walls(
+    walls: tuple[str, ...], over: tuple[str, ...], zipped: bool, adaptive: bool, resolution: float | None, out: Path,
+    **asked: Any,
+) -> None:  # fmt: skip
     """Compute quantities of a family of walls: of one named WALL over values of its parameters, or of several WALLs.
 
     The folder gets table.csv, table.json, a picture, and with asperity[studies] table.parquet. A sweep that was
@@ -211,25 +255,65 @@ def sweep_walls(walls: tuple[str, ...], workers: int | None, scheduler: str | No
       asperity sweep first.toml second.toml koch --quantity gap_specular,accommodation --out walls
     """
     from .spectral import sweep
-    from .spectral.sweeps.folder import checkpoint_in, family_and_grid, in_words, save_all
+    from .spectral.sweeps.folder import in_words, save_all
+    from .spectral.sweeps.named_families import family_and_grid
 
-    if workers is not None and scheduler is not None:
-        raise click.UsageError("--workers are started here, a --scheduler has its own; choose one")
-    family, grid = family_and_grid(walls, asked["over"], asked["adaptive"])
-    checkpoint = checkpoint_in(out, overwrite=asked["force"])
-    names = [name.strip() for name in asked["quantity"].split(",")]
-    try:
-        table = sweep(
-            family, grid, names, asked["tolerance"], checkpoint=checkpoint, client=scheduler or workers, progress=True,
-            zipped=asked["zipped"],
-        )  # fmt: skip
-    except KeyboardInterrupt as stop:
-        click.echo(f"asperity: {stop}", err=True)
-        # at once: libraries would wait for their threads
-        os._exit(INTERRUPTED)
+    family, grid = family_and_grid(walls, over, adaptive, resolution)
+    table = _run_in_folder(partial(sweep, family, grid, zipped=zipped), out, **asked)
     click.echo(in_words(table))
     for path in save_all(table, out):
         click.echo(f"wrote {path}")
+
+
+@main.command()
+@click.argument("spectrum")
+@click.option("--points", default=64, show_default=True, help="Heights of each wall, at equal distances.")
+@click.option("--rms-slope", type=float, help="Root mean squared slope; this or --rms-height.")
+@click.option("--rms-height", type=float, help="Root mean squared height about the mean.")
+@click.option("--period", default=1.0, show_default=True, help="Period of the walls, in the unit of all lengths.")
+@click.option("--smooth", is_flag=True, help="Join the heights by cubics: polygons have no spectral gap.")
+@click.option("--walls", default=100, show_default=True, type=click.IntRange(min=4), help="Number of walls.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of the random generator.")
+@click.option("--bins", type=click.IntRange(min=1), help="Also write the mean law on so many bins, as mean-law.npz.")
+@with_engine
+def ensemble(spectrum: str, walls: int, seed: int, bins: int | None, out: Path, **given: Any) -> None:
+    """Compute mean and spread of quantities over random walls with normal heights.
+
+    SPECTRUM is gaussian:length=NUMBER or exponential:length=NUMBER, the correlation function of the heights, or
+    self-affine:hurst=NUMBER with longest=NUMBER and shortest=NUMBER, the ends of its wave lengths, or without. Needs
+    asperity[profiles].
+
+    The folder gets means.csv, with --bins the mean law, and table.csv, table.json and with asperity[studies]
+    table.parquet, in which each wall has the seed that makes it again. A run that was stopped, by Ctrl-C or otherwise,
+    goes on when the same command is given again.
+
+    \b
+    Examples:
+      asperity ensemble gaussian:length=0.3 --points 12 --rms-slope 0.1 --smooth --quantity gap_specular --out gaussian
+      asperity ensemble self-affine:hurst=0.8 --rms-slope 0.2 --quantity resistance,accommodation --out affine
+    """
+    from .kernels import Bins
+    from .spectral import ensemble as over_random_walls
+    from .spectral import mean_law
+    from .spectral.sweeps.folder import LAW_CHECKPOINT, MEAN_LAW, means_in_words, save_ensemble
+    from .spectral.sweeps.named_families import RandomFamily, spectrum_from_text
+
+    kind = {name: given.pop(name) for name in ("points", "rms_slope", "rms_height", "period", "smooth")}
+    family = RandomFamily(spectrum_from_text(spectrum), **kind)
+    # a wall that cannot be made is refused before the work
+    family(seed)
+    found = _run_in_folder(partial(over_random_walls, family, walls, rng=seed), out, **given)
+    click.echo(means_in_words(found))
+    for path in save_ensemble(found, out):
+        click.echo(f"wrote {path}")
+    if bins is not None:
+        with _ending_at_ctrl_c():
+            law = mean_law(
+                family, walls, Bins(bins), given["tolerance"], rng=seed, checkpoint=out / LAW_CHECKPOINT,
+                client=given["scheduler"] or given["workers"],
+            )  # fmt: skip
+        law.save(out / MEAN_LAW, overwrite=True)
+        click.echo(f"mean law on {bins} bins, Frobenius error {float(law.error):.2g}\nwrote {out / MEAN_LAW}")
 
 
 @main.command(epilog=WALL_HELP)

@@ -1,8 +1,6 @@
 """The position of a satellite of the moving disk, and its first contact with a piece of the wall: compiled.
 
-A satellite meets a line or an upright conic at F = 0, see below.
-
-Bezier pieces are graphs, see `graphs`.
+A satellite meets a line, an upright conic or a graph, a part of a Bezier piece, at F = 0, see below and `graphs`.
 
 **No root is passed.** On [t, t + ahead] the second derivative of F(D(t)) is at least c = F''(t) - L ahead, where L
 bounds the third derivative. So F lies above the parabola with F(t), F'(t) and c, and the first root of the parabola is
@@ -57,8 +55,8 @@ from ...tracing.double_double.sides import ARC as CURVED
 from ...tracing.double_double.sides import BEZIER as SPLINE
 from ...tracing.double_double.sides import LINE as STRAIGHT
 from ...tracing.double_double.sides import Arrival, Face, in_front_at
-from .graph_table import FIRST_S, PIECE
-from .shapes import in_frame, parameter_at
+from .graph_table import FIRST_S, LEAST_BEND, MOST_BEND, PIECE, STEEPNESS, THIRD
+from .shapes import height_above, in_frame, parameter_at
 
 # Angle below which `turning` uses series up to the tenth power; the omitted terms are below 3e-18 of the sum.
 SMALL_TURN = 0.1
@@ -214,14 +212,42 @@ def safe_step(f, f1, c):
     return (f1 + math.sqrt(disc)) / -c if c < 0.0 else np.inf
 
 
+@inlined
+def graph_after(form, t, rotation, path):
+    """-> (F, F', F'', xi, xi'): F of a graph on a path after the time t, and the abscissa with its speed."""
+    graph, begin = form
+    motion = path.motion
+    state = satellite_after(t, rotation, path.turn, motion)
+    d_xi, d_eta = in_frame(graph, state.dx, state.dy)
+    f, slope, bend = height_above(graph, begin, d_xi, d_eta)
+    xi1, eta1 = in_frame(graph, motion.v1 + motion.omega * state.cosine, motion.v2 + motion.omega * state.sine)
+    turn = motion.spin * motion.omega
+    xi2, eta2 = in_frame(graph, -turn * state.sine, turn * state.cosine)
+    return f, eta1 - slope * xi1, eta2 - slope * xi2 - bend * xi1 * xi1, begin.abscissa + d_xi, xi1
+
+
+@inlined
+def graph_bounds(sign, graph, motion, xi1, ahead):
+    """-> (c, doubt, third): bounds on a graph's sign F up to a time ahead: F'' is at least c and at most c + doubt.
+
+    ``third`` bounds |F'''|.
+    """
+    most, least = (graph[MOST_BEND], graph[LEAST_BEND]) if sign > 0.0 else (-graph[LEAST_BEND], -graph[MOST_BEND])
+    pull = abs(motion.spin * motion.omega)
+    inertial = pull * graph[STEEPNESS]
+    speed = min(motion.fastest, abs(xi1) + pull * ahead)
+    third = speed * (graph[THIRD] * speed * speed + 3.0 * (most - least) * pull) + inertial * abs(motion.spin)
+    return -inertial - most * speed * speed, 2.0 * inertial + (most - least) * speed * speed, third
+
+
 @compiled
-def next_root(sign, leaving, line, conic, span, path, patience):
+def next_root(sign, leaving, line, conic, graph, span, path, patience):
     """-> (t, rotation, code): first time in the span at which sign F falls through 0, inf if none; `turning` until t.
 
-    F is given by a ``line``, see `towards_line`, or by a ``conic`` (f, g1, g2, curvature, stretch); the other one is
-    None. ``leaving`` means that F is 0 to rounding at the start of the span; this root is not returned. ``patience`` is
-    the longest time for which the bounds on F are useful. After ROOT_STEPS steps the code is `BOUNCE_LIMIT`, and t is
-    the time up to which there is no root.
+    F is given by a ``line``, see `towards_line`, by a ``conic`` (f, g1, g2, curvature, stretch), or by a ``graph`` (its
+    row and the `Start`); the others are None. ``leaving`` means that F is 0 to rounding at the start of the span; this
+    root is not returned. ``patience`` is the longest time for which the bounds on F are useful. After ROOT_STEPS steps
+    the code is `BOUNCE_LIMIT`, and t is the time up to which there is no root.
     """
     t, end, rotation = span
     turn, motion, slack = path.turn, path.motion, path.slack
@@ -231,6 +257,8 @@ def next_root(sign, leaving, line, conic, span, path, patience):
             f, f1, f2, third, growth = conic_after(conic, t, rotation, turn, motion)
         if line is not None:
             f, f1, f2 = line_after(line, t, rotation, motion)
+        if graph is not None:
+            f, f1, f2, _, xi1 = graph_after(graph, t, rotation, path)
         f, f1, f2 = sign * f, sign * f1, sign * f2
         if number == 0 and leaving:
             if f1 <= 0.0:
@@ -241,10 +269,18 @@ def next_root(sign, leaving, line, conic, span, path, patience):
             return t, rotation, CLEAR if number > 0 else CORNER
         ahead = min(end - t, patience)
         doubt = (third + growth * ahead) * ahead
-        step = safe_step(f, f1, f2 - doubt)
-        if step >= ahead:
-            if f2 - doubt > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
+        c = f2 - doubt
+        if graph is not None:
+            c, doubt, third = graph_bounds(sign, graph[0], motion, xi1, ahead)
+            if f1 < 0.0 < f2:
                 # near a tangency, where rounding decides between two roots and none
+                until = -f1 / f2
+                if until < ahead and abs(f + 0.5 * f1 * until) <= slack and third * until**3 <= slack:
+                    return t + until, turning(motion.spin * (t + until)), GRAZING
+        step = safe_step(f, f1, c)
+        if step >= ahead:
+            if graph is None and c > 0.0 and -f2 * ahead <= f1 < 0.0 and f - 0.5 * f1 * f1 / f2 <= slack:
+                # near a tangency, as above
                 t -= f1 / f2
                 return t, turning(motion.spin * t), GRAZING
             if end - t <= patience:
@@ -370,9 +406,9 @@ def first_on_piece(kind, number, own, path, span, size, ground):
     while True:
         rest = Span(t, end, rotation)
         if kind == LINE:
-            t, rotation, code = next_root(sign, leaving, line, None, rest, path, patience)
+            t, rotation, code = next_root(sign, leaving, line, None, None, rest, path, patience)
         else:
-            t, rotation, code = next_root(sign, leaving, None, conic, rest, path, patience)
+            t, rotation, code = next_root(sign, leaving, None, conic, None, rest, path, patience)
         state, inward = satellite_after(t, rotation, path.turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR

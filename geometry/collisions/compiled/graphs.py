@@ -16,32 +16,9 @@ from ...tracing.compiled.arcs import near_end
 from ...tracing.compiled.options import compiled, inlined
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, GRAZING
 from ...tracing.compiled.records import BEZIER, NO_PIECE
-from .contact import (
-    CLEAR,
-    ROOT_FRACTION,
-    ROOT_STEPS,
-    WIDEST_SLACK,
-    Span,
-    is_in_front,
-    safe_step,
-    satellite_after,
-    turning,
-)
-from .graph_table import (
-    FIRST_S,
-    LEAST_BEND,
-    LEAST_SIGMA,
-    MOST_BEND,
-    MOST_SIGMA,
-    PIECE,
-    STEEPNESS,
-    THIRD,
-    WIDTH,
-    XI1,
-    XI2,
-    XI3,
-)
-from .shapes import Start, height_above, in_frame, parameter_at
+from .contact import CLEAR, WIDEST_SLACK, Span, graph_after, is_in_front, next_root, satellite_after, turning
+from .graph_table import FIRST_S, LEAST_SIGMA, MOST_SIGMA, PIECE, STEEPNESS, WIDTH, XI1, XI2, XI3
+from .shapes import Start, in_frame, parameter_at
 
 
 @inlined
@@ -59,62 +36,6 @@ def start_on(number, own, path, ground):
     return Start(xi, xi, eta, 0.0), False
 
 
-@inlined
-def graph_after(graph, begin, t, rotation, path):
-    """-> (F, F', F'', xi, xi'): F on a path after the time t, and the abscissa with its speed."""
-    motion = path.motion
-    state = satellite_after(t, rotation, path.turn, motion)
-    d_xi, d_eta = in_frame(graph, state.dx, state.dy)
-    f, slope, bend = height_above(graph, begin, d_xi, d_eta)
-    xi1, eta1 = in_frame(graph, motion.v1 + motion.omega * state.cosine, motion.v2 + motion.omega * state.sine)
-    turn = motion.spin * motion.omega
-    xi2, eta2 = in_frame(graph, -turn * state.sine, turn * state.cosine)
-    return f, eta1 - slope * xi1, eta2 - slope * xi2 - bend * xi1 * xi1, begin.abscissa + d_xi, xi1
-
-
-@compiled
-def next_graph_root(sign, leaving, graph, begin, span, path, patience):
-    """-> (t, rotation, code): first time in the span at which sign F falls through 0, inf if none; see `next_root`."""
-    t, end, rotation = span
-    motion, slack = path.motion, path.slack
-    pull = abs(motion.spin * motion.omega)
-    inertial = pull * graph[STEEPNESS]
-    most, least = (graph[MOST_BEND], graph[LEAST_BEND]) if sign > 0.0 else (-graph[LEAST_BEND], -graph[MOST_BEND])
-    for number in range(ROOT_STEPS):
-        f, f1, f2, _, xi1 = graph_after(graph, begin, t, rotation, path)
-        f, f1, f2 = sign * f, sign * f1, sign * f2
-        if number == 0 and leaving:
-            if f1 <= 0.0:
-                return t, rotation, GRAZING
-            f = 0.0
-        elif f <= 0.0:
-            return t, rotation, CLEAR if number > 0 else CORNER
-        ahead = min(end - t, patience)
-        speed = min(motion.fastest, abs(xi1) + pull * ahead)
-        c = -inertial - most * speed * speed
-        if f1 < 0.0 < f2:
-            # near a tangency, where rounding decides between two roots and none
-            until = -f1 / f2
-            third = speed * (graph[THIRD] * speed * speed + 3.0 * (most - least) * pull) + inertial * abs(motion.spin)
-            if until < ahead and abs(f + 0.5 * f1 * until) <= slack and third * until**3 <= slack:
-                return t + until, turning(motion.spin * (t + until)), GRAZING
-        step = safe_step(f, f1, c)
-        if step >= ahead:
-            if end - t <= patience:
-                break
-            step = ahead
-        before = t
-        t += step
-        rotation = turning(motion.spin * t)
-        # F at the new t is at most its distance from the parabola; far below the slack it counts as 0
-        doubt = 2.0 * inertial + (most - least) * speed * speed
-        if step < ahead and (doubt * step * step <= ROOT_FRACTION * slack or t == before):
-            return t, rotation, CLEAR
-    else:
-        return t, rotation, BOUNCE_LIMIT
-    return np.inf, rotation, CLEAR
-
-
 @compiled
 def first_on_graph(number, own, path, span, size, ground):
     """-> (t, state, code): first contact in the span of one satellite with the front of one graph, inf if none.
@@ -124,7 +45,8 @@ def first_on_graph(number, own, path, span, size, ground):
     t, end, rotation = span
     graph, motion, slack = ground.graphs[number], path.motion, path.slack
     begin, is_own = start_on(number, own, path, ground)
-    here, rate, _, _, _ = graph_after(graph, begin, t, rotation, path)
+    form = graph, begin
+    here, rate, _, _, _ = graph_after(form, t, rotation, path)
     patience = 2.0 * size / motion.fastest
     reach = slack * graph[STEEPNESS]
     leaving = is_own and t == 0.0
@@ -134,20 +56,20 @@ def first_on_graph(number, own, path, span, size, ground):
     if leaving:
         sign = 1.0 if is_own or rate > 0.0 else -1.0
     while True:
-        t, rotation, code = next_graph_root(sign, leaving, graph, begin, Span(t, end, rotation), path, patience)
+        t, rotation, code = next_root(sign, leaving, None, None, form, Span(t, end, rotation), path, patience)
         state, inward = satellite_after(t, rotation, path.turn, motion), 0.0
         if t >= end:
             return np.inf, state, CLEAR
         if code == BOUNCE_LIMIT:
             return t, state, code
         if sign > 0.0:
-            _, inward, _, along, _ = graph_after(graph, begin, t, rotation, path)
+            _, inward, _, along, _ = graph_after(form, t, rotation, path)
             wide = slack * max(1.0, min(motion.fastest / abs(inward), WIDEST_SLACK))
             if -wide <= along <= graph[WIDTH] + wide:
                 return t, state, CORNER if near_end(graph, path.x + state.dx, path.y + state.dy, wide) else code
         if code == GRAZING:
             # a tangency beside the part: the search goes on where F is four slacks from 0
-            _, _, bent, _, _ = graph_after(graph, begin, t, rotation, path)
+            _, _, bent, _, _ = graph_after(form, t, rotation, path)
             if sign * bent <= 0.0:
                 return t, state, GRAZING
             t += math.sqrt(8.0 * slack / (sign * bent))

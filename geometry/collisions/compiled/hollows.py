@@ -53,7 +53,7 @@ def first_in_hollow(h, own, came_from, path, span, ground):
             edge = hollows[h, LEFT] if side < 0 else hollows[h, RIGHT]
             line = towards_line(side * (edge - path.x), -float(side), 0.0, path.turn, motion)
             rest = Span(t, end, rotation)
-            hit, then, unclear = next_root(1.0, came_from == side, line, None, rest, path, np.inf)
+            hit, then, unclear = next_root(1.0, came_from == side, line, None, None, rest, path, np.inf)
             if hit < end:
                 end, kind, number, code = hit, SIDE, side, unclear
                 where = satellite_after(hit, then, path.turn, motion)

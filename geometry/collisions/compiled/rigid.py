@@ -111,7 +111,7 @@ def descent(path, span, ground):
     dx, dy, sine, _ = satellite_after(t, rotation, turn, motion)
     if y + dy > 0.0:
         tops = towards_line(y, 0.0, 1.0, turn, motion)
-        t, rotation, code = next_root(1.0, NO, tops, None, span, path, np.inf)
+        t, rotation, code = next_root(1.0, NO, tops, None, None, span, path, np.inf)
         if t >= end or code == GRAZING:
             return np.inf, rotation, -1, 0.0, CLEAR
         if code != CLEAR:

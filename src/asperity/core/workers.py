@@ -14,6 +14,7 @@ from .errors import AsperityError, InputError
 
 # Tasks that the scheduler knows at a time: two for each of a thousand workers.
 BACKLOG = 2000
+LARGEST_TASK = "100 MB"
 # Seconds to wait for a result whose worker is gone, before it is asked whether there is any other.
 PATIENCE = 20.0
 SCHEDULER_GONE = "the scheduler is gone, and with it the tasks that it had; start one, and this again"
@@ -60,7 +61,9 @@ def connected(client: Any) -> Iterator[Any]:
         yield found
 
 
-def results(function: Callable[[Task], Result], tasks: Iterable[Task], client: Any) -> Iterator[tuple[Task, Result]]:
+def results(
+    function: Callable[[Task], Result], tasks: Iterable[Task], client: Any, backlog: int = BACKLOG
+) -> Iterator[tuple[Task, Result]]:
     """Every task with its result, in the order in which they end.
 
     Parameters
@@ -70,6 +73,8 @@ def results(function: Callable[[Task], Result], tasks: Iterable[Task], client: A
     tasks : iterable
     client : distributed.Client or None
         From `connected`.
+    backlog : int
+        Tasks that the scheduler knows at a time; fewer where tasks or results are large.
 
     Raises
     ------
@@ -85,19 +90,27 @@ def results(function: Callable[[Task], Result], tasks: Iterable[Task], client: A
     if client is None:
         yield from ((task, function(task)) for task in tasks)
         return
+    from dask import config
+
     rest = iter(tasks)
+
+    def submit(task: Task, **where: Any) -> Any:
+        # a block of pairs is longer than what dask warns of
+        with config.set({"distributed.admin.large-graph-warning-threshold": LARGEST_TASK}):
+            return client.submit(function, task, pure=False, **where)
+
     # one task on each machine first: it compiles the loops, which the other workers then find on the disk
     workers = _one_worker_a_machine(client)
     first = {
-        client.submit(function, task, pure=False, workers=[address], allow_other_workers=True): task
+        submit(task, workers=[address], allow_other_workers=True): task
         for address, task in zip(workers, islice(rest, len(workers)), strict=False)
     }
     yield from _collected(first, lambda: {})
 
     def submitted(number: int) -> dict[Any, Task]:
-        return {client.submit(function, task, pure=False): task for task in islice(rest, number)}
+        return {submit(task): task for task in islice(rest, number)}
 
-    yield from _collected(submitted(BACKLOG), lambda: submitted(1))
+    yield from _collected(submitted(backlog), lambda: submitted(1))
 
 
 def _collected(waiting: dict[Any, Task], more: Callable[[], dict[Any, Task]]) -> Iterator[tuple[Task, Any]]:

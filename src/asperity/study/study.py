@@ -180,7 +180,8 @@ def study_wall(
         enclosed = _or_refusal(lambda: _enclosures(law, gap, tolerance), refusals, "enclosures", reason=AsperityError)
         bar.update()
         collision = CollisionLaw.from_wall(wall, disk)
-        collision_matrix = _matrix(collision.law, basis, tolerance, rng)
+        # only the detailed report mentions it
+        collision_matrix = _matrix(collision.law, basis, tolerance, rng, most=FIRST_SAMPLES)
         bar.update()
         collision_gap = _or_refusal(lambda: spectral_gap(collision.law, tolerance, rng), refusals, "collision_gap")
         bar.update()
@@ -259,15 +260,17 @@ def _enclosures(law: WallLaw, gap: SpectralGap | None, tolerance: float) -> Encl
     return enclosures(law, ENCLOSED, tolerance=MATRIX_FRACTION * tolerance)
 
 
-def _matrix(law: Law, basis: Bins, tolerance: float, rng: np.random.Generator) -> KernelMatrix:
-    """In bins; where rays are needed, as many as the error of a first sample asks for."""
+def _matrix(
+    law: Law, basis: Bins, tolerance: float, rng: np.random.Generator, most: int = MOST_SAMPLES
+) -> KernelMatrix:
+    """In bins; where rays are needed, as many as the error of a first sample asks for, and at most ``most``."""
     wanted = tolerance * float(np.sqrt(basis.size))
     found = discretise(law, basis, tolerance=wanted, samples=FIRST_SAMPLES, rng=rng)
-    if not found.samples or found.tolerance_met:
+    if not found.samples or found.tolerance_met or most <= FIRST_SAMPLES:
         return found
     # the error falls at least like the root of their number
     more = 2 ** math.ceil(2.0 * math.log2(float(found.error) / wanted))
-    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, MOST_SAMPLES), rng=rng)
+    return discretise(law, basis, tolerance=wanted, samples=min(FIRST_SAMPLES * more, most), rng=rng)
 
 
 def check_tracer(wall: Wall, rng: np.random.Generator) -> TracerCheck:

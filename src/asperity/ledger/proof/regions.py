@@ -78,12 +78,6 @@ def shift_of_the_bands(shift: Code) -> Verdict:
     return holds(times == 1, "angles are covered once", m=m, J=J)
 
 
-def _corrected_width(rho: np.ndarray, eps: np.ndarray, L: float) -> np.ndarray:
-    ell = np.log(1 / rho)
-    gap = rolling.gap_radius(eps, rho)
-    return np.asarray((rho / 2 - gap) / eps - (L * ell + 1) - L * ell**2 / (4 * np.log(ell)))
-
-
 @erratum(
     id="S5.34",
     section="5.3.5",
@@ -95,7 +89,7 @@ def _corrected_width(rho: np.ndarray, eps: np.ndarray, L: float) -> np.ndarray:
     ),
     corrected=Formula(
         r"\varepsilon^{-1}(\rho/2 - \delta_0) - (L\log(1/\rho) + 1) - \frac{L\log(1/\rho)^2}{4\log\log(1/\rho)}",
-        _corrected_width,
+        lambda rho, eps, L: rolling.good_half_width(eps, eps, rho, L),
     ),
     reason="As printed it is negative for every ρ < 1 and L ≥ 1, so Ξ is empty. From the corrected edge, a fraction "
     "that tends to 1, the flights of the iteration end at the gap; R'_ε is to be changed likewise.",

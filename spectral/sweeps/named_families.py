@@ -1,0 +1,149 @@
+"""The families of walls of the command line, by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import InputError
+from ...geometry import WALLS, HeightCorrelation, SelfAffine, Wall, random_wall, wall_from_text
+from .points import RESOLUTION, Between, Value
+
+# How heights are correlated, by name: what makes it, and its parameters, of which the first must be given.
+SPECTRA: Mapping[str, tuple[Callable[..., HeightCorrelation | SelfAffine], tuple[str, ...]]] = MappingProxyType(
+    {
+        "gaussian": (HeightCorrelation, ("length",)),
+        "exponential": (lambda length: HeightCorrelation(length, "exponential"), ("length",)),
+        "self-affine": (SelfAffine, ("hurst", "longest", "shortest")),
+    }
+)
+
+
+@dataclass(frozen=True)
+class NamedFamily:
+    """Walls by name and parameters, as on the command line.
+
+    Examples
+    --------
+    >>> NamedFamily("rectangular-teeth")(height_to_width=4).depth
+    2.0
+    """
+
+    text: str
+
+    def __call__(self, **parameters: Value) -> Wall:
+        pairs = ",".join(f"{name}={value}" for name, value in parameters.items())
+        return wall_from_text(f"{self.text}{',' if ':' in self.text else ':'}{pairs}")
+
+
+def wall_by_name(wall: str) -> Wall:
+    """The wall that a text describes; the name of the parameter is that of the column of a table."""
+    return wall_from_text(wall)
+
+
+def family_and_grid(
+    walls: Sequence[str], over: Sequence[str], adaptive: bool, resolution: float | None = None
+) -> tuple[Any, dict[str, Any]]:
+    """What `sweep` is given, from the words of the command line.
+
+    Examples
+    --------
+    >>> family_and_grid(["koch"], ["generations=1:3:3"], adaptive=False)
+    (NamedFamily(text='koch'), {'generations': [1, 2, 3]})
+    """
+    if resolution is not None and not adaptive:
+        raise InputError("--resolution: expected --adaptive with it")
+    if not over:
+        if adaptive:
+            raise InputError("--adaptive: expected --over NAME=LOW:HIGH:POINTS with it")
+        return wall_by_name, {"wall": list(walls)}
+    if len(walls) > 1:
+        raise InputError(f"--over: expected one named wall, got {', '.join(walls)}; several are swept without --over")
+    name = walls[0].partition(":")[0].strip().lower().replace("_", "-")
+    if name not in WALLS:
+        raise InputError(f"--over: expected a named wall, one of {', '.join(WALLS)}, got {walls[0]!r}")
+    grid = dict(_axis(text, adaptive, resolution) for text in over)
+    unknown = sorted(set(grid) - set(WALLS[name].defaults))
+    if unknown:
+        known = ", ".join(WALLS[name].defaults) or "it has none"
+        raise InputError(f"--over: {name} has no parameter {unknown[0]!r} (parameters: {known})")
+    return NamedFamily(walls[0]), grid
+
+
+def _axis(text: str, adaptive: bool, resolution: float | None) -> tuple[str, Any]:
+    """``name=low:high:points`` or ``name=value,value``."""
+    name, _, values = text.partition("=")
+    ends = values.split(":")
+    try:
+        if len(ends) == 1:
+            return name.replace("-", "_"), [_number(value) for value in values.split(",")]
+        low, high, number = float(ends[0]), float(ends[1]), int(ends[2])
+    except (ValueError, IndexError) as reason:
+        raise InputError(f"--over: expected NAME=LOW:HIGH:POINTS or NAME=VALUE,VALUE, got {text!r}") from reason
+    if adaptive:
+        return name.replace("-", "_"), Between(low, high, number, RESOLUTION if resolution is None else resolution)
+    if number < 1:
+        raise InputError(f"--over: expected at least one point, got {text!r}")
+    values_between = np.linspace(low, high, number)
+    whole = "." not in ends[0] + ends[1] and np.array_equal(values_between, np.round(values_between))
+    return name.replace("-", "_"), [int(x) if whole else float(x) for x in values_between]
+
+
+def _number(text: str) -> float | int:
+    return int(text) if text.strip().lstrip("+-").isdigit() else float(text)
+
+
+@dataclass(frozen=True)
+class RandomFamily:
+    """Random walls of one kind, by their seeds.
+
+    Examples
+    --------
+    >>> family = RandomFamily(spectrum_from_text("gaussian:length=0.1"), 64, rms_slope=0.2)
+    >>> family(rng=3) == random_wall(HeightCorrelation(0.1), 64, rms_slope=0.2, rng=3)
+    True
+    """
+
+    spectrum: HeightCorrelation | SelfAffine
+    points: int
+    rms_slope: float | None = None
+    rms_height: float | None = None
+    period: float = 1.0
+    smooth: bool = False
+
+    def __call__(self, rng: int) -> Wall:
+        return random_wall(
+            self.spectrum, self.points, rms_slope=self.rms_slope, rms_height=self.rms_height, period=self.period,
+            smooth=self.smooth, rng=rng,
+        )  # fmt: skip
+
+
+def spectrum_from_text(text: str) -> HeightCorrelation | SelfAffine:
+    """The correlation or the spectrum of heights that a text describes.
+
+    Raises
+    ------
+    InputError
+        If there is no such name or parameter, or a value is not a number.
+
+    Examples
+    --------
+    >>> spectrum_from_text("self-affine:hurst=0.8,longest=0.5")
+    SelfAffine(hurst=0.8, longest=0.5, shortest=None)
+    """
+    name, _, tail = text.partition(":")
+    known = "; ".join(f"{one}:{','.join(f'{key}=NUMBER' for key in keys)}" for one, (_, keys) in SPECTRA.items())
+    refusal = InputError(f"spectrum: expected {known}, got {text!r}")
+    make, keys = SPECTRA.get(name.strip().lower().replace("_", "-"), (None, ()))
+    pairs = [part.partition("=") for part in tail.split(",")]
+    try:
+        given = {key.strip(): float(value) for key, _, value in pairs}
+    except ValueError as reason:
+        raise refusal from reason
+    if make is None or len(given) < len(pairs) or not set(given) <= set(keys) or keys[0] not in given:
+        raise refusal
+    return make(**given)

@@ -1,0 +1,228 @@
+"""Disks with unequal satellites and with teeth: the compiled collision, dense searches, conservation, the limit."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.stats import ks_2samp
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity.errors import InputError
+from asperity.geometry.walls.interior import in_solid
+
+DISK = geo.Disk(1.0, 0.5)
+WALLS = {"triangular": geo.triangular_teeth(1.2), "rectangular": geo.rectangular_teeth(0.8), "flat": geo.flat()}
+
+
+def gear(teeth: int = 40, depth: float = 0.08) -> geo.SatelliteDisk:
+    """A disk with triangular teeth, at unequal angles."""
+    turns = 2.0 * np.pi * (np.arange(2 * teeth) + 0.3 * np.sin(np.arange(2 * teeth))) / (2 * teeth)
+    return geo.SatelliteDisk(DISK, 2 * teeth, 0.0, [1.0, 1.0 - depth] * teeth, turns, joined=True)
+
+
+def states(period: float, spacing: float, n: int, seed: int = 0):
+    rng = np.random.default_rng(seed)
+    position = rng.uniform([0.0, -0.5], [1.0, 0.5], (n, 2)) * [period, spacing]
+    up, turn = np.sqrt(rng.uniform(0.05, 1.0, n)), rng.uniform(0.0, 2.0 * np.pi, n)
+    side = np.sqrt(1.0 - up**2)
+    return position, np.stack([side * np.cos(turn), -up, side * np.sin(turn)], axis=1) @ DISK.frame
+
+
+@pytest.mark.parametrize("name", WALLS)
+def test_equally_spaced_points_collide_as_in_the_compiled_loop(name):
+    for scale in (1e-2, 1e-4):
+        space = geo.ConfigurationSpace(WALLS[name], DISK, scale)
+        position, velocity = states(scale * space.wall.period, space.spacing, 30)
+        known = geo.collide(DISK, WALLS[name], scale, position, velocity, space.spacing)
+        body = geo.SatelliteDisk(DISK, space.charts.satellites, 0.0)
+        found = geo.collide_rim(body, WALLS[name], scale, position, velocity)
+        np.testing.assert_array_equal(found.contacts, known.contacts)
+        np.testing.assert_array_equal(found.two_satellites, known.two_satellites)
+        for ours, theirs in ((found.velocity, known.velocity), (found.position, known.position)):
+            np.testing.assert_allclose(ours, theirs, atol=1e-10)
+        np.testing.assert_allclose(found.time, known.time, atol=1e-10)
+
+
+def test_a_round_satellite_meets_the_wall_of_its_centre():
+    # a satellite of radius s on a flat wall touches s above the tops: the disk of radius 1 + s with a point there
+    size, position, velocity = 0.05, *states(1.0, 0.3, 20, 1)
+    bumps = geo.SatelliteDisk(DISK, 21, size, 1.0 - size)
+    found = geo.collide_rim(bumps, geo.flat(), 0.1, position, velocity)
+    points = geo.collide_rim(geo.SatelliteDisk(DISK, 21, 0.0, 1.0 - size), geo.flat(), 0.1, position, velocity)
+    np.testing.assert_allclose(found.velocity, points.velocity, atol=1e-12)
+    np.testing.assert_allclose(found.time, points.time, atol=1e-12)
+
+
+@pytest.mark.parametrize("wall", ["triangular", "flat"])
+def test_teeth_keep_the_energy_and_go_back_when_reversed(wall):
+    body = gear()
+    position, velocity = states(0.1, 0.15, 30, 2)
+    there = geo.collide_rim(body, WALLS[wall], 0.1, position, velocity)
+    good = there.status == geo.Status.ESCAPED
+    assert good.mean() > 0.9
+    np.testing.assert_allclose(DISK.inner(there.velocity, there.velocity), 1.0, atol=1e-12)
+    back = geo.collide_rim(body, WALLS[wall], 0.1, there.position[good], -there.velocity[good])
+    few = there.contacts[good] <= 6
+    np.testing.assert_array_equal(back.contacts[few], there.contacts[good][few])
+    np.testing.assert_allclose(-back.velocity[few], velocity[good][few], atol=1e-6)
+
+
+def path_of(body, wall, scale, position, velocity):
+    """Configurations (x1, x2, alpha) on the way, 200 between contacts."""
+    whole = geo.collide_rim(body, wall, scale, [position], [velocity])
+    at, moving, clock, height, found = np.array(position), np.array(velocity), 0.0, 0.0, []
+    for k in range(1, int(whole.contacts[0]) + 1):
+        one = geo.collide_rim(body, wall, scale, [position], [velocity], max_contacts=k)
+        last = k == whole.contacts[0]
+        # after the last contact the time until height 0 is included
+        end = float(one.time[0]) if not last else float(whole.time[0])
+        after = one.velocity[0]
+        if last:
+            # the height grows at v2 before and at v2' after the contact
+            end = (float(whole.time[0]) * after[1] + height - moving[1] * clock) / (after[1] - moving[1])
+        t = np.linspace(0.0, end - clock, 200)[:, None]
+        start = np.array([at[0], height, at[1]])
+        found.append(start + t * moving)
+        at = found[-1][-1][[0, 2]]
+        moving, height, clock = after, float(found[-1][-1][1]), end
+    return whole, np.concatenate(found)
+
+
+def test_neither_teeth_nor_tips_of_the_wall_enter_the_other_body():
+    from matplotlib.path import Path
+
+    body, wall, scale = gear(24, 0.12), WALLS["triangular"], 0.1
+    contacts = 0
+    for position, velocity in zip(*states(0.1, 0.2, 12, 3), strict=True):
+        whole, path = path_of(body, wall, scale, position, velocity)
+        if whole.status[0] != geo.Status.ESCAPED:
+            continue
+        contacts += int(whole.contacts[0])
+        for x1, x2, alpha in path[::7]:
+            points = body.arms(alpha - 0.5 * math.pi) + np.array([x1, x2])
+            inside = in_solid(wall, (points + np.array([0.0, 1.0])) / scale + np.array([0.0, 1e-9]))
+            assert not inside.any()
+            tips = scale * np.array([[k, 0.0] for k in range(math.floor(-1 / scale), 13)]) + [0.0, -1.0]
+            rim = Path(points - 1e-6 * (points - np.array([x1, x2])))
+            assert not rim.contains_points(tips).any()
+    assert contacts > 15
+
+
+def dense_gap(first, second, position, velocity, time):
+    """The least distance of two toothed disks or rims of round satellites, over all points and edges."""
+    outlines = []
+    for k, body in enumerate((first, second)):
+        x, y, turn = position[k] + velocity[k] * time
+        outlines.append((body.arms(turn) + np.array([x, y]), body.sizes, body.joined))
+    found = []
+    for (points, sizes, _), (others, widths, joined) in (outlines, outlines[::-1]):
+        apart = np.hypot(*np.moveaxis(points[:, None] - others[None], -1, 0)) - sizes[:, None] - widths[None]
+        found.append(apart.min())
+        if joined:
+            ends = np.roll(others, -1, axis=0)
+            along = ends - others
+            part = np.sum((points[:, None] - others[None]) * along, axis=2) / np.sum(along**2, axis=1)
+            foot = others[None] + np.clip(part, 0.0, 1.0)[..., None] * along
+            found.append((np.hypot(*np.moveaxis(points[:, None] - foot, -1, 0)) - sizes[:, None] - widths[0]).min())
+    return min(found)
+
+
+UNEQUAL = geo.SatelliteDisk(DISK, 5, [0.1, 0.25, 0.05, 0.3, 0.15], [1.0, 0.9, 1.1, 0.8, 1.0], [0.1, 1.0, 2.9, 4.0, 5.5])
+TOOTHED = geo.SatelliteDisk(geo.Disk(2.0, 0.7), 12, 0.02, [1.5, 1.1] * 6, joined=True)
+
+
+@pytest.mark.parametrize(("first", "second"), [(UNEQUAL, UNEQUAL), (UNEQUAL, TOOTHED), (TOOTHED, UNEQUAL)],
+                         ids=["satellites", "on teeth", "teeth on"])  # fmt: skip
+def test_the_first_contact_is_that_of_a_dense_search_over_unequal_satellites_and_teeth(first, second):
+    rng, met = np.random.default_rng(1), 0
+    apart = first.largest + second.largest + 0.05
+    for _ in range(6):
+        position = np.array([[0.0, apart, rng.uniform(0, 7)], [0.0, 0.0, rng.uniform(0, 7)]])
+        velocity = np.array([[rng.uniform(-1, 1), -1.0, rng.uniform(-3, 3)], [0.0, 0.0, rng.uniform(-3, 3)]])
+        times = np.linspace(0.0, 1.5, 1201)
+        gaps = np.array([dense_gap(first, second, position, velocity, t) for t in times])
+        touched = np.flatnonzero(gaps < 3e-3)
+        hit = geo.collide_pair(first, second, [position], [velocity], max_contacts=1)
+        assert (len(touched) > 0) or hit.contacts[0] == 0
+        if hit.contacts[0]:
+            at = float(hit.time[0])
+            assert abs(dense_gap(first, second, position, velocity, at)) < 1e-9
+            # no contact before: the gap is positive, and it falls through 0 there
+            assert np.all(gaps[times < at - 1e-3] > 0.0)
+            if first.joined or second.joined:
+                assert dense_gap(first, second, position, velocity, at - 1e-4) > 0.0
+            else:
+                root = brentq(partial(dense_gap, first, second, position, velocity), at - 2e-4, at + 2e-4)
+                assert math.isclose(root, at, abs_tol=1e-9)
+            met += 1
+    assert met >= 3
+
+
+def test_energy_momentum_and_angular_momentum_of_unequal_and_toothed_disks_are_kept():
+    rng, n = np.random.default_rng(2), 40
+    position = np.zeros((n, 2, 3))
+    position[:, 0, 1] = UNEQUAL.largest + TOOTHED.largest + 0.01
+    position[:, :, 2] = rng.uniform(0.0, 7.0, (n, 2))
+    velocity = np.tile([[-0.6, -1.0, 0.7], [0.1, 0.3, -0.4]], (n, 1, 1))
+    hit = geo.collide_pair(UNEQUAL, TOOTHED, position, velocity)
+    assert hit.contacts.max() >= 2
+    mass, inertia = np.array([1.0, 2.0]), np.array([0.5, 0.7])
+
+    def totals(x, w):
+        orbit = x[..., 0] * w[..., 1] - x[..., 1] * w[..., 0]
+        energy = np.sum(mass * np.sum(w[..., :2] ** 2, axis=-1) + inertia * w[..., 2] ** 2, axis=1)
+        return np.sum(mass[:, None] * w[..., :2], axis=1), np.sum(mass * orbit + inertia * w[..., 2], axis=1), energy
+
+    for kept, before in zip(totals(hit.position, hit.velocity), totals(position, velocity), strict=True):
+        np.testing.assert_allclose(kept, before, atol=1e-12)
+
+
+def test_unequal_spacing_has_the_same_limit_law():
+    # the angles of the limit do not depend on which satellite touches
+    scale, n = 1e-5, 300
+    rng = np.random.default_rng(5)
+    gaps = rng.uniform(0.5, 1.5, 500)
+    turns = 2.0 * np.pi * np.concatenate([[0.0], np.cumsum(gaps)[:-1]]) / gaps.sum()
+    body = geo.SatelliteDisk(DISK, 500, 0.0, 1.0, turns)
+    velocity = -DISK.from_angles(1.1, 1.2)
+    position = np.stack([rng.uniform(0.0, scale, n), rng.uniform(0.0, 2.0 * np.pi, n)], axis=1)
+    found = geo.collide_rim(body, WALLS["triangular"], scale, position, np.tile(velocity, (n, 1)))
+    good = found.status == geo.Status.ESCAPED
+    assert good.mean() > 0.99
+    limit = ker.CollisionLaw.from_wall(WALLS["triangular"], DISK).sample(np.tile(velocity, (20_000, 1)), rng)
+    angles = [DISK.to_angles(w) for w in (found.velocity[good], limit)]
+    # the atoms of the limit are spread by rho; bins wider than that
+    counts = [np.histogram(theta, np.linspace(0, np.pi, 13))[0] / len(theta) for theta, _ in angles]
+    assert np.abs(counts[0] - counts[1]).sum() < 0.2
+    assert abs(np.median(angles[0][1]) - (math.pi - 1.2)) < 0.01
+    assert ks_2samp(angles[0][0], math.pi - angles[0][0]).pvalue < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"size": [0.1, 0.2]}, "size: expected 4"), ({"size": [-0.1, 0, 0, 0]}, "size"),
+        ({"radius": [1, 1, 1, 0]}, "radius"), ({"angles": [0, 1, 1, 3]}, "angles: expected 4 increasing"),
+        ({"angles": [0.0, 0.1, 0.2, 0.3]}, "half a turn"), ({"size": [0, 0, 0, 0.1], "joined": True}, "equal sizes"),
+        ({"joined": 1}, "joined"),
+    ],
+)  # fmt: skip
+def test_rims_that_are_none_are_refused(arguments, words):
+    with pytest.raises(InputError, match=words):
+        geo.SatelliteDisk(DISK, 4, **({"size": 0.0} | arguments))
+
+
+def test_walls_that_are_not_straight_are_refused():
+    state = [[0.0, 0.0]], [[0.0, -1.0, 0.0]]
+    with pytest.raises(InputError, match="straight pieces"):
+        geo.collide_rim(gear(), geo.focusing_arcs(1.0), 0.1, *state)
+    with pytest.raises(InputError, match="edges shorter"):
+        square = geo.SatelliteDisk(DISK, 4, 0.0, joined=True)
+        geo.collide_rim(square, geo.flat(), 0.1, *state)
+    limited = geo.collide_rim(gear(), WALLS["triangular"], 0.1, *states(0.1, 0.1, 10, 7), max_contacts=1)
+    assert limited.counts()["bounce_limit"] > 0
