@@ -1,4 +1,4 @@
-"""The first hit of a ray on a Bezier piece, and the reflection there: compiled, inlined in `rays`. Loads numba.
+"""The first hit of a ray on a Bezier piece, and the reflection there: compiled. Loads numba.
 
 A piece b(s), 0 <= s <= 1, is hit where g(s) = (b(s) - p) x v falls through zero. The root at the ray's start on the
 piece itself is divided out.
@@ -14,9 +14,11 @@ from ....core.rounding import EPS
 from ...scene.columns import END_X, END_Y, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
 from ...scene.tolerances import JOINT_ULPS, NEARBY, TANGENT_ULPS
 from ..double_double.beziers import curve_size
-from .options import inlined
+from .options import inlined, inner
 
 ROOT_STEPS = 80
+# What `nearest_bezier` returns for a ray that meets no piece.
+NO_BEZIER_HIT = np.inf, -1, 0.0, 0, -1.0
 
 
 @inlined
@@ -197,6 +199,23 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
         t, s, tangent = hit_from_own(curve, g, own_s, px, py, vx, vy, slack)
         return t, s, tangent, -1.0
     return hit_from_afar(curve, g, px, py, vx, vy, slack)
+
+
+@inner
+def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack, time):
+    """-> (t, number, s, tangent, near_s): the first hit before ``time`` on the pieces from ``first`` to ``end``.
+
+    ``near_s`` is that of the last piece that has one, else -1; for all else see `bezier_hit`. The ray starts on the
+    piece ``own_number`` at ``own_s``; the number is -1 if it starts elsewhere.
+    """
+    number, hit_s, doubt, near = -1, 0.0, 0, -1.0
+    for k in range(first, end):
+        t, s, tangent, near_s = bezier_hit(beziers[k], own_s if k == own_number else -1.0, px, py, vx, vy, slack)
+        if t < time:
+            time, number, hit_s, doubt = t, k, s, tangent
+        if near_s >= 0.0:
+            near = near_s
+    return time, number, hit_s, doubt, near
 
 
 @inlined

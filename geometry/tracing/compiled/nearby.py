@@ -19,11 +19,11 @@ from ...scene.columns import (
 )
 from ...scene.tolerances import NEARBY_SLACKS
 from ..double_double.arcs import refined_arcs
-from ..double_double.sides import ARC, Arrival, Face, in_front
+from ..double_double.sides import ARC, Arrival, Face, in_front_at, line_in_front_of_line
 from ..double_double.sides import BEZIER as CURVE
 from ..double_double.sides import LINE as STRAIGHT
 from .arcs import arc_time, on_arc
-from .beziers import bezier_hit
+from .beziers import NO_BEZIER_HIT
 from .lines import line_time
 from .options import allocating, inner
 from .pointers import address_at, call_at
@@ -50,16 +50,23 @@ def face_of(tables, kind, number, s):
 
 @allocating
 def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
-    """-> bool: whether the ray's start lies, or may lie, in front of a nearby piece; see `sides`."""
-    if own.kind in (OPENING, SIDE):
-        # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
-        return True
-    return in_front(
+    """-> bool: whether a ray that left a piece starts, or may start, in front of a nearby piece; see `sides`.
+
+    At least one of the pieces is a curve.
+    """
+    return in_front_at(
         tables.joints,
         face_of(tables, hit.kind, hit.number, hit.s),
         face_of(tables, own.kind, own.number, own.s),
         (px, 0.0), (py, 0.0), vx, vy, Arrival(own.flown, slack, slack),
     )  # fmt: skip
+
+
+@allocating
+def line_starts_in_front(joints, line, own, px, py, vx, vy, slack):
+    """-> bool: `starts_in_front` for a ray that left a line, and another line."""
+    arrival = Arrival(own.flown, slack, slack)
+    return line_in_front_of_line(joints, line, own.number, (px, 0.0), (py, 0.0), vx, vy, arrival)
 
 
 @inner
@@ -91,18 +98,23 @@ def arc_nearby(arc, px, py, vx, vy, slack):
 
 
 @inner
-def piece_nearby(tables, piece, own, px, py, vx, vy, slack):
+def piece_nearby(scope, piece, own, px, py, vx, vy):
     """-> (t, s, tangent, is_clear): time to a hit on a piece close by, or inf, and the position s on the piece.
 
     ``piece`` is the kind and row of the piece.
     """
+    tables, slack = scope.tables, scope.slack
     kind, number = piece
     is_own = own.kind == kind and own.number == number
     t, s, tangent, is_clear = np.inf, 0.0, 0, False
     if kind == BEZIER:
-        _, _, _, near_s = bezier_hit(tables.beziers[number], own.s if is_own else -1.0, px, py, vx, vy, slack)
-        if near_s >= 0.0:
-            t, s = 0.0, near_s
+        address = address_at(scope.slots.bezier)
+        if address != 0:
+            own_number = number if is_own else -1
+            arguments = tables.beziers, number, number + 1, own_number, own.s, px, py, vx, vy, slack, np.inf
+            _, _, _, _, near_s = call_at(address, NO_BEZIER_HIT, arguments)
+            if near_s >= 0.0:
+                t, s = 0.0, near_s
     elif not is_own and kind == LINE:
         t, s, is_clear = line_nearby(tables, number, px, py, vx, vy, slack)
     elif not is_own:
@@ -129,15 +141,22 @@ def hit_nearby(scope, own, px, py, vx, vy):
         (BEZIER, scope.beziers),
     ):
         for number in range(first, end):
-            t, s, tangent, is_clear = piece_nearby(tables, (kind, number), own, px, py, vx, vy, slack)
+            t, s, tangent, is_clear = piece_nearby(scope, (kind, number), own, px, py, vx, vy)
             if t < found.time:
                 hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else DOUBTFUL)
-                if is_clear:
+                # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
+                if is_clear or not from_piece:
                     found = hit
                     continue
-                address = address_at(scope.slots.in_front)
+                both_lines = kind == LINE and own.kind == LINE
+                address = address_at(scope.slots.line_in_front if both_lines else scope.slots.in_front)
                 if address == 0:
                     return Hit(hit.time, kind, number, s, DOUBTFUL)
-                if call_at(address, is_clear, (tables, hit, own, px, py, vx, vy, slack)):
+                if both_lines:
+                    arguments = tables.joints, number, own, px, py, vx, vy, slack
+                    is_front = call_at(address, is_clear, arguments)
+                else:
+                    is_front = call_at(address, is_clear, (tables, hit, own, px, py, vx, vy, slack))
+                if is_front:
                     found = hit
     return found

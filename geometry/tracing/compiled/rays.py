@@ -53,10 +53,10 @@ from ...scene.columns import (
 from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
 from .arcs import arc_incidence, arc_reflect, arc_time, near_end, on_arc_after
-from .beziers import bend_number, bezier_hit, bezier_reflect
+from .beziers import NO_BEZIER_HIT, bend_number, bezier_reflect, nearest_bezier
 from .interruption import is_raised
 from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_grid
-from .nearby import DOUBTFUL, hit_nearby, starts_in_front
+from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined
 from .pointers import Late, address_at, address_of, call_at
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, results_for
@@ -142,10 +142,14 @@ def nearest_curve(scope, own, px, py, vx, vy):
         elif 0.0 <= t < time and on_arc_after(ellipses[k], t, px, py, vx, vy, ellipses[k, STRETCH], slack):
             time, kind, number, doubt = t, ELLIPSE, k, tangent
     first, end = scope.beziers
-    for k in range(first, end):
-        own_s = own.s if own.kind == BEZIER and own.number == k else -1.0
-        t, s, tangent, near_s = bezier_hit(beziers[k], own_s, px, py, vx, vy, slack)
-        if t < time:
+    if first < end:
+        address = address_at(scope.slots.bezier)
+        if address == 0:
+            return Hit(0.0, BEZIER, first, 0.0, DOUBTFUL), False
+        own_number = own.number if own.kind == BEZIER else -1
+        arguments = beziers, first, end, own_number, own.s, px, py, vx, vy, slack, time
+        t, k, s, tangent, near_s = call_at(address, NO_BEZIER_HIT, arguments)
+        if k >= 0:
             time, kind, number, hit_s, doubt = t, BEZIER, k, s, tangent
         nearby = nearby or near_s >= 0.0
     return Hit(time, kind, number, hit_s, doubt), nearby
@@ -363,18 +367,20 @@ def trace_rays(x, theta, tables, limit, stop, results, slots):
             results.velocity[i, POINT_X], results.velocity[i, POINT_Y] = vx, vy
 
 
-def _late_functions() -> tuple[Late, Late]:
-    """Return `hit_nearby` and `starts_in_front`, for all walls; few rays need them."""
+def _late_functions() -> tuple[Late, ...]:
+    """Return the functions of `Slots`, for all walls."""
     own, numbers = Own(OPENING, -1, -1.0, 0.0, -1, 0), (0.0, 0.0, 0.0, 0.0)
-    scope = Scope(NO_TABLES, np.empty(0), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, Slots(0, 0))
+    scope = Scope(NO_TABLES, np.empty(0), 0.0, 0.0, 0.0, (0, 0), (0, 0), (0, 0), (0, 0), False, Slots(0, 0, 0, 0))
     return (
         Late(hit_nearby, (scope, own, *numbers)),
         Late(starts_in_front, (NO_TABLES, Hit(0.0, LINE, 0, 0.0, 0), own, *numbers, 0.0)),
+        Late(line_starts_in_front, (NO_TABLES.joints, 0, own, *numbers, 0.0)),
+        Late(nearest_bezier, (NO_TABLES.beziers, 0, 0, 0, 0.0, *numbers, 0.0, 0.0)),
     )
 
 
-NEARBY, IN_FRONT = _late_functions()
-SLOTS = Slots(NEARBY.slot, IN_FRONT.slot)
+LATE = _late_functions()
+SLOTS = Slots(*(function.slot for function in LATE))
 
 
 @cache

@@ -15,10 +15,15 @@ NO_PIECE, OPENING, SIDE, LINE, CIRCLE, ELLIPSE, BEZIER = 0, 1, 2, 3, 4, 5, 6
 
 
 class Slots(NamedTuple):
-    """The slots (`Late`) of functions that few rays need: `hit_nearby` and `starts_in_front`."""
+    """The slots (`Late`) of functions that few rays or few walls need.
+
+    `hit_nearby`, `starts_in_front`, `line_starts_in_front` and `nearest_bezier`.
+    """
 
     nearby: int
     in_front: int
+    line_in_front: int
+    bezier: int
 
 
 class Scope(NamedTuple):

@@ -44,8 +44,8 @@ def jit(**options: Any) -> Callable[[Any], Any]:
         dispatcher = decorate(function)
         if options.get("no_cpython_wrapper") and isinstance(dispatcher, CPUDispatcher):
             dispatcher.__class__ = _Inner
-        # not with numba's switch that turns compilation off
-        if hasattr(dispatcher, "enable_caching"):
+        # not with numba's switch that turns compilation off; an inlined function is stored as a part of its callers
+        if hasattr(dispatcher, "enable_caching") and not options.get("forceinline"):
             try:
                 # what the option ``cache`` does, with another cache
                 dispatcher._cache = _SafeCache(function)

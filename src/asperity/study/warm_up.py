@@ -20,10 +20,10 @@ def _rays() -> None:
 
 
 def _difficult_rays() -> None:
-    from ..geometry.tracing.compiled.rays import IN_FRONT, NEARBY
+    from ..geometry.tracing.compiled.rays import LATE
 
-    NEARBY.load()
-    IN_FRONT.load()
+    for function in LATE:
+        function.load()
     # this ray meets a corner, so it is traced again in double-double arithmetic
     geo.trace(geo.triangular_teeth(1.5), 0.5, pi / 2)
     ker.WallLaw(geo.rectangular_teeth(1.5)).apply(np.cos, 1e-12)
