@@ -116,7 +116,7 @@ def test_numba_stands_in_the_compiled_folders_only():
     for name, path in MODULES.items():
         at_top = [node for node in ast.parse(path.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)]
         if any(node.module == "numba" for node in at_top):
-            assert set(name.split(".")) & set(COMPILED) or name in ("geometry.scene.grid", "core.compilation"), name
+            assert set(name.split(".")) & set(COMPILED) or name == "core.compilation", name
 
 
 def test_contributing_lists_the_folders_from_the_ground_up():

@@ -1,4 +1,4 @@
-"""Runs of hits computed in one step, and lines found through a grid: to be the same as hit by hit, line by line."""
+"""Runs of hits computed in one step, and lines found through boxes: to be the same as hit by hit, line by line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
-from asperity.geometry.scene.columns import GRID_COLUMNS, PARTNER, RUN_SINE
+from asperity.geometry.scene.columns import PARTNER, RUN_SINE, TREE_LEVELS
 
 EPS = np.finfo(float).eps
 # Counts fit into int64 up to here.
@@ -209,27 +209,27 @@ MANY = {
 }
 
 
-def without_grid(wall):
+def without_boxes(wall):
     plain = geo.Wall(wall.pieces, wall.period, wall.islands)
     hollows = plain.scene.hollows.copy()
-    hollows[:, GRID_COLUMNS] = 0.0
-    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, grid=None)
+    hollows[:, TREE_LEVELS] = 0.0
+    plain.__dict__["scene"] = replace(plain.scene, hollows=hollows, boxes=None)
     return plain
 
 
 @pytest.mark.parametrize("name", MANY)
-def test_a_grid_changes_no_bit(name):
+def test_a_tree_of_boxes_changes_no_bit(name):
     wall = MANY[name]
     assert wall.plan().hollows_with_grid >= 1
-    count = 3_000 if len(wall.pieces) < 1_000 else 500  # without the grid a ray asks every piece
+    count = 3_000 if len(wall.pieces) < 1_000 else 500  # without boxes a ray asks every piece
     x, theta = rays(6, count)
-    # and rays along the axes, and aimed at joints: their walks pass along edges and through corners of cells
+    # and rays along the axes, and aimed at joints: they pass along edges and through corners of boxes
     below = wall.vertices[wall.vertices[:, 1] < -1e-3]
     targets = below[np.random.default_rng(7).integers(0, len(below), count)]
     aimed = np.mod(np.arctan2(targets[:, 1], targets[:, 0] - x), np.pi)
     x = np.concatenate([x, x, targets[:, 0] % 1.0, wall.vertices[::7, 0] % 1.0])
     theta = np.concatenate([theta, aimed, np.full(count, np.pi / 2), np.full(len(wall.vertices[::7]), np.pi / 4)])
-    found, plain = geo.trace(wall, x, theta), geo.trace(without_grid(wall), x, theta)
+    found, plain = geo.trace(wall, x, theta), geo.trace(without_boxes(wall), x, theta)
     for field in ("x", "theta", "collisions", "status"):
         assert np.array_equal(getattr(found, field), getattr(plain, field))
 
@@ -248,7 +248,7 @@ def test_a_wall_of_sixty_thousand_lines_is_traced_in_microseconds_a_bounce():
     assert spent / traced.collisions.sum() < 10e-6
 
 
-def test_the_plan_tells_channels_wedges_and_grids():
+def test_the_plan_tells_channels_wedges_and_trees():
     assert geo.rectangular_teeth(2.0).plan().channels == 1
     assert geo.triangular_teeth(0.1).plan().wedges == 1
     assert geo.triangular_teeth(0.7).plan().wedges == 0

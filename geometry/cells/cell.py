@@ -11,7 +11,7 @@ from typing import Any, Self
 from ...core.checks import Floats, frozen, positive_number
 from ...core.estimates import Estimate
 from ...core.kinds import explained
-from ..curves.curve import Curve, Point
+from ..curves.curve import Curve, Point, point_array
 from ..curves.segment import Segment
 from .hollow import Hollow, flat_tops, hollows_between
 from .origin import HighestPoint, highest_point_of
@@ -210,4 +210,4 @@ class Cell:
 
 
 def _vertices(path: Sequence[Curve]) -> Floats:
-    return frozen([*(p.start for p in path), path[-1].end])
+    return frozen(point_array([*(p.start for p in path), path[-1].end]))

@@ -16,7 +16,7 @@ from ...core.checks import Floats
 from ...core.errors import WallError
 from ...core.rounding import EPS
 from ..curves.crossings import find_crossing
-from ..curves.curve import Curve, Point
+from ..curves.curve import Curve, Point, point_array
 from ..curves.segment import Segment
 
 # Distance, relative to the wall's size, up to which the ends of two pieces join; enough for input of ten digits.
@@ -123,16 +123,16 @@ def _curves(given: Sequence[Curve], name: str) -> Pieces:
         pieces = tuple(given)
     except TypeError as reason:
         raise WallError(f"{name}: expected a sequence of curves, got {given!r}") from reason
-    for i, piece in enumerate(pieces):
-        if not isinstance(piece, Curve):
-            raise WallError(f"{name}[{i}]: expected a Segment, an Arc or a Bezier, got {piece!r}")
+    if not all(issubclass(kind, Curve) for kind in set(map(type, pieces))):
+        i, piece = next((i, piece) for i, piece in enumerate(pieces) if not isinstance(piece, Curve))
+        raise WallError(f"{name}[{i}]: expected a Segment, an Arc or a Bezier, got {piece!r}")
     if not pieces:
         raise WallError(f"{name}: expected at least one piece, got none")
     return pieces
 
 
 def _end_points(pieces: Pieces) -> tuple[Floats, Floats]:
-    return np.array([p.start for p in pieces]), np.array([p.end for p in pieces])
+    return point_array(p.start for p in pieces), point_array(p.end for p in pieces)
 
 
 def _size(starts: Floats, ends: Floats, period: float) -> Floats:
@@ -187,15 +187,18 @@ def _snapped(vertices: Floats, slack: Floats, period: float, size: Floats) -> Fl
 
 def _pinned(pieces: Pieces, vertices: Floats, size: Floats, label: str) -> Pieces:
     """Set the end points of every piece to its vertices; pieces with these end points are returned unchanged."""
-    points = [(x, y) for x, y in vertices.tolist()]
+    starts, ends = _end_points(pieces)
+    moved = np.any((starts != vertices[:-1]) | (ends != vertices[1:]), axis=1)
+    moved |= np.array([piece.rounding for piece in pieces]) != 0.0
+    closed = np.all(vertices[1:] == vertices[:-1], axis=1)
     shortest = 4.0 * JOIN_TOLERANCE * float(size.max())
-    result = []
-    for i, piece in enumerate(pieces):
-        start, end = points[i], points[i + 1]
-        if start == end and piece.length <= shortest:
-            raise WallError(f"piece {i}{label} has no length: it starts and ends at {start}; leave it out")
-        exact = piece.rounding == 0.0 and piece.start == start and piece.end == end
-        result.append(piece if exact else piece.pinned(start, end))
+    result = list(pieces)
+    for i in np.flatnonzero(moved | closed).tolist():
+        (x0, y0), (x1, y1) = vertices[i : i + 2].tolist()
+        if closed[i] and pieces[i].length <= shortest:
+            raise WallError(f"piece {i}{label} has no length: it starts and ends at {(x0, y0)}; leave it out")
+        if moved[i]:
+            result[i] = pieces[i].pinned((x0, y0), (x1, y1))
     return tuple(result)
 
 

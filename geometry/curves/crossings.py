@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats
 from ...core.errors import WallError
 from ...core.rounding import EPS
-from .curve import Curve
+from .curve import Curve, point_array
 from .segment import Segment
 
 # Tolerance of the polylines that replace curves, in coordinates where the wall is 1 wide and 1 deep. Polylines of
@@ -104,7 +104,7 @@ def find_crossing(
     turns = _turns((pieces, *islands), size)
     if len(loops) == 1 and not turns and shapely.LinearRing(_without_repeats(loops[0].points)).is_simple:
         return None
-    straight = np.array([isinstance(p, Segment) for loop in (pieces, *islands) for p in loop])
+    straight = np.concatenate([straight_in(loop) for loop in (pieces, *islands)])
     # a crossing among few periods is one among all, and costs less to find: crossings grow like the square of copies
     for few in [*itertools.takewhile(lambda n: n < copies, (FEW**k for k in itertools.count(1))), copies]:
         some = [_close(path, few), *loops[1:]]
@@ -140,7 +140,7 @@ def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[
     """Return the joints at which paths turn back along themselves; the first path is open, the others are closed."""
     found, first = [], 0
     for number, path in enumerate(paths):
-        into, out = _directions(path)
+        into, out = directions_of(path)
         follower = np.roll(out, -1, axis=0)
         across = into[:, 0] * follower[:, 1] - into[:, 1] * follower[:, 0]
         back = (np.sum(into * follower, axis=1) < 0.0) & (np.abs(across) <= REVERSED)
@@ -158,15 +158,20 @@ def _turns(paths: Sequence[Sequence[Curve]], size: tuple[float, float]) -> list[
     return found
 
 
-def _directions(path: Sequence[Curve]) -> tuple[Floats, Floats]:
+def directions_of(path: Sequence[Curve]) -> tuple[Floats, Floats]:
     """Return the unit tangents of every piece at its end and at its start."""
-    chords = np.array([piece.end for piece in path]) - np.array([piece.start for piece in path])
-    straight = np.array([isinstance(piece, Segment) for piece in path])
+    chords = np.diff(point_array([*(piece.start for piece in path), path[-1].end]), axis=0)
+    straight = straight_in(path)
     chords[straight] /= np.hypot(chords[straight, 0], chords[straight, 1])[:, np.newaxis]
     into, out = chords, chords.copy()
     for k in np.flatnonzero(~straight).tolist():
         into[k], out[k] = path[k].tangent(1.0), path[k].tangent(0.0)
     return into, out
+
+
+def straight_in(path: Sequence[Curve]) -> NDArray[np.bool_]:
+    """Return whether each piece is a segment."""
+    return np.array([isinstance(piece, Segment) for piece in path])
 
 
 def _coincidence(before: Curve, after: Curve, across: float, size: tuple[float, float]) -> float:
@@ -190,6 +195,9 @@ def _without_repeats(points: Floats) -> Floats:
 
 
 def _flatten(pieces: Sequence[Curve], size: tuple[float, float], first_label: int) -> _Loop:
+    if straight_in(pieces).all():
+        points = point_array([*(piece.start for piece in pieces), pieces[-1].end]) / size
+        return _Loop(points, np.arange(first_label, first_label + len(pieces)))
     chunks, labels = [], []
     for i, piece in enumerate(pieces):
         if isinstance(piece, Segment):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from itertools import chain
 from typing import Any, Self
 
 import numpy as np
@@ -88,6 +90,11 @@ class Curve(ABC):
             bounds.append((min(values), max(values)))
         (xmin, xmax), (ymin, ymax) = bounds
         return xmin, ymin, xmax, ymax
+
+
+def point_array(points: Iterable[Point]) -> Floats:
+    """Return points as an array of shape (n, 2), twice as fast as numpy does."""
+    return np.fromiter(chain.from_iterable(points), np.float64).reshape(-1, 2)
 
 
 def as_point(name: str, value: Any) -> Point:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,6 +49,24 @@ class Segment(Curve):
         object.__setattr__(self, "end", as_point("Segment end", self.end))
         if self.start == self.end:
             raise WallError(f"Segment: expected two different points, got {self.start} twice; leave this piece out")
+
+    @classmethod
+    def path(cls, vertices: Floats) -> list[Self]:
+        """Return the segments between consecutive points, which are finite and different.
+
+        Examples
+        --------
+        >>> [piece.length for piece in Segment.path(np.array([[0.0, 0.0], [3.0, -4.0], [3.0, 0.0]]))]
+        [5.0, 4.0]
+        """
+        pieces, assign = [], object.__setattr__
+        for start, end in pairwise(zip(*vertices.T.tolist(), strict=True)):
+            # without the checks of the constructor, which take longer than all else in a wall of many pieces
+            piece = object.__new__(cls)
+            assign(piece, "start", start)
+            assign(piece, "end", end)
+            pieces.append(piece)
+        return pieces
 
     def point(self, s: ArrayLike) -> Floats:
         """Return the points at the parameters ``s`` in [0, 1], shape ``s.shape + (2,)``."""

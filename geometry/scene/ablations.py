@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from ...core.checks import Floats
-from .columns import FIRST_PAIR, GRID_COLUMNS, PAIRS_END, RUN_SINE
+from .columns import FIRST_PAIR, PAIRS_END, RUN_SINE, TREE_LEVELS
 from .scene import Scene
 
 Table = TypeVar("Table", Floats, Floats | None)
@@ -22,9 +22,9 @@ def without_runs(scene: Scene) -> Scene:
     return replace(scene, circles=_cleared(scene.circles, (RUN_SINE,)))
 
 
-def without_grid(scene: Scene) -> Scene:
-    """Return the scene without grids: every line of a hollow is tested."""
-    return replace(scene, hollows=_cleared(scene.hollows, (GRID_COLUMNS,)), grid=None)
+def without_boxes(scene: Scene) -> Scene:
+    """Return the scene without trees of boxes: every line of a hollow is tested."""
+    return replace(scene, hollows=_cleared(scene.hollows, (TREE_LEVELS,)), boxes=None)
 
 
 def without_formulas(scene: Scene) -> Scene:

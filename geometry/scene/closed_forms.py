@@ -51,6 +51,8 @@ if TYPE_CHECKING:
 DOUBT_FRACTION = 2.0**-30
 # Half angle, radians, below which arcs are traced hit by hit, which is more accurate for positions along flat arcs.
 FLATTEST_ARC = 0.05
+# Pieces of a hollow with a closed form: two lines, or one arc.
+MOST_PIECES = 2
 # Angle, radians, up to which a wedge is traced hit by hit, with runs of hits computed in one step.
 NARROWEST_WEDGE = WIDEST_WEDGE
 

@@ -36,14 +36,9 @@ FIRST_BEZIER = 9  # the same in `beziers`
 BEZIERS_END = 10
 LEFT_EDGE = 11  # the left end of the opening: NO_EDGE, SMOOTH_EDGE or CORNER_EDGE
 RIGHT_EDGE = 12  # the right end
-GRID_X = 13  # lower left corner of the grid over the lines of a hollow that has many
-GRID_Y = 14
-CELL_WIDTH = 15  # of a grid cell
-CELL_HEIGHT = 16
-GRID_COLUMNS = 17  # number of grid columns, 0 without a grid
-GRID_ROWS = 18  # number of grid rows
-GRID_START = 19  # index of the first cell in the list `grid`, see `grid.grid_of`
-HOLLOW_COLUMNS = 20
+TREE_ROOT = 13  # row of the root in `boxes`, of the tree over the lines of a hollow that has many
+TREE_LEVELS = 14  # number of levels of the tree, 0 without a tree
+HOLLOW_COLUMNS = 15
 # Kinds of ends of an opening; NO_EDGE for an open wall.
 NO_EDGE, SMOOTH_EDGE, CORNER_EDGE = 0.0, 1.0, 2.0
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ..cells.cell import Cell
 from ..cells.hollow_shape import distinct_hollows
-from .columns import FORM, GRID_COLUMNS, NO_FORM, PAIR_ANGLE, RUN_SINE
+from .columns import FORM, NO_FORM, PAIR_ANGLE, RUN_SINE, TREE_LEVELS
 from .scene import Scene
 
 
@@ -34,7 +34,8 @@ class TracePlan:
         meet at more than 0.3 radians, apex below the opening) and circular hollows (one arc of half angle 0.05 to
         pi/2). Rays within 1e-9 of a corner are traced segment by segment.
     hollows_with_grid : int
-        Number of hollows with so many lines that a grid selects the lines to test; elsewhere every piece is tested.
+        Number of hollows with so many lines that a tree of boxes selects the lines to test; elsewhere every piece is
+        tested.
     distinct_hollows : int
         Number of hollows that differ by more than translation and scale, to 64 rounding errors. The law of the wall
         is a mixture of the laws of these hollows.
@@ -89,7 +90,7 @@ def plan_of(wall: Cell, scene: Scene, is_mirror_symmetric: bool) -> TracePlan:
         channels=parallel,
         wedges=0 if scene.pairs is None else len(scene.pairs) // 2 - parallel,
         closed_forms=0 if scene.closed is None else int((scene.closed[:, FORM] != NO_FORM).sum()),
-        hollows_with_grid=int((scene.hollows[:, GRID_COLUMNS] > 0.0).sum()),
+        hollows_with_grid=int((scene.hollows[:, TREE_LEVELS] > 0.0).sum()),
         distinct_hollows=len(distinct_hollows(wall)) if wall.closes else 1,
         mirror_symmetric=is_mirror_symmetric,
     )

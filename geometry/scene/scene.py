@@ -6,7 +6,7 @@ columns.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import asin, cos, hypot, pi, sin
@@ -19,15 +19,14 @@ from ...core.checks import Floats
 from ..cells.cell import Cell
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
+from ..curves.crossings import directions_of, straight_in
 from ..curves.curve import Curve, Point
-from ..curves.segment import Segment
-from .closed_forms import closed_form_of, closed_table
+from .boxes import TREE_COLUMNS, tree_of
+from .closed_forms import MOST_PIECES, closed_form_of, closed_table
 from .columns import (
     ARC_COLUMNS,
     BEZIER_COLUMNS,
     BEZIERS_END,
-    CELL_HEIGHT,
-    CELL_WIDTH,
     CHORD_X,
     CHORD_Y,
     CIRCLES_END,
@@ -46,11 +45,6 @@ from .columns import (
     FIRST_PAIR,
     FORM,
     FORM_COLUMNS,
-    GRID_COLUMNS,
-    GRID_ROWS,
-    GRID_START,
-    GRID_X,
-    GRID_Y,
     HOLLOW_COLUMNS,
     IS_CORNER,
     JOINT_COLUMNS,
@@ -81,6 +75,8 @@ from .columns import (
     START_Y,
     STARTS_LINE,
     STRETCH,
+    TREE_LEVELS,
+    TREE_ROOT,
     X1,
     X2,
     X3,
@@ -102,44 +98,36 @@ LONGEST_ARC = 1.5 * pi
 # Number of chords from which on a run along an arc pays for its two arctangents and one sincos.
 RUN_CHORDS = 8.0
 OUTLINE_POINTS = 64
-# Number of lines in a hollow from which on it has a grid; not tuned (at 256 lines a grid saves a third of the time).
-GRID_LINES = 96
+# Number of lines in a hollow from which on it has a tree of boxes.
+TREE_LINES = 96
 
 
 def hull_of(piece: Curve, start: Point, end: Point) -> list[Point]:
-    """Return four points whose convex hull contains the piece."""
-    if isinstance(piece, Segment):
-        return [start, end, start, end]
+    """Return four points whose convex hull contains a curved piece."""
     if isinstance(piece, Bezier):
         return [start, *list(piece.control_points[1:-1])[:2], *[end] * (5 - len(piece.control_points))]
     x0, y0, x1, y1 = piece.box
     return [(x0, y0), (x0, y1), (x1, y0), (x1, y1)]
 
 
-def corners_of(pieces: list[Curve]) -> list[bool]:
+def corners_of(pieces: Sequence[Curve]) -> NDArray[np.bool_]:
     """Return whether each joint of the cycle of pieces is a corner; the first joint is repeated at the end."""
-    heads = np.array([_tangent(piece, 0.0) for piece in pieces])
-    tails = np.roll(np.array([_tangent(piece, 1.0) for piece in pieces]), 1, axis=0)
+    tails, heads = directions_of(pieces)
+    tails = np.roll(tails, 1, axis=0)
     turn = np.abs(tails[:, 0] * heads[:, 1] - tails[:, 1] * heads[:, 0])
     corner = (turn > SMOOTH_JOINT) | (np.sum(tails * heads, axis=1) < 0.0)
-    return [*map(bool, corner), bool(corner[0])]
+    return np.append(corner, corner[0])
 
 
-def _tangent(piece: Curve, s: float) -> Point:
-    if isinstance(piece, Segment):
-        dx, dy = piece.end[0] - piece.start[0], piece.end[1] - piece.start[1]
-        length = hypot(dx, dy)
-        return dx / length, dy / length
-    x, y = piece.tangent(s)
-    return float(x), float(y)
-
-
-def line_row(start: Point, end: Point) -> Floats:
-    """Return a row of ``lines``; the columns of its pairs are set later."""
-    x, y = end[0] - start[0], end[1] - start[1]
-    length = hypot(x, y)
-    row = {EDGE_X: x, EDGE_Y: y, LINE_NORMAL_X: -y / length, LINE_NORMAL_Y: x / length, LENGTH: length}
-    return row_of(LINE_COLUMNS, row)
+def line_rows(starts: Floats, ends: Floats) -> Floats:
+    """Return rows of ``lines``; the columns of their pairs are set later."""
+    rows = np.zeros((len(starts), LINE_COLUMNS))
+    edges = ends - starts
+    length = np.array(list(map(hypot, *edges.T.tolist())))
+    rows[:, [EDGE_X, EDGE_Y]] = edges
+    rows[:, LINE_NORMAL_X], rows[:, LINE_NORMAL_Y] = -edges[:, 1] / length, edges[:, 0] / length
+    rows[:, LENGTH] = length
+    return rows
 
 
 def arc_row(arc: Arc, ends: Mapping[int, float]) -> Floats:
@@ -197,7 +185,7 @@ class Tables(NamedTuple):
     ellipses: Floats
     beziers: Floats
     pairs: Floats
-    grid: NDArray[np.int64]
+    boxes: Floats
     cell: float
     is_open: bool
 
@@ -211,7 +199,7 @@ NO_TABLES = Tables(
     np.empty((0, ARC_COLUMNS)),
     np.empty((0, BEZIER_COLUMNS)),
     np.empty((0, PAIR_COLUMNS)),
-    np.empty(0, np.int64),
+    np.empty((0, TREE_COLUMNS)),
     1.0,
     False,
 )
@@ -228,7 +216,7 @@ class Scene:
     ellipses: Floats | None
     beziers: Floats | None
     pairs: Floats | None
-    grid: NDArray[np.int64] | None
+    boxes: Floats | None
     cell: float
     is_open: bool
     closed: Floats | None = None
@@ -246,7 +234,7 @@ class Scene:
             ellipses=_filled(self.ellipses, ARC_COLUMNS),
             beziers=_filled(self.beziers, BEZIER_COLUMNS),
             pairs=_filled(self.pairs, PAIR_COLUMNS),
-            grid=np.empty(0, np.int64) if self.grid is None else self.grid,
+            boxes=_filled(self.boxes, TREE_COLUMNS),
             cell=float(self.cell),
             is_open=bool(self.is_open),
         )
@@ -260,23 +248,14 @@ class Scene:
 def scene_of(wall: Cell) -> Scene:
     """Build the tables of a wall."""
     tables = _Tables()
-    vertices = [(float(x), float(y)) for x, y in wall.vertices]
-    corners = corners_of(list(wall.pieces))
+    chain = _chain_of(wall.pieces, wall.vertices)
     if wall.closes:
         for hollow in wall.hollows:
-            chain = _Chain(
-                list(wall.pieces[hollow.first : hollow.last]),
-                vertices[hollow.first : hollow.last + 1],
-                corners[hollow.first : hollow.last + 1],
-            )
-            tables.add_hollow(
-                hollow.left, hollow.right, [chain], edges=(_edge(chain.corners[0]), _edge(chain.corners[-1]))
-            )
+            part = chain.part(hollow.first, hollow.last)
+            edges = (_edge(part.corners[0]), _edge(part.corners[-1]))
+            tables.add_hollow(hollow.left, hollow.right, [part], edges)
     else:
-        chains = [_Chain(list(wall.pieces), vertices, corners)]
-        for island, island_vertices in zip(wall.islands, wall.island_vertices, strict=True):
-            loop = [(float(x), float(y)) for x, y in island_vertices]
-            chains.append(_Chain(list(island), loop, corners_of(list(island))))
+        chains = [chain, *map(_chain_of, wall.islands, wall.island_vertices)]
         tables.add_hollow(0.0, wall.period, chains, edges=(NO_EDGE, NO_EDGE))
     return tables.scene(wall.period, not wall.closes)
 
@@ -288,185 +267,232 @@ def _edge(is_corner: bool) -> float:
 def scene_in_one(wall: Cell) -> Scene:
     """Build the tables of a closed wall with its whole cell, flat tops included, as one hollow."""
     tables = _Tables()
-    vertices = [(float(x), float(y)) for x, y in wall.vertices]
-    chain = _Chain(list(wall.pieces), vertices, corners_of(list(wall.pieces)))
+    chain = _chain_of(wall.pieces, wall.vertices)
     tables.add_hollow(0.0, wall.period, [chain], edges=(CORNER_EDGE, CORNER_EDGE))
     return tables.scene(wall.period, False)
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Chain:
-    """Connected pieces with their joints; ``vertices`` and ``corners`` have one entry more than ``pieces``."""
+    """Connected pieces with their joints; ``vertices`` and ``corners`` have one row more than ``pieces``."""
 
-    pieces: list[Curve]
-    vertices: list[Point]
-    corners: list[bool]
+    pieces: tuple[Curve, ...]
+    vertices: Floats
+    corners: NDArray[np.bool_]
+    is_line: NDArray[np.bool_]
+
+    def part(self, first: int, last: int) -> _Chain:
+        """Return the pieces from ``first`` to before ``last``."""
+        joints = slice(first, last + 1)
+        return _Chain(self.pieces[first:last], self.vertices[joints], self.corners[joints], self.is_line[first:last])
+
+    def curves(self) -> list[int]:
+        """Return the numbers of the pieces that are no segments."""
+        numbers: list[int] = np.flatnonzero(~self.is_line).tolist()
+        return numbers
+
+    def joint(self, number: int) -> Point:
+        """Return the joint at which a piece starts."""
+        x, y = self.vertices[number].tolist()
+        return x, y
 
     def without_long_arcs(self) -> _Chain:
         """Return the chain with every arc of more than LONGEST_ARC cut in two at a smooth joint."""
-        pieces: list[Curve] = []
-        vertices, corners = [self.vertices[0]], [self.corners[0]]
-        for piece, vertex, corner in zip(self.pieces, self.vertices[1:], self.corners[1:], strict=True):
-            if isinstance(piece, Arc) and abs(piece.end_angle - piece.start_angle) > LONGEST_ARC:
-                middle = 0.5 * (piece.start_angle + piece.end_angle)
-                first = Arc(piece.center, piece.semi_axes, piece.start_angle, middle)
-                pieces += [first, Arc(piece.center, piece.semi_axes, middle, piece.end_angle)]
-                vertices += [first.end, vertex]
-                corners += [False, corner]
-            else:
-                pieces.append(piece)
-                vertices.append(vertex)
-                corners.append(corner)
-        return _Chain(pieces, vertices, corners)
+        chain = self
+        for k in reversed(self.curves()):
+            arc = self.pieces[k]
+            if isinstance(arc, Arc) and abs(arc.end_angle - arc.start_angle) > LONGEST_ARC:
+                middle = 0.5 * (arc.start_angle + arc.end_angle)
+                first = Arc(arc.center, arc.semi_axes, arc.start_angle, middle)
+                second = Arc(arc.center, arc.semi_axes, middle, arc.end_angle)
+                chain = _Chain(
+                    (*chain.pieces[:k], first, second, *chain.pieces[k + 1 :]),
+                    np.insert(chain.vertices, k + 1, first.end, axis=0),
+                    np.insert(chain.corners, k + 1, False),
+                    np.insert(chain.is_line, k, False),
+                )
+        return chain
+
+
+def _chain_of(pieces: tuple[Curve, ...], vertices: Floats) -> _Chain:
+    return _Chain(pieces, vertices, corners_of(pieces), straight_in(pieces))
 
 
 class _Tables:
-    """The tables of a scene under construction."""
+    """The tables of a scene under construction; each hollow adds a block of rows to every one."""
 
     def __init__(self) -> None:
         self.hollows: list[Floats] = []
-        self.joints: list[Floats] = []
-        self.lines: list[Floats] = []
-        self.circles: list[Floats] = []
-        self.ellipses: list[Floats] = []
-        self.beziers: list[Floats] = []
-        self.pairs: list[Floats] = []
-        self.grids: list[NDArray[np.int64]] = []
+        self.joints = _Blocks(JOINT_COLUMNS)
+        self.lines = _Blocks(LINE_COLUMNS)
+        self.circles = _Blocks(ARC_COLUMNS)
+        self.ellipses = _Blocks(ARC_COLUMNS)
+        self.beziers = _Blocks(BEZIER_COLUMNS)
+        self.pairs = _Blocks(PAIR_COLUMNS)
+        self.boxes = _Blocks(TREE_COLUMNS)
         self.closed: list[Floats] = []
 
     def add_hollow(self, left: float, right: float, chains: list[_Chain], edges: tuple[float, float]) -> None:
         """Append one hollow, or the whole cell of an open wall."""
         is_closed = len(chains) == 1 and edges != (NO_EDGE, NO_EDGE)
         chains = [chain.without_long_arcs() for chain in chains]
-        before = self._sizes()
-        for chain in chains:
-            self._add_chain(chain)
-        after = self._sizes()
-        joints = np.array([vertex for chain in chains for vertex in chain.vertices])
-        size = float(np.max(np.ptp(joints, axis=0))) if len(joints) else right - left
-        size = max(size, right - left)
+        vertices = np.concatenate([chain.vertices for chain in chains])
+        size = max(float(np.max(np.ptp(vertices, axis=0))), right - left)
         row = {LEFT: left, RIGHT: right, SIZE: size, LEFT_EDGE: edges[0], RIGHT_EDGE: edges[1]}
-        row |= dict(zip((FIRST_JOINT, FIRST_CIRCLE, FIRST_ELLIPSE, FIRST_BEZIER), before, strict=True))
-        row |= dict(zip((JOINTS_END, CIRCLES_END, ELLIPSES_END, BEZIERS_END), after, strict=True))
+        row |= dict(zip((FIRST_JOINT, FIRST_CIRCLE, FIRST_ELLIPSE, FIRST_BEZIER), self._sizes(), strict=True))
+        joints = np.concatenate([_joint_rows(chain) for chain in chains])
+        lines = np.concatenate([_chain_lines(chain) for chain in chains])
+        circles = self._curves(chains)
         self.hollows.append(row_of(HOLLOW_COLUMNS, row))
-        self._mark_runs(before[1], after[1], chains)
-        inside = bool(np.all((left <= joints[:, 0]) & (joints[:, 0] <= right)))
+        if len(circles):
+            _mark_runs(circles, chains, size)
+        inside = bool(np.all((left <= vertices[:, 0]) & (vertices[:, 0] <= right)))
         if inside or edges != (NO_EDGE, NO_EDGE):
-            self._mark_pairs(before[0], chains, size)
-        self._add_grid(before[0])
-        form = closed_form_of(chains[0].pieces, chains[0].vertices, size) if is_closed else None
+            self._mark_pairs(lines, chains, size)
+        if np.count_nonzero(joints[:, STARTS_LINE]) >= TREE_LINES:
+            self._add_tree(joints, size)
+        self.joints.append(joints)
+        self.lines.append(lines)
+        self.circles.append(circles)
+        columns = [JOINTS_END, CIRCLES_END, ELLIPSES_END, BEZIERS_END]
+        self.hollows[-1][columns] = self._sizes()
+        form = None
+        if is_closed and len(chains[0].pieces) <= MOST_PIECES:
+            form = closed_form_of(chains[0].pieces, list(map(chains[0].joint, range(len(chains[0].vertices)))), size)
         self.closed.append(row_of(FORM_COLUMNS, {FORM: NO_FORM}) if form is None else form)
 
     def _sizes(self) -> tuple[int, int, int, int]:
-        return len(self.joints), len(self.circles), len(self.ellipses), len(self.beziers)
+        return self.joints.count, self.circles.count, self.ellipses.count, self.beziers.count
 
-    def _add_chain(self, chain: _Chain) -> None:
-        for i, piece in enumerate(chain.pieces):
-            start, end = chain.vertices[i], chain.vertices[i + 1]
-            is_line = isinstance(piece, Segment)
-            self._add_joint(start, chain.corners[i], is_line)
-            self.lines.append(line_row(start, end) if is_line else np.zeros(LINE_COLUMNS))
-            ends = {
-                START_X: start[0], START_Y: start[1], END_X: end[0], END_Y: end[1],
-                START_CORNER: chain.corners[i], END_CORNER: chain.corners[i + 1],
-            }  # fmt: skip
-            if isinstance(piece, Arc):
-                (self.circles if piece.is_circular else self.ellipses).append(arc_row(piece, ends))
-            elif isinstance(piece, Bezier):
-                self.beziers.append(bezier_row(piece, ends))
-        self._add_joint(chain.vertices[-1], chain.corners[-1], False)
-        self.lines.append(np.zeros(LINE_COLUMNS))
+    def _curves(self, chains: list[_Chain]) -> Floats:
+        """Append ellipses and Bezier pieces; return the rows of circles, whose runs are not marked yet."""
+        circles: list[Floats] = []
+        ellipses: list[Floats] = []
+        beziers: list[Floats] = []
+        for chain in chains:
+            for i in chain.curves():
+                piece, start, end = chain.pieces[i], chain.joint(i), chain.joint(i + 1)
+                ends = {
+                    START_X: start[0], START_Y: start[1], END_X: end[0], END_Y: end[1],
+                    START_CORNER: chain.corners[i], END_CORNER: chain.corners[i + 1],
+                }  # fmt: skip
+                if isinstance(piece, Arc):
+                    (circles if piece.is_circular else ellipses).append(arc_row(piece, ends))
+                elif isinstance(piece, Bezier):
+                    beziers.append(bezier_row(piece, ends))
+        self.ellipses.append(table_of(ellipses, ARC_COLUMNS))
+        self.beziers.append(table_of(beziers, BEZIER_COLUMNS))
+        return table_of(circles, ARC_COLUMNS)
 
-    def _add_joint(self, vertex: Point, is_corner: bool, starts_line: bool) -> None:
-        row = {JOINT_X: vertex[0], JOINT_Y: vertex[1], IS_CORNER: is_corner, STARTS_LINE: starts_line}
-        self.joints.append(row_of(JOINT_COLUMNS, row))
+    def _add_tree(self, joints: Floats, size: float) -> None:
+        """Add a tree over the lines of the last hollow."""
+        starts = joints[:, [JOINT_X, JOINT_Y]]
+        is_line = (joints[:, STARTS_LINE] > 0.0)[:, np.newaxis]
+        ends = np.where(is_line, np.roll(starts, -1, axis=0), starts)
+        tree, levels = tree_of(starts, ends, self.joints.count, self.boxes.count, size)
+        self.hollows[-1][[TREE_ROOT, TREE_LEVELS]] = self.boxes.count, levels
+        self.boxes.append(tree)
 
-    def _mark_runs(self, first: int, last: int, chains: list[_Chain]) -> None:
-        """Set RUN_SINE of the focusing circles whose circular segment contains no other piece of the hollow."""
-        outlines = [
-            np.array([vertex]) if isinstance(piece, Segment) else piece.point(np.linspace(0.0, 1.0, OUTLINE_POINTS))
-            for chain in chains
-            for piece, vertex in zip(chain.pieces, chain.vertices, strict=False)
-        ]
-        ends = [np.array([chain.vertices[-1]]) for chain in chains]
-        points = np.concatenate(outlines + ends)
-        for row in self.circles[first:last]:
-            half, radius = 0.5 * row[SPAN], 1.0 / abs(row[CURVATURE])
-            x, y = points[:, 0] - row[START_X], points[:, 1] - row[START_Y]
-            own = abs(
-                np.hypot(
-                    points[:, 0] - row[START_X] - row[NORMAL_X] / row[CURVATURE],
-                    points[:, 1] - row[START_Y] - row[NORMAL_Y] / row[CURVATURE],
-                )
-            )
-            height = y * row[CHORD_X] - x * row[CHORD_Y]
-            slack = 1e-12 * self.hollows[-1][SIZE]
-            foreign = (height < -slack) & (np.abs(own - radius) > slack)
-            if row[CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
-                row[RUN_SINE] = sin(half / RUN_CHORDS)
-
-    def _add_grid(self, first: int) -> None:
-        """Add a grid to the last hollow, whose lines start at joint ``first``, if it has at least GRID_LINES lines."""
-        joints = np.array(self.joints[first:], dtype=np.float64)
-        is_line = joints[:, STARTS_LINE] > 0.0
-        if is_line.sum() < GRID_LINES:
-            return
-        from .grid import grid_of
-
-        starts = np.ascontiguousarray(joints[:, [JOINT_X, JOINT_Y]])
-        ends = np.roll(starts, -1, axis=0)
-        ends[~is_line] = starts[~is_line]
-        frame, table = grid_of(starts, ends, first, sum(map(len, self.grids)))
-        columns = [GRID_X, GRID_Y, CELL_WIDTH, CELL_HEIGHT, GRID_COLUMNS, GRID_ROWS, GRID_START]
-        self.hollows[-1][columns] = frame
-        self.grids.append(table)
-
-    def _mark_pairs(self, first: int, chains: list[_Chain], size: float) -> None:
-        """Find the channels and wedges of the last hollow, whose lines start at joint ``first``."""
-        numbers, starts, ends, hulls = [], [], [], []
+    def _mark_pairs(self, lines: Floats, chains: list[_Chain], size: float) -> None:
+        """Find the channels and wedges of the last hollow, whose lines are given."""
+        first, numbers, starts, ends, hulls = self.joints.count, [], [], [], []
         joint = first
         for chain in chains:
-            for piece, start, end in zip(chain.pieces, chain.vertices, chain.vertices[1:], strict=False):
-                if isinstance(piece, Segment):
-                    numbers.append(joint)
-                    starts.append(start)
-                    ends.append(end)
-                hulls.append(hull_of(piece, start, end))
-                joint += 1
-            joint += 1
+            numbers.append(joint + np.flatnonzero(chain.is_line))
+            starts.append(chain.vertices[:-1])
+            ends.append(chain.vertices[1:])
+            hulls.append(_hulls(chain))
+            joint += len(chain.vertices)
+        is_line = np.concatenate([chain.is_line for chain in chains])
         rows = facing_pairs(
-            np.array(numbers, dtype=np.int64),
-            np.array(starts, dtype=np.float64).reshape(-1, 2),
-            np.array(ends, dtype=np.float64).reshape(-1, 2),
-            np.array(hulls, dtype=np.float64).reshape(-1, 4, 2),
-            size,
-        )
+            np.concatenate(numbers), np.concatenate(starts)[is_line], np.concatenate(ends)[is_line],
+            np.concatenate(hulls), size,
+        )  # fmt: skip
+        table: list[Floats] = []
         for line, row in sorted(rows, key=lambda pair: (pair[0], *pair[1].values())):
-            if self.lines[line][PAIRS_END] == 0.0:
-                self.lines[line][[FIRST_PAIR, PAIRS_END]] = len(self.pairs)
-            self.pairs.append(row_of(PAIR_COLUMNS, row))
-            self.lines[line][PAIRS_END] += 1.0
+            if lines[line - first, PAIRS_END] == 0.0:
+                lines[line - first, [FIRST_PAIR, PAIRS_END]] = self.pairs.count + len(table)
+            table.append(row_of(PAIR_COLUMNS, row))
+            lines[line - first, PAIRS_END] += 1.0
+        self.pairs.append(table_of(table, PAIR_COLUMNS))
 
     def scene(self, cell: float, is_open: bool) -> Scene:
-        joints, lines = table_of(self.joints, JOINT_COLUMNS), table_of(self.lines, LINE_COLUMNS)
+        joints, lines = self.joints.whole(), self.lines.whole()
         return Scene(
             hollows=table_of(self.hollows, HOLLOW_COLUMNS),
             joints=joints,
             lines=lines if joints[:, STARTS_LINE].any() else None,
-            circles=_table(self.circles),
-            ellipses=_table(self.ellipses),
-            beziers=_table(self.beziers),
-            pairs=_table(self.pairs),
-            grid=np.concatenate(self.grids) if self.grids else None,
+            circles=self.circles.table(),
+            ellipses=self.ellipses.table(),
+            beziers=self.beziers.table(),
+            pairs=self.pairs.table(),
+            boxes=self.boxes.table(),
             cell=cell,
             is_open=is_open,
             closed=closed_table(self.closed),
         )
 
 
+class _Blocks:
+    """A table that grows by blocks of rows."""
+
+    def __init__(self, columns: int) -> None:
+        self.count, self._blocks = 0, [np.empty((0, columns))]
+
+    def append(self, block: Floats) -> None:
+        self.count += len(block)
+        self._blocks.append(block)
+
+    def whole(self) -> Floats:
+        return np.concatenate(self._blocks)
+
+    def table(self) -> Floats | None:
+        return self.whole() if self.count else None
+
+
+def _joint_rows(chain: _Chain) -> Floats:
+    rows = np.zeros((len(chain.vertices), JOINT_COLUMNS))
+    rows[:, [JOINT_X, JOINT_Y]] = chain.vertices
+    rows[:, IS_CORNER], rows[:-1, STARTS_LINE] = chain.corners, chain.is_line
+    return rows
+
+
+def _chain_lines(chain: _Chain) -> Floats:
+    """Return a row of ``lines`` for every joint of a chain, zeros where no segment starts."""
+    rows = np.zeros((len(chain.vertices), LINE_COLUMNS))
+    numbers = np.flatnonzero(chain.is_line)
+    rows[numbers] = line_rows(chain.vertices[numbers], chain.vertices[numbers + 1])
+    return rows
+
+
+def _hulls(chain: _Chain) -> Floats:
+    """Return `hull_of` of every piece."""
+    hulls = np.stack([chain.vertices[:-1], chain.vertices[1:]] * 2, axis=1)
+    for k in chain.curves():
+        hulls[k] = hull_of(chain.pieces[k], chain.joint(k), chain.joint(k + 1))
+    return hulls
+
+
+def _mark_runs(circles: Floats, chains: list[_Chain], size: float) -> None:
+    """Set RUN_SINE of the focusing circles whose circular segment contains no other piece of the hollow."""
+    outlines = [chain.vertices for chain in chains]
+    outlines += [c.pieces[k].point(np.linspace(0.0, 1.0, OUTLINE_POINTS)) for c in chains for k in c.curves()]
+    points = np.concatenate(outlines)
+    for row in circles:
+        half, radius = 0.5 * row[SPAN], 1.0 / abs(row[CURVATURE])
+        x, y = points[:, 0] - row[START_X], points[:, 1] - row[START_Y]
+        own = abs(
+            np.hypot(
+                points[:, 0] - row[START_X] - row[NORMAL_X] / row[CURVATURE],
+                points[:, 1] - row[START_Y] - row[NORMAL_Y] / row[CURVATURE],
+            )
+        )
+        height = y * row[CHORD_X] - x * row[CHORD_Y]
+        slack = 1e-12 * size
+        foreign = (height < -slack) & (np.abs(own - radius) > slack)
+        if row[CURVATURE] > 0.0 and half <= 0.5 * pi + SMOOTH_JOINT and not foreign.any():
+            row[RUN_SINE] = sin(half / RUN_CHORDS)
+
+
 def _filled(table: Floats | None, columns: int) -> Floats:
     return np.empty((0, columns)) if table is None else np.require(table, np.float64, ["C", "A", "W"])
-
-
-def _table(rows: list[Floats]) -> Floats | None:
-    return np.array(rows) if rows else None

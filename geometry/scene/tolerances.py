@@ -16,3 +16,6 @@ TANGENT_ULPS = 16.0
 NEARBY = 2.0**-20
 # NEARBY as a multiple of the slack, JOINT_ULPS rounding errors of the hollow's size; all are powers of 2.
 NEARBY_SLACKS = NEARBY / (JOINT_ULPS * EPS)
+# Margin of the boxes about lines, in units of the hollow's size: corners within the slack of a ray lie in boxes that it
+# meets, and rounding in the test of a box loses none.
+BOX_MARGIN = 4.0 * JOINT_ULPS * EPS

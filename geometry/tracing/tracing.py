@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_array, finite_number, instance, number_between, whole_number
 from ...core.kinds import explained
-from ..scene.columns import LEFT, RIGHT
+from ..scene.columns import FORM, FORM_COLUMNS, LEFT, NO_FORM, RIGHT
 from ..walls.wall import Wall
 from .threads import in_blocks, interruptibly, new_flag
 
@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 # Rays times pieces up to which rays are traced on the caller's thread. With 10^6 segments per ray, at about 10 ns a
 # piece, this takes a fraction of a second. Another thread costs 0.1 ms, as much as a few hundred segments.
 LITTLE_WORK = 16
+# Rows of the trees of boxes, 0.3 kB each, from which on they exceed a core's cache: rays are then traced in the order
+# of their entries, so that neighbours meet the same boxes.
+LARGE_TREE = 2**10
+# Rays of a trace from which on waves are considered; and rays of a process from which on it compiles the function for
+# waves, because hit by hit they take as long as the compilation. If it is stored on disk, it is used at once.
+MANY_RAYS, COMPILING_PAYS = 2**12, 2**23
 # Angle (radians) below which, and number of periods above which, the distance in x between y = 0 and a wall's highest
 # points is reduced by whole periods before rounding; its rounding error would grow with the distance.
 FLAT, FAR = 2.0**-6, 2.0**6
@@ -144,9 +150,10 @@ def trace(
 
     Notes
     -----
-    Cost per bounce: 10 to 20 ns in hollows that ``wall.plan()`` counts as closed forms, else about 70 ns for a wall of
-    few pieces and below 1 us for 10^5 lines (with a grid). The first call in a process loads the compiled functions
-    (about 1 s); the first call on a machine compiles them once for all walls (about 10 s, then cached).
+    Cost per bounce: 10 to 20 ns in hollows that ``wall.plan()`` counts as closed forms; about 40 ns for a wall of few
+    lines and circles and 0.4 us for 10^5 lines, from 4,096 rays on; 70 ns and more for few rays and for other curves.
+    The first call in a process loads the compiled functions (about 1 s); the first call on a machine compiles them
+    once for all walls (about 10 s, then cached).
 
     Examples
     --------
@@ -168,7 +175,7 @@ def trace(
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
     scene = wall.scene
     stop = new_flag()
-    trace_block = _block_tracer(scene, max_collisions, stop)
+    trace_block = _block_tracer(scene, max_collisions, stop, _goes_in_waves(scene, len(starts)))
 
     def run(block: slice) -> None:
         trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], status[block])
@@ -192,7 +199,18 @@ def _work(scene: Scene) -> int:
     return len(scene.joints) + (0 if scene.beziers is None else 10 * len(scene.beziers))
 
 
-def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) -> Callable[..., None]:
+def _goes_in_waves(scene: Scene, rays: int) -> bool:
+    """Whether rays are traced in waves, which needs a function that takes a second to compile once on a machine."""
+    if rays < MANY_RAYS or scene.is_open or scene.ellipses is not None or scene.beziers is not None:
+        return False
+    if scene.closed is not None and np.all(scene.closed[:, FORM] != NO_FORM):
+        return False
+    from .compiled.closed_forms import SIMPLE
+
+    return SIMPLE.is_worth(rays, COMPILING_PAYS)
+
+
+def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in_waves: bool) -> Callable[..., None]:
     """Return a function of x, theta and four arrays to fill, which traces by closed forms where possible."""
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
@@ -208,8 +226,10 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) ->
         from .compiled.closed_forms import CROSSINGS, UNDECIDED, room_for, trace_closed
         from .compiled.pointers import checked
 
-        tables, work = (scene.hollows, scene.closed, scene.cell), room_for(scene.hollows)
-        checked(lambda: trace_closed(x, theta, tables, max_collisions, results, work, CROSSINGS))
+        tables, room = scene.tables, room_for(scene.hollows)
+        closed = np.empty((0, FORM_COLUMNS)) if scene.closed is None else scene.closed
+        crossings = CROSSINGS if in_waves else (*CROSSINGS[:2], 0)
+        checked(lambda: trace_closed(x, theta, tables, closed, max_collisions, results, room, crossings))
         rest = np.flatnonzero(results[-1] == UNDECIDED)
         if len(rest):
             followed = tuple(np.empty(len(rest), result.dtype) for result in results)
@@ -217,7 +237,15 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64]) ->
             for result, part in zip(results, followed, strict=True):
                 result[rest] = part
 
-    return follow if scene.closed is None else close
+    trace_block = close if in_waves or scene.closed is not None else follow
+
+    def in_order(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
+        order = np.argsort(x % scene.cell)
+        trace_block(x[order], theta[order], *results)
+        for result in results:
+            result[order] = result.copy()
+
+    return in_order if scene.boxes is not None and len(scene.boxes) >= LARGE_TREE else trace_block
 
 
 @explained

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from os import PathLike
 from pathlib import Path
 from typing import Self
@@ -133,9 +132,7 @@ class Wall(Cell):
             raise WallError(f"vertices {i} and {i + 1} coincide at {tuple(points[i].tolist())}; leave one out")
         if not points[-1, 0] > 0.0:
             raise WallError(f"vertices: expected the last x, the period, to be greater than 0, got {points[-1, 0]:g}")
-        corners = [(x, y) for x, y in points.tolist()]
-        pieces = [Segment(p, q) for p, q in pairwise(corners)]
-        return cls(pieces, corners[-1][0], unit=unit)
+        return cls(Segment.path(points), float(points[-1, 0]), unit=unit)
 
     @classmethod
     @explained

@@ -30,8 +30,8 @@ from ...scene.columns import (
     START_Y,
     STRETCH,
 )
-from ...tracing.compiled.interruption import is_raised
 from ...tracing.compiled.options import compiled, inlined, inner
+from ...tracing.compiled.pointers import is_raised
 from ...tracing.compiled.rays import BOUNCE_LIMIT, CORNER, ESCAPED, GRAZING, last_hollow
 from ...tracing.compiled.records import BEZIER, LINE, NO_PIECE, SIDE
 from .columns import ALPHA, OMEGA, V1, V2, X1

@@ -19,6 +19,9 @@ from .options import inlined, inner
 ROOT_STEPS = 80
 # What `nearest_bezier` returns for a ray that meets no piece.
 NO_BEZIER_HIT = np.inf, -1, 0.0, 0, -1.0
+# Size, in eps times that of its products, from which on g is not 0: twice that of a contact. Each value of g has about
+# eight rounding errors.
+NO_ZERO_ULPS = 2.0 * TANGENT_ULPS
 
 
 @inlined
@@ -147,6 +150,10 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
     a0, a1, a2, a3 = g
     # size of the products in the sum g
     spread = max(abs(vx), abs(vy)) * (abs(curve[START_X] - px) + abs(curve[START_Y] - py) + curve_size(curve))
+    # g lies between its four Bernstein coefficients, so it has no zero if they have one sign
+    b1, b2, b3 = a0 + a1 / 3.0, a0 + (2.0 * a1 + a2) / 3.0, a0 + a1 + a2 + a3
+    if max(min(a0, b1, b2, b3), -max(a0, b1, b2, b3)) > NO_ZERO_ULPS * EPS * spread:
+        return np.inf, 0.0, 0, -1.0
     # g can fall through zero once on each part of [0, 1] between its extrema
     c1, c2 = extrema(a1, a2, a3)
     best_t, best_s, tangent, near_s = np.inf, 0.0, 0, -1.0

@@ -16,11 +16,15 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...scene.columns import (
+    BEZIERS_END,
     CHAIN,
     CIRCLE_X,
     CIRCLE_Y,
     COPIES,
     DOUBT,
+    ELLIPSES_END,
+    FIRST_BEZIER,
+    FIRST_ELLIPSE,
     FORM,
     FORM_LEFT,
     FORM_RIGHT,
@@ -37,15 +41,18 @@ from ...scene.columns import (
     WEDGE_X,
     WEDGE_Y,
 )
+from ...scene.scene import NO_TABLES
+from .lanes import WAVE, WORK
 from .options import compiled, inlined, inner
 from .pointers import Late, address_at, call_at
 from .rays import FLAT_TOP, TOP_CORNER, opening_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
+from .waves import cross_simple
 
 # Status of a ray to be traced hit by hit.
 UNDECIDED = 255
 ESCAPED = 0
-RAYS = 512
+RAYS = WAVE
 # Adding and then subtracting this number rounds a number below 2^51 to an integer.
 ROUNDER = 1.5 * 2.0**52
 
@@ -54,7 +61,7 @@ class Room(NamedTuple):
     """Work space: six arrays for the rays of a block.
 
     Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, of which ``heads``
-    is the first ray (-1 for none), ``others`` the next; and the hollows that rays meet.
+    is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and the work space of waves.
     """
 
     numbers: Floats
@@ -62,12 +69,13 @@ class Room(NamedTuple):
     others: NDArray[np.int64]
     met: NDArray[np.int64]
     heads: NDArray[np.int64]
+    waves: Floats
 
 
 def room_for(hollows: Floats) -> Room:
     """Return the work space of `trace_closed`, for one thread."""
     rays, others, met = np.empty((3, RAYS), np.int64)
-    return Room(np.empty((6, RAYS)), rays, others, met, np.full(len(hollows), -1))
+    return Room(np.empty((6, RAYS)), rays, others, met, np.full(len(hollows), -1), np.empty(WORK))
 
 
 @inner
@@ -164,30 +172,59 @@ def cross_wedge(form, entry, angle, hits, vx, vy, turn):
         entry[i] = exit
 
 
-def _crossings() -> tuple[Late, Late]:
+def _crossings() -> tuple[Late, Late, Late]:
     form, work = np.empty(1), np.empty(1)
-    return Late(cross_wedge, (form, *[work] * 6)), Late(cross_arc, (form, *[work] * 5))
+    return (
+        Late(cross_wedge, (form, *[work] * 6)),
+        Late(cross_arc, (form, *[work] * 5)),
+        Late(cross_simple, (NO_TABLES, 0, 0, *[work] * 4)),
+    )
 
 
-WEDGES, ARCS = _crossings()
-# The slots of `cross_wedge` and `cross_arc`.
-CROSSINGS = WEDGES.slot, ARCS.slot
+WEDGES, ARCS, SIMPLE = _crossings()
+# The slots of `cross_wedge`, `cross_arc` and `cross_simple`; 0 in place of the last one leaves its hollows undecided.
+CROSSINGS = WEDGES.slot, ARCS.slot, SIMPLE.slot
 
 
 @inlined
 def cross(form, entry, angle, hits, room, crossings):
-    """Reflect rays by one hollow; ``room`` is work space."""
+    """Reflect rays by one hollow with a closed form; ``room`` is work space."""
     count = entry.shape[0]
-    wedge, arc = crossings
+    wedge, arc, _ = crossings
     address = address_at(wedge if form[FORM] == WEDGE else arc)
-    first, second = room[0, :count], room[1, :count]
+    first, second = room.numbers[0, :count], room.numbers[1, :count]
     if address == 0:
         for j in range(count):
             hits[j] = 0.0
     elif form[FORM] == WEDGE:
-        call_at(address, None, (form, entry, angle, hits, first, second, room[2, :count]))
+        call_at(address, None, (form, entry, angle, hits, first, second, room.numbers[2, :count]))
     else:
         call_at(address, None, (form, entry, angle, hits, first, second))
+
+
+@inlined
+def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
+    """Reflect rays by hollow number h: by its closed form if it has one, else in waves."""
+    if closed.shape[0] > 0 and closed[h, FORM] != NO_FORM:
+        cross(closed[h], entry, angle, hits, room, crossings)
+        return
+    _, _, simple = crossings
+    address = address_at(simple) if simple != 0 else 0
+    if address == 0:
+        for j in range(entry.shape[0]):
+            hits[j] = 0.0
+    else:
+        call_at(address, None, (tables, h, limit, entry, angle, hits, room.waves))
+
+
+@inlined
+def is_crossed(hollow, closed, h, crossings):
+    """-> bool: whether rays in hollow number h are not all left undecided."""
+    if closed.shape[0] > 0 and closed[h, FORM] != NO_FORM:
+        return True
+    _, _, simple = crossings
+    straight_or_circular = hollow[ELLIPSES_END] == hollow[FIRST_ELLIPSE] and hollow[BEZIERS_END] == hollow[FIRST_BEZIER]
+    return simple != 0 and straight_or_circular
 
 
 @inlined
@@ -197,27 +234,32 @@ def cell_of(x, cell):
 
 
 @compiled
-def trace_closed(x, theta, scene, limit, results, work, crossings):
+def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     """Trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
 
-    ``scene`` are the hollows, their closed forms, and the width of a cell. ``results`` are four arrays to fill: x,
-    theta, collisions, status. ``work`` is `room_for`, ``crossings`` is `CROSSINGS`.
+    ``closed`` are the closed forms, empty if no hollow has one. ``results`` are four arrays to fill: x, theta,
+    collisions, status. ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
     """
-    hollows, closed, cell = scene
+    hollows, cell = tables.hollows, tables.cell
     out_x, out_theta, bounces, status = results
-    room, rays, others, met, heads = work
-    whole = hollows.shape[0] == 1 and hollows[0, LEFT] == 0.0 and hollows[0, RIGHT] == cell
+    numbers, rays, others, met, heads, _ = room
+    whole = (
+        is_crossed(hollows[0], closed, 0, crossings)
+        and hollows.shape[0] == 1
+        and hollows[0, LEFT] == 0.0
+        and hollows[0, RIGHT] == cell
+    )
     for first in range(0, x.shape[0], RAYS):
         count = min(RAYS, x.shape[0] - first)
         starts = x[first : first + count]
         if whole:
             # a single hollow without flat tops: compute in the arrays of the results, without gathering
-            entry, angle, hits = out_x[first : first + count], out_theta[first : first + count], room[3, :count]
+            entry, angle, hits = out_x[first : first + count], out_theta[first : first + count], numbers[3, :count]
             for j in range(count):
                 entry[j] = starts[j] - cell_of(starts[j], cell)
             for j in range(count):
                 angle[j] = theta[first + j]
-            cross(closed[0], entry, angle, hits, room, crossings)
+            cross_hollow(tables, closed, 0, limit, entry, angle, hits, room, crossings)
             for j in range(count):
                 entry[j] += cell_of(starts[j], cell)
             for j in range(count):
@@ -230,7 +272,7 @@ def trace_closed(x, theta, scene, limit, results, work, crossings):
             h = opening_at(x[i] - cell_of(x[i], cell), hollows)
             if h == FLAT_TOP:
                 out_x[i], out_theta[i], bounces[i], status[i] = x[i], mirrored(theta[i]), 1, ESCAPED
-            elif h == TOP_CORNER or closed[h, FORM] == NO_FORM:
+            elif h == TOP_CORNER or not is_crossed(hollows[h], closed, h, crossings):
                 status[i] = UNDECIDED
             else:
                 if heads[h] < 0:
@@ -246,11 +288,11 @@ def trace_closed(x, theta, scene, limit, results, work, crossings):
                 rays[count] = first + j
                 count += 1
                 j = others[j]
-            entry, angle, hits = room[4, :count], room[5, :count], room[3, :count]
+            entry, angle, hits = numbers[4, :count], numbers[5, :count], numbers[3, :count]
             for j in range(count):
                 entry[j] = x[rays[j]] - cell_of(x[rays[j]], cell)
                 angle[j] = theta[rays[j]]
-            cross(closed[h], entry, angle, hits, room, crossings)
+            cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings)
             for j in range(count):
                 i = rays[j]
                 out_x[i], out_theta[i], bounces[i] = entry[j] + cell_of(x[i], cell), angle[j], int(hits[j])

@@ -8,27 +8,26 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scene.boxes import BOXES, CONTENT, PARENT
 from ...scene.columns import (
-    CELL_HEIGHT,
-    CELL_WIDTH,
     EDGE_X,
     EDGE_Y,
-    GRID_COLUMNS,
-    GRID_ROWS,
-    GRID_START,
-    GRID_X,
-    GRID_Y,
     IS_CORNER,
     JOINT_X,
     JOINT_Y,
     STARTS_LINE,
+    TREE_LEVELS,
+    TREE_ROOT,
 )
 from ...scene.tolerances import NEARBY_SLACKS
+from .lanes import boxes_met, first_bit, last_bit, lines_met
 from .options import inlined
 from .records import LINE
 
 # Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.
 LEAST_FRACTION = 5e-324
+# Mask of all boxes of a row.
+ALL_BOXES = (1 << BOXES) - 1
 
 
 @inlined
@@ -92,54 +91,82 @@ def nearest_line(scope, own, px, py, vx, vy, time):
 
 
 @inlined
-def nearest_line_in_grid(scope, own, px, py, vx, vy, time):
-    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the grid cells along the ray.
+def first_boxes(scope, px, py, vx, vy, least, most):
+    """-> walk: before the first leaf that a ray meets between two times.
 
-    Every cell lists all lines within a margin, so rounding in the grid traversal misses no line that the ray can meet.
-    The numbers c of the joints are the same in every cell.
+    A walk is the row of a node and its level, from 1 above the leaves; the mask of the boxes in the node still to
+    visit; and eight bits for each level, those masks of the nodes above.
     """
-    tables, hollow, slack = scope.tables, scope.hollow, scope.slack
-    joints, grid = tables.joints, tables.grid
-    close = NEARBY_SLACKS * slack
-    columns, rows, base = int(hollow[GRID_COLUMNS]), int(hollow[GRID_ROWS]), int(hollow[GRID_START])
-    x, y = (px - hollow[GRID_X]) / hollow[CELL_WIDTH], (py - hollow[GRID_Y]) / hollow[CELL_HEIGHT]
-    column, row = min(max(int(x), 0), columns - 1), min(max(int(y), 0), rows - 1)
-    right, up = 1 if vx > 0.0 else -1, 1 if vy > 0.0 else -1
-    step_x = hollow[CELL_WIDTH] / abs(vx) if vx != 0.0 else np.inf
-    step_y = hollow[CELL_HEIGHT] / abs(vy) if vy != 0.0 else np.inf
-    leave_x = ((column + 1 if vx > 0.0 else column) - x) * (hollow[CELL_WIDTH] / vx) if vx != 0.0 else np.inf
-    leave_y = ((row + 1 if vy > 0.0 else row) - y) * (hollow[CELL_HEIGHT] / vy) if vy != 0.0 else np.inf
+    root, levels = int(scope.hollow[TREE_ROOT]), int(scope.hollow[TREE_LEVELS])
+    return root, levels - 1, boxes_met(scope.tables.boxes, root, px, py, vx, vy, least, most), 0
+
+
+@inlined
+def next_leaf(scope, walk, forward, px, py, vx, vy, least, most):
+    """-> (leaf, walk): the row of the next leaf that a ray meets between two times, -1 after the last one.
+
+    Boxes are visited in the order of the wall, or against it if not ``forward``.
+    """
+    boxes, top = scope.tables.boxes, int(scope.hollow[TREE_LEVELS]) - 1
+    node, level, mask, waiting = walk
+    while True:
+        if mask == 0:
+            if level == top:
+                return -1, (node, level, mask, waiting)
+            node = int(boxes[node, PARENT])
+            level += 1
+            mask = waiting >> (BOXES * level) & ALL_BOXES
+            if mask != 0:
+                mask &= boxes_met(boxes, node, px, py, vx, vy, least, most)
+            continue
+        box = first_bit(mask) if forward else last_bit(mask)
+        mask ^= 1 << box
+        row = int(boxes[node, CONTENT]) + box
+        if level == 1:
+            return row, (node, level, mask, waiting)
+        place = BOXES * level
+        waiting = (waiting & ~(ALL_BOXES << place)) | (mask << place)
+        node = row
+        level -= 1
+        mask = boxes_met(boxes, node, px, py, vx, vy, least, most)
+
+
+@inlined
+def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
+    """-> (t, line, fraction, corner, nearby) as `nearest_line`, from the lines in the boxes along the ray."""
+    tables, slack = scope.tables, scope.slack
+    joints, boxes = tables.joints, tables.boxes
+    close, most = NEARBY_SLACKS * slack, time + 2.0 * slack
     best, found, best_fraction = np.inf, -1, 0.0
     corner_time, nearby = np.inf, False
+    walk = first_boxes(scope, px, py, vx, vy, -close, most)
     while True:
-        cell = base + row * columns + column
-        for entry in range(grid[cell], grid[cell + 1]):
-            j = grid[entry]
-            c_before, ahead = joint_side(joints, j, own, px, py, vx, vy, slack)
+        leaf, walk = next_leaf(scope, walk, vx > 0.0, px, py, vx, vy, -close, most)
+        if leaf < 0:
+            return best, found, best_fraction, corner_time, nearby
+        met = lines_met(boxes, leaf, px, py, vx, vy, slack)
+        first = int(boxes[leaf, CONTENT])
+        at_end, met = met >> BOXES, met & ALL_BOXES
+        while at_end != 0:
+            j = first + first_bit(at_end)
+            at_end &= at_end - 1
+            _, ahead = joint_side(joints, j, own, px, py, vx, vy, slack)
             corner_time = min(corner_time, ahead)
-            if joints[j, STARTS_LINE] <= 0.0:
-                # a joint where no line starts, listed because it may be a corner
+            if joints[j, STARTS_LINE] > 0.0:
+                _, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
+                corner_time = min(corner_time, ahead)
+        while met != 0:
+            j = first + first_bit(met)
+            met &= met - 1
+            if own.kind == LINE and j == own.number:
                 continue
-            c_after, ahead = joint_side(joints, j + 1, own, px, py, vx, vy, slack)
-            corner_time = min(corner_time, ahead)
-            if c_before >= 0.0 >= c_after and c_before > c_after and (own.kind != LINE or j != own.number):
-                t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
-                # of two lines at equal distance the first along the wall is hit, as without a grid
-                if t > close:
-                    if t < best or (t == best and j < found):
-                        best, found, best_fraction = t, j, fraction
-                elif t >= -close:
-                    nearby = True
-        if min(leave_x, leave_y) > min(best, time) + 2.0 * slack:
-            break
-        if leave_x < leave_y:
-            column += right
-            leave_x += step_x
-            if column < 0 or column >= columns:
-                break
-        else:
-            row += up
-            leave_y += step_y
-            if row < 0 or row >= rows:
-                break
-    return best, found, best_fraction, corner_time, nearby
+            c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
+            c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
+            t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
+            # of two lines at equal distance the first along the wall is hit, as without boxes
+            if t > close:
+                if t < best or (t == best and j < found):
+                    best, found, best_fraction = t, j, fraction
+                    most = min(best, time) + 2.0 * slack
+            elif t >= -close:
+                nearby = True

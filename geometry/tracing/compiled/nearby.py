@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scene.boxes import BOXES, CONTENT
 from ...scene.columns import (
     JOINT_X,
     JOINT_Y,
@@ -24,7 +25,7 @@ from ..double_double.sides import BEZIER as CURVE
 from ..double_double.sides import LINE as STRAIGHT
 from .arcs import arc_time, on_arc
 from .beziers import NO_BEZIER_HIT
-from .lines import line_time
+from .lines import first_boxes, line_time, next_leaf
 from .options import allocating, inner
 from .pointers import address_at, call_at
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
@@ -124,39 +125,52 @@ def piece_nearby(scope, piece, own, px, py, vx, vy):
 
 
 @allocating
+def nearer(scope, found, piece, own, px, py, vx, vy):
+    """-> Hit: the earlier of a hit and of that on a nearby piece, given by kind and row, if the ray starts in front."""
+    tables, slack = scope.tables, scope.slack
+    kind, number = piece
+    t, s, tangent, is_clear = piece_nearby(scope, piece, own, px, py, vx, vy)
+    if not t < found.time:
+        return found
+    from_piece = own.kind not in (OPENING, SIDE)
+    hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else DOUBTFUL)
+    # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
+    if is_clear or not from_piece:
+        return hit
+    both_lines = kind == LINE and own.kind == LINE
+    address = address_at(scope.slots.line_in_front if both_lines else scope.slots.in_front)
+    if address == 0:
+        return Hit(0.0, kind, number, s, DOUBTFUL)
+    if both_lines:
+        is_front = call_at(address, is_clear, (tables.joints, number, own, px, py, vx, vy, slack))
+    else:
+        is_front = call_at(address, is_clear, (tables, hit, own, px, py, vx, vy, slack))
+    return hit if is_front else found
+
+
+@allocating
 def hit_nearby(scope, own, px, py, vx, vy):
     """-> Hit: the first hit on nearby pieces with the ray's start on their front side.
 
     The hit is DOUBTFUL if the gap between start and piece is within the slack, as in the apex of a wedge: double
     precision does not determine how the ray continues.
     """
-    tables, slack = scope.tables, scope.slack
-    from_piece = own.kind not in (OPENING, SIDE)
     found = Hit(np.inf, NO_PIECE, -1, 0.0, 0)
-    first_joint, joints_end = scope.joints
-    for kind, (first, end) in (
-        (LINE, (first_joint, joints_end - 1)),
-        (CIRCLE, scope.circles),
-        (ELLIPSE, scope.ellipses),
-        (BEZIER, scope.beziers),
-    ):
+    first, end = scope.joints
+    if scope.has_tree:
+        close = NEARBY_SLACKS * scope.slack
+        walk = first_boxes(scope, px, py, vx, vy, -close, close)
+        while True:
+            leaf, walk = next_leaf(scope, walk, True, px, py, vx, vy, -close, close)
+            if leaf < 0:
+                break
+            start = int(scope.tables.boxes[leaf, CONTENT])
+            for number in range(start, min(start + BOXES, end - 1)):
+                found = nearer(scope, found, (LINE, number), own, px, py, vx, vy)
+    else:
+        for number in range(first, end - 1):
+            found = nearer(scope, found, (LINE, number), own, px, py, vx, vy)
+    for kind, (first, end) in ((CIRCLE, scope.circles), (ELLIPSE, scope.ellipses), (BEZIER, scope.beziers)):
         for number in range(first, end):
-            t, s, tangent, is_clear = piece_nearby(scope, (kind, number), own, px, py, vx, vy)
-            if t < found.time:
-                hit = Hit(max(t, 0.0), kind, number, s, tangent if is_clear or not from_piece else DOUBTFUL)
-                # no piece lies above the opening or beyond a side, so a piece within rounding of them is hit there
-                if is_clear or not from_piece:
-                    found = hit
-                    continue
-                both_lines = kind == LINE and own.kind == LINE
-                address = address_at(scope.slots.line_in_front if both_lines else scope.slots.in_front)
-                if address == 0:
-                    return Hit(hit.time, kind, number, s, DOUBTFUL)
-                if both_lines:
-                    arguments = tables.joints, number, own, px, py, vx, vy, slack
-                    is_front = call_at(address, is_clear, arguments)
-                else:
-                    is_front = call_at(address, is_clear, (tables, hit, own, px, py, vx, vy, slack))
-                if is_front:
-                    found = hit
+            found = nearer(scope, found, (kind, number), own, px, py, vx, vy)
     return found

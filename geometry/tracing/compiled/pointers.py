@@ -1,4 +1,4 @@
-"""Calls of compiled functions by their address. Loads numba.
+"""Calls of compiled functions by their address, and the flag that ends a long one. Loads numba.
 
 numba copies all called functions into a function and optimises them again, at every level. A large function that is
 called from many places, or seldom, is compiled once instead and called by its address. A function that few walls need
@@ -16,6 +16,8 @@ from llvmlite import ir
 from numba import typeof, types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from ....core.compilation import is_stored
 
 Result = TypeVar("Result")
 
@@ -44,7 +46,19 @@ class Late:
         self._function, self._arguments = function, arguments
         self._callback = ctypes.CFUNCTYPE(ctypes.c_int64)(self.load)
         self._words = np.array([0, ctypes.cast(self._callback, ctypes.c_void_p).value], np.int64)
+        self._uses, self._stored = 0, False
         self.slot = int(self._words.ctypes.data)
+
+    def is_worth(self, uses: int, enough: int) -> bool:
+        """Return whether to call the function ``uses`` times: once it is loaded, stored, or wanted ``enough`` times.
+
+        So no compilation takes longer than the work for which the function is wanted.
+        """
+        self._uses += uses
+        if self._words[0] == 0 and self._uses < enough and not self._stored:
+            kinds = tuple(typeof(argument) for argument in self._arguments)
+            self._stored = is_stored(self._function, kinds)
+        return bool(self._words[0] != 0 or self._stored or self._uses >= enough)
 
     def load(self) -> int:
         """Compile or load the function now; return its address, 0 if that failed."""
@@ -98,3 +112,18 @@ def call_at(context, address, result, arguments):
         return value
 
     return result(types.intp, result, arguments), call
+
+
+@intrinsic
+def is_raised(context, flag):
+    """Whether the first number of an array of integers is not 0, read from memory at every call.
+
+    The compiler would move an ordinary read out of a loop that does not write to the array.
+    """
+
+    def read(context, builder, signature, arguments):
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        number = builder.load_atomic(array.data, "monotonic", 8)
+        return builder.icmp_signed("!=", number, number.type(0))
+
+    return types.boolean(flag), read

@@ -29,7 +29,6 @@ from ...scene.columns import (
     FIRST_ELLIPSE,
     FIRST_JOINT,
     FIRST_PAIR,
-    GRID_COLUMNS,
     IS_CORNER,
     JOINT_X,
     JOINT_Y,
@@ -49,16 +48,16 @@ from ...scene.columns import (
     RUN_SINE,
     SIZE,
     STRETCH,
+    TREE_LEVELS,
 )
 from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
 from .arcs import arc_incidence, arc_reflect, arc_time, near_end, on_arc_after
 from .beziers import NO_BEZIER_HIT, bend_number, bezier_reflect, nearest_bezier
-from .interruption import is_raised
-from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_grid
+from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_boxes
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined
-from .pointers import Late, address_at, address_of, call_at
+from .pointers import Late, address_at, address_of, call_at, is_raised
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit, Own, Scope, Slots, results_for
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, mirrored, sine_cosine
@@ -113,7 +112,7 @@ def scope_of(tables, h, slots):
         (int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])),
         (int(hollow[FIRST_ELLIPSE]), int(hollow[ELLIPSES_END])),
         (int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])),
-        hollow[GRID_COLUMNS] > 0.0,
+        hollow[TREE_LEVELS] > 0.0,
         slots,
     )
 
@@ -159,8 +158,8 @@ def nearest_curve(scope, own, px, py, vx, vy):
 def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
     hit, nearby = nearest_curve(scope, own, px, py, vx, vy)
-    if scope.has_grid:
-        t, line, fraction, corner, near = nearest_line_in_grid(scope, own, px, py, vx, vy, hit.time)
+    if scope.has_tree:
+        t, line, fraction, corner, near = nearest_line_in_boxes(scope, own, px, py, vx, vy, hit.time)
     else:
         t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:

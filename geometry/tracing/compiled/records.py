@@ -31,7 +31,7 @@ class Scope(NamedTuple):
 
     The tables of the wall, the row of the hollow, the ends of its opening, and the slack: double precision does not
     resolve hits within the slack of a joint. Then the ranges of the hollow's joints and pieces in the tables, whether
-    its lines have a grid, and the slots of late functions.
+    its lines have a tree, and the slots of late functions.
     """
 
     tables: Tables
@@ -43,7 +43,7 @@ class Scope(NamedTuple):
     circles: tuple[int, int]
     ellipses: tuple[int, int]
     beziers: tuple[int, int]
-    has_grid: bool
+    has_tree: bool
     slots: Slots
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.checks import Floats
 from ..core.tables import table
 from ..geometry import Trace, trace
-from ..geometry.scene.ablations import without_formulas, without_grid, without_pairs, without_runs
+from ..geometry.scene.ablations import without_boxes, without_formulas, without_pairs, without_runs
 from ..geometry.scene.scene import Scene, scene_in_one
 from ..kernels import KernelMatrix, Legendre, PolygonLaw, WallLaw, discretise
 from ..kernels.discretisation.method import Budget
@@ -115,8 +115,8 @@ def savings_of(name: str, rays: int = RAYS, repeats: int = REPEATS) -> list[Savi
     if plan.arcs_with_runs:
         traced(f"runs on {plan.arcs_with_runs} arcs", followed, without_runs(followed))
     if plan.hollows_with_grid:
-        what = f"pieces off the way, by a grid in {plan.hollows_with_grid} hollows"
-        traced(what, followed, without_grid(followed))
+        what = f"pieces off the way, by boxes in {plan.hollows_with_grid} hollows"
+        traced(what, followed, without_boxes(followed))
     if plan.pieces_left_out or plan.hollows > 1:
         what = f"{plan.pieces_left_out} flat tops and {plan.hollows - 1} other hollows"
         traced(what, followed, without_formulas(scene_in_one(wall)))
@@ -272,7 +272,7 @@ def plan_words(wall: Wall) -> str:
     if any(runs.values()):
         words.append("runs of hits on " + ", ".join(f"{number} {what}" for what, number in runs.items() if number))
     if plan.hollows_with_grid:
-        words.append(f"{plan.hollows_with_grid} grids")
+        words.append(f"{plan.hollows_with_grid} trees of boxes")
     if plan.mirror_symmetric:
         words.append("mirror-symmetric: half of the angles give the other half")
     return "; ".join(words)

@@ -151,3 +151,15 @@ class _SafeCache(FunctionCache):
         logger.info("a damaged file of compiled functions in %s is made again (%r)", self.cache_path, reason)
         with suppress(OSError):
             self.flush()
+
+
+def is_stored(function: Any, kinds: tuple[Any, ...]) -> bool:
+    """Return whether a function compiled for arguments of these numba types is on disk."""
+    cache = function._cache
+    if not isinstance(cache, _SafeCache):
+        return False
+    try:
+        return cache._index_key(kinds, function.targetctx.codegen()) in cache._cache_file._load_index()
+    # a damaged index can raise anything
+    except Exception:
+        return False

@@ -1,0 +1,124 @@
+"""Bounces a second on walls of all kinds, and the first rays of a large profile (python -m benchmarks.rays).
+
+Times are processor seconds, the least of the repeats, so that other processes disturb them less; two threads are timed
+by the clock, alternately with one. ``--profile`` measures only the profile of 200,000 points.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from asperity import geometry as geo
+from asperity.core.tables import table
+
+RAYS, REPEATS = 2**18, 5
+LARGE_PROFILE, FIRST_RAYS = 200_000, 10**6
+# Of the random profiles: exponent of the amplitudes, fraction of the wave numbers that are present, mean slope.
+DECAY, SMOOTHED, SLOPE = 1.3, 0.125, 0.5
+
+
+def profile_of(points: int) -> geo.Wall:
+    """A random profile and its mirror image."""
+    rng = np.random.default_rng(3)
+    waves = np.arange(1, points // 2)
+    spectrum = np.zeros(points // 2 + 1, complex)
+    spectrum[1 : points // 2] = waves**-DECAY * np.exp(
+        2j * np.pi * rng.random(len(waves)) - (waves / (SMOOTHED * points)) ** 2
+    )
+    heights = np.fft.irfft(spectrum, points)
+    slope = np.sqrt(np.mean((np.diff(heights) * points) ** 2))
+    return geo.Wall.from_profile(np.arange(points) / (points - 1.0), heights * SLOPE / slope)
+
+
+def wall_of_arcs() -> geo.Wall:
+    """A valley of six arcs, focusing and dispersing in turn."""
+    points = np.array([(0, 0), (0.15, -0.25), (0.35, -0.4), (0.5, -0.5), (0.7, -0.35), (0.85, -0.3), (1, 0)])
+    pieces = []
+    for k, (start, end) in enumerate(pairwise(points)):
+        half, side = (0.4, 1.0) if k % 2 else (0.5, -1.0)
+        edge = end - start
+        radius = 0.5 * np.hypot(*edge) / np.sin(half)
+        to_centre = side * np.array([-edge[1], edge[0]]) / np.hypot(*edge)
+        middle = np.arctan2(-to_centre[1], -to_centre[0])
+        centre = 0.5 * (start + end) + radius * np.cos(half) * to_centre
+        pieces.append(geo.Arc(centre, radius, middle - side * half, middle + side * half))
+    return geo.Wall(pieces)
+
+
+WALLS: dict[str, Callable[[], geo.Wall]] = {
+    "triangular teeth (2 lines)": lambda: geo.triangular_teeth(0.7),
+    "focusing arc (1 arc)": lambda: geo.focusing_arcs(1.2),
+    "mushroom (6 lines, 1 arc)": lambda: geo.mushrooms(0.3, 0.5),
+    "Koch 4 (256 lines)": lambda: geo.koch(4),
+    "dispersing arcs": lambda: geo.dispersing_arcs(1.0),
+    "valley of 6 arcs": wall_of_arcs,
+    "double parabola (Bezier)": geo.double_parabola,
+    "32 Bezier pieces": lambda: geo.random_wall(geo.HeightCorrelation(0.1), 32, rms_slope=0.5, smooth=True, rng=3),
+    "profile, 1,000 lines": lambda: profile_of(501),
+    "profile, 10^5 lines": lambda: profile_of(50_001),
+}
+
+
+def random_rays(wall: geo.Wall, rays: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rays with uniform entries and uniform cosines."""
+    rng = np.random.default_rng(0)
+    return rng.random(rays) * wall.period, np.arccos(1.0 - 2.0 * rng.random(rays))
+
+
+def timed(clock: Callable[[], float], call: Callable[[], Any]) -> tuple[Any, float]:
+    """The result, and the time by a clock."""
+    begin = clock()
+    result = call()
+    return result, clock() - begin
+
+
+def bounce_rows() -> list[str]:
+    """A row for each wall."""
+    rows = []
+    for name, make in WALLS.items():
+        wall = make()
+        x, theta = random_rays(wall, RAYS)
+        times: list[tuple[float, float, float]] = []
+        for _ in range(REPEATS):
+            traced, work = timed(time.process_time, lambda: geo.trace(wall, x, theta, threads=1))  # noqa: B023
+            _, one = timed(time.perf_counter, lambda: geo.trace(wall, x, theta, threads=1))  # noqa: B023
+            _, two = timed(time.perf_counter, lambda: geo.trace(wall, x, theta, threads=2))  # noqa: B023
+            times.append((work, one, two))
+        work, one, two = np.min(times, axis=0)
+        bounces = traced.collisions.sum()
+        rows.append(
+            f"{name} | {bounces / RAYS:.2f} | {bounces / work / 1e6:.2f} | {1e9 * work / RAYS:.0f} | {one / two:.2f}"
+        )
+    return rows
+
+
+def profile_row() -> str:
+    """Processor seconds of the steps to the first rays of a large profile."""
+    wall, made = timed(time.process_time, lambda: profile_of(LARGE_PROFILE))
+    _, tables = timed(time.process_time, lambda: wall.scene)
+    x, theta = random_rays(wall, FIRST_RAYS)
+    _, traced = timed(time.process_time, lambda: geo.trace(wall, x, theta))
+    return f"{LARGE_PROFILE:,} | {made:.2f} | {tables:.2f} | {traced:.2f} | {made + tables + traced:.2f}"
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.rays", description=__doc__)
+    parser.add_argument("--profile", action="store_true", help="only the profile of 200,000 points")
+    if not parser.parse_args().profile:
+        from asperity.geometry.tracing.compiled.closed_forms import SIMPLE
+
+        SIMPLE.load()
+        print(table("wall | bounces a ray | million bounces/s | ns a ray | two threads", iter(bounce_rows())))
+        print()
+    print(table("points | wall, s | tables, s | first 10^6 rays, s | in all, s", iter([profile_row()])))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,444 @@
+"""Vectors of eight numbers in compiled code: eight boxes or lines against a ray, or eight rays against a piece.
+
+Loads numba, whose compiler does not vectorise such loops by itself. Every number is computed by the same operations as
+by `lines`, `arcs` and `rays`, so with the same rounding. Comparisons with NaN, as in an empty place, are false.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from ....core.rounding import EPS
+from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, OTHER_X, OTHER_Y
+from ...scene.tolerances import TANGENT_ULPS
+
+WORD, NUMBER, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
+LANES = ir.VectorType(NUMBER, BOXES)
+
+
+class _Lanes:
+    """A vector of eight numbers or truth values in compiled code, with the operations of arithmetic."""
+
+    def __init__(self, builder: Any, value: Any) -> None:
+        self.builder, self.value = builder, value
+
+    def _with(self, other: Any, operation: str) -> _Lanes:
+        other = other if isinstance(other, _Lanes) else constant(self.builder, other)
+        return _Lanes(self.builder, getattr(self.builder, operation)(self.value, other.value))
+
+    def __add__(self, other: Any) -> _Lanes:
+        return self._with(other, "fadd")
+
+    def __sub__(self, other: Any) -> _Lanes:
+        return self._with(other, "fsub")
+
+    def __mul__(self, other: Any) -> _Lanes:
+        return self._with(other, "fmul")
+
+    def __truediv__(self, other: Any) -> _Lanes:
+        return self._with(other, "fdiv")
+
+    def __neg__(self) -> _Lanes:
+        return _Lanes(self.builder, self.builder.fneg(self.value))
+
+    def __abs__(self) -> _Lanes:
+        return self._call("fabs")
+
+    def __and__(self, other: _Lanes) -> _Lanes:
+        return self._with(other, "and_")
+
+    def __or__(self, other: _Lanes) -> _Lanes:
+        return self._with(other, "or_")
+
+    def __invert__(self) -> _Lanes:
+        return _Lanes(self.builder, self.builder.not_(self.value))
+
+    def __ge__(self, other: Any) -> _Lanes:
+        return self._compared(">=", other)
+
+    def __gt__(self, other: Any) -> _Lanes:
+        return self._compared(">", other)
+
+    def __le__(self, other: Any) -> _Lanes:
+        return self._compared("<=", other)
+
+    def __lt__(self, other: Any) -> _Lanes:
+        return self._compared("<", other)
+
+    def equals(self, other: Any) -> _Lanes:
+        return self._compared("==", other)
+
+    def root(self) -> _Lanes:
+        return self._call("sqrt")
+
+    def where(self, yes: _Lanes, no: _Lanes) -> _Lanes:
+        return _Lanes(self.builder, self.builder.select(self.value, yes.value, no.value))
+
+    def any(self) -> Any:
+        """Return a condition of the compiled code for its branches."""
+        return self.builder.icmp_unsigned("!=", self.mask(), WORD(0))
+
+    def mask(self) -> Any:
+        return self.builder.zext(self.builder.bitcast(self.value, ir.IntType(BOXES)), WORD)
+
+    def _compared(self, how: str, other: Any) -> _Lanes:
+        other = other if isinstance(other, _Lanes) else constant(self.builder, other)
+        return _Lanes(self.builder, self.builder.fcmp_ordered(how, self.value, other.value))
+
+    def _call(self, name: str) -> _Lanes:
+        kind = ir.FunctionType(LANES, [LANES])
+        function = self.builder.module.declare_intrinsic(f"llvm.{name}.v{BOXES}f64", (), kind)
+        return _Lanes(self.builder, self.builder.call(function, [self.value]))
+
+
+def repeated(builder: Any, number: Any) -> _Lanes:
+    """Return a number of the compiled code in all lanes."""
+    index = ir.IntType(32)
+    one = builder.insert_element(ir.Constant(LANES, ir.Undefined), number, index(0))
+    return _Lanes(builder, builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(index, BOXES), [0] * BOXES)))
+
+
+def constant(builder: Any, number: float) -> _Lanes:
+    """Return a known number in all lanes."""
+    return repeated(builder, NUMBER(number))
+
+
+class _Table:
+    """The vectors that begin at a place of an array of numbers: at ``row`` of a table, or at a column of work space."""
+
+    def __init__(self, context: Any, builder: Any, kind: Any, table: Any) -> None:
+        self._array = context.make_array(kind)(context, builder, table)
+        self.builder = builder
+
+    def row(self, number: Any) -> _Table:
+        stride = cgutils.unpack_tuple(self.builder, self._array.strides)[0]
+        start = self.builder.add(self.builder.ptrtoint(self._array.data, WORD), self.builder.mul(number, stride))
+        self._start = self.builder.inttoptr(start, NUMBER.as_pointer())
+        return self
+
+    def column(self, number: Any) -> _Table:
+        self._start = self.builder.gep(self._array.data, [number])
+        return self
+
+    def __getitem__(self, place: int) -> _Lanes:
+        return _Lanes(self.builder, self.builder.load(self._at(place), align=8))
+
+    def __setitem__(self, place: int, value: _Lanes) -> None:
+        self.builder.store(value.value, self._at(place), align=8)
+
+    def pack(self, place: int, value: _Lanes, chosen: _Lanes) -> None:
+        """Store the chosen lanes one after the other."""
+        start = self.builder.gep(self._start, [WORD(place)])
+        bits = ir.VectorType(BIT, BOXES)
+        kind = ir.FunctionType(ir.VoidType(), [LANES, NUMBER.as_pointer(), bits])
+        store = self.builder.module.declare_intrinsic(f"llvm.masked.compressstore.v{BOXES}f64", (), kind)
+        self.builder.call(store, [value.value, start, chosen.value])
+
+    def _at(self, place: int) -> Any:
+        return self.builder.bitcast(self.builder.gep(self._start, [WORD(place)]), LANES.as_pointer())
+
+
+def cross(ax: _Lanes, ay: _Lanes, bx: _Lanes, by: _Lanes) -> _Lanes:
+    """Return the cross product."""
+    return ax * by - ay * bx
+
+
+def dot(ax: _Lanes, ay: _Lanes, bx: _Lanes, by: _Lanes) -> _Lanes:
+    """Return the dot product."""
+    return ax * bx + ay * by
+
+
+@intrinsic
+def boxes_met(typing, table, row, px, py, vx, vy, least, most):
+    """-> int: mask of the boxes in a row of a tree that a ray meets between the times ``least`` and ``most``.
+
+    Bit k tells about box k.
+    """
+
+    def met(context, builder, signature, values):
+        at = _Table(context, builder, signature.args[0], values[0]).row(values[1])
+        px, py, vx, vy, least, most = (repeated(builder, value) for value in values[2:])
+        dx, dy, width, height = at[ANCHOR_X] - px, at[ANCHOR_Y] - py, at[OTHER_X], at[OTHER_Y]
+        # of the middle: its distance from the ray's line and its position along it; and those of the box about it
+        middle, along = abs(cross(dx, dy, vx, vy)), dot(dx, dy, vx, vy)
+        reach, length = dot(width, height, abs(vy), abs(vx)), dot(width, height, abs(vx), abs(vy))
+        return ((middle <= reach) & (along + length >= least) & (along - length <= most)).mask()
+
+    return types.int64(table, types.int64, *[types.float64] * 6), met
+
+
+@intrinsic
+def lines_met(typing, table, row, px, py, vx, vy, slack):
+    """-> int: mask of the lines in a row of a tree that a ray's line crosses from their free side.
+
+    Bits 8 to 15 tell whether an end of the line is within the slack of the ray's line.
+    """
+
+    def met(context, builder, signature, values):
+        at = _Table(context, builder, signature.args[0], values[0]).row(values[1])
+        px, py, vx, vy, slack = (repeated(builder, value) for value in values[2:])
+        before = cross(at[ANCHOR_X] - px, at[ANCHOR_Y] - py, vx, vy)
+        after = cross(at[OTHER_X] - px, at[OTHER_Y] - py, vx, vy)
+        crossed = (before >= 0.0) & (after <= 0.0) & (before > after)
+        at_end = (abs(before) <= slack) | (abs(after) <= slack)
+        return builder.or_(crossed.mask(), builder.shl(at_end.mask(), WORD(BOXES)))
+
+    return types.int64(table, types.int64, *[types.float64] * 5), met
+
+
+@intrinsic
+def first_bit(typing, mask):
+    """-> int: the number of the lowest bit of a mask that is not 0."""
+
+    def count(context, builder, signature, values):
+        return builder.cttz(values[0], BIT(1))
+
+    return types.int64(types.int64), count
+
+
+@intrinsic
+def last_bit(typing, mask):
+    """-> int: the number of the highest bit of a mask that is not 0."""
+
+    def count(context, builder, signature, values):
+        return builder.sub(WORD(63), builder.ctlz(values[0], BIT(1)))
+
+    return types.int64(types.int64), count
+
+
+# Rays of a wave, and the columns of its work space where the numbers of these rays begin: eight more fit in.
+WAVE = 512
+ROOM = WAVE + BOXES
+PX, PY, VX, VY, OWN, BEFORE, BOUNCES, RAY = (ROOM * k for k in range(8))
+TIME, PIECE, HIT_X, HIT_Y, FACE_X, FACE_Y, UNCERTAIN, DOUBT = (ROOM * k for k in range(8, 16))
+OUT_X, OUT_VX, OUT_VY, OUT_BOUNCES, OUT_RAY, OUT_ANGLE = (ROOM * k for k in range(16, 22))
+WORK = ROOM * 22
+# Values of UNCERTAIN.
+BEFORE_RUN, AT_CORNER = 1.0, 2.0
+# Numbers of pieces in OWN, PIECE and BEFORE: of lines their rows, of the opening -1; -2 for no line;
+# circle k has -3 - k.
+NO_PIECE, NO_LINE, CIRCLE_NUMBERS = -1.0, -2.0, -3.0
+
+
+class _Ray:
+    """Eight rays of a wave, and the nearest hits so far."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, values: Any) -> None:
+        self.at = _Table(context, builder, signature.args[0], values[0]).column(values[1])
+        self.px, self.py, self.vx, self.vy = self.at[PX], self.at[PY], self.at[VX], self.at[VY]
+        self.own = self.at[OWN]
+
+    def doubt(self, doubtful: _Lanes) -> None:
+        builder = self.at.builder
+        with builder.if_then(doubtful.any(), likely=False):
+            self.at[DOUBT] = doubtful.where(constant(builder, 1.0), self.at[DOUBT])
+
+    def hit(
+        self,
+        nearer: _Lanes,
+        piece: _Lanes,
+        time: _Lanes,
+        place: Any,
+        normal: Any,
+        at_corner: _Lanes,
+        before_run: _Lanes,
+    ) -> None:
+        builder = self.at.builder
+        flag = before_run.where(constant(builder, BEFORE_RUN), constant(builder, 0.0))
+        flag = at_corner.where(constant(builder, AT_CORNER), flag)
+        new = {TIME: time, PIECE: piece, HIT_X: place[0], HIT_Y: place[1], UNCERTAIN: flag}
+        for column, value in {**new, FACE_X: normal[0], FACE_Y: normal[1]}.items():
+            self.at[column] = nearer.where(value, self.at[column])
+
+
+@intrinsic
+def clear_hits(typing, work, first):
+    """Begin the search of the nearest hits of eight rays."""
+
+    def clear(context, builder, signature, values):
+        at = _Table(context, builder, signature.args[0], values[0]).column(values[1])
+        at[TIME] = constant(builder, float("inf"))
+        at[DOUBT] = constant(builder, 0.0)
+        return context.get_dummy_value()
+
+    return types.void(work, types.int64), clear
+
+
+@intrinsic
+def meet_corner(typing, work, first, x, y, slack):
+    """Doubt those of eight rays that meet a corner."""
+
+    def meet(context, builder, signature, values):
+        ray = _Ray(context, builder, signature, values)
+        x, y, slack = (repeated(builder, value) for value in values[2:])
+        doubt_at_corner(ray, x - ray.px, y - ray.py, slack)
+        return context.get_dummy_value()
+
+    return types.void(work, types.int64, *[types.float64] * 3), meet
+
+
+def doubt_at_corner(ray: _Ray, dx: _Lanes, dy: _Lanes, slack: _Lanes) -> _Lanes:
+    """Doubt rays that meet the corner at (dx, dy) from them; return its side of the rays."""
+    side = cross(dx, dy, ray.vx, ray.vy)
+    near = abs(side) <= slack
+    with ray.at.builder.if_then(near.any(), likely=False):
+        # at entry the corners of the opening are behind the ray
+        behind = ray.own.equals(NO_PIECE) & dy.equals(0.0)
+        ray.doubt(near & (dot(dx, dy, ray.vx, ray.vy) > slack) & ~behind)
+    return side
+
+
+@intrinsic
+def meet_line(typing, work, first, start, end, edge, normal, length, close, numbers):
+    """Find the hits of eight rays on a line that are nearer.
+
+    ``start`` and ``end`` are joints (x, y, slack), where the slack is negative if the joint is no corner; a hit before
+    the time ``close`` is in doubt. ``numbers`` are that of the line, and the
+    same if runs of hits begin on it, else `NO_LINE`.
+    """
+
+    def meet(context, builder, signature, values):
+        ray = _Ray(context, builder, signature, values)
+        parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, value)] for value in values[2:6]]
+        (x0, y0, corner0), (x1, y1, corner1), (edge_x, edge_y), normal = parts
+        length = repeated(builder, values[6])
+        close = repeated(builder, values[7])
+        number, with_runs = (repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[8]))
+        before = doubt_at_corner(ray, x0 - ray.px, y0 - ray.py, corner0)
+        after = cross(x1 - ray.px, y1 - ray.py, ray.vx, ray.vy)
+        crossed = (before >= 0.0) & (after <= 0.0) & (before > after) & ~ray.own.equals(number)
+        with builder.if_then(crossed.any()):
+            across = before - after
+            late = before > across * 0.5
+            fraction = late.where(after, before) / across
+            x, y = late.where(x1, x0) + fraction * edge_x, late.where(y1, y0) + fraction * edge_y
+            time = dot(x - ray.px, y - ray.py, ray.vx, ray.vy)
+            ray.doubt(crossed & (abs(time) <= close))
+            at_corner = abs(fraction) * length <= late.where(corner1, corner0)
+            nearer = crossed & (time > close) & (time < ray.at[TIME])
+            ray.hit(nearer, number, time, (x, y), normal, at_corner, ray.at[BEFORE].equals(with_runs))
+        return context.get_dummy_value()
+
+    number = types.float64
+    three, two = types.UniTuple(number, 3), types.UniTuple(number, 2)
+    return types.void(work, types.int64, three, three, two, two, number, number, two), meet
+
+
+@intrinsic
+def meet_circle(typing, work, first, ends, normal, curvature, chord, sines, slacks, number):
+    """Find the hits of eight rays on a circular arc that are nearer, as `arcs` does for one ray.
+
+    ``ends`` are the start and the end of the arc, ``chord`` the direction and SHORT_CHORD; the one sine is that below
+    which a run may begin. ``slacks`` are the slack, those of the two ends, negative where there is no corner, and the
+    time within which a hit is in doubt.
+    """
+
+    def meet(context, builder, signature, values):
+        ray = _Ray(context, builder, signature, values)
+        px, py, vx, vy = ray.px, ray.py, ray.vx, ray.vy
+        parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[k])] for k in (2, 3, 5, 7)]
+        (x0, y0, x1, y1), (nx, ny), (chord_x, chord_y, short), (slack, slack0, slack1, close) = parts
+        k, run_sine, number = (repeated(builder, values[k]) for k in (4, 6, 8))
+        zero, focusing = constant(builder, 0.0), k > 0.0
+        rx, ry = px - x0, py - y0
+        b = dot(nx, ny, vx, vy) - k * dot(rx, ry, vx, vy)
+        speed2 = dot(vx, vy, vx, vy)
+        f = dot(nx, ny, rx, ry) - k * 0.5 * dot(rx, ry, rx, ry)
+        d = b * b + k * 2.0 * speed2 * f
+        own = ray.own.equals(number)
+        ray.doubt(~focusing & ~own & (b < 0.0) & (abs(d) <= b * (TANGENT_ULPS * EPS) * b))
+        root, far = d.root(), focusing & (b >= 0.0)
+        top = own.where(b * 2.0, far.where(b + root, f * 2.0))
+        time = top / (own | far).where(k * speed2, root - b)
+        forward = own.where(b, constant(builder, -1.0))
+        possible = (own & focusing & (forward > 0.0)) | (~own & (d >= 0.0) & (focusing | (b < 0.0)))
+        ray.doubt(possible & ~own & (abs(time) <= close))
+        qx, qy = px + time * vx - x0, py + time * vy - y0
+        mx, my = nx - k * qx, ny - k * qy
+        along, height = dot(qx, qy, chord_x, chord_y), cross(qy, qx, chord_y, chord_x)
+        on_short = (along >= -slack) & (along <= short + slack) & (cross(my, mx, chord_y, chord_x) > 0.0)
+        on_long = (focusing & (height <= slack)) | (~focusing & (height >= -slack))
+        is_short = short > 0.0
+        on_arc = (is_short & on_short) | (~is_short & on_long)
+        nearer = possible & on_arc & (time >= 0.0) & (time < ray.at[TIME])
+        with builder.if_then(nearer.any()):
+            # one Newton step puts the point back on the arc
+            f = dot(nx, ny, qx, qy) - k * 0.5 * dot(qx, qy, qx, qy)
+            qx, qy = qx - f * mx, qy - f * my
+            mx, my = nx - k * qx, ny - k * qy
+            scale = constant(builder, 1.0) / dot(mx, my, mx, my).root()
+            mx, my, x, y = mx * scale, my * scale, x0 + qx, y0 + qy
+            from_start, from_end = dot(x - x0, y - y0, x - x0, y - y0), dot(x - x1, y - y1, x - x1, y - y1)
+            at_end = ((slack0 > 0.0) & (from_start <= slack0 * slack0)) | (
+                (slack1 > 0.0) & (from_end <= slack1 * slack1)
+            )
+            begins_run = (run_sine > zero) & (abs(dot(vx, vy, mx, my)) <= run_sine)
+            ray.hit(nearer, number, time, (x, y), (mx, my), at_end, begins_run)
+        return context.get_dummy_value()
+
+    number_, pairs = types.float64, types.UniTuple
+    four, three, two = (pairs(number_, size) for size in (4, 3, 2))
+    return types.void(work, types.int64, four, two, number_, three, number_, four, number_), meet
+
+
+@intrinsic
+def advance(typing, work, first, count, kept, left_out, opening, slack, limit):
+    """-> int: let eight rays leave through the opening, or reflect them at their hits, and pack those that go on.
+
+    ``count`` is the number of rays of the wave; ``kept`` and ``left_out``, where rays that go on and rays that have
+    left are written. Rays in doubt, or with ``limit`` hits, are dropped. The result is the number of rays that go on,
+    plus 256 times that of rays that have left.
+    """
+
+    def move(context, builder, signature, values):
+        ray = _Ray(context, builder, signature, values)
+        at, px, py, vx, vy = ray.at, ray.px, ray.py, ray.vx, ray.vy
+        rest = repeated(builder, builder.sitofp(builder.sub(values[2], values[1]), NUMBER))
+        left, right = (repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[5]))
+        slack, limit = repeated(builder, values[6]), repeated(builder, values[7])
+        lane = _Lanes(builder, ir.Constant(LANES, [float(k) for k in range(BOXES)]))
+        time, bounces, own, zero = at[TIME], at[BOUNCES], at[OWN], constant(builder, 0.0)
+        certain = (lane < rest) & at[DOUBT].equals(0.0)
+        to_right, to_left = dot(right - px, py, vy, vx), dot(left - px, py, vy, vx)
+        upward = -py / vy
+        upward = (upward > 0.0).where(upward, zero)
+        leaves = (vy > 0.0) & (to_right >= 0.0) & (to_left <= 0.0) & ((time - upward) * vy > slack)
+        out = certain & leaves
+        goes_on = certain & ~leaves & at[UNCERTAIN].equals(0.0) & (time < float("inf")) & (bounces < limit)
+        index = at[RAY]
+        nx, ny, x, y, piece = at[FACE_X], at[FACE_Y], at[HIT_X], at[HIT_Y], at[PIECE]
+        w = dot(vx, vy, nx, ny) * 2.0
+        wx, wy = vx - w * nx, vy - w * ny
+        scale = constant(builder, 1.5) - dot(wx, wy, wx, wy) * 0.5
+        before = (own >= 0.0).where(own, constant(builder, NO_PIECE))
+        end = _Table(context, builder, signature.args[0], values[0]).column(values[4])
+        for column, value in {
+            OUT_X: px + upward * vx, OUT_VX: vx, OUT_VY: vy, OUT_BOUNCES: bounces, OUT_RAY: index
+        }.items():  # fmt: skip
+            end.pack(column, value, out)
+        goal = _Table(context, builder, signature.args[0], values[0]).column(values[3])
+        for column, value in {
+            PX: x, PY: y, VX: wx * scale, VY: wy * scale, OWN: piece, BEFORE: before, BOUNCES: bounces + 1.0, RAY: index
+        }.items():  # fmt: skip
+            goal.pack(column, value, goes_on)
+        both = builder.shl(builder.ctpop(out.mask()), WORD(8))
+        return builder.or_(builder.ctpop(goes_on.mask()), both)
+
+    number = types.float64
+    return types.int64(work, *[types.int64] * 4, types.UniTuple(number, 2), number, number), move
+
+
+@intrinsic
+def before_runs(typing, work, first):
+    """-> int: mask of those of eight rays whose hits may begin runs."""
+
+    def read(context, builder, signature, values):
+        at = _Table(context, builder, signature.args[0], values[0]).column(values[1])
+        return at[UNCERTAIN].equals(BEFORE_RUN).mask()
+
+    return types.int64(work, types.int64), read

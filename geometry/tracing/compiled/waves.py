@@ -1,0 +1,209 @@
+"""Rays through hollows of lines and circles in waves: all rays that are inside hit their next piece, eight at once.
+
+Every number is computed as by `rays`, so a ray has the same result by both, to the last bit. A ray for which rounding,
+a corner or a run of hits would matter has no result here. Loads numba.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...scene.boxes import BOXES
+from ...scene.columns import (
+    CHORD_X,
+    CHORD_Y,
+    CIRCLES_END,
+    CURVATURE,
+    EDGE_X,
+    EDGE_Y,
+    END_CORNER,
+    END_X,
+    END_Y,
+    FIRST_CIRCLE,
+    FIRST_JOINT,
+    FIRST_PAIR,
+    IS_CORNER,
+    JOINT_X,
+    JOINT_Y,
+    JOINTS_END,
+    LENGTH,
+    LINE_NORMAL_X,
+    LINE_NORMAL_Y,
+    NORMAL_X,
+    NORMAL_Y,
+    PAIRS_END,
+    PARTNER,
+    RUN_SINE,
+    SHORT_CHORD,
+    START_CORNER,
+    START_X,
+    START_Y,
+    STARTS_LINE,
+    TREE_LEVELS,
+)
+from ...scene.tolerances import NEARBY_SLACKS
+from .lanes import (
+    AT_CORNER,
+    BEFORE,
+    BEFORE_RUN,
+    BOUNCES,
+    CIRCLE_NUMBERS,
+    DOUBT,
+    FACE_X,
+    FACE_Y,
+    HIT_X,
+    HIT_Y,
+    NO_LINE,
+    NO_PIECE,
+    OUT_ANGLE,
+    OUT_BOUNCES,
+    OUT_RAY,
+    OUT_VX,
+    OUT_VY,
+    OUT_X,
+    OWN,
+    PIECE,
+    PX,
+    PY,
+    RAY,
+    TIME,
+    UNCERTAIN,
+    VX,
+    VY,
+    advance,
+    before_runs,
+    clear_hits,
+    first_bit,
+    meet_circle,
+    meet_corner,
+    meet_line,
+)
+from .lines import nearest_line_in_boxes
+from .options import inlined, inner
+from .rays import scope_of
+from .records import CIRCLE, LINE, OPENING, Own, Slots
+from .runs import skip_chords, skip_crossings
+from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
+
+# Waves after which the rays that are left are traced one by one.
+MOST_WAVES = 64
+# Above one by more than all rounding errors of the sine of incidence.
+RUN_MARGIN = 1.0 + 2.0**-40
+
+
+@inlined
+def begins_run(tables, work, i, slack, limit):
+    """-> bool: whether ray i of a wave makes a run of hits after its hit, which is computed in one step elsewhere."""
+    px, py, vx, vy = work[HIT_X + i], work[HIT_Y + i], work[VX + i], work[VY + i]
+    nx, ny = work[FACE_X + i], work[FACE_Y + i]
+    w = 2.0 * (vx * nx + vy * ny)
+    vx, vy = vx - w * nx, vy - w * ny
+    piece, most = int(work[PIECE + i]), np.int64(limit - work[BOUNCES + i] - 1)
+    if piece < 0:
+        _, _, _, _, hits = skip_chords(tables.circles[int(CIRCLE_NUMBERS) - piece], px, py, vx, vy, most)
+        return hits > 0
+    for row in range(int(tables.lines[piece, FIRST_PAIR]), int(tables.lines[piece, PAIRS_END])):
+        if tables.pairs[row, PARTNER] == work[OWN + i]:
+            _, _, _, _, hits = skip_crossings(tables.pairs[row], (nx, ny), px, py, vx, vy, slack, most)
+            return hits > 0
+    return False
+
+
+@inlined
+def corner_slack(is_corner, slack):
+    """-> float: the slack at a joint, negative if it is no corner."""
+    return slack if is_corner > 0.0 else -1.0
+
+
+@inlined
+def meet_boxes(scope, work, i):
+    """Find the nearest hit of ray i of a wave on the lines in the boxes along it, if that is nearer."""
+    joints, lines = scope.tables.joints, scope.tables.lines
+    piece, bounces = int(work[OWN + i]), int(work[BOUNCES + i])
+    kind = OPENING if bounces == 0 else (LINE if piece >= 0 else CIRCLE)
+    own = Own(kind, piece, -1.0, 0.0, -1, bounces)
+    px, py, vx, vy, time = work[PX + i], work[PY + i], work[VX + i], work[VY + i], work[TIME + i]
+    t, line, fraction, corner, nearby = nearest_line_in_boxes(scope, own, px, py, vx, vy, time)
+    if nearby or corner < np.inf:
+        work[DOUBT + i] = 1.0
+    if t < time:
+        near = line if fraction >= 0.0 else line + 1
+        work[TIME + i], work[PIECE + i] = t, line
+        work[HIT_X + i] = joints[near, JOINT_X] + fraction * lines[line, EDGE_X]
+        work[HIT_Y + i] = joints[near, JOINT_Y] + fraction * lines[line, EDGE_Y]
+        work[FACE_X + i], work[FACE_Y + i] = lines[line, LINE_NORMAL_X], lines[line, LINE_NORMAL_Y]
+        may_run = work[BEFORE + i] == line and lines[line, PAIRS_END] > 0.0
+        at_corner = abs(fraction) * lines[line, LENGTH] <= scope.slack and joints[near, IS_CORNER] > 0.0
+        work[UNCERTAIN + i] = AT_CORNER if at_corner else (BEFORE_RUN if may_run else 0.0)
+
+
+@inlined
+def meet_pieces(scope, work, first, count):
+    """Find the nearest hits of eight rays on the circles and lines of a hollow."""
+    joints, lines, circles = scope.tables.joints, scope.tables.lines, scope.tables.circles
+    hollow, slack = scope.hollow, scope.slack
+    close = NEARBY_SLACKS * slack
+    clear_hits(work, first)
+    for k in range(int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])):
+        arc = circles[k]
+        ends = arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]
+        at_start, at_end = corner_slack(arc[START_CORNER], slack), corner_slack(arc[END_CORNER], slack)
+        meet_circle(
+            work, first, ends, (arc[NORMAL_X], arc[NORMAL_Y]), arc[CURVATURE],
+            (arc[CHORD_X], arc[CHORD_Y], arc[SHORT_CHORD]), RUN_MARGIN * arc[RUN_SINE],
+            (slack, at_start, at_end, close), CIRCLE_NUMBERS - k,
+        )  # fmt: skip
+    if hollow[TREE_LEVELS] > 0.0:
+        for i in range(first, min(first + BOXES, count)):
+            meet_boxes(scope, work, i)
+        return
+    for j in range(int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])):
+        x, y, at_joint = joints[j, JOINT_X], joints[j, JOINT_Y], corner_slack(joints[j, IS_CORNER], slack)
+        if joints[j, STARTS_LINE] > 0.0:
+            end = joints[j + 1, JOINT_X], joints[j + 1, JOINT_Y], corner_slack(joints[j + 1, IS_CORNER], slack)
+            meet_line(
+                work, first, (x, y, at_joint), end, (lines[j, EDGE_X], lines[j, EDGE_Y]),
+                (lines[j, LINE_NORMAL_X], lines[j, LINE_NORMAL_Y]), lines[j, LENGTH], close,
+                (float(j), float(j) if lines[j, PAIRS_END] > 0.0 else NO_LINE),
+            )  # fmt: skip
+        elif at_joint > 0.0:
+            meet_corner(work, first, x, y, slack)
+
+
+@inner
+def cross_simple(tables, h, limit, entry, angle, hits, work):
+    """Reflect rays by a hollow of few lines and circles, with results as in `closed_forms.cross_arc`.
+
+    The rays go through the hollow in waves: all rays that are still inside hit their next piece, eight at once. Rays
+    with more than ``limit`` hits or with runs of hits have no result.
+    """
+    scope = scope_of(tables, h, Slots(0, 0, 0, 0))
+    slack, opening = scope.slack, (scope.left, scope.right)
+    for i in range(entry.shape[0]):
+        sine, cosine = sine_cosine(angle[i])
+        work[PX + i], work[PY + i], work[VX + i], work[VY + i] = entry[i], 0.0, -cosine, -sine
+        work[OWN + i], work[BEFORE + i], work[BOUNCES + i], work[RAY + i] = NO_PIECE, NO_PIECE, 0.0, i
+        hits[i] = 0.0
+    count, left = entry.shape[0], 0
+    for _ in range(MOST_WAVES):
+        kept = 0
+        for first in range(0, count, BOXES):
+            meet_pieces(scope, work, first, count)
+            mask = before_runs(work, first)
+            while mask != 0:
+                i = first + first_bit(mask)
+                mask &= mask - 1
+                if i < count and not begins_run(tables, work, i, slack, limit):
+                    work[UNCERTAIN + i] = 0.0
+            found = advance(work, first, count, kept, left, opening, slack, float(limit))
+            kept += found & 255
+            left += found >> 8
+        count = kept
+        if count == 0:
+            break
+    for i in range(left):
+        gone = direction_angle(work[OUT_VX + i], work[OUT_VY + i])
+        work[OUT_ANGLE + i] = gone if gone < LAST_ANGLE else LAST_ANGLE
+    for i in range(left):
+        j = int(work[OUT_RAY + i])
+        entry[j], angle[j], hits[j] = work[OUT_X + i], work[OUT_ANGLE + i], work[OUT_BOUNCES + i]

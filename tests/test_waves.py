@@ -1,0 +1,115 @@
+"""Rays in waves, eight at once: to be those of the loop hit by hit, to the last bit."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from asperity import geometry as geo
+from asperity.geometry.scene.columns import FORM_COLUMNS
+from asperity.geometry.tracing import tracing
+from asperity.geometry.tracing.compiled import closed_forms
+from asperity.geometry.tracing.compiled.pointers import Late
+from asperity.geometry.tracing.compiled.trigonometry import mirrored
+from test_runs import random_teeth
+
+RAYS = 5_000
+
+
+def valley_of_arcs():
+    """One hollow of five arcs, focusing and dispersing in turn, and a line."""
+    points = [(0, 0), (0.15, -0.25), (0.35, -0.4), (0.5, -0.5), (0.7, -0.35), (0.85, -0.3), (1, 0)]
+    pieces = [geo.Segment(points[0], points[1])]
+    for k, (start, end) in enumerate(pairwise(points[1:])):
+        (x0, y0), (x1, y1), focusing = start, end, 1.0 if k % 2 else -1.0
+        chord, bearing, half = np.hypot(x1 - x0, y1 - y0), np.arctan2(y1 - y0, x1 - x0), 0.5
+        radius = 0.5 * chord / np.sin(half)
+        centre = (
+            0.5 * (x0 + x1) - focusing * radius * np.cos(half) * np.sin(bearing),
+            0.5 * (y0 + y1) + focusing * radius * np.cos(half) * np.cos(bearing),
+        )
+        middle = bearing - focusing * np.pi / 2
+        pieces.append(geo.Arc(centre, radius, middle - focusing * half, middle + focusing * half))
+    return geo.Wall(pieces)
+
+
+WALLS = {
+    "mushroom": geo.mushrooms(0.3, 0.5),
+    "koch": geo.koch(4),
+    "dispersing arcs": geo.dispersing_arcs(1.0),
+    "valley of arcs": valley_of_arcs(),
+    "deep teeth": geo.rectangular_teeth(30.0),
+    "teeth in boxes": random_teeth(400, 5),
+    "profile": geo.Wall.from_profile(np.arange(300), np.random.default_rng(4).random(300)),
+    "large": geo.mushrooms(0.4, 1.0).scaled(3e5),
+}
+
+
+def rays_of(wall, seed):
+    """Spread rays; rays through joints and up to 10^k ulps beside them; rays along the opening."""
+    rng = np.random.default_rng(seed)
+    x = wall.period * rng.uniform(-2.0, 3.0, RAYS)
+    spread = np.arccos(1.0 - 2.0 * rng.random(RAYS))
+    below = wall.scene.joints[wall.scene.joints[:, 1] < 0.0]
+    joint = below[rng.integers(len(below), size=RAYS)]
+    start = wall.period * rng.random(RAYS)
+    aimed = np.arctan2(-joint[:, 1], start - joint[:, 0])
+    aimed += np.rint(10.0 ** rng.uniform(-1.0, 9.0, RAYS)) * rng.choice([-1, 1], RAYS) * np.finfo(float).eps
+    flat = 10.0 ** rng.uniform(-9.0, -1.0, RAYS)
+    flat = np.where(rng.random(RAYS) < 0.5, flat, np.pi - flat)
+    return np.concatenate([x, start, x]), np.clip(np.concatenate([spread, aimed, flat]), 1e-12, np.pi - 1e-12)
+
+
+def traced(monkeypatch, in_waves, *arguments, **options):
+    monkeypatch.setattr(tracing, "_goes_in_waves", lambda scene, rays: in_waves)
+    found = geo.trace(*arguments, **options)
+    return found.x, found.theta, found.collisions, found.status
+
+
+@pytest.mark.parametrize("limit", [3, 2**62])
+@pytest.mark.parametrize("name", WALLS)
+def test_a_wave_gives_each_ray_the_bits_of_the_loop(name, limit, monkeypatch):
+    wall = WALLS[name]
+    x, theta = rays_of(wall, 1)
+    together = traced(monkeypatch, True, wall, x, theta, max_collisions=limit)
+    one_by_one = traced(monkeypatch, False, wall, x, theta, max_collisions=limit)
+    for mine, right in zip(together, one_by_one, strict=True):
+        assert np.array_equal(mine, right)
+
+
+@pytest.mark.parametrize("name", ["mushroom", "koch", "dispersing arcs", "valley of arcs", "profile"])
+def test_few_rays_are_left_to_the_loop(name):
+    wall = WALLS[name]
+    x, theta = (part[:RAYS] for part in rays_of(wall, 2))
+    closed = np.empty((0, FORM_COLUMNS)) if wall.scene.closed is None else wall.scene.closed
+    results = np.empty(RAYS), np.empty(RAYS), np.empty(RAYS, np.int64), np.empty(RAYS, np.uint8)
+    room = closed_forms.room_for(wall.scene.hollows)
+    closed_forms.trace_closed(x, theta, wall.scene.tables, closed, 2**62, results, room, closed_forms.CROSSINGS)
+    assert np.mean(results[-1] == closed_forms.UNDECIDED) < 0.01
+
+
+def test_a_ray_is_the_same_whatever_rays_go_with_it(monkeypatch):
+    wall = WALLS["mushroom"]
+    x, theta = rays_of(wall, 3)
+    whole = traced(monkeypatch, True, wall, x, theta)
+    part = traced(monkeypatch, True, wall, x[5:2000:3], theta[5:2000:3])
+    for all_rays, some in zip(whole, part, strict=True):
+        assert np.array_equal(all_rays[5:2000:3], some)
+
+
+def test_curves_without_waves_and_open_walls_stay_with_the_loop():
+    for wall in (geo.double_parabola(), geo.triangular_teeth(0.7), geo.elliptical_arcs(1.0, geo.Disk(1.0, 0.6))):
+        assert not tracing._goes_in_waves(wall.scene, 2**30)
+    assert not tracing._goes_in_waves(geo.mushrooms(0.3, 0.5).scene, tracing.MANY_RAYS - 1)
+
+
+def test_a_function_is_worth_its_compilation_once_it_is_wanted_often_or_stored():
+    late = Late(mirrored, (np.float32(1.0),))
+    assert not late.is_worth(4, 10)
+    assert not late.is_worth(5, 10)
+    assert late.is_worth(1, 10)
+    used = Late(closed_forms.cross_simple, closed_forms.SIMPLE._arguments)
+    closed_forms.SIMPLE.load()
+    assert used.is_worth(1, 10)
