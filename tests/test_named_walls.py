@@ -218,3 +218,18 @@ def test_parameters_out_of_range_are_refused(call):
 def test_more_generations_of_mushrooms_need_a_stem():
     with pytest.raises(InputError, match="larger stem_aspect"):
         geo.mushrooms(0.5, 0.0, 2)
+
+
+@pytest.mark.parametrize("name", geo.WALLS)
+def test_a_function_without_arguments_returns_the_wall_of_the_command_line(name):
+    wall = getattr(geo, name.replace("-", "_"))()
+    assert wall == geo.WALLS[name].build() == geo.wall_from_text(name)
+    written = ",".join(f"{key}={value!r}" for key, value in geo.WALLS[name].defaults.items())
+    assert geo.wall_from_text(f"{name}:{written}") == wall
+
+
+def test_every_parameter_of_a_named_wall_has_a_default_that_is_a_number():
+    defaults = {name: dict(entry.defaults) for name, entry in geo.WALLS.items()}
+    assert defaults["mushrooms"] == {"stem_to_cap": 0.2, "stem_aspect": 0.5, "generations": 1}
+    assert defaults["elliptical-arcs"] == {"half_angle": 1.2, "mass": 1.0, "inertia": 0.5}
+    assert {type(value) for known in defaults.values() for value in known.values()} == {int, float}

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import difflib
+import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -29,7 +30,7 @@ from .wall import Wall, load_wall
 
 @dataclass(frozen=True)
 class NamedWall:
-    """A wall's constructor with its name, default parameters and a one-line summary."""
+    """A wall's constructor with its name, a one-line summary, and the defaults of its parameters as numbers."""
 
     name: str
     constructor: Callable[..., Wall]
@@ -46,34 +47,26 @@ def _elliptical(half_angle: float, mass: float, inertia: float) -> Wall:
     return elliptical_arcs(half_angle, Disk(mass, inertia))
 
 
-def _entry(name: str, constructor: Callable[..., Wall], summary: str, **defaults: float | int) -> NamedWall:
-    return NamedWall(name, constructor, MappingProxyType(defaults), summary)
+def _entry(function: Callable[..., Wall], summary: str, constructor: Callable[..., Wall] | None = None) -> NamedWall:
+    """The entry of a function with its defaults; ``constructor`` takes the numbers of a disk in its place."""
+    defaults: dict[str, float | int] = {}
+    for parameter in inspect.signature(function).parameters.values():
+        value = parameter.default
+        defaults |= asdict(value) if isinstance(value, Disk) else {parameter.name: value}
+    name = function.__name__.replace("_", "-")
+    return NamedWall(name, constructor or function, MappingProxyType(defaults), summary)
 
 
 _ENTRIES = (
-    _entry("flat", flat, "a flat wall: specular reflection"),
-    _entry("triangular-teeth", triangular_teeth, "triangular teeth, apex angle in radians", angle=0.7),
-    _entry("rectangular-teeth", rectangular_teeth, "half flat tops, half crevices", height_to_width=1.0),
-    _entry("focusing-arcs", focusing_arcs, "one circular arc below each period's chord", half_angle=1.2),
-    _entry("dispersing-arcs", dispersing_arcs, "circular bumps that meet in corners", curvature=1.0),
-    _entry(
-        "elliptical-arcs",
-        _elliptical,
-        "arcs that the disk feels as circular",
-        half_angle=1.2,
-        mass=1.0,
-        inertia=0.5,
-    ),
-    _entry("double-parabola", double_parabola, "Plakhov's parabolas: nearly retroreflecting"),
-    _entry(
-        "mushrooms",
-        mushrooms,
-        "semicircular caps on straight stems",
-        stem_to_cap=0.2,
-        stem_aspect=0.5,
-        generations=1,
-    ),
-    _entry("koch", koch, "Koch's curve turned downwards", generations=4),
+    _entry(flat, "a flat wall: specular reflection"),
+    _entry(triangular_teeth, "triangular teeth, apex angle in radians"),
+    _entry(rectangular_teeth, "half flat tops, half crevices"),
+    _entry(focusing_arcs, "one circular arc below each period's chord"),
+    _entry(dispersing_arcs, "circular bumps that meet in corners"),
+    _entry(elliptical_arcs, "arcs that the disk feels as circular", _elliptical),
+    _entry(double_parabola, "Plakhov's parabolas: nearly retroreflecting"),
+    _entry(mushrooms, "semicircular caps on straight stems"),
+    _entry(koch, "Koch's curve turned downwards"),
 )
 
 WALLS: Mapping[str, NamedWall] = MappingProxyType({entry.name: entry for entry in _ENTRIES})

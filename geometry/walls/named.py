@@ -19,6 +19,8 @@ from .wall import Wall
 # 4^10 is a million segments; more pieces do not fit the memory of a laptop.
 MOST_GENERATIONS = 10
 
+UNIFORM_DISK = Disk()
+
 
 def flat() -> Wall:
     """Return the flat wall y = 0: every reflection is specular.
@@ -32,7 +34,7 @@ def flat() -> Wall:
 
 
 @explained
-def triangular_teeth(angle: float) -> Wall:
+def triangular_teeth(angle: float = 0.7) -> Wall:
     """Return triangular teeth with tips at the integers.
 
     Parameters
@@ -59,7 +61,7 @@ def triangular_teeth(angle: float) -> Wall:
 
 
 @explained
-def rectangular_teeth(height_to_width: float) -> Wall:
+def rectangular_teeth(height_to_width: float = 1.0) -> Wall:
     """Return rectangular teeth: a flat top on [0, 1/2] and a crevice on [1/2, 1].
 
     Parameters
@@ -86,7 +88,7 @@ def rectangular_teeth(height_to_width: float) -> Wall:
 
 
 @explained
-def focusing_arcs(half_angle: float) -> Wall:
+def focusing_arcs(half_angle: float = 1.2) -> Wall:
     """Return the wall of one circular arc per period, below its chord [0, 1].
 
     Parameters
@@ -115,7 +117,7 @@ def focusing_arcs(half_angle: float) -> Wall:
 
 
 @explained
-def dispersing_arcs(curvature: float) -> Wall:
+def dispersing_arcs(curvature: float = 1.0) -> Wall:
     """Return circular bumps with tops at the integers and a corner at x = 1/2.
 
     Parameters
@@ -144,7 +146,7 @@ def dispersing_arcs(curvature: float) -> Wall:
 
 
 @explained
-def elliptical_arcs(half_angle: float, disk: Disk) -> Wall:
+def elliptical_arcs(half_angle: float = 1.2, disk: Disk = UNIFORM_DISK) -> Wall:
     """Return the wall of elliptical arcs whose foreshortened wall is ``focusing_arcs(half_angle)``.
 
     Parameters
@@ -152,7 +154,7 @@ def elliptical_arcs(half_angle: float, disk: Disk) -> Wall:
     half_angle : float
         xi in (0, pi/2], radians.
     disk : Disk
-        The disk for which the wall acts as circular arcs.
+        The disk for which the wall acts as circular arcs; by default the uniform disk, mass 1 and inertia 1/2.
 
     Raises
     ------
@@ -191,7 +193,7 @@ def double_parabola() -> Wall:
 
 
 @explained
-def koch(generations: int) -> Wall:
+def koch(generations: int = 4) -> Wall:
     """Return the Koch curve pointing downwards, a wall of 4^generations segments.
 
     Parameters
