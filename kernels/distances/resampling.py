@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import InputError
+from ...core.long_runs import progress_bar
 from ..matrices.matrix import KernelMatrix, check_same_basis
 from ..sampling.counts import Counts
 from .transport import grid_wasserstein, power_mean
@@ -104,8 +105,10 @@ def null_distances(
     between = distance_of_rows(first, *measured)
     found = []
     draws = [_draws(matrix, common, number, rng) for matrix in (first, second)]
-    for one, other in zip(*draws, strict=True):
-        found.append(np.atleast_1d(between(one, other)))
+    with progress_bar(number, "sample", "distance") as bar:
+        for one, other in zip(*draws, strict=True):
+            found.append(np.atleast_1d(between(one, other)))
+            bar.update(found[-1].size)
     return np.concatenate(found)
 
 

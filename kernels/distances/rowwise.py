@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.checks import Floats
 from ...core.estimates import Estimate
+from ...core.long_runs import progress_bar
 from ..bases.measure import SINE, gauss_on_intervals
 from ..laws.law import ENTRY_POINTS, Law
 from ..matrices.matrix import KernelMatrix, joint_kind
@@ -108,8 +109,10 @@ def _nodes(low: Floats, high: Floats, sup: bool) -> tuple[Floats, Floats]:
 def _rows(first: Law, second: Law, angle: Floats, edges: Floats, order: float) -> Floats:
     step = max(1, CORNERS_AT_ONCE // max(edges.size, MOST_ATOMS))
     parts = []
-    for start in range(0, angle.size, step):
-        theta = angle[start : start + step]
-        one, other = (outgoing_distributions(law, theta, edges) for law in (first, second))
-        parts.append(wasserstein(one, other, order))
+    with progress_bar(angle.size, "angle", "distance") as bar:
+        for start in range(0, angle.size, step):
+            theta = angle[start : start + step]
+            one, other = (outgoing_distributions(law, theta, edges) for law in (first, second))
+            parts.append(wasserstein(one, other, order))
+            bar.update(theta.size)
     return np.concatenate(parts)

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from ...core.checkpoints import Checkpoint
 from ...core.checks import Floats
-from ...core.long_runs import Engine
+from ...core.long_runs import Engine, progress_bar
 from ...core.version import __version__
 from ...core.workers import BACKLOG, connected, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import DrivenLaw, Law, entry_inside
 from ..walls.identity import law_digest
-from .rays import RaySums, progress_bar
+from .rays import RaySums
 
 # Rays of a task for a worker, a second of work or a few. Counts in cells do not depend on it; sums of real numbers are
 # added task by task, so that it is a constant.
@@ -182,7 +182,7 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
     path, client = engine.get("checkpoint"), engine.get("client")
     if path is None and client is None and sums.basis.is_partition:
         # without further tables, which can be large
-        with progress_bar(job.total) as bar:
+        with progress_bar(job.total, "ray") as bar:
             for task in range(job.tasks):
                 job.add_to(sums, job.first_table(task), task)
                 bar.update(job.rays_of(task))
@@ -191,7 +191,7 @@ def count_long(sums: RaySums, job: Job, engine: Engine) -> None:
     try:
         with ExitStack() as stack:
             store = None if path is None else stack.enter_context(Checkpoint(path, _identity(job)))
-            bar = stack.enter_context(progress_bar(job.total))
+            bar = stack.enter_context(progress_bar(job.total, "ray"))
             run.all_tasks(store, stack.enter_context(connected(client)), bar)
     except KeyboardInterrupt as stop:
         lost = "without a checkpoint they are lost"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from .counts import SampledArray, array_from_counts, array_from_sums, count_pair
 
 # Rays in a chunk: at least SMALLEST_CHUNK, and one for CELLS_A_RAY matrix entries, so that adding matrices is cheap.
 SMALLEST_CHUNK, CELLS_A_RAY = 2**16, 16
-SLOW_SECONDS = 2.0
 
 
 class RaySums:
@@ -92,13 +90,3 @@ class RaySums:
             return table[::-1, ::-1]
         flip = reflection_matrix(self.basis)
         return flip @ table @ flip.T
-
-
-def progress_bar(total: int) -> AbstractContextManager[Any]:
-    """A progress bar that appears after SLOW_SECONDS."""
-    from tqdm import tqdm
-
-    bar: AbstractContextManager[Any] = tqdm(
-        total=total, unit="ray", unit_scale=True, delay=SLOW_SECONDS, disable=None, leave=False
-    )
-    return bar

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from ...core.long_runs import progress_bar
 from ...kernels import Basis, CircularArcLaw, KernelMatrix, Law, Legendre, Panels, SpecularFrame, discretise
 from ...kernels.bases.mirror import is_mirror_symmetric
 from ..eigenvalues.spectra import Spectrum, matrix_spectrum
@@ -137,6 +139,12 @@ class SharedMatrices:
 
 def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge) -> Refinement:
     """Refine until the changes decrease and the error is below the tolerance, or the largest basis is reached."""
+    with progress_bar(None, "basis", "gap") as bar:
+        return _refined(law, tolerance, matrices, edge, bar)
+
+
+def _refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: EssentialEdge, bar: Any) -> Refinement:
+    """The refinement, whose last error the bar shows."""
     levels: list[Spectrum] = []
     evidence: list[str] = []
     steps = Refinement((), False, ())
@@ -148,6 +156,8 @@ def refined(law: Law, tolerance: float, matrices: SharedMatrices, edge: Essentia
         levels.append(found)
         evidence.append(f"{basis!r}: gap {found.gap:.12g} +- {found.gap_error:.2g} ({matrix.method})")
         steps = Refinement(tuple(levels), _converges(levels, tolerance), tuple(evidence))
+        bar.set_postfix_str(f"error {steps.error:.1g}, asked for {tolerance:.1g}", refresh=False)
+        bar.update()
         near_edge = near_edge and 1.0 - found.gap - found.gap_error < edge.high
         if len(levels) >= FEWEST_LEVELS and steps.converges and steps.error <= tolerance:
             break

@@ -16,6 +16,7 @@ from ...core.checkpoints import Checkpoint
 from ...core.checks import finite_number, positive_number
 from ...core.errors import AsperityError, InputError
 from ...core.kinds import explained
+from ...core.long_runs import progress_bar
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...geometry import Wall
@@ -167,14 +168,12 @@ class _Run:
 
     def _points(self, checkpoint: str | Path | None, client: Any, progress: bool) -> list[Point]:
         """All points of the plan, whose rows are then found."""
-        from tqdm import tqdm
-
         points: list[Point] = []
         with ExitStack() as stack:
             store = None if checkpoint is None else stack.enter_context(Checkpoint(checkpoint, self.identity()))
             known = {} if store is None else {key: json.loads(text) for key, text in store.parts()}
             workers = stack.enter_context(connected(client))
-            bar = stack.enter_context(tqdm(total=self.grid.size, unit="point", disable=None if progress else True))
+            bar = stack.enter_context(progress_bar(self.grid.size, "point", shown=progress))
             plan = self.grid.plan()
             portion = next(plan, [])
             while portion:

@@ -410,8 +410,7 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
     """
     import json
 
-    from tqdm import tqdm
-
+    from .core.long_runs import progress_bar
     from .ledger import findings, selected
     from .ledger.text import finding_as_dict, latex_of, table_of
 
@@ -419,7 +418,11 @@ def verify(ids: tuple[str, ...], as_json: bool, as_latex: bool) -> None:
     if as_latex:
         click.echo(latex_of(chosen))
         return
-    found = list(tqdm(findings(chosen), "verify", len(chosen), delay=2, disable=None, leave=False, unit="row"))
+    found = []
+    with progress_bar(len(chosen), "row", "verify") as bar:
+        for finding in findings(chosen):
+            found.append(finding)
+            bar.update()
     click.echo(json.dumps([finding_as_dict(one) for one in found], indent=2) if as_json else table_of(found))
     if any(one.as_stated is False for one in found):
         sys.exit(1)

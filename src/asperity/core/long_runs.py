@@ -1,9 +1,14 @@
-"""Long runs in parts: each depends on its number alone, is computed by any worker, and stored when it is finished."""
+"""Long runs in parts: each depends on its number alone, is computed by any worker, and stored when it is finished.
+
+The progress bar of everything that takes long is here too.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import io
+import multiprocessing
+import sys
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -18,6 +23,9 @@ from .errors import AsperityError, InputError
 from .workers import connected, results
 
 Arrays = dict[str, NDArray[Any]]
+
+# Before that no progress bar appears.
+SLOW_SECONDS = 2.0
 
 
 class Engine(TypedDict, total=False):
@@ -98,6 +106,41 @@ def all_parts(
         lost = "without a checkpoint they are lost"
         raise KeyboardInterrupt(f"{done}; {lost if path is None else f'{path} has them: give the same call'}") from stop
     return [_unpacked(packed[part]) for part in range(number)]
+
+
+def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown: bool = True) -> Any:
+    """A progress bar of tqdm, on a terminal and in a notebook, which appears after SLOW_SECONDS and leaves no trace.
+
+    It is silent where standard error is no terminal, and in the processes of workers.
+
+    Parameters
+    ----------
+    total : int or None
+        None where it is not known.
+    unit : str
+        What is counted, in the singular.
+    text : str, optional
+        What stands before the bar.
+    shown : bool
+        Without it the bar is silent everywhere.
+
+    Examples
+    --------
+    >>> with progress_bar(2, "part", shown=False) as bar:
+    ...     bar.update()
+    >>> bar.disable
+    True
+    """
+    from tqdm.auto import tqdm
+
+    # tqdm.auto takes the bar for notebooks only in one, where standard error is no terminal
+    notebook = sys.modules.get("tqdm.notebook")
+    in_notebook = notebook is not None and issubclass(tqdm, notebook.tqdm_notebook)
+    silent = not shown or multiprocessing.parent_process() is not None
+    return tqdm(
+        desc=text, total=total, unit=unit, unit_scale=unit == "ray", delay=SLOW_SECONDS, leave=False,
+        disable=True if silent else False if in_notebook else None,
+    )  # fmt: skip
 
 
 def digest(*values: Any) -> str:

@@ -18,6 +18,7 @@ from ..core.estimates import NORMAL_95, Estimate
 from ..core.files import moved_when_complete
 from ..core.html import html_table
 from ..core.kinds import explained
+from ..core.long_runs import progress_bar
 from ..geometry import Disk, Wall, trace
 from ..geometry.cells.miniature import wall_miniature
 from ..kernels import Bins, CollisionLaw, KernelMatrix, Law, WallLaw, discretise
@@ -159,15 +160,12 @@ def study_wall(
     >>> report.gap.verdict, report.matrix.method
     ('no gap', 'exact')
     """
-    from tqdm import tqdm
-
     positive_number("tolerance", tolerance)
     basis = Bins(bins)
     rng = generator(rng, 0)
     disk = disk or Disk()
     refusals: dict[str, str] = {}
-    # silent where standard error is not a terminal, and in the first two seconds
-    with tqdm(total=8, desc=name, delay=2, disable=None if progress else True, leave=False) as bar:
+    with progress_bar(8, "part", name, shown=progress) as bar:
         tracer = check_tracer(wall, rng) if wall.hollows else None
         bar.update()
         law = WallLaw(wall)

@@ -1,0 +1,86 @@
+"""Progress bars appear on a terminal and in a notebook, after two seconds, and nowhere else."""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import sys
+from types import ModuleType
+
+import pytest
+import tqdm.auto
+import tqdm.std
+
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.core import long_runs
+from asperity.core.long_runs import progress_bar
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def written(monkeypatch, stream, seconds=0.0):
+    """The stream, which takes the place of standard error; in a fixture pytest would take it away again."""
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(long_runs, "SLOW_SECONDS", seconds)
+    return stream
+
+
+def shown(count=3):
+    """Whether the bar is not silent."""
+    with progress_bar(count, "part", "work") as bar:
+        for _ in range(count):
+            bar.update()
+        return not bar.disable
+
+
+def test_a_bar_appears_on_a_terminal_and_names_what_is_done(monkeypatch):
+    terminal = written(monkeypatch, Terminal())
+    shown()
+    assert "work" in terminal.getvalue() and "part" in terminal.getvalue()
+
+
+def test_nothing_appears_in_the_first_two_seconds(monkeypatch):
+    terminal = written(monkeypatch, Terminal(), long_runs.SLOW_SECONDS)
+    assert shown() and terminal.getvalue() == "" and long_runs.SLOW_SECONDS == 2.0
+
+
+def test_away_from_a_terminal_nothing_appears(monkeypatch):
+    stream = written(monkeypatch, io.StringIO())
+    assert not shown() and stream.getvalue() == ""
+
+
+def test_a_worker_shows_nothing_on_the_terminal_of_its_parent(monkeypatch):
+    terminal = written(monkeypatch, Terminal())
+    monkeypatch.setattr(multiprocessing, "parent_process", object)
+    assert not shown() and terminal.getvalue() == ""
+
+
+def test_in_a_notebook_a_bar_is_shown_although_standard_error_is_no_terminal(monkeypatch):
+    stream = written(monkeypatch, io.StringIO())
+    notebook = ModuleType("tqdm.notebook")
+    notebook.tqdm_notebook = type("tqdm_notebook", (tqdm.std.tqdm,), {})
+    monkeypatch.setitem(sys.modules, "tqdm.notebook", notebook)
+    assert not shown()
+    monkeypatch.setattr(tqdm.auto, "tqdm", type("tqdm", (notebook.tqdm_notebook,), {}))
+    assert shown() and "work" in stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("work", "words"),
+    [
+        (
+            lambda: spec.spectral_gap(0.5 * ker.CircularArcLaw(1.2) + 0.5 * ker.henyey_greenstein(0.3), 1e-2),
+            ("gap", "basis"),
+        ),
+        (lambda: ker.distance(ker.henyey_greenstein(0.3), ker.henyey_greenstein(0.5)), ("distance", "angle")),
+    ],
+    ids=["gap", "distance"],
+)
+def test_long_computations_have_bars(monkeypatch, work, words):
+    terminal = written(monkeypatch, Terminal())
+    work()
+    assert all(word in terminal.getvalue() for word in words)
