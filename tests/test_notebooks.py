@@ -147,6 +147,44 @@ def test_without_pandas_the_message_names_the_extra(monkeypatch):
         spec.spectrum(LAW, k=2).to_frame()
 
 
+@pytest.mark.parametrize("frame", ["paper", "specular"])
+def test_a_matrix_as_a_table_has_its_bins_in_radians_and_its_error(frame):
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    edges = np.array([0.0, 0.5, 1.25, np.pi - 1.25, np.pi - 0.5, np.pi])
+    P = ker.discretise(ker.henyey_greenstein(0.4), ker.Bins(edges))
+    P = P if frame == "paper" else P.in_specular_frame()
+    table, array = P.to_frame(), P.to_xarray()
+    assert np.array_equal(table.to_numpy(), P.array) and np.array_equal(array.values, P.array)
+    # the row is the incoming bin: rows sum to 1, columns do not
+    assert np.allclose(table.sum(axis="columns"), 1.0, atol=1e-9) and not np.allclose(table.sum(axis="index"), 1.0)
+    assert np.allclose(array.sum("outgoing"), 1.0, atol=1e-9)
+    assert float(array.sel(incoming=0.3, outgoing=1.0, method="nearest")) == P.array[0, 1]
+    assert table.loc[0.25, 0.875] == P.array[0, 1]
+    for name in ("incoming", "outgoing"):
+        assert array[f"{name}_low"].values.tolist() == edges[:-1].tolist() and array[name].attrs["units"] == "rad"
+        assert array[f"{name}_high"].values.tolist() == edges[1:].tolist()
+    assert np.allclose(array["weight"], -np.diff(np.cos(edges)) / 2, atol=1e-15)
+    for attributes in (table.attrs, array.attrs):
+        assert attributes["frobenius_error"] == float(P.error) and attributes["error_kind"] == P.error.kind
+        assert attributes["convention"] == frame
+
+
+def test_a_matrix_without_bins_of_one_angle_is_no_table():
+    P = ker.discretise(LAW, ker.Legendre(4))
+    pair = ker.discretise(LAW, ker.Bins(2))
+    for matrix in (P, pair.tensor(pair)):
+        for make in (matrix.to_frame, matrix.to_xarray):
+            with pytest.raises(InputError, match=r"discretise in Bins\(64\)"):
+                make()
+
+
+def test_without_xarray_the_message_of_a_matrix_names_the_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(InputError, match=r"asperity\[studies\]"):
+        ker.discretise(LAW, ker.Bins(2)).to_xarray()
+
+
 def test_pandas_is_loaded_by_to_frame_alone():
     code = "import sys, asperity.spectral as s; s.Spectrum; assert 'pandas' not in sys.modules"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

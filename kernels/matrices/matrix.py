@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from ...core.checks import Floats, finite_array, finite_number, frozen, number_between, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
+from ...core.frames import data_array, data_frame
 from ...core.html import html_table
 from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
@@ -435,6 +436,48 @@ class KernelMatrix:
         record["metadata"] = dict(self.metadata)
         record["replicates"] = [store_array(part, arrays, f"replicate{k}") for k, part in enumerate(self.replicates)]
         return archive.write(path, record, arrays, self.basis, overwrite=overwrite)
+
+    def to_frame(self) -> Any:
+        """P[i, j] as a pandas.DataFrame (extra ``studies``): a row for each incoming, a column for each outgoing bin.
+
+        Both are labelled by the centres of the bins in radians. ``attrs`` has the Frobenius error of ``symmetric``, its
+        kind, the convention, the law and the method. An InputError unless the basis is `Bins`.
+        """
+        edges = self._bin_edges("to_frame")
+        centres = 0.5 * (edges[1:] + edges[:-1])
+        frame = data_frame({str(k): column for k, column in enumerate(self.array.T)})
+        frame.index, frame.columns = centres, centres
+        frame = frame.rename_axis(index="incoming", columns="outgoing")
+        frame.attrs.update(self._described())
+        return frame
+
+    def to_xarray(self) -> Any:
+        """P[i, j] as an xarray.DataArray (extra ``studies``) with the dimensions ``incoming`` and ``outgoing``.
+
+        Their coordinates are the centres of the bins in radians; ``incoming_low``, ``incoming_high`` and so on are the
+        edges, ``weight`` the invariant measure of an incoming bin. ``attrs`` as of `to_frame`. An InputError unless the
+        basis is `Bins`.
+        """
+        edges = self._bin_edges("to_xarray")
+        coordinates: dict[str, Any] = {"weight": ("incoming", self.weights)}
+        for name in ("incoming", "outgoing"):
+            unit = {"units": "rad"}
+            coordinates[name] = (name, 0.5 * (edges[1:] + edges[:-1]), unit)
+            coordinates |= {f"{name}_low": (name, edges[:-1], unit), f"{name}_high": (name, edges[1:], unit)}
+        names = "incoming", "outgoing"
+        return data_array(self.array, dims=names, coords=coordinates, name="probability", attrs=self._described())
+
+    def _bin_edges(self, what: str) -> Floats:
+        if not isinstance(self.basis, Bins):
+            raise InputError(f"{what}: {self.basis!r} has no bins of one angle; discretise in Bins(64)")
+        return self.basis.edges
+
+    def _described(self) -> dict[str, Any]:
+        """What a table says of this matrix."""
+        return {
+            "frobenius_error": float(self.error), "error_kind": self.error.kind, "convention": self.frame,
+            "law": self.law, "method": self.method,
+        }  # fmt: skip
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the density with respect to the invariant measure; returns the axes."""

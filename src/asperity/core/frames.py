@@ -1,4 +1,4 @@
-"""Tables as data frames of pandas."""
+"""Tables as data frames of pandas, and arrays with coordinates of xarray."""
 
 from __future__ import annotations
 
@@ -22,3 +22,18 @@ def data_frame(columns: Mapping[str, Any]) -> Any:
     except ImportError as reason:
         raise InputError("to_frame: needs pandas; install it with: pip install 'asperity[studies]'") from reason
     return pandas.DataFrame(dict(columns))
+
+
+def data_array(values: Any, **described: Any) -> Any:
+    """An xarray.DataArray, with its dimensions, coordinates, name and attributes.
+
+    Raises
+    ------
+    InputError
+        If xarray is not installed.
+    """
+    try:
+        xarray = import_module("xarray")
+    except ImportError as reason:
+        raise InputError("to_xarray: needs xarray; install it with: pip install 'asperity[studies]'") from reason
+    return xarray.DataArray(values, **described)
