@@ -92,6 +92,55 @@ def test_scattering_in_a_circle_is_an_involution_that_preserves_the_flux(body):
         assert abs(values.mean() - exact) < 4.5 * values.std() / np.sqrt(values.size)
 
 
+REGIONS = {
+    "polygon": geo.Container.polygon([(-3, -2), (4, -2), (5, 3), (0, 5)]),
+    "ellipse": geo.Container.ellipse(5.0, 4.0),
+    "stadium": geo.Container.stadium(2.0, 4.0),
+}
+
+
+@pytest.mark.parametrize("region", REGIONS.values(), ids=REGIONS)
+@pytest.mark.parametrize("body", [TRIANGLE, SLOT], ids=["triangle", "slot"])
+def test_scattering_in_a_convex_region_is_an_involution_that_preserves_the_flux(body, region):
+    n, perimeter = 20_000, region.closed().perimeter
+    before, after = body.scatter_in(region, n, RNG)
+    again = body._through_region(after, region.closed())
+    turn = np.abs(np.exp(2j * np.pi * (again[:, 0] - before[:, 0]) / perimeter) - 1.0)
+    assert np.mean((turn < 1e-8) & (np.abs(again[:, 1] - before[:, 1]) < 1e-8)) > 0.999
+    assert np.all((after[:, 1] > 0.0) & (after[:, 1] < np.pi))
+    place = 2.0 * np.pi * after[:, 0] / perimeter
+    for values, exact in ((np.cos(after[:, 1]) ** 2, 1 / 3), (np.cos(place), 0.0), (np.sin(place), 0.0)):
+        assert abs(values.mean() - exact) < 4.5 * values.std() / np.sqrt(n)
+
+
+def test_the_lines_that_meet_a_body_do_not_depend_on_the_region_around_it():
+    """Crofton: perimeter(C) times the distribution of what a line meets, for a polygon, an ellipse and a circle."""
+    body = np.sum(np.hypot(*(np.roll(TRIANGLE.polygons[0], -1, axis=0) - TRIANGLE.polygons[0]).T))
+    n = 40_000
+    for region in REGIONS.values():
+        around = region.closed()
+        before, _ = TRIANGLE.scatter_in(region, n, RNG)
+        _, free = ker.PolygonalBody([[(0.5, 0.5), (0.5 + 1e-7, 0.5), (0.5, 0.5 + 1e-7)]]).scatter_in(region, n, RNG)
+        after = TRIANGLE._through_region(before, around)
+        met = np.abs(after - free).max(axis=1) > 1e-6
+        fraction = body / around.perimeter
+        assert abs(met.mean() - fraction) < 4.5 * np.sqrt(fraction * (1 - fraction) / n)
+
+
+@pytest.mark.parametrize(
+    ("region", "words"),
+    [
+        (geo.Container.polygon([(-3, -2), (4, -2), (4, 3)]), "contains the body"),
+        (geo.Container.strip(9.0), "outer loop"),
+        (geo.flat(), "Container"),
+        (geo.Container.sinai(9.0, 0.5), "convex"),
+    ],
+)
+def test_a_region_that_is_not_a_convex_set_around_the_body_is_refused(region, words):
+    with pytest.raises(InputError, match=words):
+        ker.PolygonalBody([[(-2.5, -1.5), (-1.0, -1.5), (-2.5, 0.0)]]).scatter_in(region, 10)
+
+
 def test_the_fraction_of_lines_that_meet_a_convex_body_is_its_perimeter_over_that_of_the_circle():
     """Cauchy and Crofton; and the mean momentum transfer is 8/3 of the perimeter, in any circle around the body."""
     perimeter = np.sum(np.hypot(*(np.roll(TRIANGLE.polygons[0], -1, axis=0) - TRIANGLE.polygons[0]).T))

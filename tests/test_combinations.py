@@ -89,7 +89,7 @@ def test_specular_and_retroreflection_are_involutions() -> None:
     assert (specular() ** 1001).branches(1.0)[1].tolist() == [math.pi - 1.0]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(cheap, cheap)
 def test_adjoints_pass_to_the_other_side_of_the_inner_product(first: Law, second: Law) -> None:
     for law in (first @ second, 0.4 * first + 0.6 * second, first**2, first.in_specular_frame()):

@@ -54,7 +54,8 @@ def rays(wall, seed, count):
 @pytest.mark.parametrize("name", WALLS)
 def test_every_ray_is_right_to_rounding_times_its_condition(name):
     wall = WALLS[name]
-    x, theta = rays(wall, 1, RAYS)
+    # a grazing ray passes a million cells of an open wall
+    x, theta = rays(wall, 1, RAYS if wall.closes else RAYS // 8)
     traced = geo.trace(wall, x, theta, max_collisions=2_000)
     twin = refined_trace(wall.scene, x, theta, 2_000)
     gone = traced.escaped & (twin.status == geo.Status.ESCAPED)

@@ -70,7 +70,8 @@ def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invarian
         "two arrays": (theta, image), "one array": both, "memmap": np.load(tmp_path / "a.npy", mmap_mode="r"),
         "whole": [(theta, image)], "rows": chunks(theta, image, 1), "odd": chunks(theta, image, 700),
     }  # fmt: skip
-    h5py = pytest.importorskip("h5py")
+    import h5py
+
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["pairs"], file["in"], file["out"] = both, theta, image
         found |= {"hdf5": file["pairs"], "hdf5, two": (file["in"], file["out"])}
@@ -81,7 +82,8 @@ def test_the_bits_depend_neither_on_the_chunks_nor_on_the_source(basis, invarian
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning")
 @pytest.mark.parametrize("basis", BASES, ids=repr)
 def test_arrays_of_zarr_give_the_bits_of_numpys_whatever_their_chunks(basis, tmp_path):
-    zarr = pytest.importorskip("zarr")
+    import zarr
+
     theta, image = pairs()
     whole = bits(ker.estimate_stream((theta, image), basis))
     both = zarr.open(str(tmp_path / "both"), mode="w", shape=(NUMBER, 2), chunks=(700, 2), dtype="f8")
@@ -96,7 +98,8 @@ def test_arrays_of_zarr_give_the_bits_of_numpys_whatever_their_chunks(basis, tmp
 
 @pytest.fixture(scope="module")
 def workers():
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     with distributed.Client(n_workers=2, threads_per_worker=1, processes=False, dashboard_address=None) as client:
         yield client
 

@@ -236,9 +236,11 @@ def test_a_run_along_an_arc_counts_every_hop():
 @pytest.mark.parametrize("name", WALLS)
 def test_grazing_rays_are_accounted_for(name, theta):
     wall = WALLS[name]
-    traced = geo.trace(wall, np.linspace(0.001, 0.999, 997), theta, max_collisions=10_000)
+    # such a ray passes a million cells of an open wall, for 20 ms
+    number = 997 if wall.closes else 47
+    traced = geo.trace(wall, np.linspace(0.001, 0.999, number), theta, max_collisions=10_000)
     counts = traced.counts()
-    assert sum(counts.values()) == 997
+    assert sum(counts.values()) == number
     assert np.isfinite(traced.x).all() and np.isfinite(traced.theta).all()
     if wall.closes:
         # a long channel takes cot(theta) bounces, which the limit cuts; next to a corner rays are nearer than rounding

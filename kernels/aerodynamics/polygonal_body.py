@@ -13,6 +13,7 @@ from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, gen
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.kinds import explained, explained_class
+from ...geometry import Container
 from ..bases.measure import SINE
 
 # Reflections of a particle at most.
@@ -22,6 +23,8 @@ RULE_OF_THREE = 3.0
 FEWEST_RAYS = 100
 # Directions and offsets, relative to the body's width, that differ by less count as unchanged: a few roundings a hit.
 UNCHANGED = 1e-9
+# Points of a region's boundary at which its tangents are compared, to see that it is convex.
+BOUNDARY_POINTS = 4096
 
 
 @dataclass(frozen=True)
@@ -248,6 +251,85 @@ class PolygonalBody:
         phi = np.arctan2(exits[:, 1], exits[:, 0])
         angle = np.arctan2(out.velocity[:, 1], out.velocity[:, 0]) - (phi - 0.5 * math.pi)
         return np.stack([np.mod(phi, 2.0 * math.pi), np.mod(angle, 2.0 * math.pi)], axis=1)
+
+    @explained
+    def scatter_in(self, region: Container, n: int, rng: Rng = None) -> tuple[Floats, Floats]:
+        """Draw states from the scattering measure of the body B in a convex set C around it: the law P^{B,C}.
+
+        Parameters
+        ----------
+        region : Container
+            The convex set C: a polygon, or a container whose curves make one loop.
+        n : int
+        rng : None, int or numpy.random.Generator
+
+        Returns
+        -------
+        (before, after)
+            Shape (n, 2) each: the arc length of the point where the particle enters or leaves C, against the clock, and
+            the angle in (0, pi) from the clockwise tangent there to *minus* the incoming, or to the outgoing, velocity.
+            Particles enter with the density ds sin(theta) dtheta; the map is an involution and preserves it.
+
+        Raises
+        ------
+        InputError
+            If the region is not convex, or does not contain the body.
+
+        Examples
+        --------
+        The fraction of particles that meet a convex body is its perimeter over that of the region (Crofton):
+
+        >>> from asperity import geometry as geo
+        >>> square = PolygonalBody([[(-1, -1), (1, -1), (1, 1), (-1, 1)]])
+        >>> before, after = square.scatter_in(geo.Container.polygon([(-2, -2), (2, -2), (2, 2), (-2, 2)]), 4000, rng=0)
+        >>> undisturbed = np.isclose(np.sin(before[:, 1]), np.sin(after[:, 1]))
+        >>> bool(0.4 < np.mean(undisturbed) < 1.0), before.shape
+        (True, (4000, 2))
+        """
+        whole_number("n", n, 1)
+        source, around = generator(rng), _convex(region)
+        if not around.contains(self._starts).all():
+            raise InputError(f"region: expected one that contains the body, got {region!r}")
+        before = np.stack([around.perimeter * source.random(n), SINE.sample(n, source)], axis=1)
+        return before, self._through_region(before, around)
+
+    def _through_region(self, before: Floats, region: Container) -> Floats:
+        """Arc length and angle of exit of the particles that enter the region at an arc length and an angle."""
+        start, wall = region.point_at(before[:, 0])
+        tangent, normal = _frames(region, start, wall)
+        sine, cosine = np.sin(before[:, 1])[:, None], np.cos(before[:, 1])[:, None]
+        out = self.scatter(start, -cosine * tangent - sine * normal)
+        time, wall = region.next_wall(out.position, out.velocity, np.where(out.reflections > 0, -1, wall))
+        ends = out.position + time[:, None] * out.velocity
+        tangent, normal = _frames(region, ends, wall)
+        angle = np.arctan2(np.sum(out.velocity * normal, axis=1), np.sum(out.velocity * tangent, axis=1))
+        return np.stack([region.length_at(ends, wall), angle], axis=1)
+
+
+def _frames(region: Container, points: Floats, wall: NDArray[np.int64]) -> tuple[Floats, Floats]:
+    """Clockwise unit tangents and outer unit normals at points on the walls of a region, shape (n, 2) each."""
+    tangent = np.empty_like(points)
+    for number in np.unique(wall):
+        here = wall == number
+        tangent[here] = -region.touch(int(number), points[here]).tangent
+    return tangent, np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+
+
+def _convex(region: Container) -> Container:
+    """The region as curves; an InputError if it is not one convex loop, by its tangents at points of the boundary."""
+    if not isinstance(region, Container):
+        raise InputError(f"region: expected a Container, got {region!r}")
+    around = region.closed()
+    around.area  # noqa: B018 - refuses regions without an outer loop
+    point, wall = around.point_at(around.perimeter * (np.arange(BOUNDARY_POINTS) + 0.5) / BOUNDARY_POINTS)
+    tangent, _ = _frames(around, point, wall)
+    ahead = np.roll(tangent, -1, axis=0)
+    turn = np.arctan2(tangent[:, 0] * ahead[:, 1] - tangent[:, 1] * ahead[:, 0], np.sum(tangent * ahead, axis=1))
+    if turn.min() < -UNCHANGED or abs(turn.sum() - 2.0 * math.pi) > 1e-6:
+        raise InputError(
+            f"region: expected a convex region, got {region!r}, whose boundary turns to the right somewhere"
+        )
+    return around
 
 
 @dataclass(frozen=True)

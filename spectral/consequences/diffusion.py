@@ -120,9 +120,9 @@ def diffusivity(law: Law, radius: float = 1.0, speed: float = 1.0, arrangement: 
         )
     if holds_of_all(law, _keeps_sines):
         raise InputError(
-            f"law: {law!r} reflects every ray at its own angle to the wall, so that all flights of a particle are "
-            "equally long and the particles have no common diffusivity; expected a law that changes angles, as a "
-            "mixture with lambertian() does"
+            "law: every ray keeps its angle to the wall, so all flights of a particle are equally long and the "
+            f"particles have no common diffusivity; got {law!r}, expected a law that changes angles, as a mixture with "
+            "lambertian() does"
         )
     exact = ideal_spectrum(law) is not None
     if not exact and zeta + doubt >= 1.0 - BALLISTIC:

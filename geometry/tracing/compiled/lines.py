@@ -98,7 +98,7 @@ def first_boxes(scope, px, py, vx, vy, least, most):
     visit; and eight bits for each level, those masks of the nodes above.
     """
     root, levels = int(scope.hollow[TREE_ROOT]), int(scope.hollow[TREE_LEVELS])
-    return root, levels - 1, boxes_met(scope.tables.boxes, root, px, py, vx, vy, least, most), 0
+    return root, levels - 1, boxes_met(scope.tables.boxes, root, px, py, vx, vy, least, most), np.int64(0)
 
 
 @inlined

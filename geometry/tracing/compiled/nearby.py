@@ -32,8 +32,8 @@ from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 
 # A value of `Hit.doubt`: the side of the piece on which the ray starts is not resolved.
 DOUBTFUL = 2
-# A constant of this type, because numba compiles a function again for every literal argument.
-NOT_OWN = np.bool_(False)
+# Constants of these types, because numba compiles a function again for every literal argument.
+NOT_OWN, FORWARD, A_LINE = np.bool_(False), np.bool_(True), np.int64(LINE)
 
 
 @allocating
@@ -161,15 +161,15 @@ def hit_nearby(scope, own, px, py, vx, vy):
         close = NEARBY_SLACKS * scope.slack
         walk = first_boxes(scope, px, py, vx, vy, -close, close)
         while True:
-            leaf, walk = next_leaf(scope, walk, True, px, py, vx, vy, -close, close)
+            leaf, walk = next_leaf(scope, walk, FORWARD, px, py, vx, vy, -close, close)
             if leaf < 0:
                 break
             start = int(scope.tables.boxes[leaf, CONTENT])
             for number in range(start, min(start + BOXES, end - 1)):
-                found = nearer(scope, found, (LINE, number), own, px, py, vx, vy)
+                found = nearer(scope, found, (A_LINE, number), own, px, py, vx, vy)
     else:
         for number in range(first, end - 1):
-            found = nearer(scope, found, (LINE, number), own, px, py, vx, vy)
+            found = nearer(scope, found, (A_LINE, number), own, px, py, vx, vy)
     for kind, (first, end) in ((CIRCLE, scope.circles), (ELLIPSE, scope.ellipses), (BEZIER, scope.beziers)):
         for number in range(first, end):
             found = nearer(scope, found, (kind, number), own, px, py, vx, vy)

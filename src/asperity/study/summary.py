@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import shorten
 from typing import TYPE_CHECKING
 
 from ..core.estimates import Estimate, compact
@@ -12,6 +13,8 @@ if TYPE_CHECKING:
     from ..spectral import SpectralGap
     from .result import StudyResult, TracerCheck
 
+# Characters; the detailed report has the whole reason.
+LONGEST_REFUSAL = 110
 CONVENTIONS = {"paper": "retroreflection is the identity", "specular": "specular reflection is the identity"}
 
 
@@ -28,7 +31,7 @@ def summary_of(study: StudyResult) -> str:
         "gap": _gap(study.gap, refused("gap", "not asked for")),
         "": _gap(study.specular_gap, refused("specular_gap", "not asked for")),
         "relaxation": _relaxation(found.relaxation_time, found.without_gap),
-        "diffusion": f"refused: {found.refusal}"
+        "diffusion": _refused(found.refusal)
         if found.diffusion is None
         else f"D = {compact(found.diffusion)} in a channel of half-width 1 at speed 1",
         "disk": f"mass {disk.mass:g}, inertia {disk.inertia:g}: feels the wall {1.0 / disk.foreshortening:.4g} times "
@@ -38,6 +41,10 @@ def summary_of(study: StudyResult) -> str:
         f"{study.conservation['rolling_momentum_defect']:.0e}",
     }
     return "\n".join(f"{title:11s}{line}" for title, line in lines.items())
+
+
+def _refused(reason: str) -> str:
+    return shorten(f"refused: {reason}", LONGEST_REFUSAL, placeholder=" ...")
 
 
 def _rays(tracer: TracerCheck | None) -> str:
@@ -58,7 +65,7 @@ def _law(matrix: KernelMatrix) -> str:
 
 def _gap(gap: SpectralGap | None, refusal: str) -> str:
     if gap is None:
-        return f"refused: {refusal}"
+        return _refused(refusal)
     words = CONVENTIONS[gap.convention]
     if not gap.self_adjoint:
         norm = compact(Estimate(1.0 - gap.value, gap.error, gap.kind, gap.method))
