@@ -469,7 +469,9 @@ def page() -> str:
     blocks = []
     for number, figure in enumerate(FIGURES, start=1):
         caption = str(figure.__doc__).splitlines()[0]
-        blocks.append(f"```{{figure}} /generated/figures/{figure.__name__}.png\n({number}) {caption}\n```\n")
+        name = figure.__name__
+        picture = f"/generated/figures/{name}.png\n:alt: {name.replace('_', ' ').capitalize()}\n"
+        blocks.append(f"```{{figure}} {picture}({number}) {caption}\n```\n")
     return "\n".join(blocks)
 
 
