@@ -51,7 +51,7 @@ extensions = [
 ]
 exclude_patterns = [
     *("_build", "_templates", "how-to", "examples"),
-    *("generated/ledger.md", "generated/backreferences", "**/sg_execution_times*", "**/*.ipynb"),
+    *("generated/*.md", "generated/backreferences", "**/sg_execution_times*", "**/*.ipynb"),
 ]
 templates_path = ["_templates"]
 
@@ -113,9 +113,11 @@ def end_the_side_bar(app: Sphinx, env: BuildEnvironment) -> None:
 
 
 def give_headings_a_level(_app: Sphinx, _page: str, _template: str, context: dict[str, Any], _tree: object) -> None:
-    """State the level of the captions in the side bar, which readers of screens need to list them."""
-    tree = context["furo_navigation_tree"]
-    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+    """State the level of the captions of lists of pages, which readers of screens need to list them."""
+    for part in {"body", "furo_navigation_tree"} & set(context):
+        context[part] = context[part].replace(
+            'class="caption" role="heading"', 'class="caption" role="heading" aria-level="2"'
+        )
 
 
 def setup(app: Sphinx) -> None:
