@@ -6,6 +6,7 @@ import warnings
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 from sphinx.addnodes import toctree
 from sphinx.application import Sphinx
@@ -50,7 +51,7 @@ extensions = [
 ]
 exclude_patterns = [
     *("_build", "_templates", "how-to", "examples"),
-    *("generated/ledger.md", "generated/backreferences", "**/sg_execution_times*", "**/*.ipynb"),
+    *("generated/*.md", "generated/backreferences", "**/sg_execution_times*", "**/*.ipynb"),
 ]
 templates_path = ["_templates"]
 
@@ -99,9 +100,6 @@ sphinx_gallery_conf = {
 }
 warnings.filterwarnings("ignore", message="FigureCanvasAgg is non-interactive")
 
-# the name of a field, such as "value", may also be that of attributes of several classes
-suppress_warnings = ["ref.python"]
-
 # Pages that list many others: the bar at the side of every page ends with them.
 LISTS = ("api/generated/task-", "decisions/index", "checks/index")
 
@@ -114,8 +112,18 @@ def end_the_side_bar(app: Sphinx, env: BuildEnvironment) -> None:
                 entries.parent.remove(entries)
 
 
+def give_headings_a_level(_app: Sphinx, _page: str, _template: str, context: dict[str, Any], _tree: object) -> None:
+    """State the level of the captions of lists of pages, which readers of screens need to list them."""
+    for part in {"body", "furo_navigation_tree"} & set(context):
+        context[part] = context[part].replace(
+            'class="caption" role="heading"', 'class="caption" role="heading" aria-level="2"'
+        )
+
+
 def setup(app: Sphinx) -> None:
     app.connect("env-updated", end_the_side_bar)
+    # after the theme has made the tree
+    app.connect("html-page-context", give_headings_a_level, priority=900)
 
 
 # single backticks in docstrings are names
@@ -131,6 +139,6 @@ autodoc_type_aliases = {name: name for name in ("ArrayLike", "Floats", "Rng", "E
 python_use_unqualified_type_names = True
 python_maximum_signature_line_length = 88
 napoleon_google_docstring = False
-# as fields: an Attributes section would otherwise document a dataclass's fields a second time
-napoleon_use_ivar = True
+# as a list: otherwise a dataclass's fields are documented a second time, and a line of several names is misread
+napoleon_custom_sections = [("Attributes", "params_style")]
 napoleon_use_rtype = False

@@ -107,6 +107,14 @@ def test_the_slower_examples_agree_with_what_is_known(run, name):
         assert names["table"].rows[-1].value == pytest.approx(1 - 3 / 8 * math.log(9), abs=1e-6)
 
 
+def test_no_line_of_a_page_is_lost_as_a_comment():
+    """A line that begins with a percent sign is a comment in Markdown of MyST: "95 %" may not be broken before it."""
+    pages = [page for page in DOCS.rglob("*.md") if not {"_build", "generated"} & set(page.parts)]
+    lines = [(page.name, line) for page in pages for line in page.read_text(encoding="utf-8").splitlines()]
+    assert len(pages) > 40
+    assert not [(name, line) for name, line in lines if line.lstrip().startswith("%")]
+
+
 def test_every_short_example_is_in_the_story(reference):
     assert sorted(reference.STORY) == HOW_TO
 

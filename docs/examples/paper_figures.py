@@ -122,7 +122,7 @@ def liouville_coordinates() -> Figure:
 
 
 def outcomes_of_rectangular_teeth() -> Figure:
-    """Rays on rectangular teeth: specular ones in blue, retroreflected ones in red (section 1.2.3)."""
+    """Rays on rectangular teeth: specular ones in blue, retroreflected ones in orange (section 1.2.3)."""
     figure, ax = canvas(7.0, 3.6)
     wall, theta = geo.rectangular_teeth(0.8), 1.1
     solid_wall(ax, wall, range(-1, 2), -0.95)
@@ -469,7 +469,9 @@ def page() -> str:
     blocks = []
     for number, figure in enumerate(FIGURES, start=1):
         caption = str(figure.__doc__).splitlines()[0]
-        blocks.append(f"```{{figure}} /generated/figures/{figure.__name__}.png\n({number}) {caption}\n```\n")
+        name = figure.__name__
+        picture = f"/generated/figures/{name}.png\n:alt: {name.replace('_', ' ').capitalize()}\n"
+        blocks.append(f"```{{figure}} {picture}({number}) {caption}\n```\n")
     return "\n".join(blocks)
 
 
