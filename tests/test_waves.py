@@ -13,6 +13,7 @@ from asperity.geometry.tracing import tracing
 from asperity.geometry.tracing.compiled import closed_forms
 from asperity.geometry.tracing.compiled.pointers import Late
 from asperity.geometry.tracing.compiled.trigonometry import mirrored
+from asperity.geometry.tracing.threads import new_flag
 from test_runs import random_teeth
 
 RAYS = 5_000
@@ -97,6 +98,15 @@ def test_a_ray_is_the_same_whatever_rays_go_with_it(monkeypatch):
     part = traced(monkeypatch, True, wall, x[5:2000:3], theta[5:2000:3])
     for all_rays, some in zip(whole, part, strict=True):
         assert np.array_equal(all_rays[5:2000:3], some)
+
+
+def test_waves_end_at_a_raised_flag_as_the_loop_does():
+    wall, stop = WALLS["mushroom"], new_flag()
+    stop[0] = 1
+    x, theta = rays_of(wall, 4)
+    results = np.empty_like(x), np.empty_like(x), np.empty(x.shape, np.int64), np.full(x.shape, 77, np.uint8)
+    tracing._block_tracer(wall.scene, 10, stop, True)(x, theta, *results)
+    assert np.all(results[-1] == 77)
 
 
 def test_curves_without_waves_and_open_walls_stay_with_the_loop():
