@@ -257,3 +257,17 @@ def test_the_plan_tells_channels_wedges_and_trees():
     assert tilted.channels + tilted.wedges == 1 and not tilted.mirror_symmetric
     two = geo.Wall.from_vertices([(0, 0), (0.25, -0.5), (0.5, 0), (0.75, -0.5), (1, 0)]).plan()
     assert two.hollows == 2 and two.distinct_hollows == 1
+
+
+def test_of_two_lines_at_a_joint_a_tree_of_boxes_finds_the_same_as_the_plain_list():
+    along = np.arange(1, 100) / 100
+    left = np.column_stack([0.5 * along, -0.37 * along])
+    right = np.column_stack([1.0 - 0.5 * along, -0.37 * along])[::-1]
+    wall = geo.Wall.from_vertices([(0, 0), *left.tolist(), (0.5, -0.37), *right.tolist(), (1, 0)])
+    assert wall.plan().hollows_with_grid == 1
+    rng = np.random.default_rng(1)
+    joint, x = wall.vertices[1:-1][rng.integers(199, size=3_000)], rng.random(3_000)
+    theta = np.arctan2(-joint[:, 1], x - joint[:, 0])
+    found, plain = geo.trace(wall, x, theta), geo.trace(without_boxes(wall), x, theta)
+    for field in ("x", "theta", "collisions", "status"):
+        assert np.array_equal(getattr(found, field), getattr(plain, field))

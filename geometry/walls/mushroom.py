@@ -23,7 +23,7 @@ SHORTEST_STEM = 256.0 * EPS
 
 
 @explained
-def mushrooms(stem_to_cap: float = 0.2, stem_aspect: float = 0.5, generations: int = 1) -> Wall:
+def mushrooms(stem_to_cap: float = 0.2, stem_aspect: float = 0.0, generations: int = 1) -> Wall:
     """Return a wall of mushroom-shaped hollows.
 
     A hollow is a straight stem, open in the middle of the cell, above a cap as wide as the cell: a semicircle below a
