@@ -34,11 +34,13 @@ def measure(problem: WorkProblem, method: WorkMethod, budget: float, repeats: in
     """
     times: list[float] = []
     errors: list[dict[str, float]] = []
+    spent = 0.0
     try:
-        while len(times) < repeats and sum(times) <= seconds:
+        while len(times) < repeats and spent <= seconds:
             start = time.perf_counter()
             result = _solve(method, budget, len(times))
             times.append(time.perf_counter() - start)
+            spent += times[-1]
             value, reported, note = _parts(result)
             errors.append(problem.errors(value, method.name))
     except (AsperityError, ArithmeticError, MemoryError, np.linalg.LinAlgError) as reason:
