@@ -45,7 +45,7 @@ def test_norms_of_powers_and_products():
     "law",
     [
         ker.specular(), ker.maxwell(0.9), ker.TriangularTeethLaw(0.7), ker.WallLaw(geo.koch(1)),
-        ker.WallLaw(geo.mushrooms(0.4, 0.0)), ker.CircularArcLaw(0.5 * np.pi), ker.InvolutionLaw(lambda t: np.pi - t),
+        ker.WallLaw(geo.mushrooms(0.4)), ker.CircularArcLaw(0.5 * np.pi), ker.InvolutionLaw(lambda t: np.pi - t),
         0.5 * ker.lambertian() + 0.5 * ker.InvolutionLaw(lambda t: np.pi - t),
     ],
     ids=repr,

@@ -108,12 +108,12 @@ def test_the_parabola_pair_sends_grazing_rays_back_and_has_no_visible_gap():
 
 
 def test_a_mushroom_ends_at_an_essential_edge_above_its_fraction_of_flat_tops():
-    edge = essential_edge(ker.WallLaw(geo.mushrooms(0.3, 0.0)))
+    edge = essential_edge(ker.WallLaw(geo.mushrooms(0.3)))
     assert edge.low > 0.7 and edge.high < 1.0 and edge.error < 1e-6
     # E[sin(theta)/sin(theta')] by plain tracing at theta = 1e-5, by z-score over shifted lattices
     shift = np.arange(8)[:, None] / 8 + 0.05
     x = (np.arange(2**12) + shift) / 2**12 % 1.0
-    traced = geo.trace(geo.mushrooms(0.3, 0.0), x.ravel(), np.full(x.size, 1e-5))
+    traced = geo.trace(geo.mushrooms(0.3), x.ravel(), np.full(x.size, 1e-5))
     means = (np.sin(1e-5) / np.sin(traced.theta)).reshape(x.shape).mean(axis=1)
     assert abs(means.mean() - edge.value) < 6.0 * means.std(ddof=1) / np.sqrt(8) + edge.error
 

@@ -22,7 +22,7 @@ def asteroids():
 
 
 def test_a_joined_wall_reflects_as_its_cells():
-    parts = [geo.focusing_arcs(1.1).scaled(0.5), geo.mushrooms(0.4, 0.0), geo.triangular_teeth(0.8).scaled(0.25)]
+    parts = [geo.focusing_arcs(1.1).scaled(0.5), geo.mushrooms(0.4), geo.triangular_teeth(0.8).scaled(0.25)]
     repeats = [2, 1, 3]
     whole = geo.join_walls(parts, repeats)
     assert whole.period == 2.75 and whole.closes
@@ -151,7 +151,7 @@ def test_an_asteroid_field_displaces_rays_without_bound_and_closed_walls_do_not(
     assert float(field.exceeds(5.0)) > 0.0
     small = [float(field.exceeds(0.5, scale)) for scale in (1.0, 0.1, 0.01)]
     assert small[0] > small[1] > small[2]
-    closed = ker.displacements(geo.mushrooms(0.4, 0.0), 20_000, rng=RNG)
+    closed = ker.displacements(geo.mushrooms(0.4), 20_000, rng=RNG)
     assert np.max(np.abs(closed.values)) <= closed.longest_possible <= 1.0
     assert closed.exceeds(1.0).kind == "bound"
     with pytest.raises(InputError, match="closes"):

@@ -112,7 +112,7 @@ def test_a_lip_without_thickness_is_met_from_below_by_a_satellite_that_came_in_b
     # (.35, .65), to x = .89, under the lip; it comes in at the very height of the lip's lower side
     rng = np.random.default_rng(0)
     position = np.array([0.06781824, -0.03185973]) + 1e-9 * rng.random((200, 2))
-    out = geo.collide(DISK, geo.mushrooms(0.3, 0.0), 0.1, position, [[-0.63075937, -0.04428023, 1.00015155]])
+    out = geo.collide(DISK, geo.mushrooms(0.3), 0.1, position, [[-0.63075937, -0.04428023, 1.00015155]])
     assert (out.contacts > 1).all() and out.two_satellites.all()
 
 

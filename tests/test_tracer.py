@@ -39,7 +39,7 @@ def bezier_wall():
 WALLS = {name: entry.build() for name, entry in geo.WALLS.items()} | {
     "semicircle": geo.focusing_arcs(np.pi / 2),
     "cusp": geo.dispersing_arcs(2.0),
-    "plated mushroom": geo.mushrooms(0.3, 0.0),
+    "plated mushroom": geo.mushrooms(0.3),
     "mushrooms on mushrooms": geo.mushrooms(0.3, 0.5, 2),
     "bezier": bezier_wall(),
     "island": island_wall(),

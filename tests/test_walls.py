@@ -136,7 +136,7 @@ def test_every_graph_of_a_function_is_a_wall(steps):
 
 def test_a_plate_of_zero_thickness_does_not_split_its_hollow():
     assert CLOSED["plate"].hollows == (geo.Hollow(0.7, 1.0, 1, 5),)
-    mushroom = geo.mushrooms(0.25, 0.0)
+    mushroom = geo.mushrooms(0.25)
     assert mushroom.hollows == (geo.Hollow(0.375, 0.625, 1, 4),)
     assert mushroom.vertices.tolist() == [[0, 0], [0.375, 0], [0, 0], [1, 0], [0.625, 0], [1, 0]]
 

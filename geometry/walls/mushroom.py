@@ -46,7 +46,7 @@ def mushrooms(stem_to_cap: float = 0.2, stem_aspect: float = 0.0, generations: i
 
     Examples
     --------
-    >>> wall = mushrooms(0.25, 0.0)
+    >>> wall = mushrooms(0.25)
     >>> wall.hollows
     (Hollow(left=0.375, right=0.625, first=1, last=4),)
     >>> wall.depth
