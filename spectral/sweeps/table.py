@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.errors import FileExistsRefusal, InputError
 from ...core.files import write_whole
-from ...core.frames import data_frame
+from ...core.frames import data_frame, needed
 from .extremum import Extremum, refined_extremum
 from .picture import draw_curves
 from .points import Point, key_of
@@ -98,16 +98,13 @@ class SweepTable:
         InputError
             If xarray is not installed.
         """
-        try:
-            import xarray
-        except ImportError as reason:
-            raise _needs("xarray", "to_xarray") from reason
+        xarray = needed("xarray", "to_xarray")
         frame = self.to_frame()
         if self.zipped:
             numbers = {key_of(dict(row.point)): number for number, row in enumerate(self.of(self.quantities[0]))}
             frame["point"] = [numbers[key_of(dict(row.point))] for row in self.rows]
         dimensions = ["point"] if self.zipped else list(self.parameters)
-        found = xarray.Dataset()
+        found: Dataset = xarray.Dataset()
         for quantity in self.quantities:
             own = frame[frame["quantity"] == quantity].set_index(dimensions)
             for suffix, column in (("", "value"), ("_error", "error"), ("_verdict", "verdict")):
@@ -160,10 +157,8 @@ class SweepTable:
             If pandas or pyarrow is not installed, or the file cannot be written.
         """
         frame = self.to_frame()
-        try:
-            import pyarrow  # noqa: F401 - pandas loads it by its name
-        except ImportError as reason:
-            raise _needs("pyarrow", "to_parquet") from reason
+        # pandas loads it by its name
+        needed("pyarrow", "to_parquet")
         write_whole(Path(path), lambda stream: frame.to_parquet(stream, engine="pyarrow", index=False), overwrite=True)
 
     def save(self, folder: str | Path, *, overwrite: bool = False) -> list[Path]:
@@ -221,7 +216,3 @@ def csv_text(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     for row in rows:
         writer.writerow([repr(float(cell)) if isinstance(cell, float) else cell for cell in row])
     return text.getvalue()
-
-
-def _needs(library: str, method: str) -> InputError:
-    return InputError(f"{method}: needs {library}; pip install 'asperity[studies]', or use to_csv and to_json")

@@ -9,31 +9,25 @@ from typing import Any
 from .errors import InputError
 
 
-def data_frame(columns: Mapping[str, Any]) -> Any:
-    """A pandas.DataFrame of named columns.
+def needed(library: str, method: str) -> Any:
+    """The module of the extra ``studies`` that a method needs.
 
     Raises
     ------
     InputError
-        If pandas is not installed.
+        If it is not installed.
     """
     try:
-        pandas = import_module("pandas")
+        return import_module(library)
     except ImportError as reason:
-        raise InputError("to_frame: needs pandas; install it with: pip install 'asperity[studies]'") from reason
-    return pandas.DataFrame(dict(columns))
+        raise InputError(f"{method}: needs {library}; install it with: pip install 'asperity[studies]'") from reason
+
+
+def data_frame(columns: Mapping[str, Any]) -> Any:
+    """A pandas.DataFrame of named columns; an InputError if pandas is not installed."""
+    return needed("pandas", "to_frame").DataFrame(dict(columns))
 
 
 def data_array(values: Any, **described: Any) -> Any:
-    """An xarray.DataArray, with its dimensions, coordinates, name and attributes.
-
-    Raises
-    ------
-    InputError
-        If xarray is not installed.
-    """
-    try:
-        xarray = import_module("xarray")
-    except ImportError as reason:
-        raise InputError("to_xarray: needs xarray; install it with: pip install 'asperity[studies]'") from reason
-    return xarray.DataArray(values, **described)
+    """An xarray.DataArray, with its dimensions, coordinates, name and attributes; an InputError without xarray."""
+    return needed("xarray", "to_xarray").DataArray(values, **described)
