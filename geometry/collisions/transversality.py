@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, Rng, finite_array, frozen, generator, instance, whole_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import Estimate, fraction_estimate
 from ...core.kinds import explained
 from ..curves.curvature import largest_curvature
 from ..curves.segment import Segment
@@ -33,8 +33,6 @@ BENT, ARC = 0.5, 1.05
 FAR = 1e9
 # Steps of the iteration that finds the reach of a contact, and the room left for the last one.
 REACH_STEPS, ROOM = 60, 1.0 + 1e-6
-# Widening of the interval of a fraction for a sample without failures (Agresti and Coull).
-EXTRA = 4.0
 
 
 @dataclass(frozen=True)
@@ -189,7 +187,7 @@ def good_fraction(space: ConfigurationSpace, samples: int = 1000, rng: Rng = Non
     -------
     Estimate
         The fraction for which `shadow` is licit, a lower bound for the fraction that collides alike; the error is the
-        half width of 95 % of the sample (Agresti and Coull).
+        half width of 95 % of the sample (Wilson).
 
     Raises
     ------
@@ -215,9 +213,7 @@ def good_fraction(space: ConfigurationSpace, samples: int = 1000, rng: Rng = Non
     model, velocity = _Model(space), parts @ space.disk.frame
     start = at_the_tops(space.wall, space.scale, position, velocity)
     good = sum(_Pair(model, x, w).follow().is_licit for x, w in zip(start, velocity, strict=True))
-    middle = (good + 0.5 * EXTRA) / (n + EXTRA)
-    half = NORMAL_95 * math.sqrt(middle * (1.0 - middle) / (n + EXTRA))
-    return Estimate(good / n, half + abs(middle - good / n), "estimate", f"{n} states, 95 % of a binomial sample")
+    return fraction_estimate(good / n, n, f"{n} states, 95 % of a binomial sample")
 
 
 class _Flight(NamedTuple):

@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, finite_array, finite_number, frozen, generator, positive_number, whole_number
 from ...core.errors import AccuracyError, InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import Estimate, mean_of_strata
 from ...core.kinds import explained, explained_class
 from ...geometry import Container
 from ..bases.measure import SINE
 
 # Reflections of a particle at most.
 MOST_REFLECTIONS = 100_000
-# If none of n rays shows an effect, its probability is below this number over n with a confidence of 95 %.
-RULE_OF_THREE = 3.0
 FEWEST_RAYS = 100
 # Directions and offsets, relative to the body's width, that differ by less count as unchanged: a few roundings a hit.
 UNCHANGED = 1e-9
@@ -192,13 +190,9 @@ class PolygonalBody:
 
     @staticmethod
     def _mean(push: Floats, width: float, number: int) -> Estimate:
-        """The mean over strips: an error from neighbouring strips, which overstates it, and the rule of three."""
-        steps = np.diff(push)
-        spread = math.sqrt(float(np.mean(steps**2)) / 2.0) / math.sqrt(number)
-        unseen = RULE_OF_THREE / number * 2.0
-        return Estimate(
-            width * float(push.mean()), width * (NORMAL_95 * spread + unseen), "estimate", f"{number} stratified rays"
-        )
+        """The mean over strips, times the width."""
+        mean = mean_of_strata(push, 2.0, f"{number} stratified rays")
+        return replace(mean, value=width * mean.value, error=width * mean.error)
 
     @explained
     def scatter_in_circle(

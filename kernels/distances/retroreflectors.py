@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from ...core.checks import Rng, generator, whole_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import Estimate, mean_of_strata
 from ...core.kinds import explained
 from ...geometry import Wall
 from ..bases.measure import SINE
 from ..laws.law import Law
 
 FEWEST_RAYS = 100
-# If none of n rays shows an effect, its probability is below this number over n with a confidence of 95 %.
-RULE_OF_THREE = 3.0
 
 
 @explained
@@ -72,7 +71,5 @@ def retroreflection_distance(reflector: Wall | Law, rays: int = 2**14, rng: Rng 
     else:
         raise InputError(f"reflector: expected a Wall, or a law in the paper's convention, got {reflector!r}")
     turned = np.abs(outgoing - theta)
-    # neighbours differ by the spread within their strata, and a little more
-    spread = math.sqrt(float(np.mean(np.diff(turned) ** 2)) / (2.0 * number))
-    error = NORMAL_95 * spread + math.pi * (RULE_OF_THREE / number + lost)
-    return Estimate(float(turned.mean()), error, "estimate", f"{number} stratified rays")
+    mean = mean_of_strata(turned, math.pi, f"{number} stratified rays")
+    return replace(mean, error=mean.error + math.pi * lost)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...core.checks import Floats, Rng, finite_number, frozen, generator, instance, positive_number, whole_number
 from ...core.errors import InputError
-from ...core.estimates import NORMAL_95, Estimate
+from ...core.estimates import NORMAL_95, Estimate, fraction_estimate
 from ...core.kinds import explained
 from ...geometry import Wall
 from ..bases.measure import SINE
@@ -59,12 +59,8 @@ class Displacements:
         found = float(np.mean(factor * np.abs(self.values) > least))
         if factor * self.longest_possible <= least:
             return Estimate(0.0, self.unresolved, "bound", "the wall closes")
-        z = NORMAL_95**2 / self.rays
-        middle = (found + 0.5 * z) / (1.0 + z)
-        half = math.sqrt(z * found * (1.0 - found) + 0.25 * z * z) / (1.0 + z)
-        # the interval about the observed frequency that contains Wilson's
-        error = abs(found - middle) + half + self.unresolved
-        return Estimate(found, error, "estimate", f"{self.rays} random rays")
+        sampled = fraction_estimate(found, self.rays, f"{self.rays} random rays")
+        return replace(sampled, error=sampled.error + self.unresolved)
 
     def quantile(self, probability: float) -> float:
         """The displacement below which a fraction of the rays lies."""

@@ -16,6 +16,8 @@ ErrorKind = Literal["bound", "estimate"]
 LEVEL = 0.95
 # Of how many standard deviations such an interval of a normal variable has on each side.
 NORMAL_95 = 1.959963984540054
+# If none of n trials shows an effect, its probability is below this number over n with a confidence of 95 %.
+RULE_OF_THREE = 3.0
 # A number without error is printed to this many decimals.
 DECIMALS = 12
 # A printed error has two digits if the first is smaller than this, of a double's significant digits at most so many;
@@ -165,6 +167,40 @@ def student_95(parts: int) -> float:
     from scipy.special import stdtrit
 
     return float(stdtrit(parts - 1, 0.5 * (1.0 + LEVEL)))
+
+
+def fraction_estimate(fraction: float, number: int, method: str) -> Estimate:
+    """The probability of what happened in a fraction of independent trials, with Wilson's interval of 95 %.
+
+    Examples
+    --------
+    >>> fraction_estimate(0.0, 100, "100 trials").error < 0.04
+    True
+    """
+    z = NORMAL_95**2 / number
+    middle = (fraction + 0.5 * z) / (1.0 + z)
+    half = math.sqrt(z * fraction * (1.0 - fraction) + 0.25 * z * z) / (1.0 + z)
+    # the interval about the observed frequency that contains Wilson's
+    return Estimate(fraction, abs(fraction - middle) + half, "estimate", method)
+
+
+def mean_of_strata(values: Any, largest: float, method: str) -> Estimate:
+    """The mean over equal strata with one random point each, in their order.
+
+    The error is 1.96 standard deviations from the differences of neighbours, which contain the spread within their
+    strata and a little more, plus 3 ``largest``/n: a value that none of n points shows, at most ``largest`` in size, is
+    rarer than 3/n with a confidence of 95 %.
+
+    Examples
+    --------
+    >>> mean_of_strata([1.0, 1.0, 1.0], 2.0, "3 points")
+    Estimate(value=1.0, error=2.0, kind='estimate', method='3 points')
+    """
+    import numpy as np
+
+    number = len(values)
+    spread = math.sqrt(float(np.mean(np.diff(values) ** 2)) / (2.0 * number))
+    return Estimate(float(np.mean(values)), NORMAL_95 * spread + RULE_OF_THREE / number * largest, "estimate", method)
 
 
 def estimate_as_dict(number: Estimate) -> dict[str, Any]:
