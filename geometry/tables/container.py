@@ -313,6 +313,14 @@ class Container:
             return boundary.touch(self.curves[wall - len(self.points)], position)
         return boundary.Touch(position, np.broadcast_to(self.tangents[wall], position.shape), np.zeros(len(position)))
 
+    def frames(self, position: Floats, wall: NDArray[np.int64]) -> tuple[Floats, Floats]:
+        """Return the unit tangents (n, 2) and inner unit normals (n, 2) at points (n, 2) of these walls (n,)."""
+        tangent = np.empty((len(position), 2))
+        for k in np.unique(wall):
+            here = wall == k
+            tangent[here] = self.touch(int(k), position[here]).tangent
+        return tangent, np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
+
     def point_at(self, length: ArrayLike) -> tuple[Floats, NDArray[np.int64]]:
         """Return the points (n, 2) of the boundary at these arc lengths (n,), and their walls (n,).
 

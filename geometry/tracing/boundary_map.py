@@ -183,15 +183,11 @@ class _Flight:
         self.position, self.wall = container.point_at(length)
         self.length = container.length_at(self.position, self.wall)
         n = len(length)
-        self.velocity, self.time = np.zeros((n, 2)), np.zeros(n)
+        tangent, normal = container.frames(self.position, self.wall)
+        angle = self.theta[:, None]
+        self.velocity, self.time = np.cos(angle) * tangent + np.sin(angle) * normal, np.zeros(n)
         self.made = np.zeros(n, dtype=np.int64)
         self.status = np.full(n, Status.ESCAPED, dtype=np.uint8)
-        for k in range(container.wall_count):
-            here = np.flatnonzero(self.wall == k)
-            tangent = container.touch(k, self.position[here]).tangent
-            normal = np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)
-            angle = self.theta[here, None]
-            self.velocity[here] = np.cos(angle) * tangent + np.sin(angle) * normal
 
     def advance(self, moving: NDArray[np.int64]) -> None:
         """Move some particles to their next wall and reflect them."""
