@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,7 +18,7 @@ from ...core.checkpoints import Checkpoint
 from ...core.checks import Floats
 from ...core.long_runs import Engine, progress_bar
 from ...core.version import __version__
-from ...core.workers import BACKLOG, connected, results
+from ...core.workers import BACKLOG, connected, in_order, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..laws.law import DrivenLaw, Law, entry_inside
@@ -257,7 +257,7 @@ class _Run:
         found: Iterable[tuple[int, Sums]] = results(_Task(self.job).sums, rest, workers, self._backlog(workers))
         stored = time.monotonic()
         try:
-            for task, own in found if self.job.basis.is_partition else _in_order(found, rest):
+            for task, own in found if self.job.basis.is_partition else in_order(found, rest):
                 self.state = self.state.after(task, self.job.first_table(task), own)
                 bar.update(self.job.rays_of(task))
                 if store is not None and time.monotonic() - stored > STORED_EVERY:
@@ -266,14 +266,3 @@ class _Run:
         finally:
             if store is not None:
                 store.put(STATE, self.state.packed(), now=True)
-
-
-def _in_order(found: Iterable[tuple[int, Sums]], tasks: Iterable[int]) -> Iterator[tuple[int, Sums]]:
-    """Results in the order of the tasks: one that comes too early waits for those before it."""
-    early: dict[int, Sums] = {}
-    coming = iter(found)
-    for task in tasks:
-        while task not in early:
-            other, own = next(coming)
-            early[other] = own
-        yield task, early.pop(task)

@@ -6,6 +6,7 @@ import io
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -18,7 +19,7 @@ from ...core.errors import InputError
 from ...core.kinds import explained
 from ...core.long_runs import digest
 from ...core.version import __version__
-from ...core.workers import connected, results
+from ...core.workers import connected, in_order, results
 from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..matrices.defects import invariance_z_score
@@ -157,21 +158,17 @@ class _Sums:
             self._store(store)
 
     def _add_each(self, blocks: Iterator[Block], basis: Basis, workers: Any) -> Iterator[None]:
-        """Add the blocks in their order; one that workers have too early waits for those before it."""
+        """Add the blocks in their order."""
         if workers is None:
             for _, theta, image in blocks:
                 self._add(theta, image, basis)
                 yield
             return
         backlog = BLOCKS_A_WORKER * max(len(workers.nthreads()), 1)
-        early: dict[int, _Sums] = {}
-        done = 0
-        for (number, *_), own in results(_Adding(basis, self.invariant).sums, blocks, workers, backlog):
-            early[number] = own
-            while done in early:
-                self._merge(early.pop(done))
-                done += 1
-                yield
+        found = results(_Adding(basis, self.invariant).sums, blocks, workers, backlog)
+        for _, own in in_order(((number, own) for (number, *_), own in found), count()):
+            self._merge(own)
+            yield
 
     def _merge(self, other: _Sums) -> None:
         self.totals += other.totals

@@ -113,6 +113,24 @@ def results(
     yield from _collected(submitted(backlog), lambda: submitted(1))
 
 
+def in_order(found: Iterable[tuple[Task, Result]], tasks: Iterable[Task]) -> Iterator[tuple[Task, Result]]:
+    """Results in the order of the tasks: one that comes too early waits for those before it.
+
+    Examples
+    --------
+    >>> list(in_order([(1, "b"), (0, "a"), (2, "c")], range(3)))
+    [(0, 'a'), (1, 'b'), (2, 'c')]
+    """
+    early: dict[Task, Result] = {}
+    order = iter(tasks)
+    due = next(order, None)
+    for task, result in found:
+        early[task] = result
+        while due is not None and due in early:
+            yield due, early.pop(due)
+            due = next(order, None)
+
+
 def _collected(waiting: dict[Any, Task], more: Callable[[], dict[Any, Task]]) -> Iterator[tuple[Task, Any]]:
     """The results of futures as they come; after each of them ``more`` are added."""
     from distributed import as_completed
