@@ -28,8 +28,8 @@ for notches in (20, 200, 2000):
 # %%
 # A ray in each. In the notched angle and the tube it leaves beside its point of entry.
 
-fig, axes = plt.subplots(1, 4, layout="constrained", figsize=(9, 4))
+fig, axes = plt.subplots(1, 4, layout="constrained", figsize=(11, 4))
 for ax, (name, wall) in zip(axes, walls.items(), strict=True):
     geo.draw_wall(wall, 0.53, 1.1, ax=ax)
-    ax.set_title(name)
+    ax.set(title=name, xlabel="x (periods)", xticks=[0.0, 0.5, 1.0])
 plt.show()

@@ -122,13 +122,18 @@ class ChannelPaths:
 
         axes = pyplot.subplots()[1] if ax is None else ax
         time = float(self.times[-1])
-        growth = math.log(time * self.speed / self.radius) if math.isinf(self.bend) else 1.0
+        is_straight = math.isinf(self.bend)
+        growth = math.log(time * self.speed / self.radius) if is_straight else 1.0
         width = math.sqrt(float(variance))
         at = np.linspace(-4.0 * width, 4.0 * width, 201)
         scaled = self.positions[:, -1] / math.sqrt(time * growth)
-        axes.hist(scaled, bins=np.linspace(at[0], at[-1], 41).tolist(), density=True, color="0.8")
-        axes.plot(at, np.exp(-0.5 * (at / width) ** 2) / (width * math.sqrt(2.0 * math.pi)), color="C0")
-        axes.set_xlabel(r"$X_t/\sqrt{t}$" if growth == 1.0 else r"$X_t/\sqrt{t\,\ln t}$")
+        axes.hist(scaled, bins=np.linspace(at[0], at[-1], 41).tolist(), density=True, color="0.8", label="paths")
+        normal = np.exp(-0.5 * (at / width) ** 2) / (width * math.sqrt(2.0 * math.pi))
+        axes.plot(at, normal, color="C0", label="normal limit")
+        scale = r"$X_t/\sqrt{t\,\ln t}$" if is_straight else r"$X_t/\sqrt{t}$"
+        axes.set_xlabel(f"{scale}  (length / time$^{{1/2}}$)")
+        axes.set_ylabel("probability density")
+        axes.legend()
         return axes
 
     def _slopes(self, means: Floats, scale: float) -> Floats:
