@@ -55,6 +55,8 @@ ESCAPED = 0
 RAYS = WAVE
 # Adding and then subtracting this number rounds a number below 2^51 to an integer.
 ROUNDER = 1.5 * 2.0**52
+# Of this type, because numba compiles a function again for a literal argument.
+FIRST_HOLLOW = np.int64(0)
 
 
 class Room(NamedTuple):
@@ -244,7 +246,7 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     out_x, out_theta, bounces, status = results
     numbers, rays, others, met, heads, _ = room
     whole = (
-        is_crossed(hollows[0], closed, 0, crossings)
+        is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
         and hollows.shape[0] == 1
         and hollows[0, LEFT] == 0.0
         and hollows[0, RIGHT] == cell
@@ -259,7 +261,7 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
                 entry[j] = starts[j] - cell_of(starts[j], cell)
             for j in range(count):
                 angle[j] = theta[first + j]
-            cross_hollow(tables, closed, 0, limit, entry, angle, hits, room, crossings)
+            cross_hollow(tables, closed, FIRST_HOLLOW, limit, entry, angle, hits, room, crossings)
             for j in range(count):
                 entry[j] += cell_of(starts[j], cell)
             for j in range(count):

@@ -19,15 +19,88 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from tempfile import gettempdir, mkdtemp
-from typing import Any
+from typing import Any, ClassVar
 
 from numba import njit
+from numba._dynfunc import make_function
 from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, Flags
+from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
+from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.untyped_passes import InlineClosureLikes
 
 logger = logging.getLogger("asperity")
+
+
+class _Same(Flags):
+    """The options of a function; equal options are one object, because numba compares them wherever it types a call."""
+
+    __hash__ = object.__hash__
+    known: ClassVar[dict[str, _Same]] = {}
+
+    @classmethod
+    def of(cls, flags: Flags) -> _Same:
+        return cls.known.setdefault(repr(flags), cls(flags))
+
+    def __eq__(self, other: object) -> bool:
+        return self is other
+
+    def copy(self) -> Any:
+        return self
+
+
+class _Pipeline(CompilerBase):
+    """numba's passes without those for closures and for expressions of whole arrays, which find nothing here."""
+
+    unused = InlineClosureLikes, InlineOverloads, NopythonRewrites
+    lowering = NativeLowering
+
+    def __init__(self, typing: Any, target: Any, library: Any, arguments: Any, result: Any, flags: Any, kinds: Any):
+        super().__init__(typing, target, library, arguments, result, _Same.of(flags), kinds)
+
+    def define_pipelines(self) -> list[Any]:
+        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        wanted = [step for step in manager.passes if step[0] not in self.unused]
+        manager.passes = [(self.lowering if step is NativeLowering else step, text) for step, text in wanted]
+        manager.finalize()
+        return [manager]
+
+
+class _InlinedLibrary(JITCodeLibrary):
+    """The code of a function that is inlined: it is optimised and becomes machine code within its callers only."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _InlinedLowering(NativeLowering):
+    """numba's translation to LLVM, which stops before it loads a function."""
+
+    _name = "inlined_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags = Flags(state.flags)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        # numba's tables name the function by this object, which nobody calls
+        name = make_function(sys.modules[__name__], state.func_id.func_name, "", 0, state.cr.env, (state.library,))
+        state.targetctx.insert_user_function(name, state.cr.fndesc, [state.library])
+        state.cr = state.cr._replace(cfunc=name)
+        return True
+
+
+class _InlinedPipeline(_Pipeline):
+    lowering = _InlinedLowering
+
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
@@ -38,7 +111,8 @@ def jit(**options: Any) -> Callable[[Any], Any]:
     Unless the options say otherwise, the function releases the lock of the interpreter, divides by zero as numpy does,
     and has no wrapper for calls from C.
     """
-    decorate: Any = njit(**{**OPTIONS, **options})
+    pipeline = _InlinedPipeline if options.get("forceinline") else _Pipeline
+    decorate: Any = njit(pipeline_class=pipeline, **{**OPTIONS, **options})
 
     def compiled(function: Any) -> Any:
         dispatcher = decorate(function)
