@@ -110,15 +110,15 @@ class HollowConditionals:
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
         from ...geometry.itineraries.compiled.gauss import gauss_tables
-        from ...geometry.itineraries.compiled.march import march_address, march_angles
+        from ...geometry.itineraries.compiled.march import marched_angles
 
         seeds = [
             self._seeds(angle, least) for angle, least in zip(theta.tolist(), tolerances * self.width, strict=True)
         ]
         found = _result(
-            lambda: march_angles(
+            lambda: marched_angles(
                 theta, tolerances, self._setting, self.degree, gauss_tables(self.least_level),
-                np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]), march_address(),
+                np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
             )
         )  # fmt: skip
         (nodes, widths), node_starts, pieces, piece_starts, errors, unresolved, rays, segments = found
@@ -141,16 +141,16 @@ class HollowConditionals:
 
         They include the middles of the wide pieces at the nearest known angles, and the points of missed pieces.
         """
-        from ...geometry.itineraries.compiled.march import wide_middles
+        from ...geometry.itineraries.compiled.march import MOST_SEEDS, wide_middles
         from ...geometry.itineraries.entry_nodes import first_nodes
 
         k = int(np.searchsorted(self._theta, angle))
         known = [self._pieces[near] for near in self._theta[max(0, k - 1) : k + 2].tolist()]
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]].tolist()
-        entries = [
-            first_nodes(angle, left, right, least),
-            *(wide_middles(conditional.low, conditional.high, least) for conditional in known),
-        ]
+        entries = [first_nodes(angle, left, right, least)]
+        for conditional in known:
+            middles = np.empty(MOST_SEEDS)
+            entries.append(middles[: wide_middles(conditional.low, conditional.high, least, middles)])
         if angle in self._pieces:
             # the changes of itinerary found before
             entries += [self._pieces[angle].low, self._pieces[angle].high]
@@ -225,6 +225,6 @@ class HollowConditionals:
                 middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
                 drift = (0.5 * (low + high) - middle) / (present - beyond)
         piece = np.uint64(label), present, absent, low, high, drift
-        angle = float(_result(lambda: find_critical(*piece, self._setting, self.degree)))
+        angle = float(_result(lambda: find_critical(*piece, self._setting, self.degree, np.zeros(1, np.int64))))
         self._critical[key] = angle
         return angle

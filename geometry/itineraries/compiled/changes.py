@@ -19,7 +19,7 @@ from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, POINT_X, POINT_Y, RIGHT
 from ...scene.scene import NO_TABLES, Scene, Tables
-from ...tracing.compiled.options import allocating, inlined, inner
+from ...tracing.compiled.options import inlined, inner, linked
 from ...tracing.compiled.pointers import address_of, call_at
 from ...tracing.compiled.rays import ESCAPED, HASH_FACTOR, SLOTS, trace_rays_address
 from ...tracing.compiled.records import Results, Slots, results_for
@@ -107,8 +107,7 @@ def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats) -> Sett
     return Setting(tables.hollows[hollow], tables, limits, np.require(edges, np.float64, ["C", "A", "W"]), tracer)
 
 
-@allocating
-def empty_chain():
+def empty_chain() -> Chain:
     """Return an empty chain for the samples of one angle; the last sample will have the successor -1."""
     return Chain(
         np.empty(MOST_SAMPLES),
@@ -120,7 +119,7 @@ def empty_chain():
     )
 
 
-@allocating
+@linked
 def task_of(setting, theta, degree, segments):
     """-> Task: the task of one incoming angle."""
     setting.tracer.angles[:] = theta
@@ -309,7 +308,7 @@ def halved(task, chain, count, gap_count, goal, most):
     return call_at(task.setting.tracer.halve, count, (task, chain, count, gap_count, goal, most))
 
 
-@inner
+@linked
 def sample_entries(entries, task, chain, goal):
     """Chain the samples at increasing positions and halve the gaps.
 
@@ -337,7 +336,7 @@ def sample_entries(entries, task, chain, goal):
     return halved(task, chain, count, gap_count, goal, np.int64(3 * MOST_SAMPLES // 4)), last
 
 
-@inner
+@linked
 def add_change(x, first, task, chain, count, goal):
     """Insert a position x of another label into the piece that begins with ``first``, and find the changes around x."""
     xs, _, _, follow, gaps, _ = chain

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from ...tracing.compiled.options import allocating, inner
+from ...tracing.compiled.options import linked, linked_allocating
 from .changes import FIRST_LABEL, is_spent, outcome, trace_block
 
 ORDERS = (4, 7, 12, 20, 32)
@@ -55,7 +55,7 @@ def gauss_tables(least: int) -> Rules:
     return Rules(np.concatenate(positions), np.concatenate(weights), np.array(starts), least)
 
 
-@inner
+@linked
 def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     """Apply rules of increasing order on an interval until the error estimate is at most ``goal``.
 
@@ -105,7 +105,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     return used, error, np.nan, rays
 
 
-@allocating
+@linked_allocating
 def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     """Compute nodes on a piece, which is halved until the rules reach the tolerance.
 

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ....core.compilation import jit
+from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
-from ...tracing.compiled.growing import append, longer
-from ...tracing.compiled.options import allocating
+from ...tracing.compiled.options import allocating, compiled, linked
 from ...tracing.compiled.pointers import address_of, call_at
 from .changes import (
     FIRST_LABEL,
     MOST_SAMPLES,
+    Chain,
+    Setting,
     add_change,
     empty_chain,
     example_chain,
@@ -29,9 +32,7 @@ from .changes import (
     task_of,
     undecided,
 )
-from .gauss import MOST_NODES, SPARE, gauss_tables, integrate_piece
-
-_compile = jit()
+from .gauss import MOST_NODES, SPARE, Rules, gauss_tables, integrate_piece
 
 # Limit on the pieces of one angle whose middles are samples of the next angle.
 MOST_SEEDS = 128
@@ -45,10 +46,38 @@ RULE_FRACTION, GAP_FRACTION = 0.5, 0.25
 LATE_FRACTION = 0.05
 
 
-@allocating
-def merged(first, second):
-    """Merge two increasing sequences."""
-    both = np.empty(first.shape[0] + second.shape[0])
+class Found(NamedTuple):
+    """What is found angle by angle.
+
+    Outgoing angles and masses of the nodes, and the start of each angle; first positions, last positions and labels of
+    the pieces, and the start of each angle; and for each angle the error, the width of unresolved rays, and the numbers
+    of rays and of ray segments.
+    """
+
+    nodes: tuple[Floats, ...]
+    node_starts: NDArray[np.int64]
+    pieces: tuple[NDArray[Any], ...]
+    piece_starts: NDArray[np.int64]
+    errors: Floats
+    unresolved: Floats
+    rays: NDArray[np.int64]
+    segments: NDArray[np.int64]
+
+
+class Room(NamedTuple):
+    """Work space: the samples, nodes and pieces of one angle, its first samples, and the middles before it and their number."""
+
+    chain: Chain
+    nodes: tuple[Floats, ...]
+    pieces: tuple[NDArray[Any], ...]
+    entries: Floats
+    middles: Floats
+    waiting: NDArray[np.int64]
+
+
+@linked
+def merge(first, second, both):
+    """Merge two increasing sequences into ``both``."""
     i, j = np.int64(0), np.int64(0)
     for k in range(both.shape[0]):
         if j == second.shape[0] or (i < first.shape[0] and first[i] <= second[j]):
@@ -57,7 +86,6 @@ def merged(first, second):
         else:
             both[k] = second[j]
             j += 1
-    return both
 
 
 @allocating
@@ -119,30 +147,26 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     return filled, error, unresolved, number, rays + count
 
 
-@allocating
-def room_for_pieces(count):
-    """Return arrays for the first positions, last positions and labels of ``count`` pieces."""
-    return np.empty(count), np.empty(count), np.empty(count, np.uint64)
+@compiled
+def wide_middles(lows, highs, least, middles):
+    """Find the middles of the pieces wider than ``least``, of the widest ones if there are more than MOST_SEEDS.
 
-
-@_compile
-def wide_middles(lows, highs, least):
-    """Return the middles of the pieces wider than ``least``, of the widest ones if there are more than MOST_SEEDS."""
+    They are written to ``middles``, with MOST_SEEDS entries; returns their number.
+    """
     # double the least width until at most MOST_SEEDS pieces remain
     least, many = max(least, EPS * EPS), True
     while many:
-        count = 0
+        count = np.int64(0)
         for k in range(lows.shape[0]):
             count += highs[k] - lows[k] > least
         many = count > MOST_SEEDS
         least *= 2.0
-    middles = np.empty(count)
-    count = 0
+    count = np.int64(0)
     for k in range(lows.shape[0]):
         if highs[k] - lows[k] > 0.5 * least:
             middles[count] = 0.5 * (lows[k] + highs[k])
             count += 1
-    return middles
+    return count
 
 
 @cache
@@ -153,53 +177,85 @@ def march_address() -> int:
     return address_of(march_angle, (example_task(), 0.0, rules, entries, example_chain(), nodes, pieces))
 
 
-@_compile
-def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts, march):
+@compiled
+def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts, march, first, room, found):
+    """Compute the conditional distributions at incoming angles from number ``first`` on; see `marched_angles`.
+
+    Returns the number of the angle before which an array of ``found`` is too small, or the number of angles.
+    ``march`` is `march_address`.
+    """
+    chain, nodes, pieces, entries, middles, waiting = room
+    node_starts, piece_starts = found.node_starts, found.piece_starts
+    hollow = setting.hollow
+    whole = hollow[RIGHT] - hollow[LEFT]
+    for k in range(first, thetas.shape[0]):
+        begin, start = node_starts[k], piece_starts[k]
+        if begin + MOST_NODES + SPARE > found.nodes[0].shape[0] or start + MOST_SAMPLES > found.pieces[0].shape[0]:
+            return np.int64(k)
+        task = task_of(setting, thetas[k], degree, found.segments[k : k + 1])
+        goal = tolerances[k] * whole
+        own = seeds[seed_starts[k] : seed_starts[k + 1]]
+        both = entries[: waiting[0] + own.shape[0]]
+        merge(middles[: waiting[0]], own, both)
+        filled, found.errors[k], found.unresolved[k], number, found.rays[k] = call_at(
+            march, (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)), (task, goal, rules, both, chain, nodes, pieces)
+        )
+        waiting[0] = wide_middles(pieces[0][:number], pieces[1][:number], goal, middles)
+        for i in range(filled):
+            found.nodes[0][begin + i], found.nodes[1][begin + i] = nodes[0][i], nodes[1][i]
+        for i in range(number):
+            found.pieces[0][start + i], found.pieces[1][start + i] = pieces[0][i], pieces[1][i]
+            found.pieces[2][start + i] = pieces[2][i]
+        node_starts[k + 1], piece_starts[k + 1] = begin + filled, start + number
+    return np.int64(thetas.shape[0])
+
+
+def _arrays(size: int, *kinds: Any) -> tuple[NDArray[Any], ...]:
+    return tuple(np.empty(size, kind) for kind in kinds)
+
+
+def marched_angles(
+    thetas: Floats,
+    tolerances: Floats,
+    setting: Setting,
+    degree: int,
+    rules: Rules,
+    seeds: Floats,
+    seed_starts: NDArray[np.int64],
+) -> Found:
     """Compute the conditional distributions at increasing incoming angles.
 
     The first samples at an angle are its seeds, which increase, and the middles of the pieces at the angle before, so
-    that a narrow piece is followed until it disappears. Returns outgoing angles and masses, angle by angle, and the
-    start of each angle; first positions, last positions and labels of the pieces, and the start of each angle; and for
-    each angle the error, the width of unresolved rays, and the numbers of rays and of ray segments. ``march`` is
-    `march_address`.
+    that a narrow piece is followed until it disappears.
     """
-    hollow = setting.hollow
-    whole = hollow[RIGHT] - hollow[LEFT]
-    chain, spent = empty_chain(), np.zeros(1, np.int64)
-    nodes = np.empty(MOST_NODES + SPARE), np.empty(MOST_NODES + SPARE)
-    angles, masses = nodes
-    pieces = room_for_pieces(MOST_SAMPLES)
-    lows, highs, labels = pieces
-    n = thetas.shape[0]
-    node_starts, piece_starts = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
-    errors, unresolved, rays, segments = np.empty(n), np.empty(n), np.empty(n, np.int64), np.empty(n, np.int64)
-    all_angles, all_masses = np.empty(1024), np.empty(1024)
-    all_lows, all_highs, all_labels = room_for_pieces(1024)
-    previous = np.empty(0)
-    for k in range(n):
-        task = task_of(setting, thetas[k], degree, spent)
-        goal = tolerances[k] * whole
-        entries = merged(previous, seeds[seed_starts[k] : seed_starts[k + 1]])
-        filled, errors[k], unresolved[k], number, rays[k] = call_at(
-            march,
-            (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)),
-            (task, goal, rules, entries, chain, nodes, pieces),
+    count = len(thetas)
+    nodes, pieces = (float, float), (float, float, np.uint64)
+    room = Room(
+        empty_chain(), _arrays(MOST_NODES + SPARE, *nodes), _arrays(MOST_SAMPLES, *pieces),
+        np.empty(MOST_SEEDS + len(seeds)), np.empty(MOST_SEEDS), np.zeros(1, np.int64),
+    )  # fmt: skip
+    found = Found(
+        (np.empty(0), np.empty(0)), np.zeros(count + 1, np.int64),
+        (np.empty(0), np.empty(0), np.empty(0, np.uint64)), np.zeros(count + 1, np.int64),
+        *_arrays(count, float, float, np.int64, np.int64),
+    )  # fmt: skip
+    done = 0
+    while done < count:
+        used, number = int(found.node_starts[done]), int(found.piece_starts[done])
+        found = found._replace(
+            nodes=_longer(found.nodes, used, 2 * used + MOST_NODES + SPARE),
+            pieces=_longer(found.pieces, number, 2 * number + MOST_SAMPLES),
         )
-        segments[k] = spent[0]
-        previous = wide_middles(lows[:number], highs[:number], goal)
-        begin, end = node_starts[k], node_starts[k] + filled
-        if end > all_angles.shape[0]:
-            all_angles, all_masses = longer(all_angles, 2 * end), longer(all_masses, 2 * end)
-        append(all_angles, begin, angles, filled)
-        append(all_masses, begin, masses, filled)
-        node_starts[k + 1] = end
-        begin, end = piece_starts[k], piece_starts[k] + number
-        if end > all_lows.shape[0]:
-            all_lows, all_highs = longer(all_lows, 2 * end), longer(all_highs, 2 * end)
-            all_labels = longer(all_labels, 2 * end)
-        append(all_lows, begin, lows, number)
-        append(all_highs, begin, highs, number)
-        append(all_labels, begin, labels, number)
-        piece_starts[k + 1] = end
-    nodes, pieces = (all_angles, all_masses), (all_lows, all_highs, all_labels)
-    return nodes, node_starts, pieces, piece_starts, errors, unresolved, rays, segments
+        done = march_angles(
+            thetas, tolerances, setting, degree, rules, seeds, seed_starts, march_address(), done, room, found
+        )
+    used, number = int(found.node_starts[-1]), int(found.piece_starts[-1])
+    return found._replace(nodes=_longer(found.nodes, used, used), pieces=_longer(found.pieces, number, number))
+
+
+def _longer(arrays: tuple[NDArray[Any], ...], used: int, size: int) -> tuple[NDArray[Any], ...]:
+    """Return copies with ``size`` entries, of which the first ``used`` are set."""
+    longer = _arrays(size, *(array.dtype for array in arrays))
+    for old, new in zip(arrays, longer, strict=True):
+        new[:used] = old[:used]
+    return longer

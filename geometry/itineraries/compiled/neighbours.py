@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....core.compilation import jit
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from ...tracing.compiled.options import inner
+from ...tracing.compiled.options import compiled, linked
 from .changes import probe, task_of
 
-_compile = jit()
 # Number of positions, at most the last width away from the expected middle, at which a piece is searched. Near a
 # critical angle the width is proportional to the distance from this angle or to its square root; both cases are found.
 POINTS_TRIED = 17
@@ -21,14 +19,14 @@ MOST_STEPS = 80
 SAME_ANGLE = 1e-11
 
 
-@inner
+@linked
 def label_at(x, task):
     """Return the label of one ray."""
     _, label = probe(x, task)
     return label
 
 
-@_compile
+@compiled
 def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree, found):
     """Return entry points whose ray has another label than the piece around them.
 
@@ -61,7 +59,7 @@ def find_missed(thetas, least_widths, pieces, starts, linked, setting, degree, f
     return count, rays
 
 
-@inner
+@linked
 def edge_from(x, step, label, task):
     """Return the end of the piece around x in the direction of ``step``, to a small fraction of its distance."""
     left, right = task.setting.hollow[LEFT], task.setting.hollow[RIGHT]
@@ -80,15 +78,14 @@ def edge_from(x, step, label, task):
     return inside
 
 
-@_compile
-def find_critical(label, present, absent, low, high, drift, setting, degree):
+@compiled
+def find_critical(label, present, absent, low, high, drift, setting, degree, spent):
     """Return the critical angle between ``present`` and ``absent`` of the piece [low, high] at the angle ``present``.
 
-    ``drift`` is the estimated derivative of the piece's middle by the angle.
+    ``drift`` is the estimated derivative of the piece's middle by the angle; ``spent``, with one entry, is work space.
     """
     hollow = setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
-    spent = np.zeros(1, np.int64)
     for _ in range(MOST_STEPS):
         if abs(present - absent) <= SAME_ANGLE:
             break

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....core.compilation import jit
-
-_compile = jit()
+from .options import linked_allocating
 
 
-@_compile
+@linked_allocating
 def longer(array, size):
     """Return a copy with ``size`` entries; the new ones are not set."""
     new = np.empty(size, array.dtype)
@@ -18,14 +16,14 @@ def longer(array, size):
     return new
 
 
-@_compile
+@linked_allocating
 def append(array, begin, source, count):
     """Copy the first ``count`` entries of ``source`` to ``array``, from ``begin`` on."""
     for i in range(count):
         array[begin + i] = source[i]
 
 
-@_compile
+@linked_allocating
 def taller(array, rows):
     """Return a copy with ``rows`` rows; the new ones are zero."""
     new = np.zeros((rows, array.shape[1]), array.dtype)
@@ -35,7 +33,7 @@ def taller(array, rows):
     return new
 
 
-@_compile
+@linked_allocating
 def larger(array, rows, columns):
     """Return a copy with ``rows`` rows and ``columns`` columns; the new entries are not set."""
     new = np.empty((rows, columns, array.shape[2]))

@@ -26,7 +26,7 @@ from ..double_double.sides import LINE as STRAIGHT
 from .arcs import arc_time, on_arc
 from .beziers import NO_BEZIER_HIT
 from .lines import first_boxes, line_time, next_leaf
-from .options import allocating, inner
+from .options import allocating, linked, linked_allocating
 from .pointers import address_at, call_at
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 
@@ -36,7 +36,7 @@ DOUBTFUL = 2
 NOT_OWN, FORWARD, A_LINE = np.bool_(False), np.bool_(True), np.int64(LINE)
 
 
-@allocating
+@linked_allocating
 def face_of(tables, kind, number, s):
     """-> Face: a piece, given by kind, row and parameter, for double-double arithmetic."""
     arc, curve = np.empty(0), np.empty(0)
@@ -70,7 +70,7 @@ def line_starts_in_front(joints, line, own, px, py, vx, vy, slack):
     return line_in_front_of_line(joints, line, own.number, (px, 0.0), (py, 0.0), vx, vy, arrival)
 
 
-@inner
+@linked
 def line_nearby(tables, j, px, py, vx, vy, slack):
     """-> (t, fraction, is_clear): time to a line close by, or inf; whether the line is certainly ahead."""
     joints = tables.joints
@@ -84,7 +84,7 @@ def line_nearby(tables, j, px, py, vx, vy, slack):
     return np.inf, 0.0, False
 
 
-@inner
+@linked
 def arc_nearby(arc, px, py, vx, vy, slack):
     """-> (t, tangent, is_clear): time to a hit on an arc close by, or inf; see `line_nearby`."""
     stretch = arc[STRETCH]
@@ -98,7 +98,7 @@ def arc_nearby(arc, px, py, vx, vy, slack):
     return t, tangent, height > wide
 
 
-@inner
+@linked
 def piece_nearby(scope, piece, own, px, py, vx, vy):
     """-> (t, s, tangent, is_clear): time to a hit on a piece close by, or inf, and the position s on the piece.
 
@@ -124,7 +124,7 @@ def piece_nearby(scope, piece, own, px, py, vx, vy):
     return t, s, tangent, is_clear
 
 
-@allocating
+@linked_allocating
 def nearer(scope, found, piece, own, px, py, vx, vy):
     """-> Hit: the earlier of a hit and of that on a nearby piece, given by kind and row, if the ray starts in front."""
     tables, slack = scope.tables, scope.slack

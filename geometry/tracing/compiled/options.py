@@ -20,4 +20,8 @@ INNER: dict[str, Any] = {**OPTIONS, "no_cpython_wrapper": True}
 inner = jit(**INNER)
 inlined = jit(**INNER, forceinline=True)
 # With numba's run time, for functions that allocate; numba applies the option to all called functions.
-allocating = jit(**{**INNER, "_nrt": True})
+ALLOCATING: dict[str, Any] = {**INNER, "_nrt": True}
+allocating = jit(**ALLOCATING)
+# Functions that are not called by their address are compiled within their callers.
+linked = jit(linked=True, **INNER)
+linked_allocating = jit(linked=True, **ALLOCATING)

@@ -28,7 +28,7 @@ from ...scene.columns import (
     START_X,
     START_Y,
 )
-from .options import inner
+from .options import linked
 
 # Least number of hits in a run, which costs about one arctangent and three sines; not tuned.
 SHORTEST_RUN = 4.0
@@ -39,7 +39,7 @@ LAST_HITS = 2.0
 END_SLACKS = 2.0
 
 
-@inner
+@linked
 def skip_chords(arc, px, py, vx, vy, most):
     """-> (px, py, vx, vy, chords): move a ray along a circular arc by all whole chords of its run, up to ``most``."""
     qx, qy = px - arc[START_X], py - arc[START_Y]
@@ -69,7 +69,7 @@ def skip_chords(arc, px, py, vx, vy, most):
     return arc[START_X] + qx, arc[START_Y] + qy, c * vx - s * vy, s * vx + c * vy, chords
 
 
-@inner
+@linked
 def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
     """-> (px, py, vx, vy, hits): move a ray from a line by an even number of hits, at most ``most``, between two lines.
 

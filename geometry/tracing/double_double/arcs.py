@@ -45,10 +45,10 @@ from .arithmetic import (
     wide,
 )
 
-_compile = jit()
+_compile = jit(linked=True, _nrt=False)
 
 
-@_compile
+@jit()
 def refined_arcs(arcs):
     """Return the table of arcs that go through both joints exactly and subtend their span exactly."""
     # at least one row, because `face_of` passes a row also for a wall without arcs

@@ -37,7 +37,7 @@ def _inverse_factorials() -> tuple[tuple[float, float], ...]:
 
 _INVERSE_FACTORIALS = _inverse_factorials()
 
-_compile = jit()
+_compile = jit(linked=True, _nrt=False)
 
 
 @_compile

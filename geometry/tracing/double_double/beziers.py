@@ -14,7 +14,7 @@ from .arithmetic import LOCAL_ERROR, add, cross, divide, dot, multiply, negate, 
 # Limit on bisections, more than the search for neighbouring doubles needs.
 ROOT_STEPS = 200
 
-_compile = jit()
+_compile = jit(linked=True, _nrt=False)
 
 
 @_compile

@@ -93,7 +93,7 @@ LARGEST_ERROR = 2.0**-50
 # Runs up to this number of hits are traced hit by hit, as a check of `compiled/runs`; so are the last hits of a run.
 LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
 
-_compile = jit()
+_compile = jit(linked=True, _nrt=False)
 
 
 @_compile
@@ -474,7 +474,7 @@ def hollow_at(hollows, entry):
     return h, False
 
 
-@_compile
+@jit(_nrt=False)
 def refined_rays(x, theta, tables, limit, most_segments, results):
     """Trace rays into ``results``, as double-doubles."""
     out_x, out_theta, bounces, status, amplification, rounding = results

@@ -40,7 +40,7 @@ BEHIND_SLACKS = 4.0
 # Newton steps that project a position onto a curve within rounding of it; each step squares the error.
 STEPS = 2
 
-_compile = jit()
+_compile = jit(linked=True, _nrt=False)
 
 
 class Face(NamedTuple):
@@ -68,7 +68,7 @@ class Arrival(NamedTuple):
     blur: float
 
 
-@_compile
+@jit(_nrt=True)
 def orientation(ax, ay, bx, by, cx, cy):
     """Return (b - a) x (c - a) with the exact sign: positive if c lies on the left of the line from a to b."""
     first, second = (bx - ax) * (cy - ay), (by - ay) * (cx - ax)

@@ -50,7 +50,12 @@ class _Same(Flags):
         return self is other
 
     def copy(self) -> Any:
-        return self
+        """Return the options that numba passes on to its own functions, the same for most functions."""
+        passed: Any = Flags(self)
+        passed.forceinline, passed.no_cpython_wrapper = False, True
+        # options that are set count as others than the same ones by default
+        passed.fastmath, passed.dbg_optnone = passed.fastmath, passed.dbg_optnone
+        return self.of(passed)
 
 
 class _Pipeline(CompilerBase):
@@ -70,8 +75,8 @@ class _Pipeline(CompilerBase):
         return [manager]
 
 
-class _InlinedLibrary(JITCodeLibrary):
-    """The code of a function that is inlined: it is optimised and becomes machine code within its callers only."""
+class _LinkedLibrary(JITCodeLibrary):
+    """The code of a function that becomes machine code, and is optimised, within its callers only."""
 
     def _optimize_final_module(self) -> None:
         pass
@@ -81,13 +86,13 @@ class _InlinedLibrary(JITCodeLibrary):
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _InlinedLowering(NativeLowering):
+class _LinkedLowering(NativeLowering):
     """numba's translation to LLVM, which stops before it loads a function."""
 
-    _name = "inlined_lowering"
+    _name = "linked_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _InlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = _LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.flags = Flags(state.flags)
         state.flags.no_compile = True
         super().run_pass(state)
@@ -98,28 +103,31 @@ class _InlinedLowering(NativeLowering):
         return True
 
 
-class _InlinedPipeline(_Pipeline):
-    lowering = _InlinedLowering
+class _LinkedPipeline(_Pipeline):
+    lowering = _LinkedLowering
 
 
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
-def jit(**options: Any) -> Callable[[Any], Any]:
+def jit(*, linked: bool = False, **options: Any) -> Callable[[Any], Any]:
     """Return a decorator that compiles a function and stores it on disk, with ``options`` of numba's ``njit``.
 
     Unless the options say otherwise, the function releases the lock of the interpreter, divides by zero as numpy does,
-    and has no wrapper for calls from C.
+    and has no wrapper for calls from C. A ``linked`` function, as one with the option ``forceinline``, is compiled and
+    stored as a part of its callers: neither Python nor a call by address reaches it.
     """
-    pipeline = _InlinedPipeline if options.get("forceinline") else _Pipeline
+    linked = linked or bool(options.get("forceinline"))
+    options |= {"no_cpython_wrapper": True} if linked else {}
+    pipeline = _LinkedPipeline if linked else _Pipeline
     decorate: Any = njit(pipeline_class=pipeline, **{**OPTIONS, **options})
 
     def compiled(function: Any) -> Any:
         dispatcher = decorate(function)
         if options.get("no_cpython_wrapper") and isinstance(dispatcher, CPUDispatcher):
             dispatcher.__class__ = _Inner
-        # not with numba's switch that turns compilation off; an inlined function is stored as a part of its callers
-        if hasattr(dispatcher, "enable_caching") and not options.get("forceinline"):
+        # not with numba's switch that turns compilation off
+        if hasattr(dispatcher, "enable_caching") and not linked:
             try:
                 # what the option ``cache`` does, with another cache
                 dispatcher._cache = _SafeCache(function)
