@@ -206,3 +206,41 @@ def test_an_inner_function_is_refused_from_python_and_called_by_compiled_ones():
     assert outer(1.5) == 3.0
     with pytest.raises(TypeError, match="py_func"):
         inner(1.5)
+
+
+def test_a_linked_function_is_a_part_of_its_callers_and_its_errors_reach_python():
+    @compilation.jit(linked=True)
+    def root(x):
+        if x < 0.0:
+            raise ValueError("negative")
+        return x**0.5
+
+    @compilation.jit(linked=True)
+    def next_root(x):
+        return root(x + 1.0)
+
+    @compilation.jit()
+    def both(x):
+        return next_root(x), root(x)
+
+    assert both(8.0) == (3.0, 8.0**0.5)
+    with pytest.raises(ValueError, match="negative"):
+        both(-0.5)
+    assert both.stats.cache_path and root.stats.cache_path is None
+    with pytest.raises(TypeError, match="py_func"):
+        root(4.0)
+
+
+def test_functions_with_equal_options_share_them():
+    @compilation.jit()
+    def first(x):
+        return x + 1.0
+
+    @compilation.jit()
+    def second(x):
+        return x - 1.0
+
+    first(1.0)
+    known = len(compilation._Same.known)
+    second(1.0)
+    assert len(compilation._Same.known) == known

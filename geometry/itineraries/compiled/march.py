@@ -65,7 +65,10 @@ class Found(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Work space: the samples, nodes and pieces of one angle, its first samples, and the middles before it and their number."""
+    """Work space for one angle: its samples, nodes and pieces, its first samples, and the middles before it.
+
+    ``waiting`` is the number of these middles.
+    """
 
     chain: Chain
     nodes: tuple[Floats, ...]
@@ -186,11 +189,13 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
     """
     chain, nodes, pieces, entries, middles, waiting = room
     node_starts, piece_starts = found.node_starts, found.piece_starts
+    (angles, masses), (lows, highs, labels) = nodes, pieces
+    (all_angles, all_masses), (all_lows, all_highs, all_labels) = found.nodes, found.pieces
     hollow = setting.hollow
     whole = hollow[RIGHT] - hollow[LEFT]
     for k in range(first, thetas.shape[0]):
         begin, start = node_starts[k], piece_starts[k]
-        if begin + MOST_NODES + SPARE > found.nodes[0].shape[0] or start + MOST_SAMPLES > found.pieces[0].shape[0]:
+        if begin + MOST_NODES + SPARE > all_angles.shape[0] or start + MOST_SAMPLES > all_lows.shape[0]:
             return np.int64(k)
         task = task_of(setting, thetas[k], degree, found.segments[k : k + 1])
         goal = tolerances[k] * whole
@@ -200,12 +205,11 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
         filled, found.errors[k], found.unresolved[k], number, found.rays[k] = call_at(
             march, (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)), (task, goal, rules, both, chain, nodes, pieces)
         )
-        waiting[0] = wide_middles(pieces[0][:number], pieces[1][:number], goal, middles)
+        waiting[0] = wide_middles(lows[:number], highs[:number], goal, middles)
         for i in range(filled):
-            found.nodes[0][begin + i], found.nodes[1][begin + i] = nodes[0][i], nodes[1][i]
+            all_angles[begin + i], all_masses[begin + i] = angles[i], masses[i]
         for i in range(number):
-            found.pieces[0][start + i], found.pieces[1][start + i] = pieces[0][i], pieces[1][i]
-            found.pieces[2][start + i] = pieces[2][i]
+            all_lows[start + i], all_highs[start + i], all_labels[start + i] = lows[i], highs[i], labels[i]
         node_starts[k + 1], piece_starts[k + 1] = begin + filled, start + number
     return np.int64(thetas.shape[0])
 

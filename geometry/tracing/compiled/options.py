@@ -22,6 +22,6 @@ inlined = jit(**INNER, forceinline=True)
 # With numba's run time, for functions that allocate; numba applies the option to all called functions.
 ALLOCATING: dict[str, Any] = {**INNER, "_nrt": True}
 allocating = jit(**ALLOCATING)
-# Functions that are not called by their address are compiled within their callers.
+# Functions that no call by address reaches become machine code within their callers only.
 linked = jit(linked=True, **INNER)
 linked_allocating = jit(linked=True, **ALLOCATING)
