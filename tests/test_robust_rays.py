@@ -36,6 +36,17 @@ def test_the_double_double_twin_agrees_with_fifty_digits(name):
         assert abs(ray.theta - mp.mpf(twin.theta[i, 0]) - mp.mpf(twin.theta[i, 1])) <= twin.rounding[i]
 
 
+def test_rays_over_many_bezier_pieces_hit_what_the_double_double_twin_hits():
+    # the twin tests every piece, the tracer those whose circles the ray meets
+    wall = geo.random_wall(geo.HeightCorrelation(0.1), 32, rms_slope=1.0, smooth=True, rng=3)
+    rng = np.random.default_rng(12)
+    x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
+    found, twin = geo.trace(wall, x, theta), refined_trace(wall.scene, x, theta)
+    assert found.escaped.all() and found.collisions.max() > 3
+    assert np.array_equal(found.collisions, twin.collisions)
+    assert np.abs(found.theta - twin.theta[:, 0]).max() < 1e-11
+
+
 @pytest.mark.parametrize(
     ("name", "x", "theta"),
     [
