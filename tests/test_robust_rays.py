@@ -10,7 +10,10 @@ import pytest
 from benchmarks.robustness import WALLS, aimed_rays, grazing_rays, judge
 
 from asperity import geometry as geo
+from asperity.geometry.tracing.compiled.rays import SLOTS, trace_rays
+from asperity.geometry.tracing.compiled.records import results_for
 from asperity.geometry.tracing.refinement import refined_trace
+from asperity.geometry.tracing.threads import new_flag
 from precise_tracer import trace_precisely
 
 RAYS = 3_000
@@ -34,6 +37,19 @@ def test_the_double_double_twin_agrees_with_fifty_digits(name):
         ray = trace_precisely(scene, x[i], theta[i])
         assert twin.status[i] == geo.Status.ESCAPED and ray.bounces == twin.collisions[i]
         assert abs(ray.theta - mp.mpf(twin.theta[i, 0]) - mp.mpf(twin.theta[i, 1])) <= twin.rounding[i]
+
+
+def test_rays_over_many_bezier_pieces_hit_what_the_double_double_twin_hits():
+    # the twin tests every piece, the loop those whose circles the ray meets; a ray without hit would be traced again
+    wall = geo.random_wall(geo.HeightCorrelation(0.1), 32, rms_slope=1.0, smooth=True, rng=3)
+    rng = np.random.default_rng(12)
+    x, theta = rng.random(RAYS), np.arccos(1.0 - 2.0 * rng.random(RAYS))
+    found = results_for(RAYS)
+    trace_rays(x, theta, wall.scene.tables, 1000, new_flag(), found, SLOTS)
+    twin = refined_trace(wall.scene, x, theta)
+    assert (found.status == geo.Status.ESCAPED).all() and found.collisions.max() > 3
+    assert np.array_equal(found.collisions, twin.collisions)
+    assert np.abs(found.theta - twin.theta[:, 0]).max() < 1e-11
 
 
 @pytest.mark.parametrize(

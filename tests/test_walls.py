@@ -3,6 +3,7 @@
 import copy
 import math
 import pickle
+import time
 from itertools import pairwise
 
 import numpy as np
@@ -187,6 +188,33 @@ def test_the_mirror_axis_may_lie_anywhere_in_the_cell():
     # the same for curves: two arcs of different radius, the cell cut between them
     arcs = [Arc((0.25, 0.0), 0.25, pi, 2 * pi), Arc((0.75, 0.0), (0.25, 0.1), pi, 2 * pi)]
     assert Wall(arcs).is_mirror_symmetric
+
+
+def test_profiles_of_repeated_heights_have_the_axes_that_a_comparison_of_all_starts_finds():
+    rng = np.random.default_rng(8)
+    for points in (40, 75, 200):
+        for levels in (2, 4):
+            height = rng.integers(levels, size=points) / 8.0
+            for seam in ("mirror", "step"):
+                wall = Wall.from_profile(np.arange(points), height, seam=seam)
+                # a slope read backwards changes its sign
+                steps = np.diff(wall.vertices, axis=0)
+                image = (steps * [1.0, -1.0])[::-1]
+                axes = [np.allclose(np.roll(steps, -k, axis=0), image, atol=1e-12) for k in range(len(steps))]
+                assert wall.is_mirror_symmetric == any(axes), (points, levels, seam)
+
+
+def test_one_changed_height_among_many_repeated_ones_takes_the_axis_away():
+    height = np.random.default_rng(9).integers(2, size=10_000) / 8.0
+    wall = Wall.from_profile(np.arange(10_000), height)
+    assert wall.is_mirror_symmetric
+    vertices = wall.vertices.copy()
+    vertices[7_001, 1] -= 1e-6
+    changed = Wall.from_vertices(vertices)
+    begin = time.process_time()
+    assert not changed.is_mirror_symmetric
+    # a comparison from each of the thousands of starts takes several seconds
+    assert time.process_time() - begin < 1.0
 
 
 def test_walls_are_values():

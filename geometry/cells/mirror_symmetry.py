@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.rounding import EPS
@@ -19,13 +20,17 @@ from .origin import joined
 MIRROR_TOLERANCE = 256.0 * EPS
 # Parameters at which pieces are compared, besides 0; the set is symmetric under t -> 1 - t.
 PARAMETERS = np.array([0.25, 0.5, 0.75, 1.0])
+# Starts from which on a correlation excludes most of them at once: a comparison takes a time of order n for each start,
+# and the heights of a measured profile repeat. Its error is below some ten roundings for each of the log2(n) stages of
+# the transforms, in units of the sum of the squares.
+MANY_STARTS, CORRELATION_ULPS = 16, 1024.0
 
 
 def has_mirror_axis(wall: Cell) -> bool:
     """Whether the periodic wall has a mirror axis x = const; for a wall with islands only x = period/2 is tested.
 
-    A wall without islands is compared with its mirror image as a cycle of pieces, starting from every piece that
-    agrees with the first piece of the image. So the result does not depend on the start of the cell.
+    A wall without islands is compared with its mirror image as a cycle of pieces, starting from every piece at which
+    the two may agree. So the result does not depend on the start of the cell.
     """
     tolerance = MIRROR_TOLERANCE * max(wall.period, float(np.abs(wall.vertices).max()), wall.depth)
     if wall.islands:
@@ -37,8 +42,23 @@ def has_mirror_axis(wall: Cell) -> bool:
         )
     own = _steps(_closed_up(wall.pieces, tolerance))
     other = _mirrored(own)
-    starts = np.flatnonzero(np.abs(own - other[0]).max(axis=(1, 2)) <= tolerance).tolist()
-    return any(np.abs(np.roll(own, -k, axis=0) - other).max() <= tolerance for k in starts)
+    starts = np.flatnonzero(np.abs(own - other[0]).max(axis=(1, 2)) <= tolerance)
+    if len(starts) > MANY_STARTS:
+        starts = starts[_may_agree(own[:, -1], other[:, -1], tolerance)[starts]]
+    return any(np.abs(np.roll(own, -k, axis=0) - other).max() <= tolerance for k in starts.tolist())
+
+
+def _may_agree(own: Floats, other: Floats, tolerance: float) -> NDArray[np.bool_]:
+    """Return for each k whether the cycle of vectors ``own``, started at k, may agree with the cycle ``other``.
+
+    The sum over j of |own[k + j] - other[j]|^2 follows for all k from one circular correlation. It is at most
+    2 n tolerance^2 where the cycles agree.
+    """
+    own, other = own - own.mean(axis=0), other - other.mean(axis=0)
+    product = np.fft.rfft(own, axis=0) * np.fft.rfft(other, axis=0).conj()
+    correlation = np.fft.irfft(product.sum(axis=1), len(own))
+    squares = float((own * own).sum() + (other * other).sum())
+    return np.asarray(squares - 2.0 * correlation <= 2.0 * len(own) * tolerance**2 + CORRELATION_ULPS * EPS * squares)
 
 
 def _closed_up(pieces: Sequence[Curve], tolerance: float) -> Sequence[Curve]:

@@ -99,7 +99,10 @@ X2 = 8
 Y2 = 9
 X3 = 10
 Y3 = 11
-BEZIER_COLUMNS = 12
+MIDDLE_X = 12  # centre of a circle about the control points
+MIDDLE_Y = 13
+REACH = 14  # its radius, with a margin of NEARBY_MARGIN times the extent of the piece
+BEZIER_COLUMNS = 15
 
 # Arcs in double-double arithmetic, made by `refined_arcs`: the ends, then numbers in two parts.
 WIDE_NORMAL_X = 4  # unit normal at the start

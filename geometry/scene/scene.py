@@ -57,12 +57,15 @@ from .columns import (
     LINE_COLUMNS,
     LINE_NORMAL_X,
     LINE_NORMAL_Y,
+    MIDDLE_X,
+    MIDDLE_Y,
     NO_EDGE,
     NO_FORM,
     NORMAL_X,
     NORMAL_Y,
     PAIR_COLUMNS,
     PAIRS_END,
+    REACH,
     RIGHT,
     RIGHT_EDGE,
     RUN_SINE,
@@ -87,6 +90,7 @@ from .columns import (
     table_of,
 )
 from .facing import facing_pairs
+from .tolerances import NEARBY_MARGIN
 
 # Largest angle, radians, between the tangents at a smooth joint. Both pieces then reflect a ray at the joint alike,
 # within twice this angle. Tangents at joints meant to be smooth agree to a few rounding errors.
@@ -171,7 +175,13 @@ def bezier_row(curve: Bezier, ends: Mapping[int, float]) -> Floats:
         a1 = 3.0 * (points[1] - points[0])
         a2 = 3.0 * (points[0] - 2.0 * points[1] + points[2])
         a3 = points[3] - points[0] + 3.0 * (points[1] - points[2])
-    columns = {X1: a1[0], Y1: a1[1], X2: a2[0], Y2: a2[1], X3: a3[0], Y3: a3[1]}
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    size = float(np.abs([a1, a2, a3]).sum())
+    reach = float(np.hypot(*(points - middle).T).max()) + NEARBY_MARGIN * size
+    columns = {
+        X1: a1[0], Y1: a1[1], X2: a2[0], Y2: a2[1], X3: a3[0], Y3: a3[1],
+        MIDDLE_X: middle[0], MIDDLE_Y: middle[1], REACH: reach,
+    }  # fmt: skip
     return row_of(BEZIER_COLUMNS, {**ends, **columns})
 
 

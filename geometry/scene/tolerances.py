@@ -14,6 +14,9 @@ TANGENT_ULPS = 16.0
 # have put the start on either side of the piece. From a start within 16 ulps of a piece, a ray at an angle of 1e-8 or
 # more to the piece meets it within this distance.
 NEARBY = 2.0**-20
+# Margin of the circles about Bezier pieces, as a fraction of the sizes that NEARBY refers to: outside of them there is
+# no hit, no contact and no hit to be tested again.
+NEARBY_MARGIN = 4.0 * NEARBY
 # NEARBY as a multiple of the slack, JOINT_ULPS rounding errors of the hollow's size; all are powers of 2.
 NEARBY_SLACKS = NEARBY / (JOINT_ULPS * EPS)
 # Margin of the boxes about lines, in units of the hollow's size: corners within the slack of a ray lie in boxes that it

@@ -11,8 +11,22 @@ import math
 import numpy as np
 
 from ....core.rounding import EPS
-from ...scene.columns import END_X, END_Y, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
-from ...scene.tolerances import JOINT_ULPS, NEARBY, TANGENT_ULPS
+from ...scene.columns import (
+    END_X,
+    END_Y,
+    MIDDLE_X,
+    MIDDLE_Y,
+    REACH,
+    START_X,
+    START_Y,
+    X1,
+    X2,
+    X3,
+    Y1,
+    Y2,
+    Y3,
+)
+from ...scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, TANGENT_ULPS
 from ..double_double.beziers import curve_size
 from .options import inlined, inner
 
@@ -217,7 +231,14 @@ def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack
     """
     number, hit_s, doubt, near = -1, 0.0, 0, -1.0
     for k in range(first, end):
-        t, s, tangent, near_s = bezier_hit(beziers[k], own_s if k == own_number else -1.0, px, py, vx, vy, slack)
+        curve = beziers[k]
+        # whether the ray meets the circle about the piece before ``time``; if not, `hit_from_afar` finds nothing
+        dx, dy = curve[MIDDLE_X] - px, curve[MIDDLE_Y] - py
+        along, room = dx * vx + dy * vy, curve[REACH] + NEARBY_MARGIN * (abs(dx) + abs(dy))
+        # no short circuit, because the processor guesses its branches wrong
+        if (k != own_number) & ((abs(dx * vy - dy * vx) > room) | (along < -room) | (along - room > time)):
+            continue
+        t, s, tangent, near_s = bezier_hit(curve, own_s if k == own_number else -1.0, px, py, vx, vy, slack)
         if t < time:
             time, number, hit_s, doubt = t, k, s, tangent
         if near_s >= 0.0:
