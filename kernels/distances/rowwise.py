@@ -33,6 +33,8 @@ MOST_BREAKPOINTS = 1536
 # If the distance jumps at unknown incoming angles, halving a panel halves its error. The difference of Gauss's and
 # Kronrod's rule may be small by chance; a fraction of the change at the last halving guards against it.
 MEMORY = 0.25
+# Turning points of values on a panel that count as smooth.
+MOST_TURNS = 2
 # Panels are halved until those that remain have at most this fraction of the wanted error.
 REMAINING = 0.3
 # Gauss nodes per panel, for the supremum. Every level doubles panels and breakpoints.
@@ -109,11 +111,20 @@ class _Panels:
         weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(_nodes(self.low, self.high)) * rule
         return np.asarray(np.sum((self.rows / unit) ** order * weight, axis=1))
 
-    def errors(self, order: float, unit: float) -> Floats:
-        """The errors of the integrals of (distance / unit)^p over the panels."""
-        return np.maximum(
-            np.abs(self.parts(order, KRONROD - GAUSS, unit)), MEMORY * self.change * (self.unit / unit) ** order
-        )
+    def errors(self, order: float, unit: float, cuts: Floats) -> Floats:
+        """The errors of the integrals of (distance / unit)^p over the panels.
+
+        Distances may oscillate within a panel that has cuts inside, or that reaches grazing at 0 or pi. Both rules can
+        then agree by chance. If such values turn more than twice, the error is at least their range times the measure.
+        """
+        found = np.abs(self.parts(order, KRONROD - GAUSS, unit))
+        powers = (self.rows / unit) ** order
+        inside = np.searchsorted(cuts, self.high, side="left") > np.searchsorted(cuts, self.low, side="right")
+        rough = inside | (self.low <= 0.0) | (self.high >= np.pi)
+        steps = np.diff(powers, axis=1)
+        rough &= np.count_nonzero(steps[:, 1:] * steps[:, :-1] < 0.0, axis=1) > MOST_TURNS
+        spread = np.where(rough, np.ptp(powers, axis=1) * SINE.mass(self.low, self.high), 0.0)
+        return np.maximum(np.maximum(found, spread), MEMORY * self.change * (self.unit / unit) ** order)
 
     def selected(self, chosen: NDArray[np.intp]) -> _Panels:
         """The panels with these indices."""
@@ -131,19 +142,17 @@ class _Panels:
 def _mean(between: ConditionalDistance, cells: int, wanted: float) -> tuple[float, float, int]:
     """The p-mean over the incoming angle, its error, and the number of panels."""
     order, halves = between.order, between.halves
-    edges, cuts = _panel_edges(between, 0), np.empty(0)
+    edges, cuts = _panel_edges(between, 0), _breakpoints(between, MOST_BREAKPOINTS)
     panels = _Panels.at(between, cells, edges[:-1], edges[1:])
     while True:
         # divided by the largest, because powers of angles underflow or overflow at high orders
         unit = float(panels.rows.max()) or 1.0
-        errors = halves * panels.errors(order, unit)
+        errors = halves * panels.errors(order, unit, cuts)
         total, doubt = halves * float(panels.parts(order, KRONROD, unit).sum()), float(errors.sum())
         value, high, low = (unit * max(power, 0.0) ** (1.0 / order) for power in (total, total + doubt, total - doubt))
         error = max(high - value, value - low)
         if error <= wanted or panels.rows.size * (cells + between.atoms + FEW_ATOMS) > MOST_CORNERS:
             return value, error, halves * panels.low.size
-        if not cuts.size:
-            cuts = _breakpoints(between, MOST_BREAKPOINTS)
         ranked = np.argsort(errors)
         many = np.cumsum(errors[ranked]) > REMAINING * doubt * wanted / error
         new = panels.selected(ranked[many]).halved(between, cells, cuts, unit)
