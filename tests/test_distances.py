@@ -19,9 +19,10 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
 from asperity.kernels.distances import joint as joint_distance
+from asperity.kernels.distances.conditional import ConditionalDistance
 from asperity.kernels.distances.distributions import cells_error, entry_error, on_cells, outgoing_distributions
 from asperity.kernels.distances.pseudometric import flux_means
-from asperity.kernels.distances.transport import Distributions, grid_wasserstein, wasserstein
+from asperity.kernels.distances.transport import Distributions, absolute_area, grid_wasserstein, wasserstein
 from asperity.kernels.laws.distribution import Distribution
 from asperity.kernels.walls.conditionals import WallConditionals
 
@@ -194,6 +195,66 @@ def test_rows_of_arcs_in_closed_form_are_those_that_are_traced():
         counted = np.histogram(traced.nodes[part], edges, weights=traced.weights[part])[0]
         # the traced rows are asked for 1e-10, an estimate that grazing rows miss
         np.testing.assert_allclose(masses, counted, rtol=0, atol=1e-7)
+
+
+def arc_row(half_angle, theta, order):
+    """W_p of an arc's row and that of Maxwell's law of 1/2, from quantiles: 0.5 sin/2 and an atom at pi - theta."""
+    x = (np.arange(200_000) + 0.5) / 200_000
+    angle = np.arccos(x * np.cos(theta - half_angle) + (1.0 - x) * np.cos(theta + half_angle))
+    base, chord = np.where(angle > 0.5 * np.pi, np.pi - theta, theta), np.minimum(angle, np.pi - angle)
+    out = base - 2.0 * np.maximum(np.ceil((half_angle + base - chord) / (2.0 * chord)), 1.0) * chord + np.pi
+    quantile = np.sort(np.where(angle > 0.5 * np.pi, np.pi - out, out))
+    start = 0.25 * (1.0 + np.cos(theta))
+    diffuse = np.where(x < start, 2.0 * x, 2.0 * x - 1.0)
+    other = np.where(
+        (x >= start) & (x < start + 0.5), np.pi - theta, np.arccos(np.clip(1.0 - 2.0 * diffuse, -1.0, 1.0))
+    )
+    return np.mean(np.abs(quantile - other) ** order) ** (1.0 / order)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 3.5])
+def test_rows_between_cuts_are_those_of_sorted_samples_of_the_map(order):
+    theta = np.array([0.05, 0.6, 1.1, 1.19, 1.5, 2.4])
+    found = ConditionalDistance(ker.CircularArcLaw(1.2), ker.maxwell(0.5), order)(theta, 64)
+    expected = [arc_row(1.2, angle, order) for angle in theta]
+    # each of some jumps of the sorted samples is misplaced by less than their spacing
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0])
+def test_rows_between_cuts_are_the_limit_of_those_on_cells(order):
+    pair = ker.CircularArcLaw(0.8), 0.3 * ker.CircularArcLaw(1.4).in_specular_frame().in_specular_frame()
+    between = ConditionalDistance(pair[0], pair[1] + 0.7 * ker.TriangularTeethLaw(0.7), order)
+    theta = np.array([0.02, 0.4, 0.79, 1.0, 1.5])
+    found = between(theta, 128)
+    errors = [
+        np.abs(between._on_cells(theta, np.linspace(0.0, np.pi, cells + 1)) - found).max() for cells in (64, 1024)
+    ]
+    assert errors[1] < 3e-5 and errors[1] < 0.05 * errors[0]
+
+
+@pytest.mark.parametrize("kind, order", [("rows", 1), ("rows", 2), ("sup", 1)])
+@pytest.mark.parametrize("other", [ker.maxwell(0.5), ker.TriangularTeethLaw(0.7)], ids=repr)
+def test_errors_of_distances_from_arcs_hold_at_every_tolerance(kind, order, other):
+    arc = ker.CircularArcLaw(1.1)
+    best = ker.distance(arc, other, order, kind, tolerance=3e-6)
+    for tolerance in (1e-2, 3e-5):
+        found = ker.distance(arc, other, order, kind, tolerance=tolerance)
+        assert abs(found.value - best.value) <= found.error + best.error
+    assert best.error <= 3e-6
+
+
+@settings(max_examples=50, deadline=None)
+@given(values=st.tuples(*[st.floats(-2.0, 2.0)] * 3))
+def test_areas_under_quadratic_pieces_are_integrals(values):
+    start, middle, end = values
+    t = (np.arange(20_000) + 0.5) / 20_000
+    curve = start + (4.0 * middle - 3.0 * start - end) * t + 2.0 * (start + end - 2.0 * middle) * t * t
+    # a piece whose three values have one sign counts as one without a change of sign
+    one_sign = min(values) >= 0.0 or max(values) <= 0.0
+    expected = abs(np.mean(curve)) if one_sign else np.mean(np.abs(curve))
+    found = absolute_area(*(np.array([[value]]) for value in (1.0, *values)))
+    assert found[0] == pytest.approx(expected, abs=1e-7)
 
 
 # ---- joint distances ---------------------------------------------------------------------------------------------

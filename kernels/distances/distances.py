@@ -77,9 +77,10 @@ def distance(
 
     Notes
     -----
-    *Laws.* Conditional distributions that consist of atoms are exact; densities are resolved on cells. The cells and
-    the nodes in the incoming angle are refined until two levels agree. The error is estimated from the difference of
-    the levels.
+    *Laws.* Conditional distributions that consist of atoms are exact. Densities are integrated between the outgoing
+    angles at which they jump, if both laws know them, else resolved on cells; the error is estimated from two numbers
+    of cells. Panels in the incoming angle are halved where the rules of Gauss and Kronrod disagree, and the sum of
+    their differences is part of the error. A supremum is that over nodes, refined until two levels agree.
 
     *Matrices* are treated as kernels between the middle angles of their cells. By the triangle inequality the error is
     at most the sum of the errors of both matrices; for empirical matrices these are found by resampling. The interval

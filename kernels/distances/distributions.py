@@ -18,7 +18,7 @@ from .transport import Distributions, power_mean, wasserstein
 
 # Incoming angles at which the error from entry points is estimated, and the number of cells for products.
 ANGLES = 64
-# Incoming angle at which laws are tested for densities and entry points; the result does not depend on it.
+# Incoming angle at which laws are tested for entry points; the result does not depend on it.
 PROBE = 1.0
 
 
@@ -126,6 +126,8 @@ class _OnCells(Composition):
         found = first.distribution(theta, edges)
         if not rest:
             return found
-        matrix = discretise(rest[0] if len(rest) == 1 else Composition(tuple(rest)), Bins(edges))
-        object.__setattr__(self, "last", matrix)
+        matrix = self.last
+        if matrix is None or not np.array_equal(matrix.basis.edges, edges):
+            matrix = discretise(rest[0] if len(rest) == 1 else Composition(tuple(rest)), Bins(edges))
+            object.__setattr__(self, "last", matrix)
         return Distribution.of_cells(np.diff(found.cumulative(edges), axis=1) @ matrix.array)

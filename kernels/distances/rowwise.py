@@ -2,70 +2,78 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields, replace
 from itertools import count
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.estimates import Estimate
-from ...core.long_runs import progress_bar
 from ..bases.measure import SINE, gauss_on_intervals
+from ..expectations.angle_panels import GAUSS, KRONROD, SLOPES, STRETCHED
 from ..laws.law import ENTRY_POINTS, Law
 from ..matrices.matrix import KernelMatrix, joint_kind
-from .distributions import PROBE, cells_error, entry_error, on_cells, outgoing_distributions
+from .conditional import ConditionalDistance
+from .distributions import cells_error, entry_error, on_cells
 from .resampling import distance_of_rows, matrices_error, stochastic_rows
-from .transport import power_mean, wasserstein
 
-# Gauss nodes per panel of the incoming angle; panels (breakpoints not counted), breakpoints, and cells of the outgoing
-# angle on the coarsest level. Every level doubles panels, breakpoints and cells.
-NODES, PANELS, BREAKPOINTS, CELLS = 4, 12, 24, 64
-# Limit on the angles times cells of a level, a few seconds of work; FEW_ATOMS is added to the cells.
-MOST_CORNERS, FEW_ATOMS = 2**22, 32
-# Corners in memory at a time. Each angle counts with at least MOST_ATOMS, the atoms of walls with many pieces.
-CORNERS_AT_ONCE, MOST_ATOMS = 2**21, ENTRY_POINTS
-FEWEST_LEVELS = 3
-# If the distance jumps at unknown incoming angles, a level at least halves the error, and the difference of two levels
-# is the error of the finer one. This difference may be small by chance; a fraction of the one before guards against it.
+# Panels of the incoming angle from 0 to pi on the coarsest level, breakpoints not counted, and breakpoints.
+PANELS, BREAKPOINTS = 32, 24
+# Incoming angles at which the number of cells is chosen.
+PROBES = 128
+# Limits on the angles times cells and atoms for a mean and for a level of a supremum, a few seconds of work;
+# FEW_ATOMS is added to the cells.
+MOST_CORNERS, MOST_OF_LEVEL, FEW_ATOMS = 2**21, 2**22, 32
+# Limits on the cells of the outgoing angle; the second is tried if, with the first, the error of a mean is mostly that
+# of cells. A supremum would take a minute.
+MOST_CELLS = (256, 1024)
+# Breakpoints at which panels are divided.
+MOST_BREAKPOINTS = 1536
+# If the distance jumps at unknown incoming angles, halving a panel halves its error. The difference of Gauss's and
+# Kronrod's rule may be small by chance; a fraction of the change at the last halving guards against it.
 MEMORY = 0.25
+# Turning points of values on a panel that count as smooth.
+MOST_TURNS = 2
+# Panels are halved until those that remain have at most this fraction of the wanted error.
+REMAINING = 0.3
+# Gauss nodes per panel, for the supremum. Every level doubles panels and breakpoints.
+NODES = 4
+FEWEST_LEVELS = 3
 # A supremum at grazing, where infinitely many breakpoints accumulate, converges with order 1.
 SUPREMUM_FACTOR = 2.0
 # Distance of the outermost nodes of a panel from its ends, as a fraction of its width, for the supremum.
 INSET = 1e-9
-# Refinement ends when its error is this fraction of the error from entry points, which it does not change.
+# Refinement in the incoming angle ends when its error is this fraction of the error from cells, which it does not
+# change, or the error from entry points, which adds noise to the differences of the rules.
 SMALL_PART = 0.1
 # Rounding of some hundred sums of angles and probabilities.
 ROUNDING = 1e-13
 
 
 def law_distance(first: Law, second: Law, order: float, sup: bool, tolerance: float) -> Estimate:
-    """The mean or the supremum over incoming angles of W_p, by Gauss rules refined until two levels agree.
+    """The mean or the supremum over incoming angles of W_p; the error is estimated.
 
-    The error is estimated from the differences of levels, which differ in nodes, breakpoints and cells.
+    The mean is an integral by the rules of Gauss and Kronrod on panels, of which those with large errors are halved.
+    The supremum is that over the nodes of panels that are refined until two levels agree. Two numbers of cells of the
+    outgoing angle are compared.
     """
-    first, second = on_cells(first), on_cells(second)
-    found: list[float] = []
-    error, from_entries = np.inf, entry_error(first, order, sup) + entry_error(second, order, sup)
-    smooth = not (_is_atomic(first) and _is_atomic(second))
-    for level in count():
-        low, high = _panels(first, second, level)
-        edges = _edges(first, second, level) if smooth else np.array([0.0, np.pi])
-        corners = low.size * NODES * (edges.size + FEW_ATOMS)
-        if level >= FEWEST_LEVELS and corners > MOST_CORNERS:
+    between = ConditionalDistance(on_cells(first), on_cells(second), order)
+    laws = (between.first, between.second)
+    from_entries = sum(entry_error(law, order, sup) for law in laws)
+    wanted = max(tolerance - from_entries, from_entries)
+    probes = SINE.quantile((np.arange(PROBES) + 0.5) / PROBES)
+    probes = np.concatenate((probes, _nodes_and_ends(_panel_edges(between, 0)))) if sup else probes
+    for most in MOST_CELLS[: 1 if sup else 2]:
+        cells, from_cells = between.cells(probes, sup, wanted, most)
+        left = max(wanted - from_cells, SMALL_PART * from_cells)
+        value, error, panels = (_supremum if sup else _mean)(between, cells, left)
+        if error > left or from_cells <= wanted:
             break
-        angle, mass = _nodes(low, high, sup)
-        rows = _rows(first, second, angle, edges, order)
-        found.append(float(rows.max()) if sup else float(power_mean(rows, mass, order)))
-        if level == 0:
-            continue
-        steps = np.abs(np.diff(found))
-        error = float(steps[-1] if level == 1 else max(steps[-1], MEMORY * steps[-2]))
-        error = (SUPREMUM_FACTOR if sup else 1.0) * error + ROUNDING
-        error += sum(cells_error(law, order, sup) for law in (first, second))
-        if level >= FEWEST_LEVELS - 1 and error <= max(tolerance - from_entries, SMALL_PART * from_entries):
-            break
-    how = f"Gauss rules on {low.size} panels; difference of two refinements"
+    error += from_cells + ROUNDING + sum(cells_error(law, order, sup) for law in laws)
+    how = f"levels with up to {panels} panels" if sup else f"rules of Gauss and Kronrod on {panels} panels"
     how += f", and {from_entries:.2g} from {ENTRY_POINTS} entry points" if from_entries else ""
-    return Estimate(found[-1], error + from_entries, "estimate", how)
+    return Estimate(value, error + from_entries, "estimate", how)
 
 
 def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup: bool) -> Estimate:
@@ -77,42 +85,135 @@ def matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, sup
     return Estimate(value, error, joint_kind(first, second), how)
 
 
-def _is_atomic(law: Law) -> bool:
-    """Whether the conditional distributions consist of atoms, so that no cells are needed."""
-    return not np.any(law.distribution(np.array([PROBE]), np.array([0.0, np.pi])).below)
+@dataclass(frozen=True)
+class _Panels:
+    """Panels of the incoming angle, the distances at their nodes, shape (panels, 15), and errors from halving.
+
+    ``change`` is the error of the integral of the p-th power over the panel that was halved, for each half, divided by
+    the p-th power of ``unit``.
+    """
+
+    low: Floats
+    high: Floats
+    rows: Floats
+    change: Floats
+    unit: Floats
+
+    @staticmethod
+    def at(between: ConditionalDistance, cells: int, low: Floats, high: Floats) -> _Panels:
+        """The panels with these ends, which no one was halved for."""
+        angle = _nodes(low, high)
+        zero = np.zeros(low.size)
+        return _Panels(low, high, between(angle.ravel(), cells).reshape(angle.shape), zero, zero + 1.0)
+
+    def parts(self, order: float, rule: Floats, unit: float) -> Floats:
+        """The integrals of (distance / unit)^p over the panels."""
+        weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(_nodes(self.low, self.high)) * rule
+        return np.asarray(np.sum((self.rows / unit) ** order * weight, axis=1))
+
+    def errors(self, order: float, unit: float, cuts: Floats) -> Floats:
+        """The errors of the integrals of (distance / unit)^p over the panels.
+
+        Distances may oscillate within a panel that has cuts inside, or that reaches grazing at 0 or pi. Both rules can
+        then agree by chance. If such values turn more than twice, the error is at least their range times the measure.
+        """
+        found = np.abs(self.parts(order, KRONROD - GAUSS, unit))
+        powers = (self.rows / unit) ** order
+        inside = np.searchsorted(cuts, self.high, side="left") > np.searchsorted(cuts, self.low, side="right")
+        rough = inside | (self.low <= 0.0) | (self.high >= np.pi)
+        steps = np.diff(powers, axis=1)
+        rough &= np.count_nonzero(steps[:, 1:] * steps[:, :-1] < 0.0, axis=1) > MOST_TURNS
+        spread = np.where(rough, np.ptp(powers, axis=1) * SINE.mass(self.low, self.high), 0.0)
+        return np.maximum(np.maximum(found, spread), MEMORY * self.change * (self.unit / unit) ** order)
+
+    def selected(self, chosen: NDArray[np.intp]) -> _Panels:
+        """The panels with these indices."""
+        return _Panels(*(getattr(self, name.name)[chosen] for name in fields(self)))
+
+    def halved(self, between: ConditionalDistance, cells: int, cuts: Floats, unit: float) -> _Panels:
+        """The halves of all panels, divided at the cut nearest to the middle, or in the middle."""
+        middle = _nearest_cut(self.low, self.high, cuts)
+        halves = _Panels.at(between, cells, np.concatenate((self.low, middle)), np.concatenate((middle, self.high)))
+        after = halves.parts(between.order, KRONROD, unit).reshape(2, -1).sum(axis=0)
+        change = 0.5 * np.abs(after - self.parts(between.order, KRONROD, unit))
+        return replace(halves, change=np.tile(change, 2), unit=np.full(halves.low.size, unit))
 
 
-def _panels(first: Law, second: Law, level: int) -> tuple[Floats, Floats]:
-    limit = BREAKPOINTS * 2**level
-    points = [law.breakpoints(limit)[0] for law in (first, second)]
-    coarse = np.unique(np.concatenate((np.linspace(0.0, np.pi, PANELS + 1), *points)))
+def _mean(between: ConditionalDistance, cells: int, wanted: float) -> tuple[float, float, int]:
+    """The p-mean over the incoming angle, its error, and the number of panels."""
+    order, halves = between.order, between.halves
+    edges, cuts = _panel_edges(between, 0), _breakpoints(between, MOST_BREAKPOINTS)
+    panels = _Panels.at(between, cells, edges[:-1], edges[1:])
+    while True:
+        # divided by the largest, because powers of angles underflow or overflow at high orders
+        unit = float(panels.rows.max()) or 1.0
+        errors = halves * panels.errors(order, unit, cuts)
+        total, doubt = halves * float(panels.parts(order, KRONROD, unit).sum()), float(errors.sum())
+        value, high, low = (unit * max(power, 0.0) ** (1.0 / order) for power in (total, total + doubt, total - doubt))
+        error = max(high - value, value - low)
+        if error <= wanted or panels.rows.size * (cells + between.atoms + FEW_ATOMS) > MOST_CORNERS:
+            return value, error, halves * panels.low.size
+        ranked = np.argsort(errors)
+        many = np.cumsum(errors[ranked]) > REMAINING * doubt * wanted / error
+        new = panels.selected(ranked[many]).halved(between, cells, cuts, unit)
+        old = panels.selected(ranked[~many])
+        panels = _Panels(
+            *(np.concatenate((getattr(old, name.name), getattr(new, name.name))) for name in fields(_Panels))
+        )
+
+
+def _supremum(between: ConditionalDistance, cells: int, wanted: float) -> tuple[float, float, int]:
+    """The supremum over the incoming angle, its error, and the number of panels of the last level."""
+    found: list[float] = []
+    error, number = np.inf, 0
+    for level in count():
+        edges = _panel_edges(between, level)
+        corners = edges.size * NODES * (cells + between.atoms + FEW_ATOMS)
+        if level >= FEWEST_LEVELS and corners > MOST_OF_LEVEL:
+            break
+        number = between.halves * (edges.size - 1)
+        found.append(float(between(_nodes_and_ends(edges), cells).max()))
+        steps = np.abs(np.diff(found))
+        if level == 0:
+            continue
+        error = SUPREMUM_FACTOR * float(steps[-1] if level == 1 else max(steps[-1], MEMORY * steps[-2]))
+        if level >= FEWEST_LEVELS - 1 and error <= wanted:
+            break
+    return found[-1], error, number
+
+
+def _nodes_and_ends(edges: Floats) -> Floats:
+    """Gauss nodes between the edges, and angles near both ends of each panel."""
+    inset = INSET * np.diff(edges)
+    angle = gauss_on_intervals(edges[:-1], edges[1:], NODES)[0]
+    return np.concatenate((angle, edges[:-1] + inset, edges[1:] - inset))
+
+
+def _nodes(low: Floats, high: Floats) -> Floats:
+    return np.asarray(low[:, None] + (high - low)[:, None] * STRETCHED)
+
+
+def _breakpoints(between: ConditionalDistance, limit: int) -> Floats:
+    """Sorted breakpoints of both laws inside the range of incoming angles."""
+    points = np.concatenate([law.breakpoints(limit)[0] for law in (between.first, between.second)])
+    return np.unique(points[(points > 0.0) & (points < np.pi / between.halves)])
+
+
+def _panel_edges(between: ConditionalDistance, level: int) -> Floats:
+    end = np.pi / between.halves
+    points = _breakpoints(between, BREAKPOINTS * 2**level)
+    coarse = np.unique(np.concatenate((np.linspace(0.0, end, PANELS // between.halves + 1), points)))
     pieces = 2**level
     fine = coarse[:-1, None] + np.arange(pieces) / pieces * np.diff(coarse)[:, None]
-    edges = np.append(fine.ravel(), np.pi)
-    return edges[:-1], edges[1:]
+    return np.append(fine.ravel(), end)
 
 
-def _edges(first: Law, second: Law, level: int) -> Floats:
-    points = [law.outgoing_breakpoints for law in (first, second)]
-    return np.unique(np.concatenate((np.linspace(0.0, np.pi, CELLS * 2**level + 1), *points)))
-
-
-def _nodes(low: Floats, high: Floats, sup: bool) -> tuple[Floats, Floats]:
-    angle, weight = gauss_on_intervals(low, high, NODES)
-    mass = weight * SINE.density(angle)
-    if sup:
-        inset = INSET * (high - low)
-        return np.concatenate((angle, low + inset, high - inset)), mass
-    return angle, mass / mass.sum()
-
-
-def _rows(first: Law, second: Law, angle: Floats, edges: Floats, order: float) -> Floats:
-    step = max(1, CORNERS_AT_ONCE // max(edges.size, MOST_ATOMS))
-    parts = []
-    with progress_bar(angle.size, "angle", "distance") as bar:
-        for start in range(0, angle.size, step):
-            theta = angle[start : start + step]
-            one, other = (outgoing_distributions(law, theta, edges) for law in (first, second))
-            parts.append(wasserstein(one, other, order))
-            bar.update(theta.size)
-    return np.concatenate(parts)
+def _nearest_cut(low: Floats, high: Floats, cuts: Floats) -> Floats:
+    """The cut nearest to the middle of each interval, if one lies inside; else the middle."""
+    middle = 0.5 * (low + high)
+    if not cuts.size:
+        return middle
+    right = np.searchsorted(cuts, middle)
+    near = cuts[np.clip(np.stack((right - 1, right)), 0, cuts.size - 1)]
+    best = np.where(np.abs(near[0] - middle) <= np.abs(near[1] - middle), *near)
+    return np.where((best > low) & (best < high), best, middle)

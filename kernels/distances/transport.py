@@ -106,6 +106,36 @@ def wasserstein(first: Distributions, second: Distributions, order: float = 1.0)
     return np.asarray(largest * power ** (1.0 / order))
 
 
+def absolute_area(width: Floats, start: Floats, middle: Floats, end: Floats) -> Floats:
+    """The integrals of abs(f), shape (rows,), for piecewise quadratic f, from its values at ends and middles of pieces.
+
+    All arrays have the shape (rows, pieces).
+
+    Examples
+    --------
+    >>> values = (np.array([[x - 0.25]]) for x in (0.0, 0.5, 1.0))
+    >>> absolute_area(np.ones((1, 1)), *values).tolist()
+    [0.3125]
+    """
+    area = np.abs(start + 4.0 * middle + end) / 6.0
+    signs = np.stack((start, middle, end))
+    mixed = (signs.max(axis=0) > 0.0) & (signs.min(axis=0) < 0.0)
+    if mixed.any():
+        start, middle, end = signs[:, mixed]
+        # f(t) = start + slope t + bend t^2 for t in (0, 1)
+        slope, bend = 4.0 * middle - 3.0 * start - end, 2.0 * (start + end - 2.0 * middle)
+        root = np.sqrt(np.maximum(slope * slope - 4.0 * bend * start, 0.0))
+        sum_of_both = -0.5 * (slope + np.where(slope < 0.0, -root, root))
+        zeros = [
+            np.clip(np.divide(top, base, out=np.zeros_like(top), where=np.abs(base) > SMALLEST_STEP), 0.0, 1.0)
+            for top, base in ((sum_of_both, bend), (start, sum_of_both))
+        ]
+        cut = np.stack((np.zeros_like(slope), np.minimum(*zeros), np.maximum(*zeros), np.ones_like(slope)))
+        primitive = cut * (start + cut * (0.5 * slope + cut * bend / 3.0))
+        area[mixed] = np.abs(np.diff(primitive, axis=0)).sum(axis=0)
+    return np.asarray((width * area).sum(axis=1))
+
+
 def _mean_power(start: Floats, end: Floats, order: float) -> Floats:
     """The mean of |f|^p for a linear function f between two values."""
     rise, middle = end - start, 0.5 * (start + end)

@@ -12,7 +12,7 @@ from ..bases.angles import clipped_inside
 
 
 class Distribution(NamedTuple):
-    """P~(theta_k, .) for some theta_k, on given edges from 0 to pi.
+    """P~(theta_k, .) for some theta_k, on given edges from 0 to pi, common ones or those of each theta_k.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Distribution(NamedTuple):
     @classmethod
     def of_atoms(cls, edges: Floats, position: Floats, mass: Floats) -> Distribution:
         """The distributions that consist of atoms only."""
-        return cls(np.zeros((len(position), edges.size)), position, mass)
+        return cls(np.zeros((len(position), edges.shape[-1])), position, mass)
 
     @classmethod
     def without_atoms(cls, below: Floats) -> Distribution:

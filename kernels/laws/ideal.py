@@ -13,6 +13,7 @@ from ..bases.basis import Basis
 from ..bases.measure import SINE
 from ..expectations.basis_means import Expectations, Unconditional
 from .density import DensityLaw
+from .distribution import Distribution
 from .law import Combination, specular
 
 
@@ -30,6 +31,14 @@ class LambertianLaw(DensityLaw):
         """sin(theta')/2, in the shape to which the two arguments broadcast."""
         shape = np.broadcast_shapes(np.shape(theta), np.shape(theta_out))
         return np.broadcast_to(SINE.density(theta_out), shape)
+
+    def density_cuts(self, theta: Floats) -> Floats:
+        """None are needed, because the density is smooth."""
+        return np.empty((theta.size, 0))
+
+    def distribution(self, theta: Floats, edges: Floats) -> Distribution:
+        """The same distribution function at every incoming angle."""
+        return Distribution.without_atoms(np.broadcast_to(SINE.cdf(edges), (theta.size, edges.shape[-1])))
 
     def expectations(self, basis: Basis) -> Expectations:
         """The integrals of the basis functions, the same at every incoming angle."""

@@ -153,6 +153,14 @@ class Law(ABC):
         """The known outgoing angles at which densities jump or have a kink for every incoming angle."""
         return np.empty(0)
 
+    def density_cuts(self, theta: Floats) -> Floats | None:
+        """Outgoing angles between which the density of P~(theta_k, .) is smooth, shape (angles, any), in any order.
+
+        The narrowest pieces may be left out. None if the law does not know them for every incoming angle; else
+        `distribution` takes other edges for each incoming angle, of shape (angles, edges).
+        """
+        return None
+
     def random_map(self) -> RandomMap | None:
         """The law as a map of a uniform number in (0, 1) and the incoming angle; None if it needs more randomness."""
         return None
@@ -164,6 +172,7 @@ class Law(ABC):
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """P~(theta_k, .) for every theta_k, with its atoms if the law knows them; ``edges`` go from 0 to pi.
 
+        A law that knows its `density_cuts` also takes edges of shape (angles, edges).
         The default computes the expectations of indicator functions.
         """
         below = self.apply(lambda angle: (angle[..., None] < edges).astype(np.float64), theta)
@@ -233,6 +242,10 @@ class BranchLaw(Law):
     def breakpoints(self, limit: int) -> tuple[Floats, float]:
         """Increasing angles in (0, pi) where the branches change, at most about ``limit`` of them, and the measure
         under sin(theta)/2 d theta of the angles, mostly near grazing, whose breakpoints were left out."""
+
+    def density_cuts(self, theta: Floats) -> Floats:
+        """None are needed, because there is no density."""
+        return np.empty((theta.size, 0))
 
     def random_map(self) -> RandomMap:
         """The map that takes the branch in whose part of (0, 1) the number lies."""
@@ -415,6 +428,11 @@ class Combination(Law):
     @property
     def outgoing_breakpoints(self) -> Floats:
         return np.unique(np.concatenate([law.outgoing_breakpoints for _, law in self.terms]))
+
+    def density_cuts(self, theta: Floats) -> Floats | None:
+        cuts = [law.density_cuts(theta) for _, law in self.terms]
+        known = [found for found in cuts if found is not None]
+        return np.concatenate(known, axis=1) if len(known) == len(cuts) else None
 
     def isometry_table(self) -> IsometryTable | None:
         """The sum of the terms' tables; None if a term has none."""
@@ -721,6 +739,10 @@ class SpecularFrame(Law):
     def outgoing_breakpoints(self) -> Floats:
         return np.asarray(np.pi - self.law.outgoing_breakpoints[::-1])
 
+    def density_cuts(self, theta: Floats) -> Floats | None:
+        cuts = self.law.density_cuts(theta)
+        return None if cuts is None else np.asarray(np.pi - cuts)
+
     def random_map(self) -> RandomMap | None:
         inner = self.law.random_map()
         if inner is None:
@@ -737,7 +759,7 @@ class SpecularFrame(Law):
         return None if table is None else table.in_specular_frame()
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
-        return self.law.distribution(theta, (np.pi - edges)[::-1]).mirrored()
+        return self.law.distribution(theta, (np.pi - edges)[..., ::-1]).mirrored()
 
     def expectations(self, basis: Basis) -> Expectations:
         """Expectations from the inner law if the basis is mirror-symmetric, else by `apply`."""

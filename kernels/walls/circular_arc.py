@@ -23,6 +23,8 @@ from ..laws.law import DrivenLaw, entry_points
 # of about 1/(4 N^2), for theta within xi/N of xi. Their outgoing angle lies within xi/N of pi - xi (or xi), and its
 # mean within xi/N^2. For a smooth function the error is below 1/(4 N^4) = 4e-12.
 MOST_HITS = 500
+# Hits of the pieces whose ends are listed; the others lie within xi/24 of pi - xi (or xi).
+HITS_IN_CUTS = 24
 FEWEST_HITS = 8
 NODES = 16
 # Evaluations of the function per block.
@@ -105,7 +107,22 @@ class CircularArcLaw(DrivenLaw):
 
     def distribution(self, theta: Floats, edges: Floats) -> Distribution:
         """The masses between the edges, by integrals of a sine."""
-        return Distribution.of_cells(self.conditional_masses(theta, edges))
+        step = max(1, CHUNK // edges.shape[-1])
+        parts = [np.empty((0, edges.shape[-1]))]
+        for start in range(0, theta.size, step):
+            part = slice(start, start + step)
+            parts.append(self._below(theta[part], edges if edges.ndim == 1 else edges[part]))
+        return Distribution.without_atoms(np.concatenate(parts))
+
+    def density_cuts(self, theta: Floats) -> Floats:
+        """The ends of the pieces with a constant number of hits, up to 24 of them."""
+        ray, mirrored, lower, upper, hits, rest, _ = self.pieces(theta, HITS_IN_CUTS)
+        base = np.where(mirrored, np.pi - theta[ray], theta[ray])
+        ends = np.pi + base - 2.0 * hits * np.where(rest, upper, [lower, upper])
+        number = np.bincount(ray, minlength=theta.size)
+        cuts = np.zeros((theta.size, 2, number.max(initial=0)))
+        cuts[ray, :, joined_lists(number)[1]] = np.clip(np.where(mirrored, np.pi - ends, ends), 0.0, np.pi).T
+        return cuts.reshape(theta.size, -1)
 
     def expectations(self, basis: Basis) -> Expectations:
         """Conditional expectations, piece by piece and with errors for polynomials on panels, else by `apply`."""
@@ -145,23 +162,26 @@ class CircularArcLaw(DrivenLaw):
 
     def conditional_masses(self, theta: Floats, edges: Floats) -> Floats:
         """P(theta, (edges[j], edges[j + 1])) for increasing edges, shape (angles, cells), by integrals of a sine."""
+        return np.diff(self.distribution(theta, edges).below, axis=1)
+
+    def _below(self, theta: Floats, edges: Floats) -> Floats:
+        """P(theta_k, (edges[0], edges[j])) for increasing edges, common ones or those of each angle."""
         ray, mirror, lower, upper, hits, rest, alone = self.pieces(theta)
         lower = np.where(rest, lower, np.minimum(lower, upper))
-        found = np.zeros((theta.size, edges.size - 1))
-        step = max(1, 2**6 * CHUNK // edges.size)
-        for start in range(0, ray.size, step):
-            part = slice(start, start + step)
-            base = np.where(mirror[part], np.pi - theta[ray[part]], theta[ray[part]])
-            mirrored = np.where(mirror[part, None], np.pi - edges, edges)
-            # theta' decreases in delta: outgoing angles below an edge have delta above this value
-            chord = (np.pi + base[:, None] - mirrored) / (2.0 * hits[part, None])
-            chord = np.where(rest[part, None], np.where(mirrored > np.pi - self.half_angle, -1.0, 4.0), chord)
-            high = np.maximum(upper[part], lower[part])[:, None]
-            below = SINE.mass(np.clip(chord, lower[part, None], high), high)
-            single = alone[part] & ~rest[part]
-            below[single] = chord[single] <= upper[part][single, None]
-            np.add.at(found, ray[part], np.abs(np.diff(below, axis=1)))
-        return np.asarray(found / found.sum(axis=1, keepdims=True))
+        own = edges if edges.ndim == 1 else edges[ray]
+        base = np.where(mirror, np.pi - theta[ray], theta[ray])
+        mirrored = np.where(mirror[:, None], np.pi - own, own)
+        # theta' decreases in delta: outgoing angles below an edge have delta above this value
+        chord = (np.pi + base[:, None] - mirrored) / (2.0 * hits[:, None])
+        chord = np.where(rest[:, None], np.where(mirrored > np.pi - self.half_angle, -1.0, 4.0), chord)
+        high = np.maximum(upper, lower)[:, None]
+        beyond = SINE.mass(np.clip(chord, lower[:, None], high), high)
+        single = alone & ~rest
+        beyond[single] = chord[single] <= upper[single][:, None]
+        # a mirrored ray has the mass above the edge
+        piece = np.abs(beyond - beyond[:, :1])
+        found = np.add.reduceat(piece, np.searchsorted(ray, np.arange(theta.size)), axis=0)
+        return np.asarray(found / found[:, -1:])
 
     def _conditional_quadrature(
         self, theta: Floats, nodes: int, most_hits: int

@@ -183,6 +183,10 @@ class WallLaw(DrivenLaw):
         """Breakpoints of the exact law; none are known without one."""
         return super().breakpoints(limit) if self.exact_law is None else self.exact_law.breakpoints(limit)
 
+    def density_cuts(self, theta: Floats) -> Floats | None:
+        known = self.exact_law or self.replacement
+        return None if known is None else known.density_cuts(theta)
+
     def isometry_table(self) -> IsometryTable | None:
         """The table of the exact law, or None."""
         return None if self.exact_law is None else self.exact_law.isometry_table()
