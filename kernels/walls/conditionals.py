@@ -159,7 +159,8 @@ class WallConditionals:
 
     def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveConditionals:
         """The conditional distributions at checked angles."""
-        incoming, group = np.unique(theta, return_inverse=True)
+        # the compiled march takes doubles by their address
+        incoming, group = np.unique(np.asarray(theta, dtype=np.float64), return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
         np.minimum.at(tolerances, group, np.broadcast_to(tolerance, theta.shape))
         before = self._spent()
