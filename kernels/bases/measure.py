@@ -5,6 +5,7 @@ No other file of the package multiplies by these weights.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -12,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats, Rng, generator
+from ...core.checks import Floats, Rng, check_memory, generator, whole_number
 from ...core.errors import InputError
 from ...core.kinds import explained_class
 
@@ -79,8 +80,11 @@ class AngularMeasure:
 
     def sample(self, size: int | tuple[int, ...], rng: Rng = None) -> Floats:
         """Draw angles from the measure."""
+        shape = size if isinstance(size, tuple) else (size,)
+        checked = tuple(whole_number("size", length, 0) for length in shape)
+        check_memory("size", "the sample", math.prod(checked))
         # 1 - U lies in (0, 1], so the angle 0 does not occur; pi is clipped to the open interval.
-        return np.asarray(np.clip(self.quantile(1.0 - generator(rng).random(size)), SMALLEST_ANGLE, LARGEST_ANGLE))
+        return np.asarray(np.clip(self.quantile(1.0 - generator(rng).random(checked)), SMALLEST_ANGLE, LARGEST_ANGLE))
 
     def quadrature(self, edges: ArrayLike, order: int) -> tuple[Floats, Floats]:
         """Gauss-Legendre nodes (angles) and weights, ``order`` of them between each two neighbouring edges.
