@@ -1,7 +1,7 @@
 """Run all measurements: ``python -m benchmarks --write`` regenerates the generated pages of the documentation.
 
 The parts are the tables of speed and goals, the standard set, the random walls, the stability report, and the savings
-of the tracer; ``--peers`` adds the peers. Each part has a time limit, together 39.5 minutes. An interrupted run
+of the tracer; ``--peers`` adds the peers. Each part has a time limit, together 43 minutes. An interrupted run
 continues in the folder ``--out``. A finished run, or a run with other options, starts again.
 """
 

@@ -1,14 +1,16 @@
 """Bounces a second on walls of all kinds, and the first rays of a large profile (python -m benchmarks.rays).
 
-Times are processor seconds, the least of the repeats, so that other processes disturb them less; two threads are timed
-by the clock, alternately with one. ``--profile`` measures only the profile of 200,000 points.
+The repeats take one thread and two in turn, so that both meet the same state of the machine. The least times count: on
+one thread also in processor seconds, which other processes disturb less. ``--profile`` measures only the profile of
+200,000 points.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -51,6 +53,22 @@ def wall_of_arcs() -> geo.Wall:
     return geo.Wall(pieces)
 
 
+@dataclass(frozen=True)
+class Throughput:
+    """Bounces a ray on one wall, and bounces a second: of a processor's time, on one thread, and on two."""
+
+    wall: str
+    bounces_per_ray: float
+    work: float
+    one_thread: float
+    two_threads: float
+
+    @property
+    def speed_up(self) -> float:
+        """How many times as fast two threads are as one."""
+        return self.two_threads / self.one_thread
+
+
 WALLS: dict[str, Callable[[], geo.Wall]] = {
     "triangular teeth (2 lines)": lambda: geo.triangular_teeth(0.7),
     "focusing arc (1 arc)": lambda: geo.focusing_arcs(1.2),
@@ -78,28 +96,39 @@ def timed(clock: Callable[[], float], call: Callable[[], Any]) -> tuple[Any, flo
     return result, clock() - begin
 
 
-def bounce_rows() -> list[str]:
-    """A row for each wall."""
+def measure_throughput(rays: int = RAYS) -> list[Throughput]:
+    """Trace the same rays on every wall, with one thread and with two in turn."""
     rows = []
     for name, make in WALLS.items():
         wall = make()
-        x, theta = random_rays(wall, RAYS)
+        x, theta = random_rays(wall, rays)
+        traced = geo.trace(wall, x, theta, threads=2)
         times: list[tuple[float, float, float]] = []
         for _ in range(REPEATS):
-            traced, work = timed(time.process_time, lambda: geo.trace(wall, x, theta, threads=1))  # noqa: B023
+            begin = time.process_time()
             _, one = timed(time.perf_counter, lambda: geo.trace(wall, x, theta, threads=1))  # noqa: B023
+            work = time.process_time() - begin
             _, two = timed(time.perf_counter, lambda: geo.trace(wall, x, theta, threads=2))  # noqa: B023
             times.append((work, one, two))
-        work, one, two = np.min(times, axis=0)
-        bounces = traced.collisions.sum()
-        rows.append(
-            f"{name} | {bounces / RAYS:.2f} | {bounces / work / 1e6:.2f} | {1e9 * work / RAYS:.0f} | {one / two:.2f}"
-        )
+        bounces = float(traced.collisions.sum())
+        rows.append(Throughput(name, bounces / rays, *(bounces / np.min(times, axis=0))))
     return rows
 
 
-def profile_row() -> str:
-    """Processor seconds of the steps to the first rays of a large profile."""
+def throughput_table(rows: Iterable[Throughput]) -> str:
+    """One line for each wall."""
+    return table(
+        "wall | bounces a ray | million bounces/s, one thread | in processor seconds | two threads | speed-up",
+        (
+            f"{row.wall} | {row.bounces_per_ray:.2f} | {row.one_thread / 1e6:.1f} | {row.work / 1e6:.1f} "
+            f"| {row.two_threads / 1e6:.1f} | {row.speed_up:.2f}"
+            for row in rows
+        ),
+    )
+
+
+def first_rays() -> str:
+    """A table row with the processor seconds of the steps to the first rays of a large profile."""
     wall, made = timed(time.process_time, lambda: profile_of(LARGE_PROFILE))
     _, tables = timed(time.process_time, lambda: wall.scene)
     x, theta = random_rays(wall, FIRST_RAYS)
@@ -115,9 +144,9 @@ def main() -> None:
         from asperity.geometry.tracing.compiled.closed_forms import SIMPLE
 
         SIMPLE.load()
-        print(table("wall | bounces a ray | million bounces/s | ns a ray | two threads", iter(bounce_rows())))
+        print(throughput_table(measure_throughput()))
         print()
-    print(table("points | wall, s | tables, s | first 10^6 rays, s | in all, s", iter([profile_row()])))
+    print(table("points | wall, s | tables, s | first 10^6 rays, s | in all, s", iter([first_rays()])))
 
 
 if __name__ == "__main__":

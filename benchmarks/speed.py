@@ -7,7 +7,6 @@ import sys
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from asperity import geometry as geo
 from asperity.bench.running.timing import least_time
@@ -16,21 +15,13 @@ from asperity.spectral import Machine
 
 from .goals import all_goals, goal_table
 from .memory import measure_memory
+from .rays import RAYS, measure_throughput, throughput_table
 from .rigid import measure_rigid, speed_table
 from .robustness import RAYS as AIMED_RAYS
 from .robustness import measure_robustness
 from .transport import PAGE_CELLS, PAGE_JOINT, transport_table
 
-RAYS, REPEATS = 2**20, 5
-# Floating-point operations of one bounce if every piece of the hollow is tested once: about 9 for each side, 24 for an
-# arc, and 30 for the hit, the reflection and the escape.
-LINE_FLOPS, ARC_FLOPS, BOUNCE_FLOPS = 9, 24, 30
-WALLS = {
-    "triangular teeth (2 lines)": geo.triangular_teeth(0.7),
-    "focusing arc (1 arc)": geo.focusing_arcs(1.2),
-    "mushroom (6 lines, 1 arc)": geo.mushrooms(0.3, 0.5),
-    "Koch 4 (256 lines)": geo.koch(4),
-}
+REPEATS = 5
 # Walls, entry points and angles with very long runs of hits. On an arc, 10^9 hits would need a ray within 1e-18 of a
 # tip, which is a corner; double precision allows about 10^6 hits.
 RUNS = {
@@ -50,17 +41,6 @@ SCRIPTS = {
 
 
 @dataclass(frozen=True)
-class Throughput:
-    """Bounces a ray and bounces a second on one wall: on one thread, on two, and at the floating-point limit."""
-
-    wall: str
-    bounces_per_ray: float
-    one_thread: float
-    two_threads: float
-    flop_limit: float
-
-
-@dataclass(frozen=True)
 class RunTime:
     """Mean number of hits of a ray, seconds a ray, and the fraction of the rays that escaped."""
 
@@ -76,31 +56,15 @@ def speed_and_goals(quick: bool) -> str:
     runs, start, disks = measure_runs(), measure_start(), measure_rigid()
     robustness = measure_robustness(AIMED_RAYS // 50 if quick else AIMED_RAYS)
     goals = all_goals(
-        [(row.wall, row.one_thread, row.two_threads) for row in throughput],
+        throughput,
         [(row.what, row.hits, row.seconds) for row in runs],
         start, robustness, measure_memory(), min(row.one_thread for row in disks),
     )  # fmt: skip
     tables = (
-        _throughput_table(throughput), _runs_table(runs), speed_table(disks), transport_table(PAGE_JOINT, PAGE_CELLS),
+        throughput_table(throughput), _runs_table(runs), speed_table(disks), transport_table(PAGE_JOINT, PAGE_CELLS),
         table("start | seconds", (f"{what} | {least:.2f}" for what, least in start.items())),
     )  # fmt: skip
     return "\n\n".join([f"Machine: {Machine.here()}.", "## Goals", goal_table(goals), "## Speed", *tables])
-
-
-def measure_throughput(rays: int) -> list[Throughput]:
-    """Trace the same rays on every wall with one thread and with two."""
-    rng = np.random.default_rng(0)
-    x, theta = rng.random(rays), np.arccos(1 - 2 * rng.random(rays))
-    peak = _peak_flops()
-    rows = []
-    for name, wall in WALLS.items():
-        traced, one = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=1), REPEATS)
-        _, two = least_time(lambda wall=wall: geo.trace(wall, x, theta, threads=2), REPEATS)
-        bounces = int(traced.collisions.sum())
-        lines = sum(isinstance(piece, geo.Segment) for piece in wall.pieces)
-        flops = BOUNCE_FLOPS + LINE_FLOPS * lines + ARC_FLOPS * (len(wall.pieces) - lines)
-        rows.append(Throughput(name, bounces / rays, bounces / one, bounces / two, peak / flops))
-    return rows
 
 
 def measure_runs() -> list[RunTime]:
@@ -123,32 +87,6 @@ def measure_start() -> dict[str, float]:
         what: least_time(lambda script=script: subprocess.run([sys.executable, "-c", script], check=True), REPEATS)[1]
         for what, script in SCRIPTS.items()
     }
-
-
-@njit(fastmath=True)
-def _multiply_add(values, rounds):  # type: ignore[no-untyped-def]
-    for _ in range(rounds):
-        for i in range(values.shape[0]):
-            values[i] = values[i] * 0.999999 + 1e-6
-
-
-def _peak_flops(rounds: int = 200_000) -> float:
-    """Twice the multiply-adds a second of one core, on an array in the first-level cache."""
-    values = np.ones(512)
-    _multiply_add(values, 1)
-    _, best = least_time(lambda: _multiply_add(values, rounds), 3)
-    return 2.0 * rounds * len(values) / best
-
-
-def _throughput_table(measured: list[Throughput]) -> str:
-    return table(
-        "wall | bounces a ray | million bounces/s, one thread | two threads | speed-up | fraction of the flop limit",
-        (
-            f"{row.wall} | {row.bounces_per_ray:.2f} | {row.one_thread / 1e6:.1f} | {row.two_threads / 1e6:.1f} "
-            f"| {row.two_threads / row.one_thread:.2f} | {row.one_thread / row.flop_limit:.3f}"
-            for row in measured
-        ),
-    )
 
 
 def _runs_table(measured: list[RunTime]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from benchmarks import goals, memory, robustness
+from benchmarks import goals, memory, rays, robustness, wall_goals
 
 from asperity import geometry as geo
 from asperity.estimates import Estimate
@@ -46,3 +46,13 @@ def test_a_goal_of_error_and_time_needs_both_and_an_error_that_holds():
         goal = goals._in_time("a number", 1.0, lambda answer=answer: answer, 0.5, limit, holds=True)
         assert goal.is_met == is_met and f"reported {reported:.1e}" in goal.reached
     assert not goals._in_time("a number", 1.0, lambda: 1.75, 0.5, 9.0).is_met
+
+
+def test_a_goal_of_a_tolerance_needs_the_error_and_the_seconds():
+    for error, seconds, is_met in ((1e-5, 4.0, True), (1e-3, 4.0, False), (1e-5, 6.0, False)):
+        goal = wall_goals.WallGoal("a law", 1e-4, 5.0, error, seconds)
+        assert goal.is_met == is_met and goal.goal == "1e-04 in 5 s"
+
+
+def test_every_wall_whose_bounces_are_counted_has_a_goal():
+    assert set(goals.BOUNCE_GOALS) == set(rays.WALLS)

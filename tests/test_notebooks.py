@@ -59,7 +59,7 @@ def text_of(value) -> str:
         (lambda: LAW, ["henyey_greenstein(0.5)", "reversible"]),
         (lambda: ker.WallLaw(geo.flat()), ["WallLaw", "closed form"]),
         (lambda: ker.discretise(LAW, ker.Bins(4)), ["Bins(4)", "Frobenius error"]),
-        (lambda: spec.spectrum(LAW, k=3), ["Eigenvalues", "0.25"]),
+        (lambda: spec.spectrum(LAW, k=3), ["Eigenvalues", "0 even", "1 odd", "2 even", "isolated"]),
         (lambda: spec.spectral_gap(LAW), ["Spectral gap 0.5", "isolated"]),
         (lambda: spec.enclosures(LAW, 2), ["indexed", "0.5"]),
         (lambda: GAP, ["0.03732(5)", "two <resolutions>"]),

@@ -15,7 +15,22 @@ from ...core.checks import Floats
 from ...core.rounding import EPS
 from ..disk.disk import Disk
 from ..disk.satellites import Satellites
-from ..scene.columns import ARC_COLUMNS, BEZIER_COLUMNS, ELLIPSES_END, FIRST_ELLIPSE, LINE_COLUMNS, SIZE
+from ..scene.columns import (
+    ARC_COLUMNS,
+    BEZIER_COLUMNS,
+    CURVATURE,
+    ELLIPSES_END,
+    FIRST_ELLIPSE,
+    JOINT_X,
+    JOINT_Y,
+    LEFT,
+    LINE_COLUMNS,
+    LINE_NORMAL_X,
+    LINE_NORMAL_Y,
+    RIGHT,
+    SIZE,
+    STARTS_LINE,
+)
 from ..tracing.threads import new_flag
 from .compiled.graph_table import graphs_of
 
@@ -115,6 +130,28 @@ def ground_of(scene: Scene) -> Ground:
     return Ground(
         scene.cell, scene.is_open, hollows, scene.joints, lines, table, exact_arcs, beziers, graphs, new_flag()
     )
+
+
+def is_convex(ground: Ground) -> bool:
+    """Return whether the cell is one convex hollow: a focusing arc, or lines.
+
+    The joints of lines must be well in front of all other lines.
+    """
+    hollows, joints, lines = ground.hollows, ground.joints, ground.lines
+    if ground.is_open or len(hollows) != 1 or len(ground.graphs):
+        return False
+    hollow, ends = hollows[0], joints[:, [JOINT_X, JOINT_Y]]
+    if hollow[LEFT] != 0.0 or hollow[RIGHT] != ground.cell:
+        return False
+    starts = np.flatnonzero(joints[:, STARTS_LINE] > 0.0)
+    if len(ground.arcs):
+        is_arc = len(joints) == 2 and not len(starts) and not ends[:, 1].any()
+        return bool(is_arc and ground.arcs[0, CURVATURE] > 0.0)
+    if len(starts) != len(joints) - 1:
+        return False
+    away = (ends - ends[starts, np.newaxis]) @ lines[starts][:, [LINE_NORMAL_X, LINE_NORMAL_Y], np.newaxis]
+    others = np.arange(len(joints)) - starts[:, np.newaxis]
+    return bool(np.all(away[..., 0][(others != 0) & (others != 1)] > ROOM * hollow[SIZE]))
 
 
 def ring_of(satellites: Satellites, scale: float, scene: Scene) -> Ring:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +16,10 @@ from ..disk.satellites import Satellites
 from ..tracing.threads import in_blocks
 from ..tracing.tracing import MAX_COLLISIONS, Status, StatusCounts
 from ..walls.wall import Wall
-from .records import DiskResults, ground_of, mass_fractions, results_for, ring_of
+from .records import DiskResults, Ground, Ring, ground_of, is_convex, mass_fractions, results_for, ring_of
+
+# Mass fractions, satellites, limit on contacts, wall.
+Constants = tuple[tuple[float, float], Ring, int, Ground]
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,9 @@ def collide(
     -----
     Positions are computed in units of the wall, relative to its cell. So small scales lose no accuracy except by the
     rounding of x1 and alpha. The first contact is found by steps that provably pass no root (see `compiled.contact`).
-    Cost: 0.2 to 0.5 microseconds per contact on a wall of few pieces; every piece of a hollow is tested.
+    Cost: 0.2 to 0.5 microseconds per contact on a wall of few pieces; every piece of a hollow is tested. Where the
+    cell is one convex hollow, as of triangular teeth or focusing arcs, 16 disks at once take 0.1 microseconds per
+    contact.
 
     Source: Rudzis 2022, sections 1.3.1 to 1.3.5, and Proposition 3.2 with the angle alpha + j rho (eq. 3.26 prints
     alpha - j rho).
@@ -115,8 +121,6 @@ def collide(
     >>> hit.velocity.round(12).tolist(), hit.contacts.tolist(), hit.counts()["escaped"]
     ([[0.0, 1.0, 0.0]], [1], 1)
     """
-    from .compiled.rigid import collide_disks
-
     check_kinds(disk, wall)
     eps = positive_number("scale", scale)
     ring = ring_of(Satellites.around(eps, eps * wall.depth, spacing), eps, wall.scene)
@@ -125,16 +129,41 @@ def collide(
     start = at_the_tops(wall, eps, at, moving)
     n = len(at)
     results = results_for(n)
-    ground, masses = ground_of(wall.scene), mass_fractions(disk)
+    ground = ground_of(wall.scene)
+    constants = mass_fractions(disk), ring, max_contacts, ground
+    collide_block = _in_waves if is_convex(ground) else _one_by_one
 
     def run(part: slice) -> None:
-        collide_disks(start[part], moving[part], masses, ring, max_contacts, ground, results.part(part))
+        collide_block(start[part], moving[part], constants, results.part(part))
 
     in_blocks(run, n, threads, stop=ground.stop)
     from_the_tops(wall, eps, at, start, moving, results)
     for array in results:
         array.setflags(write=False)
     return RigidCollision(*results)
+
+
+def _one_by_one(start: Floats, moving: Floats, constants: Constants, results: DiskResults) -> None:
+    """Collide a block of disks with any wall."""
+    from .compiled.rigid import collide_disks
+
+    collide_disks(start, moving, *constants, results)
+
+
+def _in_waves(start: Floats, moving: Floats, constants: Constants, results: DiskResults) -> None:
+    """Collide a block of disks with a wall whose cell is one convex hollow."""
+    from .compiled.lanes import WORK
+    from .compiled.waves import UNDECIDED, collide_in_waves
+
+    *_, ground = constants
+    collide_in_waves(start, moving, *constants, results, np.zeros(WORK))
+    rest = np.flatnonzero(results.status == UNDECIDED)
+    if len(rest) and not ground.stop[0]:
+        found = results_for(len(rest))
+        _one_by_one(start[rest], moving[rest], constants, found)
+        arrays: tuple[NDArray[Any], ...] = results
+        for result, some in zip(arrays, found, strict=True):
+            result[rest] = some
 
 
 def at_the_tops(wall: Wall, scale: float, position: Floats, velocity: Floats) -> Floats:

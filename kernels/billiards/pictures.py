@@ -209,8 +209,8 @@ def animate(record: BilliardRecord, frames: int = 200, duration: float = 10.0) -
             spoke.set_data([x, x + size * np.cos(angle)], [y, y + size * np.sin(angle)])
         return [line for group in lines for line in group]
 
-    figure = axes.get_figure(root=True)
-    assert figure is not None  # axes are drawn into a figure
+    # of an axes in a subfigure, the figure above it; `get_figure(root=True)` needs matplotlib 3.10
+    figure = axes.figure.figure
     animation = FuncAnimation(figure, show, frames=count, interval=1e3 * seconds / count, blit=False)
     # matplotlib warns of an animation of which no picture was drawn
     figure.canvas.draw()

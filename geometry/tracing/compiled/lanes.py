@@ -21,117 +21,120 @@ WORD, NUMBER, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
 LANES = ir.VectorType(NUMBER, BOXES)
 
 
-class _Lanes:
-    """A vector of eight numbers or truth values in compiled code, with the operations of arithmetic."""
+class Lanes:
+    """A vector of numbers or truth values in compiled code, with the operations of arithmetic."""
 
     def __init__(self, builder: Any, value: Any) -> None:
-        self.builder, self.value = builder, value
+        self.builder, self.value, self.count = builder, value, value.type.count
 
-    def _with(self, other: Any, operation: str) -> _Lanes:
-        other = other if isinstance(other, _Lanes) else constant(self.builder, other)
-        return _Lanes(self.builder, getattr(self.builder, operation)(self.value, other.value))
+    def _with(self, other: Any, operation: str) -> Lanes:
+        other = other if isinstance(other, Lanes) else constant(self.builder, other, self.count)
+        return Lanes(self.builder, getattr(self.builder, operation)(self.value, other.value))
 
-    def __add__(self, other: Any) -> _Lanes:
+    def __add__(self, other: Any) -> Lanes:
         return self._with(other, "fadd")
 
-    def __sub__(self, other: Any) -> _Lanes:
+    def __sub__(self, other: Any) -> Lanes:
         return self._with(other, "fsub")
 
-    def __mul__(self, other: Any) -> _Lanes:
+    def __mul__(self, other: Any) -> Lanes:
         return self._with(other, "fmul")
 
-    def __truediv__(self, other: Any) -> _Lanes:
+    def __truediv__(self, other: Any) -> Lanes:
         return self._with(other, "fdiv")
 
-    def __neg__(self) -> _Lanes:
-        return _Lanes(self.builder, self.builder.fneg(self.value))
+    def __neg__(self) -> Lanes:
+        return Lanes(self.builder, self.builder.fneg(self.value))
 
-    def __abs__(self) -> _Lanes:
+    def __abs__(self) -> Lanes:
         return self._call("fabs")
 
-    def __and__(self, other: _Lanes) -> _Lanes:
+    def __and__(self, other: Lanes) -> Lanes:
         return self._with(other, "and_")
 
-    def __or__(self, other: _Lanes) -> _Lanes:
+    def __or__(self, other: Lanes) -> Lanes:
         return self._with(other, "or_")
 
-    def __invert__(self) -> _Lanes:
-        return _Lanes(self.builder, self.builder.not_(self.value))
+    def __invert__(self) -> Lanes:
+        return Lanes(self.builder, self.builder.not_(self.value))
 
-    def __ge__(self, other: Any) -> _Lanes:
+    def __ge__(self, other: Any) -> Lanes:
         return self._compared(">=", other)
 
-    def __gt__(self, other: Any) -> _Lanes:
+    def __gt__(self, other: Any) -> Lanes:
         return self._compared(">", other)
 
-    def __le__(self, other: Any) -> _Lanes:
+    def __le__(self, other: Any) -> Lanes:
         return self._compared("<=", other)
 
-    def __lt__(self, other: Any) -> _Lanes:
+    def __lt__(self, other: Any) -> Lanes:
         return self._compared("<", other)
 
-    def equals(self, other: Any) -> _Lanes:
+    def equals(self, other: Any) -> Lanes:
         return self._compared("==", other)
 
-    def root(self) -> _Lanes:
+    def root(self) -> Lanes:
         return self._call("sqrt")
 
-    def where(self, yes: _Lanes, no: _Lanes) -> _Lanes:
-        return _Lanes(self.builder, self.builder.select(self.value, yes.value, no.value))
+    def floor(self) -> Lanes:
+        return self._call("floor")
+
+    def where(self, yes: Lanes, no: Lanes) -> Lanes:
+        return Lanes(self.builder, self.builder.select(self.value, yes.value, no.value))
 
     def any(self) -> Any:
         """Return a condition of the compiled code for its branches."""
         return self.builder.icmp_unsigned("!=", self.mask(), WORD(0))
 
     def mask(self) -> Any:
-        return self.builder.zext(self.builder.bitcast(self.value, ir.IntType(BOXES)), WORD)
+        return self.builder.zext(self.builder.bitcast(self.value, ir.IntType(self.count)), WORD)
 
-    def _compared(self, how: str, other: Any) -> _Lanes:
-        other = other if isinstance(other, _Lanes) else constant(self.builder, other)
-        return _Lanes(self.builder, self.builder.fcmp_ordered(how, self.value, other.value))
+    def _compared(self, how: str, other: Any) -> Lanes:
+        other = other if isinstance(other, Lanes) else constant(self.builder, other, self.count)
+        return Lanes(self.builder, self.builder.fcmp_ordered(how, self.value, other.value))
 
-    def _call(self, name: str) -> _Lanes:
-        kind = ir.FunctionType(LANES, [LANES])
-        function = self.builder.module.declare_intrinsic(f"llvm.{name}.v{BOXES}f64", (), kind)
-        return _Lanes(self.builder, self.builder.call(function, [self.value]))
+    def _call(self, name: str) -> Lanes:
+        kind = ir.FunctionType(self.value.type, [self.value.type])
+        function = self.builder.module.declare_intrinsic(f"llvm.{name}.v{self.count}f64", (), kind)
+        return Lanes(self.builder, self.builder.call(function, [self.value]))
 
 
-def repeated(builder: Any, number: Any) -> _Lanes:
+def repeated(builder: Any, number: Any, count: int = BOXES) -> Lanes:
     """Return a number of the compiled code in all lanes."""
     index = ir.IntType(32)
-    one = builder.insert_element(ir.Constant(LANES, ir.Undefined), number, index(0))
-    return _Lanes(builder, builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(index, BOXES), [0] * BOXES)))
+    one = builder.insert_element(ir.Constant(ir.VectorType(NUMBER, count), ir.Undefined), number, index(0))
+    return Lanes(builder, builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(index, count), [0] * count)))
 
 
-def constant(builder: Any, number: float) -> _Lanes:
+def constant(builder: Any, number: float, count: int = BOXES) -> Lanes:
     """Return a known number in all lanes."""
-    return repeated(builder, NUMBER(number))
+    return repeated(builder, NUMBER(number), count)
 
 
-class _Table:
+class Table:
     """The vectors that begin at a place of an array of numbers: at ``row`` of a table, or at a column of work space."""
 
-    def __init__(self, context: Any, builder: Any, kind: Any, table: Any) -> None:
+    def __init__(self, context: Any, builder: Any, kind: Any, table: Any, count: int = BOXES) -> None:
         self._array = context.make_array(kind)(context, builder, table)
-        self.builder = builder
+        self.builder, self._lanes = builder, ir.VectorType(NUMBER, count)
 
-    def row(self, number: Any) -> _Table:
+    def row(self, number: Any) -> Table:
         stride = cgutils.unpack_tuple(self.builder, self._array.strides)[0]
         start = self.builder.add(self.builder.ptrtoint(self._array.data, WORD), self.builder.mul(number, stride))
         self._start = self.builder.inttoptr(start, NUMBER.as_pointer())
         return self
 
-    def column(self, number: Any) -> _Table:
+    def column(self, number: Any) -> Table:
         self._start = self.builder.gep(self._array.data, [number])
         return self
 
-    def __getitem__(self, place: int) -> _Lanes:
-        return _Lanes(self.builder, self.builder.load(self._at(place), align=8))
+    def __getitem__(self, place: int) -> Lanes:
+        return Lanes(self.builder, self.builder.load(self._at(place), align=8))
 
-    def __setitem__(self, place: int, value: _Lanes) -> None:
+    def __setitem__(self, place: int, value: Lanes) -> None:
         self.builder.store(value.value, self._at(place), align=8)
 
-    def pack(self, place: int, value: _Lanes, chosen: _Lanes) -> None:
+    def pack(self, place: int, value: Lanes, chosen: Lanes) -> None:
         """Store the chosen lanes one after the other."""
         start = self.builder.gep(self._start, [WORD(place)])
         bits = ir.VectorType(BIT, BOXES)
@@ -140,15 +143,15 @@ class _Table:
         self.builder.call(store, [value.value, start, chosen.value])
 
     def _at(self, place: int) -> Any:
-        return self.builder.bitcast(self.builder.gep(self._start, [WORD(place)]), LANES.as_pointer())
+        return self.builder.bitcast(self.builder.gep(self._start, [WORD(place)]), self._lanes.as_pointer())
 
 
-def cross(ax: _Lanes, ay: _Lanes, bx: _Lanes, by: _Lanes) -> _Lanes:
+def cross(ax: Lanes, ay: Lanes, bx: Lanes, by: Lanes) -> Lanes:
     """Return the cross product."""
     return ax * by - ay * bx
 
 
-def dot(ax: _Lanes, ay: _Lanes, bx: _Lanes, by: _Lanes) -> _Lanes:
+def dot(ax: Lanes, ay: Lanes, bx: Lanes, by: Lanes) -> Lanes:
     """Return the dot product."""
     return ax * bx + ay * by
 
@@ -161,7 +164,7 @@ def boxes_met(typing, table, row, px, py, vx, vy, least, most):
     """
 
     def met(context, builder, signature, values):
-        at = _Table(context, builder, signature.args[0], values[0]).row(values[1])
+        at = Table(context, builder, signature.args[0], values[0]).row(values[1])
         px, py, vx, vy, least, most = (repeated(builder, value) for value in values[2:])
         dx, dy, width, height = at[ANCHOR_X] - px, at[ANCHOR_Y] - py, at[OTHER_X], at[OTHER_Y]
         # of the middle: its distance from the ray's line and its position along it; and those of the box about it
@@ -180,7 +183,7 @@ def lines_met(typing, table, row, px, py, vx, vy, slack):
     """
 
     def met(context, builder, signature, values):
-        at = _Table(context, builder, signature.args[0], values[0]).row(values[1])
+        at = Table(context, builder, signature.args[0], values[0]).row(values[1])
         px, py, vx, vy, slack = (repeated(builder, value) for value in values[2:])
         before = cross(at[ANCHOR_X] - px, at[ANCHOR_Y] - py, vx, vy)
         after = cross(at[OTHER_X] - px, at[OTHER_Y] - py, vx, vy)
@@ -229,24 +232,24 @@ class _Ray:
     """Eight rays of a wave, and the nearest hits so far."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, values: Any) -> None:
-        self.at = _Table(context, builder, signature.args[0], values[0]).column(values[1])
+        self.at = Table(context, builder, signature.args[0], values[0]).column(values[1])
         self.px, self.py, self.vx, self.vy = self.at[PX], self.at[PY], self.at[VX], self.at[VY]
         self.own = self.at[OWN]
 
-    def doubt(self, doubtful: _Lanes) -> None:
+    def doubt(self, doubtful: Lanes) -> None:
         builder = self.at.builder
         with builder.if_then(doubtful.any(), likely=False):
             self.at[DOUBT] = doubtful.where(constant(builder, 1.0), self.at[DOUBT])
 
     def hit(
         self,
-        nearer: _Lanes,
-        piece: _Lanes,
-        time: _Lanes,
+        nearer: Lanes,
+        piece: Lanes,
+        time: Lanes,
         place: Any,
         normal: Any,
-        at_corner: _Lanes,
-        before_run: _Lanes,
+        at_corner: Lanes,
+        before_run: Lanes,
     ) -> None:
         builder = self.at.builder
         flag = before_run.where(constant(builder, BEFORE_RUN), constant(builder, 0.0))
@@ -261,7 +264,7 @@ def clear_hits(typing, work, first):
     """Begin the search of the nearest hits of eight rays."""
 
     def clear(context, builder, signature, values):
-        at = _Table(context, builder, signature.args[0], values[0]).column(values[1])
+        at = Table(context, builder, signature.args[0], values[0]).column(values[1])
         at[TIME] = constant(builder, float("inf"))
         at[DOUBT] = constant(builder, 0.0)
         return context.get_dummy_value()
@@ -282,7 +285,7 @@ def meet_corner(typing, work, first, x, y, slack):
     return types.void(work, types.int64, *[types.float64] * 3), meet
 
 
-def doubt_at_corner(ray: _Ray, dx: _Lanes, dy: _Lanes, slack: _Lanes) -> _Lanes:
+def doubt_at_corner(ray: _Ray, dx: Lanes, dy: Lanes, slack: Lanes) -> Lanes:
     """Doubt rays that meet the corner at (dx, dy) from them; return its side of the rays."""
     side = cross(dx, dy, ray.vx, ray.vy)
     near = abs(side) <= slack
@@ -401,7 +404,7 @@ def advance(typing, work, first, count, kept, left_out, opening, slack, limit):
         rest = repeated(builder, builder.sitofp(builder.sub(values[2], values[1]), NUMBER))
         left, right = (repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[5]))
         slack, limit = repeated(builder, values[6]), repeated(builder, values[7])
-        lane = _Lanes(builder, ir.Constant(LANES, [float(k) for k in range(BOXES)]))
+        lane = Lanes(builder, ir.Constant(LANES, [float(k) for k in range(BOXES)]))
         time, bounces, own, zero = at[TIME], at[BOUNCES], at[OWN], constant(builder, 0.0)
         certain = (lane < rest) & at[DOUBT].equals(0.0)
         to_right, to_left = dot(right - px, py, vy, vx), dot(left - px, py, vy, vx)
@@ -416,12 +419,12 @@ def advance(typing, work, first, count, kept, left_out, opening, slack, limit):
         wx, wy = vx - w * nx, vy - w * ny
         scale = constant(builder, 1.5) - dot(wx, wy, wx, wy) * 0.5
         before = (own >= 0.0).where(own, constant(builder, NO_PIECE))
-        end = _Table(context, builder, signature.args[0], values[0]).column(values[4])
+        end = Table(context, builder, signature.args[0], values[0]).column(values[4])
         for column, value in {
             OUT_X: px + upward * vx, OUT_VX: vx, OUT_VY: vy, OUT_BOUNCES: bounces, OUT_RAY: index
         }.items():  # fmt: skip
             end.pack(column, value, out)
-        goal = _Table(context, builder, signature.args[0], values[0]).column(values[3])
+        goal = Table(context, builder, signature.args[0], values[0]).column(values[3])
         for column, value in {
             PX: x, PY: y, VX: wx * scale, VY: wy * scale, OWN: piece, BEFORE: before, BOUNCES: bounces + 1.0, RAY: index
         }.items():  # fmt: skip
@@ -438,7 +441,7 @@ def before_runs(typing, work, first):
     """-> int: mask of those of eight rays whose hits may begin runs."""
 
     def read(context, builder, signature, values):
-        at = _Table(context, builder, signature.args[0], values[0]).column(values[1])
+        at = Table(context, builder, signature.args[0], values[0]).column(values[1])
         return at[UNCERTAIN].equals(BEFORE_RUN).mask()
 
     return types.int64(work, types.int64), read

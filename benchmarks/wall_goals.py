@@ -1,0 +1,190 @@
+"""Goals of a wished tolerance on walls of every kind, of large matrices, and of a user's first commands.
+
+Each is computed once as a user would, after a rough run that compiles. Where no independent value is known, the
+reached error is the reported one, which the campaigns of `docs/checks` test.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter
+from typing import Any
+
+from asperity import geometry as geo
+from asperity import kernels as ker
+from asperity import spectral as spec
+from asperity.bench.quantities.walls import wall_of
+
+from .rays import FIRST_RAYS, LARGE_PROFILE, first_rays
+
+# Tolerance of the rough runs that compile.
+ROUGH = 1e-2
+LARGE, LARGE_SAMPLES = 10_000, 2**22
+WALLS: dict[str, Callable[[], geo.Wall]] = {
+    "cusps": lambda: wall_of("cusps"),
+    "mushroom": lambda: wall_of("mushroom"),
+    "tooth, arc and Bezier": lambda: wall_of("mixed"),
+    "skew Bezier": lambda: geo.Wall([geo.Bezier([(0, 0), (0.1, -0.6), (0.7, -0.5), (1, 0)])]),
+}
+# Half angles of dispersing arcs.
+BUMPS = (1.0 / 3.0, 2.0 / 3.0, 1.0)
+PROGRAMS = {
+    "first trace, empty cache": (
+        "from asperity import geometry as geo; geo.trace(geo.focusing_arcs(1.2), [0.3, 0.4], [1.0, 2.0])", 2.5
+    ),
+    "first trace of a mushroom, empty cache": (
+        "from asperity import geometry as geo; geo.trace(geo.mushrooms(0.3), [0.3, 0.4], [1.0, 2.0])", 2.5
+    ),
+    "first gap of focusing arcs, empty cache": (
+        "from asperity import geometry as geo, kernels as ker, spectral as spec\n"
+        "spec.spectral_gap(ker.WallLaw(geo.focusing_arcs(1.2)))", 4.0,
+    ),
+    "first gap of triangular teeth, empty cache": (
+        "from asperity import geometry as geo, kernels as ker, spectral as spec\n"
+        "spec.spectral_gap(ker.WallLaw(geo.triangular_teeth(0.7)))", 4.0,
+    ),
+    "first gap of dispersing arcs, empty cache": (
+        "from asperity import geometry as geo, kernels as ker, spectral as spec\n"
+        "spec.spectral_gap(ker.WallLaw(geo.dispersing_arcs(1.0)))", 4.0,
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class WallGoal:
+    """A tolerance and seconds that are wished, with the reported error and the seconds that were reached."""
+
+    what: str
+    tolerance: float
+    limit: float
+    error: float
+    seconds: float
+
+    @property
+    def goal(self) -> str:
+        """The wished tolerance, if there is one, and seconds."""
+        return f"{self.tolerance:.0e} in {self.limit:g} s" if self.tolerance else f"{self.limit:g} s"
+
+    @property
+    def reached(self) -> str:
+        """The reported error, if there is one, and seconds."""
+        return f"reported {self.error:.1e} in {self.seconds:.2g} s" if self.tolerance else f"{self.seconds:.2g} s"
+
+    @property
+    def is_met(self) -> bool:
+        """Whether both are."""
+        return self.error <= self.tolerance and self.seconds <= self.limit
+
+
+def wall_goals() -> list[WallGoal]:
+    """All of them, in about two minutes."""
+    return [*_laws_and_resistances(), *_gaps(), *_koch(), *_distances(), *_large_matrices(), *_programs()]
+
+
+def _laws_and_resistances() -> list[WallGoal]:
+    goals = []
+    for name, make in WALLS.items():
+        goals += [
+            _within(f"law in Bins(64), {name}", 1e-4, 5.0, lambda tolerance, make=make: _matrix(make(), tolerance)),
+            _within(
+                f"resistance, {name}", 1e-8, 20.0,
+                lambda tolerance, make=make: ker.resistance(ker.WallLaw(make()), tolerance).error,
+            ),
+        ]  # fmt: skip
+    return goals
+
+
+def _matrix(wall: geo.Wall, tolerance: float) -> float:
+    return float(ker.discretise(ker.WallLaw(wall), ker.Bins(64), tolerance=tolerance).error)
+
+
+def _gaps() -> list[WallGoal]:
+    return [
+        _within(
+            f"gap of dispersing arcs of {half_angle:.2g}", 1e-9, 1.0,
+            lambda tolerance, half_angle=half_angle: spec.spectral_gap(
+                ker.WallLaw(geo.dispersing_arcs(half_angle)), tolerance
+            ).error,
+        )
+        for half_angle in BUMPS
+    ]  # fmt: skip
+
+
+def _koch() -> list[WallGoal]:
+    """Koch 5 as an exact law, with the mass of its unresolved beams, and Koch 8 by rays."""
+    return [
+        _within("Koch 5 as an exact law", 1e-6, 20.0, lambda _: _unresolved(geo.koch(5))),
+        _within(
+            "resistance of Koch 8", 1e-3, 10.0,
+            lambda tolerance: ker.resistance(ker.WallLaw(geo.koch(8)), tolerance).error,
+        ),
+    ]  # fmt: skip
+
+
+def _unresolved(wall: geo.Wall) -> float:
+    law = ker.PolygonLaw(wall)
+    law.branches(1.0)
+    return float(law.unresolved)
+
+
+def _distances() -> list[WallGoal]:
+    arc, teeth = ker.WallLaw(geo.focusing_arcs(1.2)), ker.WallLaw(geo.triangular_teeth(0.7))
+    kinds: tuple[tuple[Any, float, float], ...] = (("rows", 1e-6, 1.0), ("joint", 1e-3, 5.0))
+    return [
+        _within(
+            f"distance of arc and teeth, {kind}", goal, limit,
+            lambda tolerance, kind=kind: ker.distance(arc, teeth, kind=kind, tolerance=tolerance).error,
+        )
+        for kind, goal, limit in kinds
+    ]  # fmt: skip
+
+
+def _large_matrices() -> list[WallGoal]:
+    """Gaps with their proof; the time of making the matrix is not counted."""
+    basis, arc = ker.Bins(LARGE), ker.CircularArcLaw(1.2)
+    matrices = {
+        "Henyey-Greenstein 0.9": ker.discretise(ker.henyey_greenstein(0.9), basis),
+        "focusing arc": ker.discretise(arc, basis, method="qmc", samples=LARGE_SAMPLES, rng=0),
+    }
+    return [
+        _in_seconds(
+            f"gap of {LARGE:,} bins with its proof, {name}", 12.0, lambda matrix=matrix: spec.spectrum(matrix, k=2)
+        )
+        for name, matrix in matrices.items()
+    ]
+
+
+def _programs() -> list[WallGoal]:
+    """A large profile, and fresh processes."""
+    goals = [_in_seconds(f"profile of {LARGE_PROFILE:,} points, wall to {FIRST_RAYS:,} rays", 4.0, first_rays)]
+    with TemporaryDirectory() as folder:
+        for number, (what, (script, limit)) in enumerate(PROGRAMS.items()):
+            empty = {**os.environ, "NUMBA_CACHE_DIR": str(Path(folder) / str(number))}
+            goals.append(_in_seconds(what, limit, lambda script=script, empty=empty: _run(["-c", script], empty)))
+        study = ["-m", "asperity", "study", "focusing-arcs", "--force", "--out", str(Path(folder) / "study")]
+        _run(study, os.environ)
+        goals.append(_in_seconds("asperity study focusing-arcs, warm", 3.0, lambda: _run(study, os.environ)))
+    return goals
+
+
+def _run(arguments: list[str], environment: Any) -> None:
+    subprocess.run([sys.executable, *arguments], check=True, env=environment, capture_output=True)
+
+
+def _within(what: str, tolerance: float, limit: float, solve: Callable[[float], float]) -> WallGoal:
+    solve(ROUGH)
+    begin = perf_counter()
+    error = solve(tolerance)
+    return WallGoal(what, tolerance, limit, float(error), perf_counter() - begin)
+
+
+def _in_seconds(what: str, limit: float, run: Callable[[], object]) -> WallGoal:
+    begin = perf_counter()
+    run()
+    return WallGoal(what, 0.0, limit, 0.0, perf_counter() - begin)
