@@ -89,7 +89,7 @@ class Checkpoint:
             self._file.execute("COMMIT")
         except sqlite3.OperationalError as reason:
             raise self._failure(reason) from reason
-        except sqlite3.DatabaseError as reason:
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as reason:
             raise InputError(f"{self.path} is not a checkpoint ({reason}); name another file") from reason
         if form != FORMAT:
             raise InputError(f"{self.path} has format {form}, this asperity reads {FORMAT}; name another file")
@@ -114,7 +114,7 @@ class Checkpoint:
         """
         try:
             rows = self._file.execute("SELECT key, value, digest FROM parts ORDER BY key").fetchall()
-        except sqlite3.Error as reason:
+        except (sqlite3.Error, UnicodeDecodeError) as reason:
             raise self._damage("the list of its parts", reason) from reason
         for key, value, digest in rows:
             if not isinstance(key, str) or not isinstance(value, (str, bytes)) or digest != _digest(key, value):
