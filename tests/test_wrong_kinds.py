@@ -15,7 +15,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core.kinds import OPERATORS
-from asperity.errors import AsperityError
+from asperity.errors import AsperityError, InputError
 from asperity.estimates import Estimate
 from asperity.study import study_wall
 
@@ -375,6 +375,11 @@ def test_whole_angles_reach_the_compiled_march_as_doubles(theta):
     law = ker.WallLaw(geo.elliptical_arcs(1.0))
     whole, doubles = (law.distribution(given, EDGES) for given in (theta, theta.astype(np.float64)))
     np.testing.assert_array_equal(whole.below, doubles.below)
+
+
+def test_edges_of_a_wrong_shape_do_not_reach_the_compiled_march():
+    with pytest.raises(InputError, match="edges"):
+        ker.WallLaw(geo.elliptical_arcs(1.0)).distribution(np.array([1.0]), np.ones((4, 3, 2)))
 
 
 @pytest.mark.filterwarnings("ignore")

@@ -130,6 +130,8 @@ class WallConditionals:
         self.least_level = least_level
         # a writable copy: numba would compile again for read-only arrays
         self.edges = np.array(edges, dtype=np.float64)
+        if self.edges.ndim != 1:
+            raise InputError(f"edges: expected shape (n,), got {self.edges.shape}")
         # angles of earlier calls now known to have missed a piece; the caller may clear the set
         self.outdated: set[float] = set()
 
