@@ -43,7 +43,7 @@ VERTEX = """k => {
 class Server:
     """`asperity explore` in a process of its own."""
 
-    def __init__(self, *arguments):
+    def __init__(self, *arguments, waits_for="shows the page"):
         self.process = subprocess.Popen(
             [sys.executable, "-m", "asperity", "explore", *arguments, "--no-browser", "--port", "0"],
             stderr=subprocess.PIPE, text=True,
@@ -51,11 +51,12 @@ class Server:
         self.lines = []
         for line in self.process.stderr:
             self.lines.append(line)
-            if "shows the page" in line:
+            if waits_for in line:
                 break
-        found = re.search(r"http://127\.0\.0\.1:(\d+)/", "".join(self.lines))
-        assert found, self.lines
-        self.address, self.port = found[0], int(found[1])
+        assert waits_for in self.lines[-1], self.lines
+        found = re.search(r"http://127\.0\.0\.1:(\d+)/", self.lines[-1])
+        if found:
+            self.address, self.port = found[0], int(found[1])
 
     def stop(self):
         """Ctrl-C; the seconds that it took and what was printed."""
@@ -331,8 +332,9 @@ def test_only_the_loopback_address_listens(server):
     assert listening == [f"0100007F:{server.port:04X}"]
 
 
-def test_ctrl_c_ends_it_at_once():
-    with subprocess_ended(Server("flat")) as server:
+@pytest.mark.parametrize("moment", ["preparing", "shows the page"])
+def test_ctrl_c_ends_it_at_once(moment):
+    with subprocess_ended(Server("flat", waits_for=moment)) as server:
         seconds, text = server.stop()
         assert server.process.returncode == 130
         assert text == "asperity: interrupted\n"

@@ -6,6 +6,7 @@ import json
 import os
 import pickle
 import resource
+import time
 import zipfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -188,6 +189,44 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path, name):
     read = {".toml": geo.load_wall, ".txt": geo.read_profile, ".npz": ker.load_matrix}[Path(name).suffix]
     with pytest.raises(InputError, match="expected a file"):
         read(tmp_path / name)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "device", "loop", "no UTF-8", "deep", "long name"])
+def test_a_report_of_work_is_continued_from_a_text_only(tmp_path, kind):
+    path = tmp_path / "report.json"
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "loop":
+        path.symlink_to(path)
+    elif kind in ("no UTF-8", "deep"):
+        path.write_bytes(b"\xff" if kind == "no UTF-8" else b"[" * 100000)
+    path = {"device": Path("/dev/zero"), "long name": tmp_path / ("n" * 300)}.get(kind, path)
+    problem = spec.WorkProblem("a", (spec.ReferenceValue(0.0, 0.0, "by hand"),))
+    with pytest.raises(InputError):
+        spec.work_precision(problem, [spec.WorkMethod("b", float)], [1.0], repeats=1, path=path)
+
+
+@pytest.mark.parametrize("read", [geo.load_wall, geo.read_profile, ker.load_matrix])
+def test_a_name_that_is_too_long_is_refused(tmp_path, read):
+    with pytest.raises(InputError, match="nnn"):
+        read(tmp_path / ("n" * 300))
+
+
+@pytest.mark.parametrize("key", ["a." * 20000 + "x = 1", "[" + "a . " * 20000 + "x]"])
+def test_a_key_of_many_parts_is_refused_at_once(tmp_path, key):
+    file = wall_file(tmp_path, key)
+    begun = time.process_time()
+    with pytest.raises(InputError, match="more than 64 parts"):
+        geo.load_wall(file)
+    assert time.process_time() - begun < 1.0
+
+
+@pytest.mark.parametrize("read", [spec.SweepTable.of_json, spec.WorkReport.of_json])
+def test_a_deeply_nested_table_is_refused(read):
+    with pytest.raises(InputError, match="JSON"):
+        read("[" * 100000)
 
 
 @pytest.mark.parametrize("text", ["a = " + "[" * 5000, "a = " + "{b=" * 5000, "period = " + "9" * 5000])

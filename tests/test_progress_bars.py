@@ -7,10 +7,12 @@ import multiprocessing
 import sys
 from types import ModuleType
 
+import numpy as np
 import pytest
 import tqdm.auto
 import tqdm.std
 
+from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.core import long_runs
@@ -69,6 +71,18 @@ def test_in_a_notebook_a_bar_is_shown_although_standard_error_is_no_terminal(mon
     assert shown() and "work" in stream.getvalue()
 
 
+def sampled():
+    rng = np.random.default_rng(0)
+    theta = [ker.SINE.sample(500, rng) for _ in range(4)]
+    return [ker.estimate(*theta[k : k + 2], ker.Bins(4)) for k in (0, 2)]
+
+
+def pocket():
+    """A wall with straight sides and a curved bottom."""
+    bottom = geo.Bezier([(0.3, -0.6), (0.5, -0.8), (0.7, -0.6)])
+    return geo.Wall([geo.Segment((0.0, 0.0), (0.3, -0.6)), bottom, geo.Segment((0.7, -0.6), (1.0, 0.0))])
+
+
 @pytest.mark.parametrize(
     ("work", "words"),
     [
@@ -77,10 +91,30 @@ def test_in_a_notebook_a_bar_is_shown_although_standard_error_is_no_terminal(mon
             ("gap", "basis"),
         ),
         (lambda: ker.distance(ker.henyey_greenstein(0.3), ker.henyey_greenstein(0.5)), ("distance", "angle")),
+        (lambda: ker.distance(*sampled(), kind="joint"), ("distance", "transport")),
+        (lambda: ker.distance(*sampled()), ("distance: error", "sample")),
+        (lambda: ker.difference_test(*sampled()), ("test", "permutation")),
+        (lambda: spec.enclosures(ker.CircularArcLaw(1.2), 2, tolerance=1e-2), ("enclosures", "level", "residual")),
+        (lambda: spec.essential_edge(ker.WallLaw(pocket())), ("essential edge", "layer")),
     ],
-    ids=["gap", "distance"],
+    ids=["gap", "distance", "transport", "error of a distance", "test", "enclosures", "essential edge"],
 )
 def test_long_computations_have_bars(monkeypatch, work, words):
     terminal = written(monkeypatch, Terminal())
     work()
     assert all(word in terminal.getvalue() for word in words)
+
+
+@pytest.mark.parametrize("form", ["profile", "wall"])
+def test_long_files_are_counted_by_a_bar_and_short_ones_are_not(monkeypatch, tmp_path, form):
+    terminal = written(monkeypatch, Terminal())
+    monkeypatch.setattr(long_runs, "MANY", 100)
+    for count, shown in ((50, False), (201, True)):
+        x = np.arange(count) / (count - 1.0)
+        if form == "profile":
+            (tmp_path / "long.txt").write_text("\n".join(f"{at} {at * (1.0 - at)}" for at in x))
+            geo.read_profile(tmp_path / "long.txt")
+        else:
+            geo.Wall.from_vertices(np.column_stack([x, -x * (1.0 - x)])).save(tmp_path / "wall.toml", overwrite=True)
+            geo.load_wall(tmp_path / "wall.toml")
+        assert (("line" if form == "profile" else "piece") in terminal.getvalue()) is shown

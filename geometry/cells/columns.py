@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.checks import Floats, whole_number
 from ...core.errors import InputError
+from ...core.long_runs import counted
 from .measured import METRES
 
 UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
@@ -57,7 +58,7 @@ class Columns:
         rows: list[tuple[float, float]] = []
         head: list[str] = []
         names_allowed = True
-        for number, line in enumerate(text.splitlines(), start=1):
+        for number, line in enumerate(counted(text.splitlines(), "line", "profile"), start=1):
             if number <= self.skiprows:
                 continue
             data, _, comment = line.partition("#")

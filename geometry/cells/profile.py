@@ -154,9 +154,9 @@ def _existing(path: str | PathLike[str]) -> Path:
         file = Path(path)
     except TypeError as reason:
         raise InputError(f"path: expected the path of a file, got {path!r}") from reason
-    if not file.exists():
+    if not regular_file(file).exists():
         raise InputError(f"{file}: expected a file with a profile, there is none")
-    return regular_file(file)
+    return file
 
 
 def _pair_of_units(units: str | Sequence[str] | None) -> tuple[str, str] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from itertools import pairwise
 from os import PathLike
@@ -10,6 +11,7 @@ from typing import Any
 
 from ...core.errors import InputError
 from ...core.files import regular_file, write_whole
+from ...core.long_runs import counted
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
 from ..curves.curve import Curve, Point
@@ -17,6 +19,8 @@ from ..curves.segment import Segment
 from .cell import Cell
 
 FORMAT = "asperity wall 1"
+# A key of so many parts, of which the parser takes the square of their number as time; walls have none.
+DOTTED = re.compile(r"(?<![\w-])(?:[\w-]+\s*\.\s*){64}")
 
 Table = dict[str, Any]
 
@@ -41,7 +45,10 @@ def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[
     """Pieces, period, islands and unit of a wall file, not yet validated as a wall; see ``load_wall``."""
     file = Path(path)
     try:
-        document = tomllib.loads(regular_file(file).read_text(encoding="utf-8"))
+        text = regular_file(file).read_text(encoding="utf-8")
+        if DOTTED.search(text):
+            raise ValueError("a key has more than 64 parts")
+        document = tomllib.loads(text)
     except RecursionError as reason:
         raise InputError(f"{file}: tables or lists are nested too deeply to be those of a wall") from reason
     except OSError as reason:
@@ -98,7 +105,7 @@ def _parts(document: Table) -> tuple[list[Curve], float, list[list[Curve]], str]
 
 def _pieces(name: str, value: Any) -> list[Curve]:
     pieces = []
-    for i, table in enumerate(_tables(name, value)):
+    for i, table in enumerate(counted(_tables(name, value), "piece", "wall")):
         try:
             pieces.append(_piece(table))
         except InputError as reason:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import Floats
 from ...core.errors import WallError
+from ...core.long_runs import counted
 from ...core.rounding import EPS
 from ..curves.crossings import find_crossing
 from ..curves.curve import Curve, Point, point_array
@@ -53,7 +54,7 @@ def canonical_path(given: Sequence[Curve], period: float) -> Pieces:
     if np.any(vertices[near, 1] != level):
         vertices[near, 1] = level
         pieces = _pinned(pieces, vertices, size, "")
-    return tuple(part for piece in pieces for part in _cut_at_touching(piece, level, limit))
+    return tuple(part for piece in counted(pieces, "piece", "wall") for part in _cut_at_touching(piece, level, limit))
 
 
 def canonical_island(given: Sequence[Curve], period: float, size: Floats, index: int) -> Pieces:

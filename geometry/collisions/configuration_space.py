@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, positive_number
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..disk import rolling
 from ..disk.charts import RollingCharts
 from ..disk.disk import Disk, contact_normal
@@ -20,6 +20,7 @@ from ..walls.interior import in_solid
 from ..walls.wall import Wall
 
 
+@explained_class
 @dataclass(frozen=True)
 class ConfigurationSpace:
     """The configuration space M of a disk above a wall, and its straightened form M_cyl.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import WallError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
@@ -27,6 +27,7 @@ CIRCLE_TOLERANCE = 4.0 * EPS
 END_ROUNDING = 4.0 * EPS
 
 
+@explained_class
 @dataclass(frozen=True, init=False, repr=False)
 class Arc(Curve):
     """The arc (cx + a cos t, cy + b sin t), t from one angle to another, clockwise or counterclockwise.

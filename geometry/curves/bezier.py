@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import WallError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 
@@ -22,6 +22,7 @@ from .curve import Curve, Point, as_point, stretch_factors, uniform_parameters
 FAR_MINIMUM = 2.0
 
 
+@explained_class
 @dataclass(frozen=True)
 class Bezier(Curve):
     """A Bezier curve of degree 2 or 3.

@@ -13,11 +13,13 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, shortened
 from ...core.errors import WallError
+from ...core.kinds import explained_class
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
 
+@explained_class
 class Curve(ABC):
     """A smooth directed curve in the plane, parametrised over [0, 1]; immutable.
 

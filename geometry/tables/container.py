@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, frozen, number_between, positive_number
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..curves.arc import Arc
 from ..curves.curve import Curve
 from ..curves.segment import Segment
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 UNIT_TOLERANCE = 1e-12
 
 
+@explained_class
 @dataclass(frozen=True)
 class Container:
     """The region in which the centre of the disk moves: {x : (x - p_i).n_i >= 0 for all i}, and inside of curves.

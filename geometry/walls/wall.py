@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, instance, positive_number
 from ...core.errors import InputError, WallError
 from ...core.html import html_table
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..cells.cell import Cell
 from ..cells.measured import Profile
 from ..cells.miniature import wall_miniature
@@ -30,6 +30,7 @@ from ..scene.plan import TracePlan, plan_of
 from ..scene.scene import Scene, scene_of
 
 
+@explained_class
 @dataclass(frozen=True, repr=False, init=False)
 class Wall(Cell):
     """One period of a wall in y <= 0, with the free side above (on the left of the direction of travel).

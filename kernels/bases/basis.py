@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats
+from ...core.kinds import explained_class
 from .intervals import cell_among
 from .measure import AngularMeasure, gauss_rule
 
@@ -22,6 +23,7 @@ DIFFERENCE = 1e-6
 DENSER, BETWEEN = 3, 1.02
 
 
+@explained_class
 class Basis(ABC):
     """An orthonormal family e_0, ..., e_{n-1} in L^2 of a probability measure on (0, pi).
 

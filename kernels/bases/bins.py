@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, check_memory, finite_array, frozen, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from .basis import Basis
 from .intervals import cell_among
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
@@ -20,6 +20,7 @@ from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 NODES_NARROW, NODES_WIDE, NARROW = 8, 20, 1.0
 
 
+@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Bins(Basis):
     r"""Normalised indicators of the bins between increasing angles from 0 to pi.

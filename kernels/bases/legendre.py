@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, whole_number
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from .basis import Basis
 from .measure import SINE, AngularMeasure, WeightName, measure_by_name
 
@@ -19,6 +19,7 @@ DEGREES_PER_PANEL = 16
 DIGITS = 18
 
 
+@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Legendre(Basis):
     r"""Orthonormal polynomials of degree 0, ..., n - 1 in cos(theta).

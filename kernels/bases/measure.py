@@ -5,6 +5,7 @@ No other file of the package multiplies by these weights.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -12,8 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.checks import Floats
+from ...core.checks import Floats, Rng, check_memory, generator, whole_number
 from ...core.errors import InputError
+from ...core.kinds import explained_class
 
 WeightName = Literal["sin", "sin2"]
 
@@ -25,6 +27,7 @@ SMALLEST_ANGLE = 1e-300
 LARGEST_ANGLE = float(np.nextafter(np.pi, 0.0))
 
 
+@explained_class
 @dataclass(frozen=True)
 class AngularMeasure:
     r"""A probability measure on (0, pi): ``"sin"`` is sin(theta)/2 d theta, ``"sin2"`` is (2/pi) sin(psi)^2 d psi.
@@ -75,10 +78,13 @@ class AngularMeasure:
                 break
         return np.where(fraction <= 0.5, angle, np.pi - angle)
 
-    def sample(self, size: int | tuple[int, ...], rng: np.random.Generator) -> Floats:
+    def sample(self, size: int | tuple[int, ...], rng: Rng = None) -> Floats:
         """Draw angles from the measure."""
+        shape = size if isinstance(size, tuple) else (size,)
+        checked = tuple(whole_number("size", length, 0) for length in shape)
+        check_memory("size", "the sample", math.prod(checked))
         # 1 - U lies in (0, 1], so the angle 0 does not occur; pi is clipped to the open interval.
-        return np.asarray(np.clip(self.quantile(1.0 - rng.random(size)), SMALLEST_ANGLE, LARGEST_ANGLE))
+        return np.asarray(np.clip(self.quantile(1.0 - generator(rng).random(checked)), SMALLEST_ANGLE, LARGEST_ANGLE))
 
     def quadrature(self, edges: ArrayLike, order: int) -> tuple[Floats, Floats]:
         """Gauss-Legendre nodes (angles) and weights, ``order`` of them between each two neighbouring edges.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, check_memory, frozen, number_between, whole_number
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from .basis import Basis, largest
 from .bins import Bins
 from .measure import SINE, AngularMeasure, WeightName
@@ -29,6 +29,7 @@ WIDEST = np.pi / 24
 BREAKPOINT_SPACING = 0.05
 
 
+@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Panels(Basis):
     r"""Polynomials of bounded degree in theta on each panel, orthonormal for the invariant measure.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from .basis import Basis
 from .measure import AngularMeasure
 
@@ -23,6 +23,7 @@ def _kron(parts: Sequence[Floats]) -> Floats:
     return product
 
 
+@explained_class
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class TensorBasis(Basis):
     """All products e_i(theta) f_k(psi), with the last factor's index running fastest; the basis of ``P.tensor(Q)``.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, shortened, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.long_runs import Engine, all_parts, digest
 from ...core.version import __version__
 from ..collisions.collision_law import CollisionLaw
@@ -39,6 +39,7 @@ class Reflector(Protocol):
         ...
 
 
+@explained_class
 @dataclass(frozen=True)
 class BilliardRecord:
     """States of n disks after each of their collisions; the first entry of every array is the initial state.

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import Floats, Rng, check_memory, finite_array, generator, instance, whole_number
 from ...core.errors import AccuracyError, InputError
 from ...core.estimates import Estimate, student_95
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..collisions.collision_law import smooth
 from .billiard import BilliardRecord, Reflector, laws_of_walls, reflected
 from .pair_law import PairLaw
@@ -29,6 +29,7 @@ OVERLAP = 1e-9
 BATCHES, BURN_IN, FEWEST_EVENTS = (16, 8, 4), 0.2, 64
 
 
+@explained_class
 @dataclass(frozen=True)
 class GasRecord(BilliardRecord):
     """States of all disks of a gas after each event; the first entry of every array is the initial state.

@@ -51,6 +51,7 @@ StateFunction = Callable[[Floats, Floats, Floats], Floats]
 Term: TypeAlias = tuple[float, Law, bool]
 
 
+@explained_class
 class VelocityLaw(TensorLaw):
     """A law of velocities in the algebra of collision laws: a sum of P~ (x) J and Q~ (x) 1, with J the flip of psi.
 

@@ -15,7 +15,7 @@ from ...core.checks import Floats, Rng, angles, check_memory, finite_array, froz
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
 from ...core.frames import data_frame
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.long_runs import Engine, all_parts
 from ...core.rounding import EPS
 from ...core.version import __version__
@@ -29,6 +29,7 @@ FEWEST_SCALES = 3
 COLUMNS = ("distance", "state_distance", "floor", "psi_defect", "two_satellites", "outliers", "drift", "shift")
 
 
+@explained_class
 @dataclass(frozen=True)
 class LimitStudy:
     """Measured distances between the true disk and its limit law; each array has one entry per scale.

@@ -14,7 +14,7 @@ from ...core.checks import Floats, Rng, finite_array, frozen, generator, positiv
 from ...core.errors import InputError
 from ...core.estimates import Estimate, student_95
 from ...core.frames import data_frame
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..bases.measure import SINE, SINE_SQUARED
 from .collision_law import StateFunction
 
@@ -28,6 +28,7 @@ Pair = tuple[StateFunction, StateFunction]
 DIMENSIONS = 5
 
 
+@explained_class
 @dataclass(frozen=True)
 class WeakLimit:
     """The differences of three laws, tested on pairs of functions; arrays of shape (scales, pairs).

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from ...core.checks import Floats
 from ...core.errors import AccuracyError
 from ...core.estimates import Estimate
+from ...core.long_runs import progress_bar
 from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.bins import Bins
@@ -42,6 +44,12 @@ def joint_law_distance(first: Law, second: Law, order: float) -> Estimate:
 
 
 def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: float, of_laws: bool = False) -> Estimate:
+    """W_p between the flux measures of two matrices; see `_joint`."""
+    with progress_bar(None, "transport", "distance") as bar:
+        return _joint(first, second, order, of_laws, bar)
+
+
+def _joint(first: KernelMatrix, second: KernelMatrix, order: float, of_laws: bool, bar: Any) -> Estimate:
     r"""W_p between the flux measures of two matrices, as point masses in the middle of the cells.
 
     The result is exact up to ``MOST_PAIRS`` pairs of occupied cells. For more pairs, neighbouring cells are merged.
@@ -55,11 +63,13 @@ def joint_matrix_distance(first: KernelMatrix, second: KernelMatrix, order: floa
     basis, one, other, moved = next(level for level in levels if _pairs(*level[1:3], order) <= MOST_PAIRS)
     merged = basis != first.basis
     value, doubt = _solved(basis, one, other, order)
+    bar.update()
     exact = joint_kind(first, second)
     if not (merged or of_laws) and doubt <= SMALL_DOUBT:
         return Estimate(value, own + doubt, exact, f"optimal transport between the occupied cells of {basis!r}")
     upper = float(matrix_distance(first, second, order, False))
     lower = _largest_projection(first.basis, flux, flux2, order)
+    bar.update()
     moved += doubt
     low, high = max(lower, value - moved), min(upper, value + moved)
     coarser = next(levels, None) if merged or of_laws else None

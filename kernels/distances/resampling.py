@@ -138,7 +138,12 @@ def matrices_error(first: KernelMatrix, second: KernelMatrix, order: float, sup:
         own = stochastic_rows(matrix)
         between = distance_of_rows(matrix, order, sup)
         draws = resampled(matrix.counts, own, RESAMPLES, np.random.default_rng(SEED))
-        found = np.concatenate([between(rows_of_counts(counts, own), own) for counts in draws])
+        parts = []
+        with progress_bar(RESAMPLES, "sample", "distance: error") as bar:
+            for counts in draws:
+                parts.append(between(rows_of_counts(counts, own), own))
+                bar.update(parts[-1].size)
+        found = np.concatenate(parts)
         mean += float(np.mean(found))
         variance += float(np.var(found, ddof=1))
     return known + mean + (DEVIATIONS_OF_SUPREMUM if sup else DEVIATIONS) * float(np.sqrt(variance))

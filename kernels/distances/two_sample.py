@@ -8,7 +8,8 @@ import numpy as np
 
 from ...core.checks import Floats, Rng, check_memory, generator, number_between, whole_number
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
+from ...core.long_runs import progress_bar
 from ..matrices.matrix import KernelMatrix
 from ..sampling.counts import Counts
 from .resampling import (
@@ -23,6 +24,7 @@ from .resampling import (
 from .transport import wasserstein_order
 
 
+@explained_class
 @dataclass(frozen=True)
 class DifferenceTest:
     """The outcome of `difference_test`.
@@ -134,14 +136,16 @@ def _permuted(
     between, sizes = distance_of_rows(first, *measured), first.counts.sum(axis=1)
     chunk = max(1, CHUNK // pooled.size)
     found = []
-    for start in range(0, number, chunk):
-        size = min(chunk, number - start)
-        dealt = np.stack(
-            [
-                rng.multivariate_hypergeometric(row, int(drawn), size=size, method="marginals")
-                for row, drawn in zip(pooled, sizes, strict=True)
-            ],
-            axis=1,
-        )
-        found.append(between(rows_of_counts(dealt, common), rows_of_counts(pooled - dealt, common)))
+    with progress_bar(number, "permutation", "test") as bar:
+        for start in range(0, number, chunk):
+            size = min(chunk, number - start)
+            dealt = np.stack(
+                [
+                    rng.multivariate_hypergeometric(row, int(drawn), size=size, method="marginals")
+                    for row, drawn in zip(pooled, sizes, strict=True)
+                ],
+                axis=1,
+            )
+            found.append(between(rows_of_counts(dealt, common), rows_of_counts(pooled - dealt, common)))
+            bar.update(size)
     return np.concatenate(found)

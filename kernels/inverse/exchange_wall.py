@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...core.checks import Floats, Rng, generator, instance, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..bases.measure import SINE
 from ..laws.interval_exchange import IntervalExchangeLaw
 from ..laws.law import Law, mixture, specular
@@ -67,6 +67,7 @@ class Generations:
     distance: Estimate
 
 
+@explained_class
 @dataclass(frozen=True, eq=False)
 class ExchangeHollow:
     """A wall with a small opening behind which mirrors perform an exchange of intervals; made by `exchange_hollow`.

@@ -10,7 +10,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import LEVEL, Estimate
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..bases.measure import SINE
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ MARGIN = 0.05
 SAMPLES = 2**16
 
 
+@explained_class
 @dataclass(frozen=True)
 class TwoMirrorHollow:
     r"""A wall with a small opening behind which two confocal parabolas exchange rays near two angles.

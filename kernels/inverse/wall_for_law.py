@@ -12,7 +12,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, frozen, generator, number_between, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import ErrorKind, Estimate
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.bins import Bins
 from ..bases.legendre import Legendre
@@ -54,6 +54,7 @@ DISTANCE_TOLERANCE = 1e-2
 ROUNDED = 64.0 * EPS
 
 
+@explained_class
 @dataclass(frozen=True, eq=False)
 class WallForLaw:
     """A wall whose law has the moments of a wanted law; made by `wall_for`.

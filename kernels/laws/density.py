@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import AccuracyError, InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction
@@ -45,6 +45,7 @@ PROBES = 24
 CHUNK = 2**20
 
 
+@explained_class
 class DensityLaw(Law):
     """A law with a density p(theta, theta') with respect to d theta'.
 

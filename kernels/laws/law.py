@@ -40,6 +40,7 @@ DEEPEST_POWER = 100
 RandomMap: TypeAlias = Callable[[Floats, Floats], tuple[Floats, "NDArray[np.bool_] | None"]]
 
 
+@explained_class
 class Law(ABC):
     """A Markov kernel P~(theta, d theta') on the half circle (0, pi).
 
@@ -220,6 +221,7 @@ class Law(ABC):
         return Combination.of(self) + Combination.of(other)
 
 
+@explained_class
 class BranchLaw(Law):
     """A law made of isometries theta' = sign theta + offset, whose probabilities are smooth between breakpoints.
 
@@ -276,6 +278,7 @@ class BranchLaw(Law):
         return total
 
 
+@explained_class
 class DrivenLaw(Law):
     """A law theta' = reflect(X, theta) with X uniform in (0, 1): the reflection of a ray that enters at random.
 

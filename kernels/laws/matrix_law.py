@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array, frozen
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ..bases.angles import clipped_inside
 from ..bases.basis import AngleFunction, Basis, Frame
 from ..bases.bins import Bins
@@ -22,6 +22,7 @@ from .law import set_properties
 ROW_SUM_TOLERANCE = 1e-9
 
 
+@explained_class
 class MatrixLaw(DensityLaw):
     """From bin i the particle goes to bin j with probability P[i, j], uniformly in cos(theta) within bin j.
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...core.checks import Floats, Rng, finite_number, frozen, generator, instance, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, fraction_estimate
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...geometry import Wall
 from ..bases.measure import SINE
 
@@ -18,6 +18,7 @@ from ..bases.measure import SINE
 LEAST_TAIL = 20
 
 
+@explained_class
 @dataclass(frozen=True)
 class Displacements:
     """Displacements x' - x of random rays, x uniform in a period and theta with density sin(theta)/2.

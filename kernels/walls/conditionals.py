@@ -130,6 +130,8 @@ class WallConditionals:
         self.least_level = least_level
         # a writable copy: numba would compile again for read-only arrays
         self.edges = np.array(edges, dtype=np.float64)
+        if self.edges.ndim != 1:
+            raise InputError(f"edges: expected shape (n,), got {self.edges.shape}")
         # angles of earlier calls now known to have missed a piece; the caller may clear the set
         self.outdated: set[float] = set()
 
@@ -159,7 +161,8 @@ class WallConditionals:
 
     def __call__(self, theta: Floats, tolerance: float | Floats) -> AdaptiveConditionals:
         """The conditional distributions at checked angles."""
-        incoming, group = np.unique(theta, return_inverse=True)
+        # the compiled march takes doubles by their address
+        incoming, group = np.unique(np.asarray(theta, dtype=np.float64), return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
         np.minimum.at(tolerances, group, np.broadcast_to(tolerance, theta.shape))
         before = self._spent()

@@ -14,7 +14,7 @@ from ...core.errors import InputError
 from ...core.estimates import ErrorKind
 from ...core.frames import data_frame
 from ...core.html import html_table
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.rounding import EPS
 from ...kernels import Basis, Bins, CollisionLaw, Composition, DensityLaw, Law, Legendre, MatrixLaw, Power, discretise
 from ...kernels.bases.measure import SINE
@@ -94,6 +94,7 @@ class Enclosure:
         return f"[{self.low:.15g}, {self.high:.15g}] {name}{parity} ({self.kind}: {self.reason})"
 
 
+@explained_class
 @dataclass(frozen=True)
 class Enclosures:
     """Enclosures, with the one of the constants first and the others by decreasing value; a sequence.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import progress_bar
 from ...kernels import Law, Legendre, Panels
 from ...kernels.bases.assembly import one_blas_thread
 from ...kernels.bases.measure import SINE
@@ -77,6 +79,12 @@ def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = M
     matrix. It is accurate for smooth functions but not symmetric, because single P e_j have breakpoints inside panels.
     Subspace iteration from smooth functions gives its leading eigenvectors. Panels with large residuals are divided.
     """
+    with progress_bar(most_levels, "level", "enclosures") as bar:
+        return _adapted(law, k, tolerance, most_levels, bar)
+
+
+def _adapted(law: Law, k: int, tolerance: float, most_levels: int, bar: Any) -> TrialSpace:
+    """The trial functions; the bar shows their residual."""
     mirrored = bool(law.mirror_symmetric)
     edges, most_panels = _first_edges(law, mirrored), MOST_PANELS[law.expectations(ONE_PANEL).is_traced]
     history: list[tuple[int, float]] = []
@@ -89,6 +97,8 @@ def adapted_trial_space(law: Law, k: int, tolerance: float, most_levels: int = M
         goal = np.sqrt(tolerance * _room(values, k))
         joint = float(np.sqrt(squares[:, :k].sum()))
         history.append((level.panels.size, joint))
+        bar.set_postfix_str(f"residual {joint:.1g}, asked for {goal:.1g}", refresh=False)
+        bar.update()
         if joint <= goal or len(history) == most_levels or len(edges) > most_panels:
             break
         edges = _divided(edges, squares[:, :k].sum(axis=1))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import Floats, Rng, check_memory, finite_array, frozen, generator, positive_number, whole_number
 from ...core.errors import InputError
 from ...core.estimates import NORMAL_95, Estimate, student_95
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...kernels import Law
 from ...kernels.bases.measure import SINE
 from .channel import MOST_CROSSINGS, SMALLEST
@@ -27,6 +27,7 @@ GROUPS = 32
 FEWEST_TIMES = 3
 
 
+@explained_class
 @dataclass(frozen=True)
 class ChannelPaths:
     """Positions along a channel of particles that start at 0 on a wall, with the invariant distribution of angles.

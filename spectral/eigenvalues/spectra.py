@@ -13,6 +13,7 @@ from ...core.errors import AccuracyError
 from ...core.estimates import NORMAL_95, Estimate
 from ...core.frames import data_frame
 from ...core.html import html_table
+from ...core.kinds import explained_class
 from ...core.rounding import EPS
 from ...kernels import Basis, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
@@ -104,6 +105,7 @@ class SpectrumErrors:
         return np.asarray(self.algebraic + self.discretisation + self.quantile * self.sampling)
 
 
+@explained_class
 @dataclass(frozen=True)
 class Spectrum:
     """The k eigenvalues of largest modulus of a reversible law, sorted descending.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...core.long_runs import progress_bar
 from ...kernels import WallLaw
 from .grazing import REMEMBERED
 
@@ -73,8 +74,14 @@ def straight_part(law: WallLaw) -> StraightPart:
     flat = wall.flat_top / wall.period
     if not _has_straight_pieces_below(wall):
         return StraightPart(flat, flat, flat)
+    with progress_bar(LAYERS * (1 + LEVELS), "layer", "essential edge") as bar:
+        return _searched(law, flat, bar)
+
+
+def _searched(law: WallLaw, flat: float, bar: Any) -> StraightPart:
+    """The straight part of a wall with straight pieces below its top, of which a fraction is flat."""
     angle = np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
-    found = _largest_of_orbits(law, angle, POINTS)
+    found = _largest_of_orbits(law, angle, POINTS, bar)
     fraction = float(found.fractions @ np.sin(angle) / np.sin(angle).sum())
     if np.all(found.fractions <= flat + 2.0 / POINTS):
         # more straight rays would be a smaller fraction than the entry points resolve
@@ -87,7 +94,7 @@ def straight_part(law: WallLaw) -> StraightPart:
         steps = spacing * np.linspace(-NEARER, NEARER, NEARBY_ANGLES)
         candidates = np.unique(np.clip((peaks[:, None] + steps).ravel(), 1e-6, np.pi - 1e-6))
         fine = level >= LEVELS - FINE_LEVELS
-        before, best = best, _largest_of_orbits(law, candidates, FINE_POINTS if fine else POINTS, fine)
+        before, best = best, _largest_of_orbits(law, candidates, FINE_POINTS if fine else POINTS, bar, fine)
         values = best.roots
     low = max(float(best.roots.max()), fraction, flat)
     change = abs(float(best.roots.max()) - float(before.roots.max()))
@@ -104,7 +111,7 @@ class _Orbits:
     fractions: Floats
 
 
-def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, halved: bool = False) -> _Orbits:
+def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, bar: Any, halved: bool = False) -> _Orbits:
     conditionals: dict[int, tuple[Floats, Floats]] = {}
     orbits = [[_node(theta)] for theta in starts]
     angles = {_node(theta): float(theta) for theta in starts}
@@ -125,6 +132,7 @@ def _largest_of_orbits(law: WallLaw, starts: Floats, points: int, halved: bool =
                     orbit.append(node)
                 fresh += [node for node in new if node not in conditionals]
         fresh = list(dict.fromkeys(fresh))
+        bar.update()
     fractions = np.array([conditionals[_node(theta)][0].sum() for theta in starts])
     return _Orbits(roots[-1], roots[-1] - roots[-2], fractions)
 

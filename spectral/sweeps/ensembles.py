@@ -18,7 +18,7 @@ from ...core.checks import Floats, Rng, check_memory, generator, instance, posit
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
 from ...core.frames import data_frame
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 from ...core.version import __version__
 from ...core.workers import connected, results
 from ...kernels import Basis, KernelMatrix, discretise
@@ -67,6 +67,7 @@ def _cells(row: EnsembleRow) -> list[str | float | int]:
     return [row.quantity, mean.value, mean.error, spread.value, spread.error, row.realisations, row.refused]
 
 
+@explained_class
 @dataclass(frozen=True)
 class Ensemble:
     """Quantities over random walls; made by `ensemble`.

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.estimates import Estimate, finite
+from ...core.kinds import explained_class
 from .points import Point, Value
 
 COLUMNS = ("quantity", "value", "error", "kind", "verdict", "method", "seconds", "version", "message")
 
 
+@explained_class
 @dataclass(frozen=True)
 class SweepRow:
     """One quantity at one point.

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.errors import FileExistsRefusal, InputError
 from ...core.files import write_whole
 from ...core.frames import data_frame, needed
+from ...core.kinds import explained_class
 from .extremum import Extremum, refined_extremum
 from .picture import draw_curves
 from .points import Point, key_of
@@ -29,6 +30,7 @@ UNITS = {"relaxation_time": "collisions"}
 FILES = ("table.csv", "table.json")
 
 
+@explained_class
 @dataclass(frozen=True)
 class SweepTable:
     """What a sweep found.
@@ -145,7 +147,7 @@ class SweepTable:
                 raise InputError(f"JSON: expected a table of format {FORMAT}, got {data['format']}")
             rows = tuple(SweepRow.of_list(data["parameters"], cells) for cells in data["rows"])
             return SweepTable(tuple(data["parameters"]), rows, bool(data["zipped"]))
-        except (ValueError, KeyError, TypeError) as reason:
+        except (ValueError, KeyError, TypeError, RecursionError) as reason:
             raise InputError(f"JSON: expected what SweepTable.to_json() gives: {reason}") from reason
 
     def to_parquet(self, path: str | Path) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import Floats, finite_array
 from ...core.errors import InputError
-from ...core.kinds import explained
+from ...core.kinds import explained, explained_class
 
 # Least number of points of a fit with a confidence interval.
 FEWEST_POINTS = 3
@@ -21,6 +21,7 @@ ALLOWANCE = 0.15
 OrderVerdict = Literal["agrees", "differs", "not resolved"]
 
 
+@explained_class
 @dataclass(frozen=True)
 class FittedOrder:
     """The order p of error ~ size^-p, fitted in the logarithms.

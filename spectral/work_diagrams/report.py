@@ -13,6 +13,7 @@ import numpy as np
 
 from ...core.errors import InputError
 from ...core.frames import data_frame
+from ...core.kinds import explained_class
 from ...core.tables import table
 from .machine import Machine
 from .order import FittedOrder, fit_order
@@ -30,6 +31,7 @@ MARKERS = "osv^D<>Ph*X"
 DECADE = 10.0
 
 
+@explained_class
 @dataclass(frozen=True)
 class WorkRow:
     """One row of a report on error against run time.
@@ -150,6 +152,7 @@ class MethodFacts:
     floor: float
 
 
+@explained_class
 @dataclass(frozen=True)
 class WorkReport:
     """Errors and run times measured by `work_precision`.
@@ -300,7 +303,7 @@ class WorkReport:
             rows = tuple(WorkRow.of_dict(row) for row in data["rows"])
             machine = Machine.of_dict(data["machine"])
             return cls(data["problem"], tuple(data["norms"]), data["auto"], MappingProxyType(methods), machine, rows)
-        except (ValueError, KeyError, TypeError) as reason:
+        except (ValueError, KeyError, TypeError, RecursionError) as reason:
             raise InputError(f"JSON: expected what WorkReport.to_json() gives: {reason!r}") from reason
 
     def _done(self, method: str | None = None) -> list[WorkRow]:

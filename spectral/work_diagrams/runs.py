@@ -13,7 +13,7 @@ import numpy as np
 from ...core.checks import Floats, positive_number, shortened, whole_number
 from ...core.errors import AsperityError, InputError
 from ...core.estimates import Estimate
-from ...core.files import write_whole
+from ...core.files import regular_file, text_of, write_whole
 from ...core.kinds import explained
 from ...kernels import KernelMatrix
 from .machine import Machine, on_few_cores
@@ -130,8 +130,8 @@ def work_precision(
     ladders = _ladders(methods, budgets)
     report = WorkReport.of(problem, methods, Machine.here(threads))
     file = None if path is None else Path(path)
-    if file is not None and file.exists():
-        report = report.continued(WorkReport.of_json(file.read_text(encoding="utf-8")))
+    if file is not None and regular_file(file).exists():
+        report = report.continued(WorkReport.of_json(text_of(file)))
     with on_few_cores(threads):
         for method in methods:
             earlier = [row for row in report.rows if row.method == method.name]

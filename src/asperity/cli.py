@@ -33,8 +33,7 @@ class OneLineErrors(click.Group):
                 return super().invoke(ctx)
         except KeyboardInterrupt:
             click.echo("asperity: interrupted", err=True)
-            # what shells give a command that the signal ended
-            sys.exit(130)
+            sys.exit(INTERRUPTED)
         except AsperityError as reason:
             click.echo(f"asperity: {' '.join(str(reason).split())}", err=True)
             sys.exit(1)
@@ -336,12 +335,7 @@ def explore(wall: str, port: int, no_browser: bool, out: Path | None) -> None:
     def say(line: str) -> None:
         click.echo(f"asperity: {line}", err=True)
 
-    try:
-        serve_page(wall, port, out, browser=not no_browser, say=say)
-    except KeyboardInterrupt:
-        say("interrupted")
-        # at once: libraries would wait for their threads
-        os._exit(INTERRUPTED)
+    serve_page(wall, port, out, browser=not no_browser, say=say)
 
 
 @main.command()

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ..core.errors import FileExistsRefusal
-from ..core.files import write_whole
+from ..core.files import text_of, write_whole
 from .comparison import compare_runs
 from .run import BenchRun, made_here, prepare_folder
 from .standard_set import FULL, QUICK, problem_names, run_problems
@@ -19,7 +19,7 @@ def run_bench(
 ) -> int:
     """Run the requested measurements, print and write the results; return the exit code."""
     names = problem_names(problems)
-    earlier = None if compare is None else BenchRun.of_json(compare.read_text(encoding="utf-8"))
+    earlier = None if compare is None else BenchRun.of_json(text_of(compare))
     if extremes:
         from .extremes.report import run_extremes
 

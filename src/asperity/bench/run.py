@@ -122,7 +122,7 @@ class BenchRun:
         try:
             data = json.loads(text)
             return cls(tuple(WorkReport.of_json(json.dumps(report)) for report in data["reports"]))
-        except (ValueError, KeyError, TypeError) as reason:
+        except (ValueError, KeyError, TypeError, RecursionError) as reason:
             raise InputError(f"JSON: expected what BenchRun.to_json() gives: {reason!r}") from reason
 
 

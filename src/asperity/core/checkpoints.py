@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sqlite3
 import time
@@ -12,7 +13,7 @@ from typing import Any
 
 from .errors import FileExistsRefusal, InputError
 
-FORMAT = 1
+FORMAT = 2
 # Seconds between two transactions at most: what ends in between is computed again.
 MOMENT = 0.5
 # Seconds for which another process may hold the file before it is refused.
@@ -80,19 +81,23 @@ class Checkpoint:
                 tables -= {"identity", "parts"}
             if not tables:
                 self._file.execute("CREATE TABLE identity (format INTEGER, value TEXT)")
-                self._file.execute("CREATE TABLE parts (key TEXT PRIMARY KEY, value)")
+                self._file.execute("CREATE TABLE parts (key TEXT PRIMARY KEY, value, digest TEXT)")
                 self._file.execute("INSERT INTO identity VALUES (?, ?)", (FORMAT, json.dumps(identity)))
             elif tables != {"identity", "parts"}:
                 raise InputError(f"{self.path} is a database of something else; name another file")
-            form, text = self._file.execute("SELECT format, value FROM identity").fetchone()
+            form, text = self._file.execute("SELECT format, value FROM identity").fetchone() or (None, "")
             self._file.execute("COMMIT")
         except sqlite3.OperationalError as reason:
             raise self._failure(reason) from reason
-        except sqlite3.DatabaseError as reason:
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as reason:
             raise InputError(f"{self.path} is not a checkpoint ({reason}); name another file") from reason
         if form != FORMAT:
             raise InputError(f"{self.path} has format {form}, this asperity reads {FORMAT}; name another file")
-        found = list(differences(json.loads(text), identity))
+        try:
+            there = json.loads(text)
+        except (ValueError, TypeError, RecursionError) as reason:
+            raise self._damage("its description", reason) from reason
+        found = list(differences(there, identity))
         if found:
             raise InputError(
                 f"{self.path} is the checkpoint of something else; name another file or delete this one. "
@@ -100,15 +105,28 @@ class Checkpoint:
             )
 
     def parts(self) -> Iterator[tuple[str, Any]]:
-        """Every key and its value."""
-        yield from self._file.execute("SELECT key, value FROM parts ORDER BY key").fetchall()
+        """Every key and its value.
+
+        Raises
+        ------
+        InputError
+            If a part is not what was stored.
+        """
+        try:
+            rows = self._file.execute("SELECT key, value, digest FROM parts ORDER BY key").fetchall()
+        except (sqlite3.Error, UnicodeDecodeError) as reason:
+            raise self._damage("the list of its parts", reason) from reason
+        for key, value, digest in rows:
+            if not isinstance(key, str) or not isinstance(value, (str, bytes)) or digest != _digest(key, value):
+                raise self._damage(f"part {key!r}", "it is not what was stored")
+            yield key, value
 
     def put(self, key: str, value: str | bytes, *, now: bool = False) -> None:
         """Store a part, in place of an earlier one with its key; at once, or with the others of half a second."""
         try:
             if not self._file.in_transaction:
                 self._file.execute("BEGIN")
-            self._file.execute("INSERT OR REPLACE INTO parts VALUES (?, ?)", (key, value))
+            self._file.execute("INSERT OR REPLACE INTO parts VALUES (?, ?, ?)", (key, value, _digest(key, value)))
             if now or time.monotonic() - self._committed > MOMENT:
                 self.commit()
         except sqlite3.Error as reason:
@@ -131,6 +149,9 @@ class Checkpoint:
             "another folder, and start again"
         )
 
+    def _damage(self, what: str, reason: object) -> InputError:
+        return InputError(f"{self.path} is damaged: {what} ({reason}); delete it and start again, or name another file")
+
     def __enter__(self) -> Checkpoint:
         return self
 
@@ -145,6 +166,12 @@ class Checkpoint:
                 raise
         finally:
             self._file.close()
+
+
+def _digest(key: str, value: str | bytes) -> str:
+    """What tells a stored part from a changed one."""
+    content = value.encode() if isinstance(value, str) else value
+    return hashlib.sha256(key.encode() + b"\0" + content).hexdigest()
 
 
 def differences(there: Any, here: Any, name: str = "") -> Iterator[str]:

@@ -23,10 +23,10 @@ def finite_array(name: str, value: ArrayLike) -> Floats:
     """Return ``value`` as float64, or raise an InputError that names the worst entry."""
     try:
         array = np.asarray(value)
-        if array.dtype.kind in "cSU":
+        if array.dtype.kind in "cSUmMV":
             raise TypeError("of another kind")
         array = array.astype(np.float64, copy=False)
-    except (TypeError, ValueError, OverflowError) as reason:
+    except Exception as reason:  # foreign objects fail in their own way
         raise InputError(f"{name}: expected numbers, got {shortened(value)}") from reason
     bad = ~np.isfinite(array)
     if bad.any():
@@ -79,7 +79,8 @@ def number_between(name: str, value: Any, low: float, high: float, *, closed: st
 
 def whole_number(name: str, value: Any, low: int, *, most: int | None = None) -> int:
     """Return ``value`` as an int of at least ``low``, and at most ``most``."""
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    # numpy counts spans of time among its integers
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
     if not whole or value < low or (most is not None and value > most):
         allowed = f"of at least {low}" if most is None else f"from {low} to {most}"
         raise InputError(f"{name}: expected a whole number {allowed}, got {shortened(value)}")

@@ -66,17 +66,36 @@ def write_whole(path: Path, content: str | Callable[[IO[bytes]], object], *, ove
                 (beside / target.name).chmod(target.stat().st_mode)
     except FileExistsRefusal:
         raise
-    except OSError as reason:
-        why = reason.strerror or reason
+    except (OSError, RuntimeError) as reason:  # the latter of links in a circle
+        why = getattr(reason, "strerror", None) or reason
         raise InputError(f"{path}: cannot write there ({why}); choose a folder that is writable") from reason
 
 
 def regular_file(path: Path) -> Path:
     """The path, or an InputError if it names a pipe or a device, where reading may never end."""
-    if path.exists() and not path.is_file():
-        kind = "a folder" if path.is_dir() else "a pipe or a device"
-        raise InputError(f"{path}: cannot read {kind}; expected a file")
+    try:
+        if path.exists() and not path.is_file():
+            kind = "a folder" if path.is_dir() else "a pipe or a device"
+            raise InputError(f"{path}: cannot read {kind}; expected a file")
+    except OSError as reason:  # of a name that is too long
+        raise InputError(f"{path}: cannot read it ({reason.strerror}); expected a file") from reason
     return path
+
+
+def text_of(path: Path) -> str:
+    """The text of a file, or an InputError that says why there is none.
+
+    Examples
+    --------
+    >>> text_of(Path("/dev/null"))
+    Traceback (most recent call last):
+    asperity.errors.InputError: /dev/null: cannot read a pipe or a device; expected a file
+    """
+    try:
+        return regular_file(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as reason:
+        why = reason.strerror if isinstance(reason, OSError) else "it is not text in UTF-8"
+        raise InputError(f"{path}: cannot read it ({why}); expected a file of text") from reason
 
 
 @contextmanager

@@ -22,9 +22,14 @@ P = ParamSpec("P")
 T = TypeVar("T")
 C = TypeVar("C", bound=type)
 
+# Methods that operators and brackets call.
+OPERATORS = ("__call__", "__getitem__", "__matmul__", "__add__", "__sub__", "__mul__", "__rmul__", "__pow__")
 # Whole numbers beyond do not fit into arrays.
 LARGEST = 2**63 - 1
 NUMBERS = ("ArrayLike", "Floats")
+FUNCTIONS = ("AngleFunction", "DensityFunction", "CostFunction", "Objective")
+# What is asked for last: numbers of other kinds, such as fractions, and lists do where they are converted.
+PLAIN: dict[Any, Any] = {"Floats": np.ndarray, "float": (float, int, np.number)}
 PATHS = ("PathLike[str]", "Path")
 ARTICLES = {
     "float": "a number", "int": "a whole number", "bool": "True or False", "str": "a text", "None": "None",
@@ -34,7 +39,9 @@ ARTICLES = {
     "KernelMatrix": "a KernelMatrix such as ker.discretise(law, basis) gives",
     "CollisionLaw": "a CollisionLaw such as ker.CollisionLaw(law, disk)",
     "Container": "a Container such as geo.Container.strip()", "Spectrum": "a Spectrum",
-    "WorkProblem": "a WorkProblem", "WorkMethod": "a WorkMethod", "ReferenceValue": "a ReferenceValue",
+    "Axes": "axes of matplotlib", "VelocityLaw": "a CollisionLaw such as ker.smooth(disk)",
+    "Estimate": "an Estimate", "WorkProblem": "a WorkProblem",
+    "WorkMethod": "a WorkMethod", "ReferenceValue": "a ReferenceValue",
 }  # fmt: skip
 
 
@@ -71,14 +78,39 @@ def explained(function: Callable[P, T]) -> Callable[P, T]:
                 known = isinstance(kind, str) and signature.parameters[name].kind is not inspect.Parameter.VAR_KEYWORD
                 if known and not _is_kind(value, kind, names):
                     raise InputError(f"{name}: expected {_words(kind, names)}, got {shortened(value)}") from reason
+            for name, value in bound.arguments.items():
+                kind = PLAIN.get(signature.parameters[name].annotation)
+                if kind is not None and not isinstance(value, kind):
+                    what = "an array of numpy" if kind is np.ndarray else "a float"
+                    raise InputError(f"{name}: expected {what}, got {shortened(value)}") from reason
+            if isinstance(reason, MemoryError):
+                raise InputError(f"{function.__qualname__}: {reason or 'not enough memory'}; ask for less") from reason
             raise
 
     return call
 
 
 def explained_class(kind: C) -> C:
-    """The class, whose constructor is `explained`."""
-    kind.__init__ = explained(kind.__init__)  # type: ignore[misc]
+    """The class, whose constructor and public methods are `explained`.
+
+    Examples
+    --------
+    >>> @explained_class
+    ... class Counter:
+    ...     def more(self, count: int) -> int:
+    ...         return 1 + count
+    >>> Counter().more("two")
+    Traceback (most recent call last):
+    asperity.errors.InputError: count: expected a whole number, got 'two'
+    """
+    for name, member in list(vars(kind).items()):
+        held = isinstance(member, (classmethod, staticmethod))
+        function = member.__func__ if held else member
+        public = name in OPERATORS or not name.startswith("_")
+        if public and inspect.isfunction(function) and not hasattr(function, "__wrapped__"):
+            setattr(kind, name, type(member)(explained(function)) if held else explained(function))
+    if not getattr(kind, "_is_protocol", False):
+        kind.__init__ = explained(kind.__init__)  # type: ignore[misc]
     return kind
 
 
@@ -91,17 +123,19 @@ def _is_kind(value: object, kind: str, names: dict[str, Any]) -> bool:
     head, _, inner = kind.removesuffix("]").partition("[")
     if head in ("Sequence", "tuple", "list", "Iterable"):
         return _are_kinds(value, inner, names)
-    if head == "Mapping":
+    if head in ("Mapping", "dict"):
         return isinstance(value, dict)
+    if head == "NDArray":
+        return isinstance(value, np.ndarray)
     if head == "Callable":
         return callable(value)
     choices = _choices(kind, names)
     if choices:
         return isinstance(value, str) and value in choices
-    return _is_plain(value, kind)
+    return _is_plain(value, kind, names)
 
 
-def _is_plain(value: object, kind: str) -> bool:
+def _is_plain(value: object, kind: str, names: dict[str, Any]) -> bool:
     if kind in ("float", *NUMBERS):
         try:
             array = finite_array("value", value)  # type: ignore[arg-type]
@@ -109,16 +143,19 @@ def _is_plain(value: object, kind: str) -> bool:
             return False
         return kind != "float" or array.ndim == 0
     if kind == "int":
-        return isinstance(value, (int, np.integer)) and not isinstance(value, bool) and abs(int(value)) <= LARGEST
+        whole = isinstance(value, (int, np.integer)) and not isinstance(value, (bool, np.timedelta64))
+        return whole and abs(int(value)) <= LARGEST  # type: ignore[call-overload]
     plain = {"bool": (bool, np.bool_), "str": str, "None": type(None), **dict.fromkeys(PATHS, os.PathLike)}
-    if kind == "str" and isinstance(value, str) and "\0" in value:
-        return False
+    if kind == "str" and isinstance(value, str):
+        # neither goes into the name of a file
+        return "\0" not in value and not any("\ud800" <= letter <= "\udfff" for letter in value)
     if kind in plain:
         return isinstance(value, plain[kind])  # type: ignore[arg-type]
-    if kind in ("AngleFunction", "DensityFunction", "CostFunction", "Objective"):
+    if _is_function(kind, names):
         return callable(value)
     # classes are known by their names: the annotation need not be importable here
-    return not kind.isidentifier() or kind == "Any" or kind not in ARTICLES or kind in _class_names(value)
+    known = kind in ARTICLES or (inspect.isclass(names.get(kind)) and not getattr(names[kind], "_is_protocol", False))
+    return not known or kind in _class_names(value)
 
 
 def _are_kinds(value: object, inner: str, names: dict[str, Any]) -> bool:
@@ -140,6 +177,11 @@ def _choices(kind: str, names: dict[str, Any]) -> tuple[Any, ...]:
         return tuple(word.strip().strip("'\"") for word in kind[len("Literal[") : -1].split(","))
     alias = names.get(kind)
     return get_args(alias) if get_origin(alias) is Literal else ()
+
+
+def _is_function(kind: str, names: dict[str, Any]) -> bool:
+    """Whether this is the name of a kind of functions."""
+    return kind in FUNCTIONS or get_origin(names.get(kind)) is Callable
 
 
 def _class_names(value: object) -> set[str]:
@@ -173,9 +215,11 @@ def _words(kind: str, names: dict[str, Any]) -> str:
         return f"a sequence, each entry {_words(_split(inner, ',')[0], names)}"
     if head == "tuple":
         return f"({', '.join(_words(part, names) for part in _split(inner, ','))})"
+    if head == "NDArray":
+        return "an array of numpy"
     choices = _choices(kind.strip(), names)
     if choices:
         return f"one of {', '.join(map(repr, choices))}"
-    if head in ("Callable", "AngleFunction", "DensityFunction", "CostFunction", "Objective"):
+    if head == "Callable" or _is_function(kind.strip(), names):
         return "a function"
     return ARTICLES.get(kind.strip(), f"a {kind.strip()}")

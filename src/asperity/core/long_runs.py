@@ -9,11 +9,11 @@ import hashlib
 import io
 import multiprocessing
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any, TypedDict, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,12 @@ from .errors import AsperityError, InputError
 from .workers import connected, results
 
 Arrays = dict[str, NDArray[Any]]
+T = TypeVar("T")
 
 # Before that no progress bar appears.
 SLOW_SECONDS = 2.0
+# Of fewer items no bar is made, and the bar of more is renewed after so many.
+MANY = 10_000
 
 
 class Engine(TypedDict, total=False):
@@ -141,6 +144,24 @@ def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown
         desc=text, total=total, unit=unit, unit_scale=unit == "ray", delay=SLOW_SECONDS, leave=False,
         disable=True if silent else False if in_notebook else None,
     )  # fmt: skip
+
+
+def counted(items: Sequence[T], unit: str, text: str) -> Iterator[T]:
+    """The items of a long sequence, counted by a progress bar.
+
+    Examples
+    --------
+    >>> sum(counted(range(3), "number", "sum"))
+    3
+    """
+    if len(items) < MANY:
+        yield from items
+        return
+    with progress_bar(len(items), unit, text) as bar:
+        for start in range(0, len(items), MANY):
+            part = items[start : start + MANY]
+            yield from part
+            bar.update(len(part))
 
 
 def digest(*values: Any) -> str:

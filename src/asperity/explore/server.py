@@ -69,14 +69,8 @@ def page_server(text: str = FIRST_WALL, port: int = PORT, out: Path | None = Non
 
 
 def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Callable[[str], object]) -> None:
-    """Serve the page until Ctrl-C, which ends the process, or raises KeyboardInterrupt before the page is served.
-
-    ``say`` prints a line.
-    """
+    """Serve the page until Ctrl-C, which ends the process; ``say`` prints a line."""
     server = page_server(text, port, out)
-    say("preparing; the first time this compiles for some seconds")
-    _prepare(text)
-    address = f"http://{ADDRESS}:{server.port}/"
 
     def end(*_: object) -> None:
         # what runs for the tabs that are open
@@ -87,6 +81,9 @@ def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Ca
         os._exit(INTERRUPTED)
 
     signal.signal(signal.SIGINT, end)
+    say("preparing; the first time this compiles for some seconds")
+    _prepare(text)
+    address = f"http://{ADDRESS}:{server.port}/"
     say(f"{address} shows the page; Ctrl-C ends it")
     server.start()
     if browser:
