@@ -6,6 +6,7 @@ import pytest
 from asperity import InputError, WallError
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.geometry.cells.hollow_shape import distinct_hollows
 from asperity.geometry.polygons.beams import beams_of
 from random_hollows import random_hollow, wall_with
 
@@ -145,3 +146,9 @@ def test_a_plate_of_no_thickness_shields_what_is_behind_it():
     assert beams.defect < 1e-13
     here = first & (beams.low <= theta) & (theta < beams.high)
     assert abs((beams.sine[here]).sum() - 1.0) < 1e-12
+
+
+def test_the_unresolved_flux_between_parallel_sides_falls_as_the_square_of_the_number_of_beams():
+    hollow = max((shape for shape, _ in distinct_hollows(geo.koch(3))), key=lambda shape: len(shape.vertices))
+    few, many = (beams_of(hollow.vertices, max_beams=count).unresolved for count in (8_000, 32_000))
+    assert many < few / 4**1.7

@@ -95,8 +95,8 @@ def beams_of(
     """Divide the rays into a polygonal hollow into beams of equal itinerary.
 
     The hollow is triangulated, and the triangles are unfolded along the rays. A beam is a convex polygon in the
-    projective plane of lines; every triangle divides it by the line through its third vertex. The largest beam is
-    divided first.
+    projective plane of lines; every triangle divides it by the line through its third vertex. The beam
+    that has the largest flux, divided by the number of slivers that it has lost in a row, is divided first.
 
     Parameters
     ----------
@@ -105,7 +105,8 @@ def beams_of(
     tolerance : float
         Largest unresolved fraction of the flux.
     max_beams : int
-        Limit on the number of beams; cavities with narrow necks never resolve completely.
+        Limit on the number of beams, and on the triangles that they pass, 64 for each; cavities with narrow necks never
+        resolve completely.
     mirror_symmetric : bool
         Whether the hollow is its own mirror image: then only rays with theta < pi/2 are divided, and mirrored.
 

@@ -16,7 +16,8 @@ EDGE = 1  # the triangle's edge through which the beam enters
 SIGN = 2  # 1 or -1: orientation of the unfolding isometry
 BOUNCES = 3
 LEAF = 4  # 1 for a beam that has left the hollow
-WHOLE_COLUMNS = 5
+CUTS = 5  # splits in which the beam was the larger part, since it last was the smaller one
+WHOLE_COLUMNS = 6
 
 # real[slot]: the flux, then the unfolding isometry V -> R V + T in two parts each, and the rounding errors of T.
 FLUX = 0
@@ -28,7 +29,8 @@ T_Y = 5
 T_Y_LOW = 6
 ERROR_X = 7
 ERROR_Y = 8
-REAL_COLUMNS = 9
+PRIORITY = 9  # flux expected to be cut off by the next split
+REAL_COLUMNS = 10
 
 # wall_lines: one row for each edge of the hollow.
 WALL_NORMAL_X = 0  # unit normal

@@ -1,4 +1,4 @@
-"""The heap of beams, with the beam of largest flux on top, and copies of beams: compiled. Loads numba."""
+"""The heap of beams, with the beam of highest priority on top, and copies of beams: compiled. Loads numba."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...tracing.compiled.options import inlined
-from .columns import FLUX, VERTEX_COLUMNS
+from .columns import PRIORITY, VERTEX_COLUMNS
 
 
 class BeamTables(NamedTuple):
@@ -28,7 +28,7 @@ def push(heap, size, real, slot):
     heap[i] = slot
     while i > 0:
         parent = (i - 1) // 2
-        if real[heap[parent], FLUX] >= real[heap[i], FLUX]:
+        if real[heap[parent], PRIORITY] >= real[heap[i], PRIORITY]:
             break
         heap[parent], heap[i] = heap[i], heap[parent]
         i = parent
@@ -37,7 +37,7 @@ def push(heap, size, real, slot):
 
 @inlined
 def pop(heap, size, real):
-    """Remove the beam of largest flux from the heap; return its slot and the new size of the heap."""
+    """Remove the beam of highest priority from the heap; return its slot and the new size of the heap."""
     top = heap[0]
     size -= 1
     heap[0] = heap[size]
@@ -46,9 +46,9 @@ def pop(heap, size, real):
         child = 2 * i + 1
         if child >= size:
             break
-        if child + 1 < size and real[heap[child + 1], FLUX] > real[heap[child], FLUX]:
+        if child + 1 < size and real[heap[child + 1], PRIORITY] > real[heap[child], PRIORITY]:
             child += 1
-        if real[heap[i], FLUX] >= real[heap[child], FLUX]:
+        if real[heap[i], PRIORITY] >= real[heap[child], PRIORITY]:
             break
         heap[i], heap[child] = heap[child], heap[i]
         i = child
