@@ -174,7 +174,8 @@ def trace(
     _check_wall(wall)
     x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
-    given, incoming = x_all.flatten(), theta_all.flatten()
+    # the compiled functions take arrays of one kind: aligned, contiguous and writable
+    given, incoming = (np.require(array, requirements="ACW").reshape(-1) for array in (x_all, theta_all))
     starts = given if wall.origin == (0.0, 0.0) else entries(wall, given, incoming)
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
@@ -186,7 +187,7 @@ def trace(
         trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], status[block])
 
     in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
-    if np.any((status == Status.CORNER) | (status == Status.GRAZING)):
+    if status.any() and np.any((status == Status.CORNER) | (status == Status.GRAZING)):
         from .refinement import retrace
 
         interruptibly(lambda: retrace(scene, starts, incoming, max_collisions, out_x, out_theta, collisions, status))

@@ -28,6 +28,11 @@ def finite_array(name: str, value: ArrayLike) -> Floats:
         array = array.astype(np.float64, copy=False)
     except Exception as reason:  # foreign objects fail in their own way
         raise InputError(f"{name}: expected numbers, got {shortened(value)}") from reason
+    with np.errstate(over="ignore", invalid="ignore"):
+        # a sum with a term that is not finite is not finite; it takes a sixth of the time of a mask
+        total = array.sum()
+    if np.isfinite(total):
+        return array
     bad = ~np.isfinite(array)
     if bad.any():
         where = tuple(int(i) for i in np.argwhere(bad)[0])
@@ -119,8 +124,8 @@ def check_memory(name: str, what: str, numbers: int) -> None:
 def angles(name: str, value: ArrayLike) -> Floats:
     """Return ``value`` as angles in radians, every one in the open interval (0, pi)."""
     array = finite_array(name, value)
-    bad = ~((array > 0.0) & (array < np.pi))
-    if bad.any():
+    if array.size and not (array.min() > 0.0 and array.max() < np.pi):
+        bad = ~((array > 0.0) & (array < np.pi))
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         index_text = f" at index {where}" if where else ""
         raise InputError(
