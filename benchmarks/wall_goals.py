@@ -91,7 +91,10 @@ def _laws_and_resistances() -> list[WallGoal]:
     goals = []
     for name, make in WALLS.items():
         goals += [
-            _within(f"law in Bins(64), {name}", 1e-4, 5.0, lambda tolerance, make=make: _matrix(make(), tolerance)),
+            _within(
+                f"law in Bins(64) by quadrature, {name}", 1e-4, 5.0,
+                lambda tolerance, make=make: _matrix(make(), tolerance),
+            ),
             _within(
                 f"resistance, {name}", 1e-8, 20.0,
                 lambda tolerance, make=make: ker.resistance(ker.WallLaw(make()), tolerance).error,
@@ -101,7 +104,8 @@ def _laws_and_resistances() -> list[WallGoal]:
 
 
 def _matrix(wall: geo.Wall, tolerance: float) -> float:
-    return float(ker.discretise(ker.WallLaw(wall), ker.Bins(64), tolerance=tolerance).error)
+    law = ker.WallLaw(wall)
+    return float(ker.discretise(law, ker.Bins(64), method="quadrature", tolerance=tolerance).error)
 
 
 def _gaps() -> list[WallGoal]:

@@ -152,3 +152,10 @@ def test_means_over_resolved_polygons_with_many_pieces_are_exact():
     expected = np.sum(probability * np.cos(outgoing), axis=-1)
     np.testing.assert_allclose(law.apply(np.cos, theta), expected, rtol=0, atol=1e-13)
     assert np.all(np.abs(law.conditionals(theta).mean(np.cos) - expected) <= law.conditionals(theta).error)
+
+
+def test_a_tolerance_below_the_rounding_is_refused():
+    law = ker.WallLaw(geo.mushrooms(0.3))
+    with pytest.raises(InputError, match=r"tolerance: expected a number of at least 2\.2e-16"):
+        law.conditionals([1.0], tolerance=1e-320)
+    assert law.conditionals([1.0], tolerance=1e-15).error[0] < 1e-10

@@ -175,7 +175,7 @@ def trace(
     x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
-    given, incoming = (np.require(array, requirements="ACW").reshape(-1) for array in (x_all, theta_all))
+    given, incoming = (np.require(array, requirements=["A", "C", "W"]).reshape(-1) for array in (x_all, theta_all))
     starts = given if wall.origin == (0.0, 0.0) else entries(wall, given, incoming)
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)

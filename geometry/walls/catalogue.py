@@ -6,6 +6,7 @@ import difflib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
+from os.path import isfile
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -96,14 +97,14 @@ def wall_from_text(text: str) -> Wall:
     >>> wall_from_text("rectangular-teeth:height_to_width=4").depth
     2.0
     """
-    if Path(text).is_file():
+    if isfile(text):
         return _wall_from_file(Path(text), {})
     name, _, tail = text.partition(":")
     entry = WALLS.get(name.strip().lower().replace("_", "-"))
     parameters = _parameters(text, tail)
     if entry is not None:
         return entry.build(**{key: _value(entry, key, value) for key, value in parameters.items()})
-    if Path(name).is_file():
+    if isfile(name):
         return _wall_from_file(Path(name), parameters)
     near = difflib.get_close_matches(name, WALLS, n=3)
     guess = f" Did you mean {' or '.join(near)}?" if near else ""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
+from os.path import exists
 from types import MappingProxyType
 
 from ...core.errors import InputError
@@ -50,6 +50,6 @@ def law_from_text(text: str) -> Law | KernelMatrix:
             if isinstance(reason, InputError):
                 raise
             raise InputError(f"law: expected a number after '{name}:', got {number!r}") from reason
-    if Path(text).exists():
+    if exists(text):
         return load_matrix(text)
     raise InputError(f"law: expected {NAMES}, or a file that KernelMatrix.save wrote, got {text!r}")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import Floats, angles, finite_number, instance
 from ...core.errors import InputError
+from ...core.rounding import EPS
 from ...geometry import Wall
 from ..bases.basis import AngleFunction
 from ..expectations.basis_means import Expectations, means_of_basis
@@ -91,7 +92,7 @@ def adaptive_conditionals(
     Raises
     ------
     InputError
-        If an angle is not in (0, pi), or the tolerance is not positive.
+        If an angle is not in (0, pi), or the tolerance is less than the rounding, 2.2e-16.
 
     Notes
     -----
@@ -110,8 +111,8 @@ def adaptive_conditionals(
     ([1.0], True)
     """
     instance("wall", wall, Wall, "geo.triangular_teeth(0.7)")
-    if not finite_number("tolerance", tolerance) > 0.0:
-        raise InputError(f"tolerance: expected a number greater than 0, got {tolerance!r}")
+    if finite_number("tolerance", tolerance) < EPS:
+        raise InputError(f"tolerance: expected a number of at least {EPS:.2g}, the rounding, got {tolerance!r}")
     incoming = np.atleast_1d(angles("theta", theta)).ravel()
     return WallConditionals(wall, int(degree), np.asarray(edges, dtype=np.float64))(incoming, tolerance)
 
