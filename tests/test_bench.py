@@ -234,9 +234,9 @@ def test_the_time_of_a_run_is_kept_and_what_it_left_out_is_said(tmp_path):
 
 
 def test_both_sets_are_done_in_the_time_that_is_promised():
-    # three minutes, and forty with everything else
+    # three minutes, and forty-five with everything else
     assert QUICK.total_seconds <= 170.0
-    assert sum(section.seconds for section in SECTIONS) <= 40.0 * 60.0
+    assert sum(section.seconds for section in SECTIONS) <= 45.0 * 60.0
     assert FULL.total_seconds < sum(section.seconds for section in SECTIONS)
 
 

@@ -58,7 +58,7 @@ def test_an_interrupt_ends_long_work_soon(name):
     with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, env=environment) as process:
         try:
             assert process.stdout is not None and process.stdout.readline() == "ready\n"
-            time.sleep(0.7)
+            time.sleep(0.3)
             process.send_signal(signal.SIGINT)
             sent = time.time()
             caught, errors = process.communicate(timeout=ENDED)

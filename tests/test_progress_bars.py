@@ -94,7 +94,7 @@ def pocket():
         (lambda: ker.distance(*sampled(), kind="joint"), ("distance", "transport")),
         (lambda: ker.distance(*sampled()), ("distance: error", "sample")),
         (lambda: ker.difference_test(*sampled()), ("test", "permutation")),
-        (lambda: spec.enclosures(ker.CircularArcLaw(1.2), 2, tolerance=1e-2), ("enclosures", "level", "residual")),
+        (lambda: spec.enclosures(ker.CircularArcLaw(1.2), 2, tolerance=1e-8), ("enclosures", "level", "residual")),
         (lambda: spec.essential_edge(ker.WallLaw(pocket())), ("essential edge", "layer")),
     ],
     ids=["gap", "distance", "transport", "error of a distance", "test", "enclosures", "essential edge"],

@@ -9,6 +9,7 @@ import hashlib
 import io
 import multiprocessing
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -139,7 +140,11 @@ def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown
     # tqdm.auto takes the bar for notebooks only in one, where standard error is no terminal
     notebook = sys.modules.get("tqdm.notebook")
     in_notebook = notebook is not None and issubclass(tqdm, notebook.tqdm_notebook)
-    silent = not shown or multiprocessing.parent_process() is not None
+    in_worker = multiprocessing.parent_process() is not None
+    if in_worker:
+        # tqdm's own lock has a semaphore of the system, of which Python warns where a worker is ended
+        tqdm.set_lock(threading.RLock())
+    silent = not shown or in_worker
     return tqdm(
         desc=text, total=total, unit=unit, unit_scale=unit == "ray", delay=SLOW_SECONDS, leave=False,
         disable=True if silent else False if in_notebook else None,
