@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import eigvalsh
 from tests import precise_triangular
+from threadpoolctl import threadpool_limits
 
 from asperity import geometry as geo
 from asperity import kernels as ker
@@ -189,7 +190,8 @@ def _large_matrices() -> list[Goal]:
     }
     # exclude imports at first use
     spec.spectrum(ker.discretise(ker.maxwell(0.5), ker.Bins(LARGE_BINS // 4)), k=2)
-    return [_large_matrix(name, matrix) for name, matrix in matrices.items()]
+    with threadpool_limits(1):
+        return [_large_matrix(name, matrix) for name, matrix in matrices.items()]
 
 
 def _large_matrix(name: str, matrix: ker.KernelMatrix) -> Goal:
