@@ -28,6 +28,7 @@ def written(monkeypatch, stream, seconds=0.0):
     """The stream, which takes the place of standard error; in a fixture pytest would take it away again."""
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(long_runs, "SLOW_SECONDS", seconds)
+    monkeypatch.setattr(long_runs, "RENEWED_SECONDS", 0.0)
     return stream
 
 

@@ -28,6 +28,8 @@ T = TypeVar("T")
 
 # Before that no progress bar appears.
 SLOW_SECONDS = 2.0
+# Least seconds between two pictures of a bar.
+RENEWED_SECONDS = 0.1
 # Of fewer items no bar is made, and the bar of more is renewed after so many.
 MANY = 10_000
 
@@ -147,6 +149,7 @@ def progress_bar(total: int | None, unit: str, text: str | None = None, *, shown
     silent = not shown or in_worker
     return tqdm(
         desc=text, total=total, unit=unit, unit_scale=unit == "ray", delay=SLOW_SECONDS, leave=False,
+        mininterval=RENEWED_SECONDS,
         disable=True if silent else False if in_notebook else None,
     )  # fmt: skip
 

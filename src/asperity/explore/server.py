@@ -18,6 +18,8 @@ from ..core.errors import INTERRUPTED, InputError
 from ..geometry import WALLS, wall_from_text
 
 ADDRESS, PORT = "127.0.0.1", 5006
+# The file descriptor.
+STANDARD_ERROR = 2
 # By these names the page may be called; another name may be an attacker's that leads to this machine.
 NAMES = (ADDRESS, "localhost")
 # Bytes of one message of the browser: a file of 64 MiB in base64.
@@ -76,7 +78,8 @@ def serve_page(text: str, port: int, out: Path | None, *, browser: bool, say: Ca
         # what runs for the tabs that are open
         for computation in multiprocessing.active_children():
             computation.kill()
-        say("interrupted")
+        # not by `say`: Python refuses to write while the signal interrupts a line that is being written
+        os.write(STANDARD_ERROR, b"asperity: interrupted\n")
         # an exception could be caught by a library, and libraries would wait for their threads
         os._exit(INTERRUPTED)
 
