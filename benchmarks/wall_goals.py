@@ -21,7 +21,7 @@ from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.bench.quantities.walls import wall_of
 
-from .rays import FIRST_RAYS, LARGE_PROFILE, first_rays
+from .rays import FIRST_RAYS, LARGE_PROFILE, first_rays, timed
 
 # Tolerance of the rough runs that compile.
 ROUGH = 1e-2
@@ -183,12 +183,10 @@ def _run(arguments: list[str], environment: Any) -> None:
 
 def _within(what: str, tolerance: float, limit: float, solve: Callable[[float], float]) -> WallGoal:
     solve(ROUGH)
-    begin = perf_counter()
-    error = solve(tolerance)
-    return WallGoal(what, tolerance, limit, float(error), perf_counter() - begin)
+    error, seconds = timed(perf_counter, lambda: solve(tolerance))
+    return WallGoal(what, tolerance, limit, float(error), seconds)
 
 
 def _in_seconds(what: str, limit: float, run: Callable[[], object]) -> WallGoal:
-    begin = perf_counter()
-    run()
-    return WallGoal(what, 0.0, limit, 0.0, perf_counter() - begin)
+    _, seconds = timed(perf_counter, run)
+    return WallGoal(what, 0.0, limit, 0.0, seconds)
