@@ -13,6 +13,7 @@ from asperity.geometry.tracing import tracing
 from asperity.geometry.tracing.compiled import closed_forms
 from asperity.geometry.tracing.compiled.pointers import Late
 from asperity.geometry.tracing.compiled.trigonometry import mirrored
+from asperity.geometry.tracing.compiled.waves import MOST_HITS
 from asperity.geometry.tracing.threads import new_flag
 from test_runs import random_teeth
 
@@ -86,7 +87,7 @@ def test_few_rays_are_left_to_the_loop(name):
     x, theta = (part[:RAYS] for part in rays_of(wall, 2))
     closed = np.empty((0, FORM_COLUMNS)) if wall.scene.closed is None else wall.scene.closed
     results = np.empty(RAYS), np.empty(RAYS), np.empty(RAYS, np.int64), np.empty(RAYS, np.uint8)
-    room = closed_forms.room_for(wall.scene.hollows)
+    room = closed_forms.room_for(wall.scene.hollows, RAYS)
     closed_forms.trace_closed(x, theta, wall.scene.tables, closed, 2**62, results, room, closed_forms.CROSSINGS)
     assert np.mean(results[-1] == closed_forms.UNDECIDED) < 0.01
 
@@ -98,6 +99,16 @@ def test_a_ray_is_the_same_whatever_rays_go_with_it(monkeypatch):
     part = traced(monkeypatch, True, wall, x[5:2000:3], theta[5:2000:3])
     for all_rays, some in zip(whole, part, strict=True):
         assert np.array_equal(all_rays[5:2000:3], some)
+
+
+def test_rays_that_come_in_for_others_and_rays_that_stay_long_have_the_bits_of_the_loop(monkeypatch):
+    cave = [(0, 0), (0.49, 0), (0.1, -0.1), (0.3, -0.9), (0.8, -0.8), (0.93, -0.15), (0.51, 0), (1, 0)]
+    wall, rng = geo.Wall.from_vertices(cave), np.random.default_rng(5)
+    x, theta = rng.uniform(0.485, 0.515, tracing.MANY_RAYS + 999), rng.uniform(0.1, 3.0, tracing.MANY_RAYS + 999)
+    together, one_by_one = (traced(monkeypatch, waves, wall, x, theta) for waves in (True, False))
+    assert np.sum(one_by_one[2] > MOST_HITS) > 100
+    for mine, right in zip(together, one_by_one, strict=True):
+        assert np.array_equal(mine, right)
 
 
 def test_waves_end_at_a_raised_flag_as_the_loop_does():

@@ -229,10 +229,10 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
         checked(lambda: trace_rays(x, theta, scene.tables, max_collisions, stop, wanted, SLOTS))
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
-        from .compiled.closed_forms import CROSSINGS, UNDECIDED, room_for, trace_closed
+        from .compiled.closed_forms import CROSSINGS, RAYS, UNDECIDED, room_for, trace_closed
         from .compiled.pointers import checked
 
-        tables, room = scene.tables, room_for(scene.hollows)
+        tables, room = scene.tables, room_for(scene.hollows, MANY_RAYS if in_waves else RAYS)
         closed = np.empty((0, FORM_COLUMNS)) if scene.closed is None else scene.closed
         crossings = CROSSINGS if in_waves else (*CROSSINGS[:2], 0)
         first, size = 0, MANY_RAYS if in_waves else len(x)
@@ -240,15 +240,15 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
             part = slice(first, first + size)
             entry, angle, found = x[part], theta[part], tuple(result[part] for result in results)
             checked(partial(trace_closed, entry, angle, tables, closed, max_collisions, found, room, crossings))
-            rest = np.flatnonzero(found[-1] == UNDECIDED)
-            if len(rest):
-                followed = tuple(np.empty(len(rest), result.dtype) for result in found)
-                follow(entry[rest], angle[rest], *followed)
-                for result, some in zip(found, followed, strict=True):
-                    result[rest] = some
-            if len(rest) > MOST_LEFT * len(entry):
+            if in_waves and np.count_nonzero(found[-1] == UNDECIDED) > MOST_LEFT * len(entry):
                 crossings = (*CROSSINGS[:2], 0)
             first += size
+        rest = np.flatnonzero(results[-1][:first] == UNDECIDED)
+        if len(rest):
+            followed = tuple(np.empty(len(rest), result.dtype) for result in results)
+            follow(x[rest], theta[rest], *followed)
+            for result, some in zip(results, followed, strict=True):
+                result[rest] = some
 
     trace_block = close if in_waves or scene.closed is not None else follow
 

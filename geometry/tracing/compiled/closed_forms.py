@@ -60,7 +60,7 @@ FIRST_HOLLOW = np.int64(0)
 
 
 class Room(NamedTuple):
-    """Work space: six arrays for the rays of a block.
+    """Work space: six arrays for the rays of a block, whose size is theirs.
 
     Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, of which ``heads``
     is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and the work space of waves.
@@ -74,10 +74,10 @@ class Room(NamedTuple):
     waves: Floats
 
 
-def room_for(hollows: Floats) -> Room:
-    """Return the work space of `trace_closed`, for one thread."""
-    rays, others, met = np.empty((3, RAYS), np.int64)
-    return Room(np.empty((6, RAYS)), rays, others, met, np.full(len(hollows), -1), np.empty(WORK))
+def room_for(hollows: Floats, block: int = RAYS) -> Room:
+    """Return the work space of `trace_closed`, for one thread and blocks of rays."""
+    rays, others, met = np.empty((3, block), np.int64)
+    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(WORK))
 
 
 @inner
@@ -251,8 +251,9 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
         and hollows[0, LEFT] == 0.0
         and hollows[0, RIGHT] == cell
     )
-    for first in range(0, x.shape[0], RAYS):
-        count = min(RAYS, x.shape[0] - first)
+    block = numbers.shape[1]
+    for first in range(0, x.shape[0], block):
+        count = min(block, x.shape[0] - first)
         starts = x[first : first + count]
         if whole:
             # a single hollow without flat tops: compute in the arrays of the results, without gathering

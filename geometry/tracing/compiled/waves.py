@@ -70,6 +70,7 @@ from .lanes import (
     UNCERTAIN,
     VX,
     VY,
+    WAVE,
     advance,
     before_runs,
     clear_hits,
@@ -85,8 +86,12 @@ from .records import CIRCLE, LINE, OPENING, Own, Slots
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
 
-# Waves after which the rays that are left are traced one by one.
+# Waves after the entry of the last ray, after which the rays that are left are traced one by one.
 MOST_WAVES = 64
+# Rays of a wave up to which the next rays come in.
+FEW = WAVE // 2
+# Hits after which a ray is traced by itself: rays that stay long would keep the next ones out.
+MOST_HITS = 2**8
 # Above one by more than all rounding errors of the sine of incidence.
 RUN_MARGIN = 1.0 + 2.0**-40
 
@@ -170,40 +175,73 @@ def meet_pieces(scope, work, first, count):
             meet_corner(work, first, x, y, slack)
 
 
-@inner
-def cross_simple(tables, h, limit, entry, angle, hits, work):
-    """Reflect rays by a hollow of few lines and circles, with results as in `closed_forms.cross_arc`.
-
-    The rays go through the hollow in waves: all rays that are still inside hit their next piece, eight at once. Rays
-    with more than ``limit`` hits or with runs of hits have no result.
-    """
-    scope = scope_of(tables, h, Slots(0, 0, 0, 0))
-    slack, opening = scope.slack, (scope.left, scope.right)
+@inlined
+def begin_rays(work, following, entry, angle):
+    """Put rays, numbered from ``following``, into the wave whose work space begins at the first free place."""
     for i in range(entry.shape[0]):
         sine, cosine = sine_cosine(angle[i])
         work[PX + i], work[PY + i], work[VX + i], work[VY + i] = entry[i], 0.0, -cosine, -sine
-        work[OWN + i], work[BEFORE + i], work[BOUNCES + i], work[RAY + i] = NO_PIECE, NO_PIECE, 0.0, i
-        hits[i] = 0.0
-    count, left = entry.shape[0], 0
-    for _ in range(MOST_WAVES):
-        kept = 0
-        for first in range(0, count, BOXES):
-            meet_pieces(scope, work, first, count)
-            mask = before_runs(work, first)
-            while mask != 0:
-                i = first + first_bit(mask)
-                mask &= mask - 1
-                if i < count and not begins_run(tables, work, i, slack, limit):
-                    work[UNCERTAIN + i] = 0.0
-            found = advance(work, first, count, kept, left, opening, slack, float(limit))
-            kept += found & 255
-            left += found >> 8
-        count = kept
-        if count == 0:
-            break
+        work[OWN + i], work[BEFORE + i], work[BOUNCES + i], work[RAY + i] = NO_PIECE, NO_PIECE, 0.0, following + i
+
+
+@inlined
+def end_rays(work, left, entry, angle, hits):
+    """Store the results of the rays that have left."""
     for i in range(left):
         gone = direction_angle(work[OUT_VX + i], work[OUT_VY + i])
         work[OUT_ANGLE + i] = gone if gone < LAST_ANGLE else LAST_ANGLE
     for i in range(left):
         j = int(work[OUT_RAY + i])
         entry[j], angle[j], hits[j] = work[OUT_X + i], work[OUT_ANGLE + i], work[OUT_BOUNCES + i]
+
+
+@inlined
+def next_hits(tables, scope, work, count, left, limit):
+    """-> (kept, gone): numbers of the rays of a wave that go on after their next hit, and that leave.
+
+    Before, ``count`` rays were in the wave and ``left`` had left.
+    """
+    slack, opening, most = scope.slack, (scope.left, scope.right), float(min(limit, MOST_HITS))
+    kept, gone = 0, 0
+    for first in range(0, count, BOXES):
+        meet_pieces(scope, work, first, count)
+        mask = before_runs(work, first)
+        while mask != 0:
+            i = first + first_bit(mask)
+            mask &= mask - 1
+            if i < count and not begins_run(tables, work, i, slack, limit):
+                work[UNCERTAIN + i] = 0.0
+        found = advance(work, first, count, kept, left + gone, opening, slack, most)
+        kept += found & 255
+        gone += found >> 8
+    return kept, gone
+
+
+@inner
+def cross_simple(tables, h, limit, entry, angle, hits, work):
+    """Reflect rays by a hollow of few lines and circles, with results as in `closed_forms.cross_arc`.
+
+    The rays go through the hollow in waves: all rays that are inside hit their next piece, eight at once. The next rays
+    take the places of those that have left. Rays with more than ``limit`` or `MOST_HITS` hits, or with runs of hits,
+    have no result.
+    """
+    scope = scope_of(tables, h, Slots(0, 0, 0, 0))
+    rays = entry.shape[0]
+    for i in range(rays):
+        hits[i] = 0.0
+    count, left, following, waves = 0, 0, 0, 0
+    while waves < MOST_WAVES:
+        if following < rays and count <= FEW:
+            end = min(following + WAVE - count, rays)
+            begin_rays(work[count:], following, entry[following:end], angle[following:end])
+            count, following = count + end - following, end
+        if count == 0:
+            break
+        if following == rays:
+            waves += 1
+        if left + count > WAVE:
+            end_rays(work, left, entry, angle, hits)
+            left = 0
+        count, gone = next_hits(tables, scope, work, count, left, limit)
+        left += gone
+    end_rays(work, left, entry, angle, hits)
