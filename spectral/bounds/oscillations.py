@@ -49,11 +49,17 @@ def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
     out = law.sample(theta, rng)
     move = min(float(np.sqrt(np.mean((angle - theta) ** 2))) for angle in (out, np.pi - out))
     best = (0.0, np.inf, np.inf)
-    for start in range(0, FREQUENCIES.size, AT_ONCE):
+    slowest = FREQUENCIES / max(move, LEAST_MOVE)
+    frequencies = slowest + max(least - slowest[0], 0.0)
+    # exp(i t_k theta) = exp(i t_first theta) exp(i (t_k - t_first) theta), and frequencies are equally spaced
+    offsets = frequencies[:AT_ONCE] - frequencies[0]
+    steps = [np.exp(1j * offsets[:, None] * angle) for angle in (theta, out)]
+    for start in range(0, frequencies.size, AT_ONCE):
         # cosines and sines as real and imaginary parts, shape (frequencies, rays)
-        t = FREQUENCIES[start : start + AT_ONCE] / max(move, LEAST_MOVE)
-        t += max(least - FREQUENCIES[0] / max(move, LEAST_MOVE), 0.0)
-        here, there = (np.exp(1j * t[:, None] * angle) for angle in (theta, out))
+        t = frequencies[start : start + AT_ONCE]
+        here, there = (
+            np.exp(1j * t[0] * angle) * step[: t.size] for angle, step in zip((theta, out), steps, strict=True)
+        )
         variance, form = _squares(here - here.mean(axis=1)[:, None]), 0.5 * _squares(there - here)
         lower = np.linalg.cholesky(variance)
         scaled = np.linalg.solve(lower, np.swapaxes(np.linalg.solve(lower, form), 1, 2))
@@ -70,6 +76,5 @@ def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
 
 def _squares(values: NDArray[np.complex128]) -> Floats:
     """Mean products of real and imaginary parts, shape (frequencies, 2, 2)."""
-    square, product = (np.abs(values) ** 2).mean(axis=1), (values**2).mean(axis=1)
-    rows = [[square + product.real, product.imag], [product.imag, square - product.real]]
-    return np.asarray(0.5 * np.moveaxis(np.array(rows), -1, 0))
+    parts = np.stack((values.real, values.imag), axis=1)
+    return np.asarray(parts @ np.swapaxes(parts, 1, 2) / values.shape[1])
