@@ -172,8 +172,10 @@ def _programs() -> list[WallGoal]:
             empty = {**os.environ, "NUMBA_CACHE_DIR": str(Path(folder) / str(number))}
             goals.append(_in_seconds(what, limit, lambda script=script, empty=empty: _run(["-c", script], empty)))
         study = ["-m", "asperity", "study", "focusing-arcs", "--force", "--out", str(Path(folder) / "study")]
-        _run(study, os.environ)
-        goals.append(_in_seconds("asperity study focusing-arcs, warm", 3.0, lambda: _run(study, os.environ)))
+        # a warm command has its bytecode, too
+        keeping = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+        _run(study, keeping)
+        goals.append(_in_seconds("asperity study focusing-arcs, warm", 3.0, lambda: _run(study, keeping)))
     return goals
 
 

@@ -27,6 +27,8 @@ RATIO, SMALLEST = 0.35, 1e-4
 WIDEST = np.pi / 24
 # Breakpoints xi (1 +- 1/N) of a circular arc become panel edges until their spacing falls below this fraction of xi.
 BREAKPOINT_SPACING = 0.05
+# Angles evaluated at a time.
+AT_ONCE = 2048
 
 
 @explained_class
@@ -141,7 +143,13 @@ class Panels(Basis):
         """The panel of each angle and the values of this panel's functions, shape ``angle.shape + (degree + 1,)``."""
         angle = np.asarray(angle, dtype=np.float64)
         panel = self._cells.index(angle)
-        return panel, np.einsum("...k,...ki->...i", self.legendre(angle, panel), self._coefficients[panel])
+        polynomials, owner = self.legendre(angle, panel).reshape(-1, self.degree + 1), panel.ravel()
+        values = np.empty_like(polynomials)
+        # in parts whose coefficients fit into the processor's cache
+        for start in range(0, owner.size, AT_ONCE):
+            part = slice(start, start + AT_ONCE)
+            np.einsum("ak,aki->ai", polynomials[part], self._coefficients[owner[part]], out=values[part])
+        return panel, values.reshape(*angle.shape, self.degree + 1)
 
     def legendre(self, angle: Floats, panel: NDArray[np.int64]) -> Floats:
         """The Legendre polynomials of the given panels at the angles, shape ``angle.shape + (degree + 1,)``."""
