@@ -60,7 +60,7 @@ FIRST_HOLLOW = np.int64(0)
 
 
 class Room(NamedTuple):
-    """Work space: six arrays for the rays of a block, whose size is theirs.
+    """Work space: six arrays, as long as a block has rays.
 
     Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, of which ``heads``
     is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and the work space of waves.
@@ -74,7 +74,7 @@ class Room(NamedTuple):
     waves: Floats
 
 
-def room_for(hollows: Floats, block: int = RAYS) -> Room:
+def room_for(hollows: Floats, block: int) -> Room:
     """Return the work space of `trace_closed`, for one thread and blocks of rays."""
     rays, others, met = np.empty((3, block), np.int64)
     return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(WORK))
