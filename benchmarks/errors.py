@@ -1,8 +1,9 @@
 """Reported errors of adaptive conditionals and matrices, against references by a second method.
 
 ``python -m benchmarks.errors`` computes the first moment and five conditionals for 24 random curved walls and
-tolerances from 1e-4 to 1e-9. It prints how many true errors exceed the reported errors, and the median ratio of
-reported to true errors, by wall and by tolerance. Cases beyond the reference's accuracy are marked.
+tolerances from 1e-4 to 1e-9, and matrices in three bases of these walls and of eight with an exact law. It prints how
+many true errors exceed the reported errors, and the median ratio of reported to true errors, by wall and by tolerance.
+Cases beyond the reference's accuracy are marked.
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
+from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.core.tables import table
 from asperity.kernels.discretisation.method import Budget
@@ -25,6 +28,13 @@ from asperity.kernels.walls.conditionals import adaptive_conditionals
 TESTS = Path(__file__).parents[1] / "tests"
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 FLIGHTS = 8_000_000
+# Matrices of curved walls are compared with ones of REFERENCE_FACTOR times as many ray segments.
+MATRIX_TOLERANCES, REFERENCE_FACTOR = (1e-1, 1e-2, 1e-3, 1e-4), 10
+BASES = (ker.Bins(8), ker.Bins(32), ker.Legendre(8))
+EXACT = (
+    geo.focusing_arcs(0.5), geo.focusing_arcs(1.0), geo.focusing_arcs(1.4), geo.rectangular_teeth(0.5),
+    geo.triangular_teeth(0.4), geo.triangular_teeth(0.9), geo.koch(1), geo.koch(2),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -85,6 +95,43 @@ def outcomes(
                 within = error <= tolerance
 
 
+def matrices(kinds: Sequence[int], most_segments: int) -> Iterator[Outcome]:
+    """Matrices of curved walls against much finer ones, and of walls with an exact law against this law."""
+    from random_curved_walls import random_curved_wall
+
+    for kind in kinds:
+        wall = random_curved_wall(kind)
+        for basis in BASES:
+            fine, error, _ = traced_matrix(wall, basis, Budget(1e-9, segments=REFERENCE_FACTOR * most_segments))
+            yield from _against(fine, error, f"matrix {basis!r}", kind, wall, basis, most_segments)
+    for kind, wall in enumerate(EXACT):
+        for basis in BASES:
+            exact = ker.discretise(ker.WallLaw(wall), basis, tolerance=1e-8)
+            known = exact.symmetric, float(exact.error)
+            yield from _against(*known, f"exact {basis!r}", kind, wall, basis, most_segments)
+
+
+def _against(
+    truth: np.ndarray, known: float, what: str, kind: int, wall: geo.Wall, basis: ker.Basis, most_segments: int
+) -> Iterator[Outcome]:
+    for tolerance in MATRIX_TOLERANCES:
+        matrix, error, _ = traced_matrix(wall, basis, Budget(tolerance, segments=most_segments))
+        yield Outcome(what, kind, tolerance, error, float(np.linalg.norm(matrix - truth)), known)
+        if error > tolerance:
+            break
+
+
+def by_basis(found: Sequence[Outcome]) -> str:
+    """A line for each basis and tolerance of the matrices."""
+    lines = []
+    for what in dict.fromkeys(one.what for one in found):
+        for tolerance in MATRIX_TOLERANCES:
+            some = [one for one in found if (one.what, one.tolerance) == (what, tolerance)]
+            lines.append(f"{what} | {tolerance:.0e} | {summary(some)}")
+    lines.append(f"all | | {summary(found)}")
+    return table("what | tolerance | numbers | exceed | cannot be told | median of reported/true", lines)
+
+
 def summary(found: Sequence[Outcome]) -> str:
     """Counts of all outcomes, of exceeded errors and of undecided outcomes, and the median of the ratios."""
     ratios = [outcome.ratio for outcome in found if outcome.ratio is not None]
@@ -125,16 +172,27 @@ def main() -> None:
     sys.path.insert(0, str(TESTS))
     parser = argparse.ArgumentParser(prog="python -m benchmarks.errors", description=__doc__)
     parser.add_argument("--flights", type=int, default=FLIGHTS, help="flights of rays for a moment at most")
-    parser.add_argument("--rows-only", action="store_true", help="leave the moments out")
+    parser.add_argument("--rows-only", action="store_true", help="leave the moments and matrices out")
+    parser.add_argument("--matrices-only", action="store_true", help="leave the rows and moments out")
     arguments = parser.parse_args()
-    started = time.process_time()
+    started, kinds = time.process_time(), [entry["kind"] for entry in references()]
+    if not arguments.matrices_only:
+        moments = not arguments.rows_only
+        found = _shown(outcomes([kind], TOLERANCES, arguments.flights, moments) for kind in kinds)
+        print(f"\n{by_tolerance(found)}\n\n{by_wall(found)}\n")
+    if not arguments.rows_only:
+        print(f"{by_basis(_shown([matrices(kinds, arguments.flights)]))}\n")
+    print(f"{time.process_time() - started:.0f} s")
+
+
+def _shown(parts: Iterable[Iterable[Outcome]]) -> list[Outcome]:
+    """All outcomes; those that exceed their errors are printed at once."""
     found = []
-    for kind in [entry["kind"] for entry in references()]:
-        for outcome in outcomes([kind], TOLERANCES, arguments.flights, not arguments.rows_only):
-            found.append(outcome)
-            if outcome.exceeds:
-                print(outcome, flush=True)
-    print(f"\n{by_tolerance(found)}\n\n{by_wall(found)}\n\n{time.process_time() - started:.0f} s")
+    for outcome in chain.from_iterable(parts):
+        found.append(outcome)
+        if outcome.exceeds:
+            print(outcome, flush=True)
+    return found
 
 
 if __name__ == "__main__":

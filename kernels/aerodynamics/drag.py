@@ -68,7 +68,7 @@ def resistance(
     law : Law
         A law in the paper's convention.
     tolerance : float
-        Wanted error. For a traced wall with few pieces the work is limited to some forty million ray segments, 5 to 15
+        Wanted error. For a traced wall with few pieces the work is limited to 140 million ray segments, 10 to 25
         seconds; ``error`` is the error reached.
     cost : callable
         ``cost(theta, theta_out)`` of two arrays that broadcast, radians; smooth between the breakpoints.

@@ -33,18 +33,18 @@ ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
 ANGLES_A_PIECE, SEGMENTS_A_CHANGE = 100, 400
 # The asymmetry ||S - S^T|| shows the antisymmetric part of errors that the error estimates of panels and angles miss.
 # If the symmetric part has the same size, the whole error is sqrt(2)/2 times the asymmetry; the rest is a margin.
-ASYMMETRY_FACTOR = 2.0
+ASYMMETRY_FACTOR, FEW_PAIRS = 1.25, 3.0
 # Error of Kronrod's rule as a fraction of its difference from Gauss's rule. Its root mean square over the positions of
 # a singularity is 0.38 for the square root at which a piece appears and 0.26 for a breakpoint; its mean is 0.
 KRONROD_FRACTION = 0.5
 # Incoming angles computed at a time, so that their nodes fit into memory.
 ANGLES_AT_ONCE = 1500
 # The errors of all conditional expectations together may be this fraction of the tolerance.
-MEAN_FRACTION = 0.1
+MEAN_FRACTION = 0.3
 SMALLEST_MEAN_TOLERANCE = 1e-14
 # The tolerance is approached in stages by this ratio, from a first one of at most COARSEST_STAGE. If only a coarse
 # result can be reached, its conditional expectations are coarse as well.
-STAGE_RATIO, COARSEST_STAGE = 1e-2, 0.1
+STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
 # Conditional expectations on a panel of smaller measure may be coarser, up to the error of a panel of this measure.
 FAIR_FRACTION = 0.02
 COARSEST_MEAN = 1e-4
@@ -119,7 +119,7 @@ def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, flo
     The error of a panel is half the difference of Kronrod's and Gauss's rule if the expectations have a kink there. If
     they are smooth, it is this difference scaled by a ratio measured when the panel was divided. The errors of panels
     differ in sign, so they are added in quadrature, together with ASYMMETRY_FACTOR times the asymmetry of the result,
-    which shows other errors. The errors of the expectations, which may all have one sign, are added linearly.
+    which shows other errors. The errors of the expectations are bounded whatever their signs.
     """
     inner, fraction = basis, 1.0
     if basis.is_polynomial and basis.size < FEWEST_FUNCTIONS:
@@ -150,23 +150,22 @@ class _Integrator:
         inside, degree, least = np.empty(0), 1, 0
         if basis.is_polynomial:
             degree = max(1, basis.size - 1)
-            self.scale = float(basis.size)
         else:
             inside = basis.edges[1:-1]
             # Piecewise polynomials of this degree are integrated after a substitution of degree 3.
             local = 0 if basis.is_partition else basis.nodes_per_interval
             degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
-            middle = 0.5 * (basis.edges[1:] + basis.edges[:-1])
-            self.scale = float(np.max(np.linalg.norm(basis.evaluate(middle), axis=1)))
         fraction = FRACTION_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_FRACTION
         longest = max(int(fraction * budget.segments), LEAST_SEGMENTS)
-        self.conditionals = WallConditionals(wall, degree, inside, least, longest)
+        self.sizes, _ = basis.magnitudes()
+        self.conditionals = WallConditionals(wall, degree, inside, least, longest, self.sizes)
         edges = basis.edges
+        self.sided = bool(np.any(np.abs(edges - 0.5 * np.pi) < 1e-12))
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
         stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
         self.first_tolerance = self.tolerance / STAGE_RATIO**stages
-        self.mean_tolerance = MEAN_FRACTION * self.first_tolerance / self.scale
+        self.mean_tolerance = MEAN_FRACTION * self.first_tolerance
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
         self._add_panels(edges[:-1], edges[1:])
 
@@ -205,10 +204,10 @@ class _Integrator:
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
-        self.mean_tolerance = max(MEAN_FRACTION * tolerance / self.scale, SMALLEST_MEAN_TOLERANCE)
-        coarse = self.panels.mean_errors(self.basis) > 2.0 * MEAN_FRACTION * tolerance * np.maximum(
-            self.panels.mass, FAIR_FRACTION
-        )
+        self.mean_tolerance = max(MEAN_FRACTION * tolerance, SMALLEST_MEAN_TOLERANCE)
+        mass = np.maximum(self.panels.mass, FAIR_FRACTION)
+        coarse = self.panels.mean_errors(self.basis) > 2.0 * self.mean_tolerance * mass
+        coarse &= self.panels.mean_squares() > (2.0 * self.mean_tolerance) ** 2 * mass
         self._fill(self.panels, np.broadcast_to(coarse[:, None], self.panels.angle.shape))
         self._recompute()
 
@@ -245,11 +244,14 @@ class _Integrator:
                 .sum(0)
             )
         panels = float(np.linalg.norm(self.panels.error))
-        conditionals = float(np.sum(self.panels.mean_errors(self.basis)))
+        conditionals = self.panels.total_mean_error(self.basis)
         if self.halved:
             flip = reflection_matrix(self.basis)
-            matrix, panels, conditionals = matrix + flip @ matrix @ flip.T, 2.0 * panels, 2.0 * conditionals
-        return matrix, panels, conditionals, ASYMMETRY_FACTOR * float(np.linalg.norm(matrix - matrix.T))
+            # the halves share no row of the matrix if each basis function lives on one side
+            both = math.sqrt(2.0) if self.sided else 2.0
+            matrix, panels, conditionals = matrix + flip @ matrix @ flip.T, both * panels, both * conditionals
+        factor = ASYMMETRY_FACTOR + FEW_PAIRS / self.basis.size
+        return matrix, panels, conditionals, factor * float(np.linalg.norm(matrix - matrix.T))
 
     def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:
         """The panels to divide: the worst ones, so many that the others together have an error below goal / 4."""
@@ -313,7 +315,8 @@ class _Integrator:
     def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
         """Compute the expectations at the nodes of the mask, and the errors of their panels."""
         fraction = FAIR_FRACTION / np.maximum(panels.mass, np.finfo(np.float64).tiny)
-        tolerance = np.minimum(self.mean_tolerance * np.maximum(1.0, fraction), COARSEST_MEAN)
+        coarsest = COARSEST_MEAN * float(np.median(self.sizes))
+        tolerance = np.minimum(self.mean_tolerance * np.sqrt(np.maximum(1.0, fraction)), coarsest)
         panel, node = np.nonzero(mask)
         for first in range(0, len(panel), ANGLES_AT_ONCE):
             few = slice(first, first + ANGLES_AT_ONCE)
@@ -323,6 +326,6 @@ class _Integrator:
             panels.image[panel[few], node[few]] = means_of_basis(
                 self.basis, conditionals.nodes, conditionals.weights, conditionals.starts
             )
-            panels.mean_error[panel[few], node[few]] = self.scale * (conditionals.error + 2.0 * conditionals.unresolved)
+            panels.mean_error[panel[few], node[few]] = conditionals.error
         touched = np.unique(panel)
         panels.error[touched] = KRONROD_FRACTION * panels.selected(touched).differences(self.basis)

@@ -46,7 +46,7 @@ class AnglePanels:
     ----------
     low, high : array, shape (panels,)
     angle, mean_error : array, shape (panels, 15)
-        The nodes, and the errors of the expectations there.
+        The nodes, and the errors there of the vector of all expectations.
     image : array, shape (panels, 15, size)
         The expectations of the basis functions, E[e_j(Theta') | theta], at the nodes.
     error : array, shape (panels,)
@@ -82,10 +82,13 @@ class AnglePanels:
             *(np.concatenate((getattr(self, field.name), getattr(other, field.name))) for field in fields(self))
         )
 
+    def _weights(self, rule: Floats) -> Floats:
+        """The weights of a rule at the nodes for the measure, shape (panels, 15)."""
+        return np.asarray((self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * rule)
+
     def _integrals(self, rule: Floats, basis: Basis) -> Floats:
         """The integrals of e_i(theta) E[e_j(Theta') | theta] over each panel, shape (panels, size, size)."""
-        weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * rule
-        here = basis.evaluate(self.angle) * weight[..., None]
+        here = basis.evaluate(self.angle) * self._weights(rule)[..., None]
         return np.asarray(np.matmul(here.transpose(0, 2, 1), self.image))
 
     def values(self, basis: Basis) -> Floats:
@@ -98,6 +101,28 @@ class AnglePanels:
 
     def mean_errors(self, basis: Basis) -> Floats:
         """The errors of the integrals due to the errors of the expectations, shape (panels,)."""
-        weight = (self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * KRONROD
+        return np.asarray(np.sum(self._linear_errors(basis), axis=1))
+
+    def mean_squares(self) -> Floats:
+        """The integrals of the squared errors of the expectations, shape (panels,)."""
+        return np.asarray(np.sum(self._weights(KRONROD) * self.mean_error**2, axis=1))
+
+    def total_mean_error(self, basis: Basis) -> float:
+        """A bound of the Frobenius error of all integrals together due to the errors of the expectations.
+
+        The integrals are the product of two arrays with one row per node: the values e_i(theta) of the basis and the
+        expectations, both times the roots of the weights. So errors d of the expectations change them by at most the
+        norm of the first array times the root of the sum of the weighted d^2. At a few nodes with large errors the sum
+        of the changes by single nodes may be smaller; the bound uses it for the largest errors, as many as is best.
+        """
+        weight, here = self._weights(KRONROD).ravel(), basis.evaluate(self.angle.ravel())
+        norm = float(np.linalg.norm(here.T @ (weight[:, None] * here), 2))
+        order = np.argsort(-self.mean_error, axis=None)
+        single = np.append(0.0, np.cumsum(self._linear_errors(basis).ravel()[order]))
+        squares = np.append(np.cumsum((weight * self.mean_error.ravel() ** 2)[order[::-1]])[::-1], 0.0)
+        return float(np.min(single + np.sqrt(norm * squares)))
+
+    def _linear_errors(self, basis: Basis) -> Floats:
+        """The changes of the integrals by the error at each node, shape (panels, 15)."""
         size = np.linalg.norm(basis.evaluate(self.angle), axis=2)
-        return np.asarray(np.sum(weight * size * self.mean_error, axis=1))
+        return np.asarray(self._weights(KRONROD) * size * self.mean_error)

@@ -121,7 +121,13 @@ class WallConditionals:
     """Conditional distributions of one wall for one kind of functions, with data shared by all calls."""
 
     def __init__(
-        self, wall: Wall, degree: int, edges: Floats, least_level: int = 0, most_segments: int = NO_LIMIT
+        self,
+        wall: Wall,
+        degree: int,
+        edges: Floats,
+        least_level: int = 0,
+        most_segments: int = NO_LIMIT,
+        sizes: Floats | None = None,
     ) -> None:
         self.wall = wall.cell
         self.degree = degree
@@ -133,13 +139,15 @@ class WallConditionals:
         self.edges = np.array(edges, dtype=np.float64)
         if self.edges.ndim != 1:
             raise InputError(f"edges: expected shape (n,), got {self.edges.shape}")
+        # bounds of the functions between the edges, or of the norm if they are vectors
+        self.sizes = np.ones(len(self.edges) + 1) if sizes is None else sizes
         # angles of earlier calls now known to have missed a piece; the caller may clear the set
         self.outdated: set[float] = set()
 
     @cached_property
     def _hollows(self) -> list[HollowConditionals]:
         """The conditional distributions of one hollow of each shape."""
-        task = self.degree, self.edges, self.least_level, self.most_segments
+        task = self.degree, self.edges, self.sizes, self.least_level, self.most_segments
         return [HollowConditionals(self.wall.scene, k, *task) for k, _ in self._shapes]
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
+from ...geometry.itineraries.pieces import Pieces, samples_between
 from ...geometry.scene.columns import LEFT, RIGHT, RUN_SINE
 
 if TYPE_CHECKING:
@@ -26,6 +27,10 @@ MOST_COLLISIONS, MOST_IN_RUNS = 100_000, 8
 NO_LIMIT = 2**62
 # Rounds in which conditional distributions are recomputed because a neighbour has a piece that they missed.
 MOST_ROUNDS = 8
+# Steps between the angles of a round of one computation: about those of a panel at first, then their middles.
+WIDEST_STEP, STEPS = 16, (8, 4, 2, 1)
+# Least distance of a sample from a predicted change, in the error of the change that the tolerance allows.
+SAMPLE_DISTANCE = 0.1
 # Critical angles per search, and the least width of their pieces as a fraction of the widest piece.
 MOST_CUTS, CUT_FRACTION = 6, 0.1
 
@@ -39,11 +44,13 @@ class Conditional(NamedTuple):
     unresolved: float
 
 
-class _Pieces(NamedTuple):
-    low: Floats
-    high: Floats
-    label: NDArray[np.uint64]
-    width_that_matters: float
+def _rounds(count: int) -> list[NDArray[np.int64]]:
+    """The numbers of increasing angles in the order of their computation, in rounds.
+
+    Every angle of a round lies in the middle between angles of earlier rounds, except in the first round.
+    """
+    number = np.arange(count)
+    return [number[::WIDEST_STEP], *(number[step :: 2 * step] for step in STEPS if step < count)]
 
 
 def _result(call: Callable[[], Result]) -> Result:
@@ -66,13 +73,15 @@ class HollowConditionals:
     hollow: int
     degree: int
     edges: Floats
+    sizes: Floats
     least_level: int
     most_segments: int = NO_LIMIT
 
     def __post_init__(self) -> None:
         self.rays, self.segments = 0, 0
+        self._size = float(np.median(self.sizes))
         self._theta = np.empty(0)
-        self._pieces: dict[float, _Pieces] = {}
+        self._pieces: dict[float, Pieces] = {}
         self._missed: dict[float, list[float]] = {}
         self._critical: dict[tuple[int, float, float], float] = {}
 
@@ -92,7 +101,7 @@ class HollowConditionals:
         has_runs = has_channels or (scene.circles is not None and bool(np.any(scene.circles[:, RUN_SINE] > 0.0)))
         most = NO_LIMIT if has_channels else MOST_COLLISIONS
         limits = Limits(most, MOST_IN_RUNS if has_runs else MOST_COLLISIONS, self.most_segments)
-        return setting_of(scene, self.hollow, limits, self.edges)
+        return setting_of(scene, self.hollow, limits, self.edges, self.sizes)
 
     def march(self, theta: Floats, tolerances: Floats) -> tuple[dict[float, Conditional], set[float]]:
         """Conditional distributions at increasing angles, and the angles of earlier calls now known to miss a piece."""
@@ -100,7 +109,10 @@ class HollowConditionals:
         asked, outdated = set(theta.tolist()), set[float]()
         pending = np.ones(len(theta), dtype=np.bool_)
         for _ in range(MOST_ROUNDS):
-            found_conditionals.update(self._march_once(theta[pending], tolerances[pending]))
+            ordered = np.flatnonzero(pending)
+            for chosen in _rounds(len(ordered)):
+                own = ordered[chosen]
+                found_conditionals.update(self._march_once(theta[own], tolerances[own]))
             missed = self._compare(theta[pending])
             outdated |= missed - asked
             pending = np.isin(theta, list(missed & asked))
@@ -112,8 +124,10 @@ class HollowConditionals:
         from ...geometry.itineraries.compiled.gauss import gauss_tables
         from ...geometry.itineraries.compiled.march import marched_angles
 
+        # the width whose error is one tolerance
+        unit = self.width / self._size
         seeds = [
-            self._seeds(angle, least) for angle, least in zip(theta.tolist(), tolerances * self.width, strict=True)
+            self._seeds(angle, least) for angle, least in zip(theta.tolist(), (tolerances * unit).tolist(), strict=True)
         ]
         found = _result(
             lambda: marched_angles(
@@ -131,30 +145,35 @@ class HollowConditionals:
             own = slice(piece_starts[k], piece_starts[k + 1])
             low, high, label = (part[own].copy() for part in pieces)
             # at the limit of ray segments pieces are missing, and the error reports it: no comparison
-            matters = np.inf if segments[k] >= self.most_segments else float(tolerances[k] * self.width)
-            self._pieces[angle] = _Pieces(low, high, label, matters)
+            matters = np.inf if segments[k] >= self.most_segments else float(tolerances[k] * unit)
+            self._pieces[angle] = Pieces.at(angle, low, high, label, matters)
         self._theta = np.union1d(self._theta, theta)
         return found_conditionals
 
     def _seeds(self, angle: float, least: float) -> Floats:
         """Start samples at an angle, in increasing order.
 
-        They include the middles of the wide pieces at the nearest known angles, and the points of missed pieces.
+        They include the points of missed pieces, and the changes of itinerary found before at this angle, else samples
+        on both sides of the changes that are predicted from the neighbouring known angles.
         """
-        from ...geometry.itineraries.compiled.march import MOST_SEEDS, wide_middles
+        from ...geometry.itineraries.compiled.changes import MOST_SAMPLES
         from ...geometry.itineraries.entry_nodes import first_nodes
 
-        k = int(np.searchsorted(self._theta, angle))
-        known = [self._pieces[near] for near in self._theta[max(0, k - 1) : k + 2].tolist()]
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]].tolist()
-        entries = [first_nodes(angle, left, right, least)]
-        for conditional in known:
-            middles = np.empty(MOST_SEEDS)
-            entries.append(middles[: wide_middles(conditional.low, conditional.high, least, middles)])
+        entries = [first_nodes(angle, left, right, least), np.array(self._missed.get(angle, []), dtype=np.float64)]
         if angle in self._pieces:
-            # the changes of itinerary found before
             entries += [self._pieces[angle].low, self._pieces[angle].high]
-        return np.sort(np.concatenate([*entries, np.array(self._missed.get(angle, []), dtype=np.float64)]))
+        else:
+            k = int(np.searchsorted(self._theta, angle))
+            far, near = self._theta[max(0, k - 2) : k + 2].tolist(), self._theta[max(0, k - 1) : k + 1].tolist()
+            known = [self._pieces[theta] for theta in near]
+            if len(known) == 2:
+                farther = [self._pieces[theta] for theta in far if theta not in near]
+                entries.append(samples_between(angle, (known[0], known[1]), farther, SAMPLE_DISTANCE * least))
+            else:
+                entries += [pieces.middles(least) for pieces in known]
+        together = np.sort(np.concatenate(entries))
+        return together[:: 1 + 2 * len(together) // MOST_SAMPLES]
 
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among ``theta`` and their neighbours at which a piece was missed."""
@@ -165,10 +184,10 @@ class HollowConditionals:
         fresh = np.isin(near, position)
         linked = (np.diff(near) == 1) & (fresh[1:] | fresh[:-1])
         angles = self._theta[near]
-        found_conditionals = [self._pieces[angle] for angle in angles.tolist()]
-        pieces = tuple(np.concatenate([conditional[part] for conditional in found_conditionals]) for part in range(3))
-        starts = np.cumsum([0, *(len(conditional.low) for conditional in found_conditionals)])
-        least = np.array([conditional.width_that_matters for conditional in found_conditionals])
+        near_pieces = [self._pieces[angle] for angle in angles.tolist()]
+        pieces = tuple(np.concatenate(parts) for parts in zip(*(known[1:4] for known in near_pieces), strict=True))
+        starts = np.cumsum([0, *(len(known.low) for known in near_pieces)])
+        least = np.array([known.matters for known in near_pieces])
         most = 2 * len(pieces[0])
         found = np.empty(most, np.int64), np.empty(most), np.zeros(1, np.int64)
         count, rays = _result(
@@ -194,7 +213,7 @@ class HollowConditionals:
                 there = set(self._pieces[absent].label.tolist())
                 conditional = self._pieces[present]
                 for k, label in enumerate(conditional.label.tolist()):
-                    if label not in there and conditional.high[k] - conditional.low[k] > conditional.width_that_matters:
+                    if label not in there and conditional.high[k] - conditional.low[k] > conditional.matters:
                         found.append((float(conditional.high[k] - conditional.low[k]), label, present, absent, k))
         found.sort(reverse=True)
         cuts = []

@@ -70,12 +70,16 @@ class Tracer(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """The data common to all angles: row of the hollow, tables of the wall, limits, edges of outgoing bins, tracer."""
+    """The data common to all angles: row of the hollow, tables of the wall, limits, outgoing cells, tracer.
+
+    ``edges`` are the edges between the cells, and ``sizes`` bounds of the functions to integrate in each cell.
+    """
 
     hollow: Floats
     tables: Tables
     limits: Limits
     edges: Floats
+    sizes: Floats
     tracer: Tracer
 
 
@@ -99,12 +103,13 @@ class Chain(NamedTuple):
     fresh: NDArray[np.int64]
 
 
-def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats) -> Setting:
+def setting_of(scene: Scene, hollow: int, limits: Limits, edges: Floats, sizes: Floats) -> Setting:
     """Return the setting of hollow number ``hollow``, for use by one thread at a time."""
     results, angles, stop = results_for(BLOCK, BLOCK, BLOCK), np.empty(BLOCK), np.zeros(1, np.int64)
     tracer = Tracer(trace_rays_address(), _halve_address(), SLOTS, angles, results, np.empty(BLOCK), stop)
     tables = scene.tables
-    return Setting(tables.hollows[hollow], tables, limits, np.require(edges, np.float64, ["C", "A", "W"]), tracer)
+    edges, sizes = (np.require(values, np.float64, ["C", "A", "W"]) for values in (edges, sizes))
+    return Setting(tables.hollows[hollow], tables, limits, edges, sizes, tracer)
 
 
 def empty_chain() -> Chain:
@@ -183,15 +188,23 @@ def is_spent(task):
 
 
 @inlined
-def spread(first, second, task):
-    """Return the largest difference of cos(angle), cos(k angle) and sin(k angle), k = ``task.degree``.
+def size_at(out, task):
+    """Return the size of the functions in the cell of an outgoing angle."""
+    return task.setting.sizes[cell_of(out, task.setting.edges)]
 
-    It is 2 if an edge lies between the angles: there a function of sup norm 1 may jump by so much.
+
+@inlined
+def spread(first, second, task):
+    """Return the largest difference of the functions between two outgoing angles.
+
+    In one cell it is that of cos(angle), cos(k angle) and sin(k angle), k = ``task.degree``, times the functions' size;
+    in two cells the sum of the sizes.
     """
-    k, edges = max(task.degree, 1), task.setting.edges
-    if cell_of(first, edges) != cell_of(second, edges):
-        return 2.0
-    return max(
+    k, edges, sizes = max(task.degree, 1), task.setting.edges, task.setting.sizes
+    here, there = cell_of(first, edges), cell_of(second, edges)
+    if here != there:
+        return sizes[here] + sizes[there]
+    return sizes[here] * max(
         abs(math.cos(first) - math.cos(second)),
         max(abs(math.cos(k * first) - math.cos(k * second)), abs(math.sin(k * first) - math.sin(k * second))),
     )
@@ -203,7 +216,9 @@ def undecided(before, task, chain):
     xs, outs, _, follow, _, _ = chain
     after = follow[before]
     width, whole = xs[after] - xs[before], task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
-    return 0.5 * width * (spread(outs[before], outs[after], task) + math.sqrt(width / whole))
+    return (
+        0.5 * width * (spread(outs[before], outs[after], task) + size_at(outs[before], task) * math.sqrt(width / whole))
+    )
 
 
 @inlined
@@ -287,7 +302,7 @@ def example_task() -> Task:
     """Return a task of the types of all tasks, for which functions are compiled to be called by their address."""
     results, stop = results_for(0), np.zeros(1, np.int64)
     tracer = Tracer(0, 0, SLOTS, np.empty(0), results, np.empty(0), stop)
-    setting = Setting(np.empty(0), NO_TABLES, Limits(1, 1, 1), np.empty(0), tracer)
+    setting = Setting(np.empty(0), NO_TABLES, Limits(1, 1, 1), np.empty(0), np.empty(0), tracer)
     return Task(setting, 0.0, 0, stop)
 
 

@@ -11,15 +11,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
 from ...tracing.compiled.options import linked, linked_allocating
-from .changes import FIRST_LABEL, is_spent, outcome, trace_block
+from .changes import BLOCK, FIRST_LABEL, is_spent, outcome, size_at, trace_block
 
-ORDERS = (4, 7, 12, 20, 32)
+LEVELS = 5
+MOST_POSITIONS = 2 ** (LEVELS + 1) - 1
 # Limit on the nodes of one incoming angle.
 MOST_NODES = 1 << 17
 # Further nodes for margins and gaps.
@@ -31,28 +31,36 @@ LEAST_RATIO = 0.03
 NARROWEST = 1e-9
 MOST_HALVINGS = 40
 # Least fraction of the tolerance for the rules of one piece, however narrow.
-LEAST_FRACTION = 0.02
+LEAST_FRACTION = 0.05
 
 
 class Rules(NamedTuple):
-    """Positions in (0, 1) and weights of all rules, consecutively, their starts, and the number of the first rule."""
+    """Nested rules: the positions in (0, 1) of the finest, the weights of every rule, and the number of the first rule.
+
+    The rule of number ``level`` has the first 2^(level + 2) - 1 positions.
+    """
 
     positions: Floats
     weights: Floats
-    starts: NDArray[np.int64]
     least: int
 
 
 def gauss_tables(least: int) -> Rules:
     """Return the rules after the substitution, to be used from number ``least`` on."""
-    positions, weights, starts = [], [], [0]
-    for order in ORDERS:
-        node, weight = np.polynomial.legendre.leggauss(order)
-        s = 0.5 * (1.0 + node)
-        positions.append(s * s * (3.0 - 2.0 * s))
-        weights.append(0.5 * weight * 6.0 * s * (1.0 - s))
-        starts.append(starts[-1] + order)
-    return Rules(np.concatenate(positions), np.concatenate(weights), np.array(starts), least)
+    positions, weights = np.empty(0), np.zeros((LEVELS, MOST_POSITIONS))
+    for level in range(LEVELS):
+        intervals = 2 ** (level + 2)
+        number = np.arange(1, intervals)
+        fresh = number if level == 0 else number[::2]
+        positions = np.append(positions, fresh / intervals)
+        # Fejer's second rule: interpolation at the inner extrema of Chebyshev's polynomials
+        odd = np.arange(1, intervals, 2)
+        angle = np.pi * positions
+        weights[level, : len(angle)] = (
+            2.0 / intervals * np.sin(angle) * np.sum(np.sin(np.outer(angle, odd)) / odd, axis=1)
+        )
+    s = np.sin(0.5 * np.pi * positions) ** 2
+    return Rules(s * s * (3.0 - 2.0 * s), 2.0 * weights * 3.0 * s * (1.0 - s), least)
 
 
 @linked
@@ -63,37 +71,42 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     rays. Without ``strict`` labels are ignored, and only the difference of the rules reveals a missed change.
     """
     low, high = ends
-    positions, weights, starts, least = rules
+    positions, weights, least = rules
     node, mass = nodes
     degree = task.degree
     width = high - low
     old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
     k = max(degree, 1)
     error = 2.0 * width
-    used, rays = np.int64(0), np.int64(0)
-    for level in range(least, len(ORDERS)):
-        first, last = starts[level], starts[level + 1]
-        if last - first > MOST_NODES - filled - 2 or is_spent(task):
+    used = np.int64(0)
+    for level in range(LEVELS):
+        count = (4 << level) - 1
+        if count > MOST_NODES - filled - 2 or is_spent(task):
             break
+        for first in range(used, count, BLOCK):
+            last = min(first + BLOCK, count)
+            block = task.setting.tracer.entries[: last - first]
+            for n in range(first, last):
+                block[n - first] = low + width * positions[n]
+            trace_block(block, task)
+            for n in range(first, last):
+                x = block[n - first]
+                out, here = outcome(n - first, x, task)
+                if strict and here != label:
+                    return used, error, x, np.int64(n)
+                node[filled + n] = out
+        used = count
+        if level < least:
+            continue
         new0, new1, new2 = 0.0, 0.0, 0.0
-        block = task.setting.tracer.entries[: last - first]
-        for n in range(first, last):
-            block[n - first] = low + width * positions[n]
-        trace_block(block, task)
-        for n in range(first, last):
-            x = block[n - first]
-            out, here = outcome(n - first, x, task)
-            rays += 1
-            if strict and here != label:
-                return used, error, x, rays
-            weight = width * weights[n]
-            node[filled + n - first], mass[filled + n - first] = out, weight
+        for n in range(count):
+            weight, out = width * weights[level, n], node[filled + n]
+            mass[filled + n] = weight
             new0 += weight * math.cos(out)
             new1 += weight * math.cos(k * out)
             new2 += weight * math.sin(k * out)
-        used = last - first
         if degree == 0 or label < FIRST_LABEL:
-            return used, 0.0, np.nan, rays
+            return used, 0.0, np.nan, used
         if level > least:
             step = max(abs(new0 - old0), max(abs(new1 - old1), abs(new2 - old2))) + EPS * width
             ratio = 1.0 if level == least + 1 else step / old_step
@@ -102,7 +115,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
                 break
             old_step = step
         old0, old1, old2 = new0, new1, new2
-    return used, error, np.nan, rays
+    return used, error, np.nan, used
 
 
 @linked_allocating
@@ -117,16 +130,17 @@ def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     low_stack[0], high_stack[0] = ends
     out, label = sample
     node, mass = nodes
+    size = size_at(out, task)
     depth, error, rays = np.int64(1), 0.0, np.int64(0)
     while depth > 0:
         depth -= 1
         low, high = low_stack[depth], high_stack[depth]
-        allowed = goal * max((high - low) / whole, LEAST_FRACTION)
+        allowed = goal / size * max((high - low) / whole, LEAST_FRACTION)
         used, miss, other, spent = apply_rules((low, high), label, allowed, rules, task, nodes, filled, strict)
         rays += spent
         if not math.isnan(other):
             return filled, error, other, rays
-        able = MOST_NODES - filled - 2 >= ORDERS[-1] and not is_spent(task)
+        able = MOST_NODES - filled - 2 >= MOST_POSITIONS and not is_spent(task)
         if miss > allowed and depth < MOST_HALVINGS and high - low > NARROWEST * whole and able:
             middle = 0.5 * (low + high)
             low_stack[depth], high_stack[depth] = middle, high
@@ -137,5 +151,5 @@ def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
             node[filled], mass[filled] = out, high - low
             used = 1
         filled += used
-        error += miss
+        error += size * miss
     return filled, error, np.nan, rays

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
-from ...tracing.compiled.options import allocating, compiled, linked
+from ...tracing.compiled.options import allocating, compiled
 from ...tracing.compiled.pointers import address_of, call_at
 from .changes import (
     FIRST_LABEL,
@@ -34,8 +34,6 @@ from .changes import (
 )
 from .gauss import MOST_NODES, SPARE, Rules, gauss_tables, integrate_piece
 
-# Limit on the pieces of one angle whose middles are samples of the next angle.
-MOST_SEEDS = 128
 # Rounding error of a mean, as a fraction of the opening, and of the position of a change, as a fraction of the hollow's
 # size. Rays have errors of a few EPS times the derivative of the map, which is seldom above some hundreds except next
 # to a change (measured, not proved).
@@ -65,30 +63,11 @@ class Found(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Work space for one angle: its samples, nodes and pieces, its first samples, and the middles before it.
-
-    ``waiting`` is the number of these middles.
-    """
+    """Work space for one angle: its samples, nodes and pieces."""
 
     chain: Chain
     nodes: tuple[Floats, ...]
     pieces: tuple[NDArray[Any], ...]
-    entries: Floats
-    middles: Floats
-    waiting: NDArray[np.int64]
-
-
-@linked
-def merge(first, second, both):
-    """Merge two increasing sequences into ``both``."""
-    i, j = np.int64(0), np.int64(0)
-    for k in range(both.shape[0]):
-        if j == second.shape[0] or (i < first.shape[0] and first[i] <= second[j]):
-            both[k] = first[i]
-            i += 1
-        else:
-            both[k] = second[j]
-            j += 1
 
 
 @allocating
@@ -112,7 +91,8 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     node[0], mass[0] = outs[0], xs[0] - left
     node[1], mass[1] = outs[last], right - xs[last]
     filled, number, unresolved = np.int64(2), np.int64(0), 0.0
-    error = ROUNDING * whole
+    largest = task.setting.sizes.max()
+    error = ROUNDING * largest * whole
     error += mass[0] * spread(outs[0], outs[1], task) + mass[1] * spread(outs[last], outs[last - 1], task)
     i = np.int64(0)
     while i >= 0:
@@ -132,7 +112,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
             filled, error = ready, error + miss
             if labels[i] < FIRST_LABEL:
                 unresolved += xs[j] - xs[i]
-                error += 2.0 * (xs[j] - xs[i])
+                error += 2.0 * largest * (xs[j] - xs[i])
         lows[number], highs[number], names[number] = xs[i], xs[j], labels[i]
         number += 1
         following = follow[j]
@@ -144,32 +124,10 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
                 filled += 2
             else:
                 mass[filled - 1] += width
-                error += width
+                error += 2.0 * largest * width
             error += undecided(j, task, chain) + EDGE_ROUNDING * hollow[SIZE] * spread(outs[j], outs[following], task)
         i = following
     return filled, error, unresolved, number, rays + count
-
-
-@compiled
-def wide_middles(lows, highs, least, middles):
-    """Find the middles of the pieces wider than ``least``, of the widest ones if there are more than MOST_SEEDS.
-
-    They are written to ``middles``, with MOST_SEEDS entries; returns their number.
-    """
-    # double the least width until at most MOST_SEEDS pieces remain
-    least, many = max(least, EPS * EPS), True
-    while many:
-        count = np.int64(0)
-        for k in range(lows.shape[0]):
-            count += highs[k] - lows[k] > least
-        many = count > MOST_SEEDS
-        least *= 2.0
-    count = np.int64(0)
-    for k in range(lows.shape[0]):
-        if highs[k] - lows[k] > 0.5 * least:
-            middles[count] = 0.5 * (lows[k] + highs[k])
-            count += 1
-    return count
 
 
 @cache
@@ -187,7 +145,7 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
     Returns the number of the angle before which an array of ``found`` is too small, or the number of angles.
     ``march`` is `march_address`.
     """
-    chain, nodes, pieces, entries, middles, waiting = room
+    chain, nodes, pieces = room
     node_starts, piece_starts = found.node_starts, found.piece_starts
     (angles, masses), (lows, highs, labels) = nodes, pieces
     (all_angles, all_masses), (all_lows, all_highs, all_labels) = found.nodes, found.pieces
@@ -200,12 +158,9 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
         task = task_of(setting, thetas[k], degree, found.segments[k : k + 1])
         goal = tolerances[k] * whole
         own = seeds[seed_starts[k] : seed_starts[k + 1]]
-        both = entries[: waiting[0] + own.shape[0]]
-        merge(middles[: waiting[0]], own, both)
         filled, found.errors[k], found.unresolved[k], number, found.rays[k] = call_at(
-            march, (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)), (task, goal, rules, both, chain, nodes, pieces)
+            march, (np.int64(0), 0.0, 0.0, np.int64(0), np.int64(0)), (task, goal, rules, own, chain, nodes, pieces)
         )
-        waiting[0] = wide_middles(lows[:number], highs[:number], goal, middles)
         for i in range(filled):
             all_angles[begin + i], all_masses[begin + i] = angles[i], masses[i]
         for i in range(number):
@@ -227,17 +182,10 @@ def marched_angles(
     seeds: Floats,
     seed_starts: NDArray[np.int64],
 ) -> Found:
-    """Compute the conditional distributions at increasing incoming angles.
-
-    The first samples at an angle are its seeds, which increase, and the middles of the pieces at the angle before, so
-    that a narrow piece is followed until it disappears.
-    """
+    """Compute the conditional distributions at incoming angles. The seeds are the first samples, which increase."""
     count = len(thetas)
     nodes, pieces = (float, float), (float, float, np.uint64)
-    room = Room(
-        empty_chain(), _arrays(MOST_NODES + SPARE, *nodes), _arrays(MOST_SAMPLES, *pieces),
-        np.empty(MOST_SEEDS + len(seeds)), np.empty(MOST_SEEDS), np.zeros(1, np.int64),
-    )  # fmt: skip
+    room = Room(empty_chain(), _arrays(MOST_NODES + SPARE, *nodes), _arrays(MOST_SAMPLES, *pieces))
     found = Found(
         (np.empty(0), np.empty(0)), np.zeros(count + 1, np.int64),
         (np.empty(0), np.empty(0), np.empty(0, np.uint64)), np.zeros(count + 1, np.int64),

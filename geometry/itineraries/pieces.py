@@ -1,0 +1,91 @@
+"""The intervals of entry points with equal itinerary at known incoming angles, and their ends predicted in between."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.checks import Floats
+
+# Mixes the labels on both sides of a change to its key; any odd number without pattern.
+KEY_FACTOR = np.uint64(6364136223846793005)
+# Distance of the samples on both sides of a predicted change from it: a fraction of the last term of the interpolation
+# by a cubic, a parabola and a line. The remainder is smaller by a factor of the angles' distance; if the samples do not
+# enclose the change, the search between its neighbours finds it.
+CUBIC_DOUBT, PARABOLA_DOUBT, LINE_DOUBT = 0.1, 0.3, 0.05
+
+
+class Pieces(NamedTuple):
+    """The pieces of one incoming angle in increasing order: their first and last positions, and their labels.
+
+    ``matters`` is the width from which on a missed piece matters. The changes between the pieces are in the order of
+    their keys: keys, positions, and the numbers of the pieces before them. Keys that occur twice are left out.
+    """
+
+    angle: float
+    low: Floats
+    high: Floats
+    label: NDArray[np.uint64]
+    matters: float
+    keys: NDArray[np.uint64]
+    changes: Floats
+    number: NDArray[np.int64]
+
+    @staticmethod
+    def at(angle: float, low: Floats, high: Floats, label: NDArray[np.uint64], matters: float) -> Pieces:
+        """The pieces at an angle, with the changes between them."""
+        key = label[:-1] * KEY_FACTOR + label[1:]
+        number = np.argsort(key)
+        differs = np.diff(key[number]) != 0
+        single = np.append(True, differs)[: len(key)] & np.append(differs, True)[: len(key)]
+        number = number[single]
+        return Pieces(angle, low, high, label, matters, key[number], 0.5 * (high[number] + low[number + 1]), number)
+
+    def middles(self, least: float, known: NDArray[np.int64] = np.empty(0, np.int64)) -> Floats:  # noqa: B008
+        """The middles of the pieces wider than ``least``, unless the changes at both ends are among the known ones."""
+        ends = np.zeros(len(self.low) + 1, dtype=np.bool_)
+        ends[[0, -1]] = len(known) > 0
+        ends[known + 1] = True
+        wanted = (self.high - self.low > least) & ~(ends[:-1] & ends[1:])
+        return np.asarray(0.5 * (self.low + self.high)[wanted])
+
+    def places(self, keys: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """The places of the changes with the keys, and whether there is such a change."""
+        if not len(self.keys):
+            return np.zeros(len(keys), np.int64), np.zeros(len(keys), np.bool_)
+        place = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return place, self.keys[place] == keys
+
+
+def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[Pieces], least: float) -> Floats:
+    """Positions that enclose the changes at an angle between two known ones, in any order.
+
+    A change present at both angles is interpolated, with the help of up to two farther angles. It gets one position on
+    either side, at a distance of at least ``least`` divided by the number of changes. Pieces wider than ``least`` of
+    which a change is not present at both angles get a position in their middle.
+    """
+    before, after = nearest
+    place, same = after.places(before.keys)
+    left, right, keys = before.number[same], after.number[place[same]], before.keys[same]
+    unmatched = before.middles(least, left), after.middles(least, right)
+    first, second = before.changes[same], after.changes[place[same]]
+    slope = (second - first) / (after.angle - before.angle)
+    line, product = first + (angle - before.angle) * slope, (angle - before.angle) * (angle - after.angle)
+    found, doubt = line, LINE_DOUBT * np.abs(second - first)
+    bends = []
+    for far in farther:
+        place, same = far.places(keys)
+        there = np.append(far.changes, np.nan)[np.where(same, place, -1)]
+        bend = ((there - first) / (far.angle - before.angle) - slope) / (far.angle - after.angle)
+        bends.append(bend)
+        found = np.where(same, line + product * bend, found)
+        doubt = np.where(same, PARABOLA_DOUBT * np.abs(product * bend), doubt)
+    if len(bends) == 2:
+        rate = (bends[1] - bends[0]) / (farther[1].angle - farther[0].angle)
+        both = np.isfinite(rate)
+        found = np.where(both, line + product * (bends[0] + (angle - farther[0].angle) * rate), found)
+        doubt = np.where(both, CUBIC_DOUBT * np.abs(product * (bends[1] - bends[0])), doubt)
+    doubt = np.maximum(doubt, least / max(1, len(keys)))
+    return np.concatenate((found - doubt, found + doubt, *unmatched))
