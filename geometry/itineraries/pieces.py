@@ -51,6 +51,10 @@ class Pieces(NamedTuple):
         wanted = (self.high - self.low > least) & ~(ends[:-1] & ends[1:])
         return np.asarray(0.5 * (self.low + self.high)[wanted])
 
+    def shared(self, other: Pieces) -> float:
+        """The total width of the pieces whose itinerary also exists at the other angle."""
+        return float(np.sum((self.high - self.low)[np.isin(self.label, other.label)]))
+
     def places(self, keys: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """The places of the changes with the keys, and whether there is such a change."""
         if not len(self.keys):

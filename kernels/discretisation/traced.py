@@ -37,6 +37,9 @@ ASYMMETRY_FACTOR, FEW_PAIRS = 1.25, 3.0
 # Error of Kronrod's rule as a fraction of its difference from Gauss's rule. Its root mean square over the positions of
 # a singularity is 0.38 for the square root at which a piece appears and 0.26 for a breakpoint; its mean is 0.
 KRONROD_FRACTION = 0.5
+# The same where neighbouring nodes share less than LEAST_SHARED of their itineraries: the nodes then sample noise, in
+# which the root mean square is 1, and one panel may dominate.
+ALIASED_FRACTION, LEAST_SHARED = 2.0, 0.8
 # Incoming angles computed at a time, so that their nodes fit into memory.
 ANGLES_AT_ONCE = 1500
 # The errors of all conditional expectations together may be this fraction of the tolerance.
@@ -287,7 +290,8 @@ class _Integrator:
         actual = np.linalg.norm(total - whole, axis=(1, 2))
         ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
         smooth = after < SMOOTH_SHRINKING * before[owner]
-        self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, KRONROD_FRACTION * after)
+        smooth &= children.error <= KRONROD_FRACTION * after
+        self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, children.error)
 
     def _cuts(self, low: float, high: float) -> Floats:
         """The angles at which a panel is divided: the critical angles inside it, or its middle if none is known."""
@@ -328,4 +332,6 @@ class _Integrator:
             )
             panels.mean_error[panel[few], node[few]] = conditionals.error
         touched = np.unique(panel)
-        panels.error[touched] = KRONROD_FRACTION * panels.selected(touched).differences(self.basis)
+        shared = np.array([self.conditionals.shared(panels.angle[k]).min() for k in touched.tolist()])
+        fraction = np.where(shared < LEAST_SHARED, ALIASED_FRACTION, KRONROD_FRACTION)
+        panels.error[touched] = fraction * panels.selected(touched).differences(self.basis)

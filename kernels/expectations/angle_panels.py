@@ -38,6 +38,19 @@ _S = 0.5 * (1.0 + NODES)
 STRETCHED, SLOPES = _S * _S * (3.0 - 2.0 * _S), 3.0 * _S * (1.0 - _S)
 
 
+def _null_rules(count: int) -> Floats:
+    """Rules of the size of the difference of Kronrod's and Gauss's rule that vanish for polynomials of low degree.
+
+    The first is the difference itself, of the highest degree. They are orthogonal to each other.
+    """
+    polynomials = np.polynomial.legendre.legvander(NODES, len(NODES) - 1)
+    orthogonal, _ = np.linalg.qr(polynomials)
+    return np.asarray(np.linalg.norm(KRONROD - GAUSS) * orthogonal.T[: -count - 1 : -1])
+
+
+NULL_RULES = _null_rules(4)
+
+
 @dataclass
 class AnglePanels:
     """A set of panels; the first axis of every array runs over the panels.
@@ -96,8 +109,9 @@ class AnglePanels:
         return self._integrals(KRONROD, basis)
 
     def differences(self, basis: Basis) -> Floats:
-        """The norms of the differences between Kronrod's and Gauss's rule, shape (panels,)."""
-        return np.asarray(np.linalg.norm(self._integrals(KRONROD - GAUSS, basis), axis=(1, 2)))
+        """The root mean square of the norms of the null rules, shape (panels,)."""
+        squares = [np.sum(self._integrals(rule, basis) ** 2, axis=(1, 2)) for rule in NULL_RULES]
+        return np.asarray(np.sqrt(np.mean(squares, axis=0)))
 
     def mean_errors(self, basis: Basis) -> Floats:
         """The errors of the integrals due to the errors of the expectations, shape (panels,)."""

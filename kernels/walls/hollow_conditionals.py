@@ -199,6 +199,11 @@ class HollowConditionals:
             self._missed.setdefault(angle, []).append(x)
         return set(angles[owner].tolist())
 
+    def shared(self, theta: Floats) -> Floats:
+        """The fraction of the opening whose itinerary also exists at the next of these known angles."""
+        known = [self._pieces[angle] for angle in theta.tolist()]
+        return np.array([pieces.shared(after) for pieces, after in pairwise(known)]) / self.width
+
     def critical_angles(self, low: float, high: float) -> list[tuple[float, float]]:
         """Angles in (low, high) where a piece appears or disappears, with the piece's width at the nearest known angle.
 
