@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...scene.columns import (
-    BEZIERS_END,
     CHAIN,
     CIRCLE_X,
     CIRCLE_Y,
     COPIES,
     DOUBT,
     ELLIPSES_END,
-    FIRST_BEZIER,
     FIRST_ELLIPSE,
     FORM,
     FORM_LEFT,
@@ -77,7 +75,7 @@ class Room(NamedTuple):
 def room_for(hollows: Floats, block: int) -> Room:
     """Return the work space of `trace_closed`, for one thread and blocks of rays."""
     rays, others, met = np.empty((3, block), np.int64)
-    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(WORK))
+    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(2 * WORK))
 
 
 @inner
@@ -225,8 +223,7 @@ def is_crossed(hollow, closed, h, crossings):
     if closed.shape[0] > 0 and closed[h, FORM] != NO_FORM:
         return True
     _, _, simple = crossings
-    straight_or_circular = hollow[ELLIPSES_END] == hollow[FIRST_ELLIPSE] and hollow[BEZIERS_END] == hollow[FIRST_BEZIER]
-    return simple != 0 and straight_or_circular
+    return simple != 0 and hollow[ELLIPSES_END] == hollow[FIRST_ELLIPSE]
 
 
 @inlined
