@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import FORM_COLUMNS
+from asperity.geometry.scene.columns import FORM_COLUMNS, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
 from asperity.geometry.tracing import tracing
 from asperity.geometry.tracing.compiled import closed_forms
 from asperity.geometry.tracing.compiled.pointers import Late
@@ -95,6 +95,20 @@ def rays_of(wall, seed):
     return np.concatenate([x, start, x]), np.clip(np.concatenate([spread, aimed, flat]), 1e-12, np.pi - 1e-12)
 
 
+def tangent_rays(wall, seed):
+    """Rays along tangents of Bezier pieces, up to 10^k ulps beside them, also at the ends of the pieces."""
+    rng, curves = np.random.default_rng(seed), wall.scene.beziers
+    row, s = curves[rng.integers(len(curves), size=RAYS)], rng.random(RAYS)
+    s[::4] = np.rint(s[::4])
+    x, y = row[:, START_X] + s * (row[:, X1] + s * row[:, X2]), row[:, START_Y] + s * (row[:, Y1] + s * row[:, Y2])
+    x, y = x + s**3 * row[:, X3], y + s**3 * row[:, Y3]
+    along = row[:, X1] + s * (2.0 * row[:, X2] + 3.0 * s * row[:, X3])
+    theta = np.arctan2(row[:, Y1] + s * (2.0 * row[:, Y2] + 3.0 * s * row[:, Y3]), along) % np.pi
+    theta += 10.0 ** rng.uniform(-16.0, -2.0, RAYS) * rng.choice([-1, 1], RAYS)
+    theta = np.clip(theta, 1e-6, np.pi - 1e-6)
+    return x - y / np.tan(theta), theta
+
+
 def traced(monkeypatch, in_waves, *arguments, **options):
     monkeypatch.setattr(tracing, "_goes_in_waves", lambda scene, rays: in_waves)
     found = geo.trace(*arguments, **options)
@@ -108,6 +122,14 @@ def test_a_wave_gives_each_ray_the_bits_of_the_loop(name, limit, monkeypatch):
     x, theta = rays_of(wall, 1)
     together = traced(monkeypatch, True, wall, x, theta, max_collisions=limit)
     one_by_one = traced(monkeypatch, False, wall, x, theta, max_collisions=limit)
+    for mine, right in zip(together, one_by_one, strict=True):
+        assert np.array_equal(mine, right)
+
+
+@pytest.mark.parametrize("name", BEZIERS)
+def test_tangent_rays_in_waves_have_the_bits_of_the_loop(name, monkeypatch):
+    wall = WALLS[name]
+    together, one_by_one = (traced(monkeypatch, waves, wall, *tangent_rays(wall, 6)) for waves in (True, False))
     for mine, right in zip(together, one_by_one, strict=True):
         assert np.array_equal(mine, right)
 
