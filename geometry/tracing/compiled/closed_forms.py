@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from ....core.checks import Floats
 from ...scene.columns import (
+    BEZIERS_END,
     CHAIN,
     CIRCLE_X,
     CIRCLE_Y,
     COPIES,
     DOUBT,
     ELLIPSES_END,
+    FIRST_BEZIER,
     FIRST_ELLIPSE,
     FORM,
     FORM_LEFT,
@@ -75,7 +77,9 @@ class Room(NamedTuple):
 def room_for(hollows: Floats, block: int) -> Room:
     """Return the work space of `trace_closed`, for one thread and blocks of rays."""
     rays, others, met = np.empty((3, block), np.int64)
-    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(2 * WORK))
+    # rays near one of many Bezier pieces are gathered in a second part
+    parts = 2 if np.any(hollows[:, BEZIERS_END] > hollows[:, FIRST_BEZIER]) else 1
+    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(parts * WORK))
 
 
 @inner
