@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from asperity import geometry as geo
-from asperity.geometry.scene.columns import FORM_COLUMNS
+from asperity.geometry.scene.columns import FORM_COLUMNS, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
 from asperity.geometry.tracing import tracing
 from asperity.geometry.tracing.compiled import closed_forms
 from asperity.geometry.tracing.compiled.pointers import Late
@@ -37,6 +37,13 @@ def valley_of_arcs():
     return geo.Wall(pieces)
 
 
+def parabola_as_a_cubic(start, middle, end, bump=0.0):
+    """The quadratic Bezier piece of these points as a cubic one, whose second point is raised by ``bump``."""
+    start, middle, end = map(np.array, (start, middle, end))
+    second = start + (middle - start) * 2 / 3 + [0.0, bump]
+    return geo.Bezier([start, second, end + (middle - end) * 2 / 3, end])
+
+
 WALLS = {
     "mushroom": geo.mushrooms(0.3, 0.5),
     "koch": geo.koch(4),
@@ -46,15 +53,39 @@ WALLS = {
     "teeth in boxes": random_teeth(400, 5),
     "profile": geo.Wall.from_profile(np.arange(300), np.random.default_rng(4).random(300)),
     "large": geo.mushrooms(0.4, 1.0).scaled(3e5),
+    "double parabola": geo.double_parabola(),
+    "nearly a parabola": geo.Wall(
+        [
+            parabola_as_a_cubic((0, 0), (0, -0.7), (0.5, -1.4), 1e-13),
+            parabola_as_a_cubic((0.5, -1.4), (1, -0.7), (1, 0)),
+        ]
+    ),
+    "inflections": geo.Wall(
+        [
+            geo.Bezier([(0, 0), (0.8, -0.3), (-0.1, -0.6), (0.5, -0.9)]),
+            geo.Bezier([(0.5, -0.9), (1.1, -0.6), (0.2, -0.3), (1, 0)]),
+        ]
+    ),
+    "mixed": geo.Wall(
+        [
+            geo.Segment((0, 0), (0.2, -0.5)),
+            geo.Bezier([(0.2, -0.5), (0.3, -0.9), (0.5, -0.2), (0.6, -0.5)]),
+            geo.Bezier([(0.6, -0.5), (0.7, -0.5), (0.8, -0.3)]),
+            geo.Segment((0.8, -0.3), (1, 0)),
+        ]
+    ),
+    "many pieces": geo.random_wall(geo.HeightCorrelation(0.1), 16, rms_slope=0.5, smooth=True, rng=3),
 }
+BEZIERS = "double parabola", "nearly a parabola", "inflections", "mixed", "many pieces"
 
 
 def rays_of(wall, seed):
-    """Spread rays; rays through joints and up to 10^k ulps beside them; rays along the opening."""
+    """Spread rays, some from the ends of the cell; rays through joints and up to 10^k ulps beside them; flat rays."""
     rng = np.random.default_rng(seed)
     x = wall.period * rng.uniform(-2.0, 3.0, RAYS)
     spread = np.arccos(1.0 - 2.0 * rng.random(RAYS))
     below = wall.scene.joints[wall.scene.joints[:, 1] < 0.0]
+    x[:: RAYS // 8] = np.rint(x[:: RAYS // 8])
     joint = below[rng.integers(len(below), size=RAYS)]
     start = wall.period * rng.random(RAYS)
     aimed = np.arctan2(-joint[:, 1], start - joint[:, 0])
@@ -62,6 +93,20 @@ def rays_of(wall, seed):
     flat = 10.0 ** rng.uniform(-9.0, -1.0, RAYS)
     flat = np.where(rng.random(RAYS) < 0.5, flat, np.pi - flat)
     return np.concatenate([x, start, x]), np.clip(np.concatenate([spread, aimed, flat]), 1e-12, np.pi - 1e-12)
+
+
+def tangent_rays(wall, seed):
+    """Rays along tangents of Bezier pieces, up to 10^k ulps beside them, also at the ends of the pieces."""
+    rng, curves = np.random.default_rng(seed), wall.scene.beziers
+    row, s = curves[rng.integers(len(curves), size=RAYS)], rng.random(RAYS)
+    s[::4] = np.rint(s[::4])
+    x, y = row[:, START_X] + s * (row[:, X1] + s * row[:, X2]), row[:, START_Y] + s * (row[:, Y1] + s * row[:, Y2])
+    x, y = x + s**3 * row[:, X3], y + s**3 * row[:, Y3]
+    along = row[:, X1] + s * (2.0 * row[:, X2] + 3.0 * s * row[:, X3])
+    theta = np.arctan2(row[:, Y1] + s * (2.0 * row[:, Y2] + 3.0 * s * row[:, Y3]), along) % np.pi
+    theta += 10.0 ** rng.uniform(-16.0, -2.0, RAYS) * rng.choice([-1, 1], RAYS)
+    theta = np.clip(theta, 1e-6, np.pi - 1e-6)
+    return x - y / np.tan(theta), theta
 
 
 def traced(monkeypatch, in_waves, *arguments, **options):
@@ -81,7 +126,15 @@ def test_a_wave_gives_each_ray_the_bits_of_the_loop(name, limit, monkeypatch):
         assert np.array_equal(mine, right)
 
 
-@pytest.mark.parametrize("name", ["mushroom", "koch", "dispersing arcs", "valley of arcs", "profile"])
+@pytest.mark.parametrize("name", BEZIERS)
+def test_tangent_rays_in_waves_have_the_bits_of_the_loop(name, monkeypatch):
+    wall = WALLS[name]
+    together, one_by_one = (traced(monkeypatch, waves, wall, *tangent_rays(wall, 6)) for waves in (True, False))
+    for mine, right in zip(together, one_by_one, strict=True):
+        assert np.array_equal(mine, right)
+
+
+@pytest.mark.parametrize("name", ["mushroom", "koch", "dispersing arcs", "valley of arcs", "profile", *BEZIERS])
 def test_few_rays_are_left_to_the_loop(name):
     wall = WALLS[name]
     x, theta = (part[:RAYS] for part in rays_of(wall, 2))
@@ -90,6 +143,13 @@ def test_few_rays_are_left_to_the_loop(name):
     room = closed_forms.room_for(wall.scene.hollows, RAYS)
     closed_forms.trace_closed(x, theta, wall.scene.tables, closed, 2**62, results, room, closed_forms.CROSSINGS)
     assert np.mean(results[-1] == closed_forms.UNDECIDED) < 0.01
+
+
+@pytest.mark.parametrize("name", ["valley of arcs", "teeth in boxes", "double parabola"])
+def test_rays_that_enter_at_a_corner_are_flagged_in_waves(name, monkeypatch):
+    theta = np.linspace(0.01, 3.13, 999)
+    *_, status = traced(monkeypatch, True, WALLS[name], np.zeros(999), theta)
+    assert np.all(status == geo.Status.CORNER)
 
 
 def test_a_ray_is_the_same_whatever_rays_go_with_it(monkeypatch):
@@ -121,7 +181,7 @@ def test_waves_end_at_a_raised_flag_as_the_loop_does():
 
 
 def test_curves_without_waves_and_open_walls_stay_with_the_loop():
-    for wall in (geo.double_parabola(), geo.triangular_teeth(0.7), geo.elliptical_arcs(1.0, geo.Disk(1.0, 0.6))):
+    for wall in (geo.triangular_teeth(0.7), geo.elliptical_arcs(1.0, geo.Disk(1.0, 0.6))):
         assert not tracing._goes_in_waves(wall.scene, 2**30)
     assert not tracing._goes_in_waves(geo.mushrooms(0.3, 0.5).scene, tracing.MANY_RAYS - 1)
 

@@ -7,10 +7,16 @@ piece itself is divided out.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
 
 from ....core.rounding import EPS
+from ...scene.boxes import BOXES
 from ...scene.columns import (
     END_X,
     END_Y,
@@ -28,6 +34,7 @@ from ...scene.columns import (
 )
 from ...scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, TANGENT_ULPS
 from ..double_double.beziers import curve_size
+from .lanes import BEFORE, HIT_S, LANES, NUMBER, RAY, TIME, WORD, Lanes, Ray, Table, constant, cross, dot, repeated
 from .options import inlined, inner
 
 ROOT_STEPS = 80
@@ -45,33 +52,68 @@ def bezier_value(a0, a1, a2, a3, s):
 
 
 @inlined
-def falling_root(a0, a1, a2, a3, low, high):
-    """-> float: the root of a cubic that falls from >= 0 at low to <= 0 at high, by safeguarded Newton steps."""
-    s = 0.5 * (low + high)
+def bezier_slope(a1, a2, a3, s):
+    """-> float: the derivative of the cubic at s."""
+    return (3.0 * a3 * s + 2.0 * a2) * s + a1
+
+
+@inlined
+def quadratic_root(a0, a1, a2):
+    """-> float: the root in [0, 1] at which the quadratic with these coefficients falls, if it has one."""
+    disc = a1 * a1 - 4.0 * a2 * a0
+    root = math.sqrt(disc if disc > 0.0 else 0.0)
+    # the sum of two numbers of the same sign
+    s = -(a1 + root) / (2.0 * a2) if a1 > 0.0 else 2.0 * a0 / (root - a1)
+    s = s if s > 0.0 else 0.0
+    return s if s < 1.0 else 1.0
+
+
+@inlined
+def falling_root(a0, a1, a2, a3, low, high, value_low, value_high):
+    """-> float: the root of a cubic that falls from >= 0 at low to <= 0 at high, by safeguarded Halley steps.
+
+    They begin at the root of the quadratic with the same values at both ends and in the middle, and end when the next
+    step would be below one rounding error.
+    """
+    span = high - low
+    level, rise, bend = parabola_through(value_low, bezier_value(a0, a1, a2, a3, low + 0.5 * span), value_high)
+    s = low + span * quadratic_root(level, rise, bend)
     for _ in range(ROOT_STEPS):
-        value = bezier_value(a0, a1, a2, a3, s)
-        if value > 0.0:
-            low = s
-        elif value < 0.0:
-            high = s
-        else:
-            return s
-        slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
-        step = s - value / slope if slope != 0.0 else 0.5 * (low + high)
-        if not low < step < high:
+        value, slope = bezier_value(a0, a1, a2, a3, s), bezier_slope(a1, a2, a3, s)
+        bend = 3.0 * a3 * s + a2
+        low, high = s if value > 0.0 else low, s if value < 0.0 else high
+        step = s - value * slope / (slope * slope - value * bend)
+        if not low <= step <= high:
             step = 0.5 * (low + high)
-        if abs(step - s) <= EPS * abs(step) or step in (low, high):
+            if value == 0.0:
+                return s
+            if step in (low, high):
+                return step
+        elif halley_error(step - s, slope, bend, a3) <= EPS * abs(step) * (slope * slope):
             return step
         s = step
     return s
 
 
 @inlined
+def parabola_through(before, middle, after):
+    """-> (a0, a1, a2): coefficients of the quadratic with these values at 0, 1/2 and 1."""
+    return before, 4.0 * middle - 3.0 * before - after, 2.0 * (before + after) - 4.0 * middle
+
+
+@inlined
+def halley_error(step, slope, bend, a3):
+    """-> float: the error of a root after a step of Halley's method from s, times the square of the slope at s.
+
+    It is (bend^2 / slope^2 - a3 / slope) step^3 to first order, where ``bend`` is half the second derivative.
+    """
+    return abs(step * step * step) * (bend * bend + abs(a3 * slope))
+
+
+@inlined
 def bezier_tangent(curve, s):
     """-> (tx, ty): b'(s)."""
-    tx = (3.0 * curve[X3] * s + 2.0 * curve[X2]) * s + curve[X1]
-    ty = (3.0 * curve[Y3] * s + 2.0 * curve[Y2]) * s + curve[Y1]
-    return tx, ty
+    return bezier_slope(curve[X1], curve[X2], curve[X3], s), bezier_slope(curve[Y1], curve[Y2], curve[Y3], s)
 
 
 @inlined
@@ -104,7 +146,7 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
     """
     _, a1, a2, a3 = g
     fraction_slack = JOINT_ULPS * EPS
-    b0 = (3.0 * a3 * own_s + 2.0 * a2) * own_s + a1
+    b0 = bezier_slope(a1, a2, a3, own_s)
     b1 = 3.0 * a3 * own_s + a2
     b2 = a3
     best_t, best_s = np.inf, 0.0
@@ -116,15 +158,16 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
             return t, s, 1
     if disc < 0.0:
         return best_t, best_s, 0
-    q = -0.5 * (b1 + math.copysign(math.sqrt(disc), b1))
-    for root in range(2):
-        bottom, top = (b2, q) if root == 0 else (q, b0)
+    root = math.sqrt(disc)
+    q = -0.5 * (b1 + (root if b1 >= 0.0 else -root))
+    for number in range(2):
+        bottom, top = (b2, q) if number == 0 else (q, b0)
         if bottom == 0.0:
             continue
         s = own_s + top / bottom
         if -fraction_slack <= s <= 1.0 + fraction_slack:
             s = min(max(s, 0.0), 1.0)
-            slope = (3.0 * a3 * s + 2.0 * a2) * s + a1
+            slope = bezier_slope(a1, a2, a3, s)
             t = bezier_time(curve, s, px, py, vx, vy)
             if slope <= 0.0 and 0.0 < t < best_t:
                 best_t, best_s = t, s
@@ -137,7 +180,8 @@ def extrema(a1, a2, a3):
     c1, c2 = 2.0, 2.0
     disc = a2 * a2 - 3.0 * a3 * a1
     if disc > 0.0:
-        q = -(a2 + math.copysign(math.sqrt(disc), a2))
+        root = math.sqrt(disc)
+        q = -(a2 + (root if a2 >= 0.0 else -root))
         if a3 != 0.0:
             c1 = q / (3.0 * a3)
         if q != 0.0:
@@ -152,7 +196,7 @@ def is_close_by(curve, g, s, t, spread, slack):
     """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start."""
     _, a1, a2, a3 = g
     # the height in front of the curve is t times the sine of incidence, g' / |b'|
-    fall = -((3.0 * a3 * s + 2.0 * a2) * s + a1)
+    fall = -bezier_slope(a1, a2, a3, s)
     tx, ty = bezier_tangent(curve, s)
     reach = slack * math.sqrt(tx * tx + ty * ty)
     return abs(t) <= NEARBY * spread and abs(t) * fall <= reach
@@ -192,7 +236,10 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                     best_t, best_s, tangent = t, high, 1
         # a root beside a contact equals the contact within rounding
         if value_low >= 0.0 >= value_high and value_low > value_high and not touched and not touches:
-            s = falling_root(a0, a1, a2, a3, low, high)
+            if curve[X3] == 0.0 and curve[Y3] == 0.0:
+                s = quadratic_root(a0, a1, a2)
+            else:
+                s = falling_root(a0, a1, a2, a3, low, high, value_low, value_high)
             t = bezier_time(curve, s, px, py, vx, vy)
             if t < best_t:
                 if is_close_by(curve, g, s, t, spread, slack):
@@ -253,8 +300,9 @@ def bezier_reflect(curve, s, vx, vy):
     py = bezier_value(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s)
     tx, ty = bezier_tangent(curve, s)
     scale = 1.0 / math.sqrt(tx * tx + ty * ty)
-    w = 2.0 * scale * scale * (vy * tx - vx * ty)
-    return px, py, vx + w * ty, vy - w * tx
+    nx, ny = -ty * scale, tx * scale
+    w = 2.0 * (vx * nx + vy * ny)
+    return px, py, vx - w * nx, vy - w * ny
 
 
 @inlined
@@ -278,3 +326,276 @@ def bend_number(curve, s):
     if c2 != 0.0 and 0.0 < q / c2 < s:
         number += 1
     return number
+
+
+class _Curve:
+    """A row of ``beziers`` in compiled code, each number in all lanes."""
+
+    def __init__(self, at: Table) -> None:
+        self._at = at
+
+    def __getitem__(self, column: int) -> Lanes:
+        return self._at.number(column)
+
+
+def _squeezed(s: Lanes) -> Lanes:
+    """Return the nearest numbers in [0, 1]; 0 for NaN."""
+    builder = s.builder
+    s = (s > 0.0).where(s, constant(builder, 0.0))
+    return (s < 1.0).where(s, constant(builder, 1.0))
+
+
+def _quadratic_roots(a0: Lanes, a1: Lanes, a2: Lanes) -> Lanes:
+    """Return `quadratic_root` of eight rays."""
+    disc, zero = a1 * a1 - 4.0 * a2 * a0, constant(a0.builder, 0.0)
+    root, rises = (disc > 0.0).where(disc, zero).root(), a1 > 0.0
+    return _squeezed(rises.where(-(a1 + root), 2.0 * a0) / rises.where(2.0 * a2, root - a1))
+
+
+def _falling_roots(g: Any, low: Lanes, high: Lanes, value_low: Lanes, value_high: Lanes, wanted: Lanes) -> Lanes:
+    """Return `falling_root` of those of eight rays that are wanted."""
+    builder, (_, a1, a2, a3) = low.builder, g
+    value_of, slope_of = bezier_value.py_func, bezier_slope.py_func
+    span = high - low
+    start = parabola_through.py_func(value_low, value_of(*g, low + 0.5 * span), value_high)
+    s = low + span * _quadratic_roots(*start)
+    states = [cgutils.alloca_once_value(builder, part.value) for part in (s, low, high, wanted)]
+    count = cgutils.alloca_once_value(builder, WORD(0))
+    body, end = builder.append_basic_block("step"), builder.append_basic_block("found")
+    builder.cbranch(wanted.any(), body, end)
+    builder.position_at_end(body)
+    s, low, high, active = (Lanes(builder, builder.load(state)) for state in states)
+    value, slope, bend = value_of(*g, s), slope_of(a1, a2, a3, s), 3.0 * a3 * s + a2
+    low, high = (value > 0.0).where(s, low), (value < 0.0).where(s, high)
+    step = s - value * slope / (slope * slope - value * bend)
+    inside = (low <= step) & (step <= high)
+    middle = 0.5 * (low + high)
+    step = inside.where(step, value.equals(0.0).where(s, middle))
+    is_small = halley_error.py_func(step - s, slope, bend, a3) <= EPS * abs(step) * (slope * slope)
+    ends = inside.where(is_small, value.equals(0.0) | step.equals(low) | step.equals(high))
+    s = active.where(step, s)
+    active = active & ~ends
+    for state, part in zip(states, (s, low, high, active), strict=True):
+        builder.store(part.value, state)
+    steps = builder.add(builder.load(count), WORD(1))
+    builder.store(steps, count)
+    more = builder.and_(active.any(), builder.icmp_unsigned("<", steps, WORD(ROOT_STEPS)))
+    builder.cbranch(more, body, end)
+    builder.position_at_end(end)
+    return Lanes(builder, builder.load(states[0]))
+
+
+def _pick(*choices: Any) -> Any:
+    """Return the value of the first choice (condition, value) that holds, else the last value."""
+    *first, value = choices
+    for condition, other in reversed(first):
+        value = condition.where(other, value)
+    return value
+
+
+def _meets_circle(ray: Ray, curve: _Curve) -> Lanes:
+    """Return which rays meet the circle about the piece before their hits, as in `nearest_bezier`."""
+    dx, dy = curve[MIDDLE_X] - ray.px, curve[MIDDLE_Y] - ray.py
+    along, room = dot(dx, dy, ray.vx, ray.vy), curve[REACH] + NEARBY_MARGIN * (abs(dx) + abs(dy))
+    return (abs(cross(dx, dy, ray.vx, ray.vy)) <= room) & (along >= -room) & (along - room <= ray.at[TIME])
+
+
+@intrinsic
+def gather_near(typing, work, first, count, beziers, k, number, place):
+    """-> int: how many of eight rays start on a Bezier piece or meet the circle about it; note them at ``place``.
+
+    ``count`` is the number of rays of the wave, ``number`` that of the piece.
+    """
+
+    def gather(context, builder, signature, values):
+        ray = Ray(context, builder, signature, values)
+        curve = _Curve(Table(context, builder, signature.args[3], values[3]).row(values[4]))
+        rest = repeated(builder, builder.sitofp(builder.sub(values[2], values[1]), NUMBER))
+        begin = repeated(builder, builder.sitofp(values[1], NUMBER))
+        lane = Lanes(builder, ir.Constant(LANES, [float(k) for k in range(BOXES)]))
+        near = (lane < rest) & (ray.own.equals(repeated(builder, values[5])) | _meets_circle(ray, curve))
+        Table(context, builder, signature.args[0], values[0]).column(values[6]).pack(RAY, lane + begin, near)
+        return builder.ctpop(near.mask())
+
+    integer = types.int64
+    return types.int64(work, integer, integer, beziers, integer, types.float64, integer), gather
+
+
+class _Meeting:
+    """Eight rays and a Bezier piece: the hits that are nearer."""
+
+    def __init__(self, context: Any, builder: Any, signature: Any, values: Any) -> None:
+        self.builder = builder
+        self.ray = Ray(context, builder, signature, values)
+        self.curve = _Curve(Table(context, builder, signature.args[2], values[2]).row(values[3]))
+        self.corners = [repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[4])]
+        self.number = repeated(builder, values[5])
+        ray, curve = self.ray, self.curve
+        self.own = ray.own.equals(self.number)
+        self.zero, self.one = constant(builder, 0.0), constant(builder, 1.0)
+        self.far = ~self.own & _meets_circle(ray, curve)
+
+    def coefficients(self) -> tuple[Lanes, Lanes, Lanes, Lanes]:
+        """Return those of g, as in `bezier_hit`."""
+        ray, curve = self.ray, self.curve
+        return (
+            cross(curve[START_X] - ray.px, curve[START_Y] - ray.py, ray.vx, ray.vy),
+            cross(curve[X1], curve[Y1], ray.vx, ray.vy),
+            cross(curve[X2], curve[Y2], ray.vx, ray.vy),
+            cross(curve[X3], curve[Y3], ray.vx, ray.vy),
+        )
+
+    def value_at_end(self) -> Lanes:
+        ray, curve = self.ray, self.curve
+        return cross(curve[END_X] - ray.px, curve[END_Y] - ray.py, ray.vx, ray.vy)
+
+    def spread(self) -> Lanes:
+        """Return the size of the products in the sum g."""
+        ray, curve = self.ray, self.curve
+        size: Lanes = curve_size.py_func(curve)
+        fast = (abs(ray.vx) > abs(ray.vy)).where(abs(ray.vx), abs(ray.vy))
+        return fast * (abs(curve[START_X] - ray.px) + abs(curve[START_Y] - ray.py) + size)
+
+    def touch(self, inside: Lanes, value: Lanes, spread: Lanes) -> None:
+        """Doubt rays whose line may touch the piece at an extremum of g."""
+        self.ray.doubt(self.far & inside & (abs(value) <= (TANGENT_ULPS * EPS) * spread))
+
+    def hit(self, s: Lanes, chosen: Lanes) -> None:
+        """Take the hits at s that are nearer."""
+        ray, curve = self.ray, self.curve
+        x = bezier_value.py_func(curve[START_X], curve[X1], curve[X2], curve[X3], s)
+        y = bezier_value.py_func(curve[START_Y], curve[Y1], curve[Y2], curve[Y3], s)
+        time = dot(x - ray.px, y - ray.py, ray.vx, ray.vy)
+        ray.doubt(chosen & self.far & (abs(time) <= NEARBY * self.spread()))
+        nearer = chosen & (time > 0.0) & (time < ray.at[TIME])
+        with self.builder.if_then(nearer.any()):
+            slope_of = bezier_slope.py_func
+            tx, ty = slope_of(curve[X1], curve[X2], curve[X3], s), slope_of(curve[Y1], curve[Y2], curve[Y3], s)
+            scale = self.one / (tx * tx + ty * ty).root()
+            start, end = self.corners
+            dx, dy = x - curve[START_X], y - curve[START_Y]
+            at_corner = (start > 0.0) & (dot(dx, dy, dx, dy) <= start * start)
+            dx, dy = x - curve[END_X], y - curve[END_Y]
+            at_corner = at_corner | ((end > 0.0) & (dot(dx, dy, dx, dy) <= end * end))
+            no_run = self.zero > 0.0
+            ray.hit(nearer, self.number, time, (x, y), (-ty * scale, tx * scale), at_corner, no_run)
+            ray.at[HIT_S] = nearer.where(s, ray.at[HIT_S])
+
+    def hit_from_own(self, g: Any, shift: Lanes, chosen: Lanes) -> None:
+        """Take hits of rays that started on the piece."""
+        _, a1, a2, a3 = g
+        s = self.ray.at[BEFORE] + shift
+        slack = JOINT_ULPS * EPS
+        chosen = chosen & (s >= -slack) & (s <= 1.0 + slack)
+        s = _squeezed(s)
+        self.hit(s, chosen & (bezier_slope.py_func(a1, a2, a3, s) <= 0.0))
+
+
+@intrinsic
+def meet_parabola(typing, work, first, beziers, k, corners, number):
+    """Find the hits of eight rays on a quadratic Bezier piece that are nearer, as `nearest_bezier` does for one ray.
+
+    ``corners`` are the slacks of the two ends, negative where there is no corner; ``number`` is that of the piece.
+    """
+
+    def meet(context, builder, signature, values):
+        all_ = _Meeting(context, builder, signature, values)
+        ray = all_.ray
+        with builder.if_then((all_.own | all_.far).any()):
+            g = all_.coefficients()
+            a0, a1, a2, a3 = g
+            with builder.if_then(all_.own.any()):
+                slope = bezier_slope.py_func(a1, a2, a3, ray.at[BEFORE])
+                bend = 3.0 * a3 * ray.at[BEFORE] + a2
+                all_.hit_from_own(g, slope / -bend, all_.own)
+            with builder.if_then(all_.far.any()):
+                last = all_.value_at_end()
+                c = a1 / (-2.0 * a2)
+                lowest = bezier_value.py_func(a0, a1, a2, a3, c)
+                inside = (c > 0.0) & (c < 1.0)
+                all_.touch(inside, lowest, all_.spread())
+                early = (a0 >= 0.0) & (lowest <= 0.0) & (a0 > lowest)
+                late = (lowest >= 0.0) & (last <= 0.0) & (lowest > last)
+                whole = (a0 >= 0.0) & (last <= 0.0) & (a0 > last)
+                falls = all_.far & ((inside & (early | late)) | (~inside & whole))
+                with builder.if_then(falls.any()):
+                    all_.hit(_quadratic_roots(a0, a1, a2), falls)
+        return context.get_dummy_value()
+
+    return _meeting_type(work, beziers), meet
+
+
+@intrinsic
+def meet_cubic(typing, work, first, beziers, k, corners, number):
+    """Find the hits of eight rays on a cubic Bezier piece that are nearer; see `meet_parabola`."""
+
+    def meet(context, builder, signature, values):
+        all_ = _Meeting(context, builder, signature, values)
+        with builder.if_then((all_.own | all_.far).any()):
+            g = all_.coefficients()
+            with builder.if_then(all_.own.any()):
+                _meet_own_cubic(all_, g)
+            a0, a1, a2, a3 = g
+            b1, b2, b3 = a0 + a1 / 3.0, a0 + (2.0 * a1 + a2) / 3.0, a0 + a1 + a2 + a3
+            room = (NO_ZERO_ULPS * EPS) * all_.spread()
+            positive = (a0 > room) & (b1 > room) & (b2 > room) & (b3 > room)
+            negative = (a0 < -room) & (b1 < -room) & (b2 < -room) & (b3 < -room)
+            all_.far = all_.far & ~positive & ~negative
+            with builder.if_then(all_.far.any()):
+                _meet_far_cubic(all_, g)
+        return context.get_dummy_value()
+
+    return _meeting_type(work, beziers), meet
+
+
+def _meeting_type(work: Any, beziers: Any) -> Any:
+    number = types.float64
+    return types.void(work, types.int64, beziers, types.int64, types.UniTuple(number, 2), number)
+
+
+def _meet_own_cubic(all_: _Meeting, g: Any) -> None:
+    """Find hits of the rays that started on the piece, as `hit_from_own` does for one ray."""
+    _, a1, a2, a3 = g
+    own_s = all_.ray.at[BEFORE]
+    b0, b1 = bezier_slope.py_func(a1, a2, a3, own_s), 3.0 * a3 * own_s + a2
+    disc = b1 * b1 - 4.0 * a3 * b0
+    all_.ray.doubt(all_.own & (abs(disc) <= (TANGENT_ULPS * EPS) * (b1 * b1 + 4.0 * abs(a3 * b0))))
+    root = disc.root()
+    q = -0.5 * (b1 + (b1 >= 0.0).where(root, -root))
+    for shift in (q / a3, b0 / q):
+        all_.hit_from_own(g, shift, all_.own & (disc >= 0.0))
+
+
+def _meet_far_cubic(all_: _Meeting, g: Any) -> None:
+    """Find hits of the rays that started elsewhere, as `hit_from_afar` does for one ray."""
+    a0, a1, a2, a3 = g
+    zero, one, last = all_.zero, all_.one, all_.value_at_end()
+    disc = a2 * a2 - 3.0 * a3 * a1
+    root = disc.root()
+    q = -(a2 + (a2 >= 0.0).where(root, -root))
+    c1, c2 = q / (3.0 * a3), a1 / q
+    # NaN, if there are no extrema, is not inside
+    first_at, second_at = (c1 < c2).where(c1, c2), (c1 < c2).where(c2, c1)
+    spread = all_.spread()
+    values = []
+    insides = []
+    for c in (first_at, second_at):
+        inside = (disc > 0.0) & (c > 0.0) & (c < 1.0)
+        value = bezier_value.py_func(*g, c)
+        all_.touch(inside, value, spread)
+        values.append(value)
+        insides.append(inside)
+    low, value_low = insides[0].where(first_at, zero), insides[0].where(values[0], a0)
+    high, value_high = insides[1].where(second_at, one), insides[1].where(values[1], last)
+    first = (a0 >= 0.0) & (value_low <= 0.0) & (a0 > value_low)
+    second = (value_low >= 0.0) & (value_high <= 0.0) & (value_low > value_high)
+    third = (value_high >= 0.0) & (last <= 0.0) & (value_high > last)
+    falls = all_.far & (first | second | third)
+    with all_.builder.if_then(falls.any()):
+        start, end = _pick((first, zero), (second, low), high), _pick((first, low), (second, high), one)
+        above = _pick((first, a0), (second, value_low), value_high)
+        below = _pick((first, value_low), (second, value_high), last)
+        all_.hit(_falling_roots(g, start, end, above, below, falls), falls)
+    again = all_.far & first & third
+    with all_.builder.if_then(again.any(), likely=False):
+        all_.hit(_falling_roots(g, high, one, value_high, last, again), again)

@@ -77,7 +77,9 @@ class Room(NamedTuple):
 def room_for(hollows: Floats, block: int) -> Room:
     """Return the work space of `trace_closed`, for one thread and blocks of rays."""
     rays, others, met = np.empty((3, block), np.int64)
-    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(WORK))
+    # rays near one of many Bezier pieces are gathered in a second part
+    parts = 2 if np.any(hollows[:, BEZIERS_END] > hollows[:, FIRST_BEZIER]) else 1
+    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(parts * WORK))
 
 
 @inner
@@ -225,8 +227,7 @@ def is_crossed(hollow, closed, h, crossings):
     if closed.shape[0] > 0 and closed[h, FORM] != NO_FORM:
         return True
     _, _, simple = crossings
-    straight_or_circular = hollow[ELLIPSES_END] == hollow[FIRST_ELLIPSE] and hollow[BEZIERS_END] == hollow[FIRST_BEZIER]
-    return simple != 0 and straight_or_circular
+    return simple != 0 and hollow[ELLIPSES_END] == hollow[FIRST_ELLIPSE]
 
 
 @inlined

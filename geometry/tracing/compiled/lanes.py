@@ -43,6 +43,8 @@ class Lanes:
     def __truediv__(self, other: Any) -> Lanes:
         return self._with(other, "fdiv")
 
+    __radd__, __rmul__ = __add__, __mul__
+
     def __neg__(self) -> Lanes:
         return Lanes(self.builder, self.builder.fneg(self.value))
 
@@ -142,6 +144,10 @@ class Table:
         store = self.builder.module.declare_intrinsic(f"llvm.masked.compressstore.v{BOXES}f64", (), kind)
         self.builder.call(store, [value.value, start, chosen.value])
 
+    def number(self, place: int) -> Lanes:
+        """Return one number of the table in all lanes."""
+        return repeated(self.builder, self.builder.load(self.builder.gep(self._start, [WORD(place)])))
+
     def _at(self, place: int) -> Any:
         return self.builder.bitcast(self.builder.gep(self._start, [WORD(place)]), self._lanes.as_pointer())
 
@@ -219,16 +225,16 @@ WAVE = 512
 ROOM = WAVE + BOXES
 PX, PY, VX, VY, OWN, BEFORE, BOUNCES, RAY = (ROOM * k for k in range(8))
 TIME, PIECE, HIT_X, HIT_Y, FACE_X, FACE_Y, UNCERTAIN, DOUBT = (ROOM * k for k in range(8, 16))
-OUT_X, OUT_VX, OUT_VY, OUT_BOUNCES, OUT_RAY, OUT_ANGLE = (ROOM * k for k in range(16, 22))
-WORK = ROOM * 22
+OUT_X, OUT_VX, OUT_VY, OUT_BOUNCES, OUT_RAY, OUT_ANGLE, HIT_S = (ROOM * k for k in range(16, 23))
+WORK = ROOM * 23
 # Values of UNCERTAIN.
 BEFORE_RUN, AT_CORNER = 1.0, 2.0
 # Numbers of pieces in OWN, PIECE and BEFORE: of lines their rows, of the opening -1; -2 for no line;
-# circle k has -3 - k.
-NO_PIECE, NO_LINE, CIRCLE_NUMBERS = -1.0, -2.0, -3.0
+# circle k has -3 - k, Bezier piece k has -2^40 - k. After a hit on a Bezier piece, BEFORE is the parameter HIT_S there.
+NO_PIECE, NO_LINE, CIRCLE_NUMBERS, BEZIER_NUMBERS = -1.0, -2.0, -3.0, -(2.0**40)
 
 
-class _Ray:
+class Ray:
     """Eight rays of a wave, and the nearest hits so far."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, values: Any) -> None:
@@ -277,7 +283,7 @@ def meet_corner(typing, work, first, x, y, slack):
     """Doubt those of eight rays that meet a corner."""
 
     def meet(context, builder, signature, values):
-        ray = _Ray(context, builder, signature, values)
+        ray = Ray(context, builder, signature, values)
         x, y, slack = (repeated(builder, value) for value in values[2:])
         doubt_at_corner(ray, x - ray.px, y - ray.py, slack)
         return context.get_dummy_value()
@@ -285,7 +291,7 @@ def meet_corner(typing, work, first, x, y, slack):
     return types.void(work, types.int64, *[types.float64] * 3), meet
 
 
-def doubt_at_corner(ray: _Ray, dx: Lanes, dy: Lanes, slack: Lanes) -> Lanes:
+def doubt_at_corner(ray: Ray, dx: Lanes, dy: Lanes, slack: Lanes) -> Lanes:
     """Doubt rays that meet the corner at (dx, dy) from them; return its side of the rays."""
     side = cross(dx, dy, ray.vx, ray.vy)
     near = abs(side) <= slack
@@ -306,7 +312,7 @@ def meet_line(typing, work, first, start, end, edge, normal, length, close, numb
     """
 
     def meet(context, builder, signature, values):
-        ray = _Ray(context, builder, signature, values)
+        ray = Ray(context, builder, signature, values)
         parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, value)] for value in values[2:6]]
         (x0, y0, corner0), (x1, y1, corner1), (edge_x, edge_y), normal = parts
         length = repeated(builder, values[6])
@@ -342,7 +348,7 @@ def meet_circle(typing, work, first, ends, normal, curvature, chord, sines, slac
     """
 
     def meet(context, builder, signature, values):
-        ray = _Ray(context, builder, signature, values)
+        ray = Ray(context, builder, signature, values)
         px, py, vx, vy = ray.px, ray.py, ray.vx, ray.vy
         parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[k])] for k in (2, 3, 5, 7)]
         (x0, y0, x1, y1), (nx, ny), (chord_x, chord_y, short), (slack, slack0, slack1, close) = parts
@@ -399,7 +405,7 @@ def advance(typing, work, first, count, kept, left_out, opening, slack, limit):
     """
 
     def move(context, builder, signature, values):
-        ray = _Ray(context, builder, signature, values)
+        ray = Ray(context, builder, signature, values)
         at, px, py, vx, vy = ray.at, ray.px, ray.py, ray.vx, ray.vy
         rest = repeated(builder, builder.sitofp(builder.sub(values[2], values[1]), NUMBER))
         left, right = (repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[5]))
@@ -419,6 +425,7 @@ def advance(typing, work, first, count, kept, left_out, opening, slack, limit):
         wx, wy = vx - w * nx, vy - w * ny
         scale = constant(builder, 1.5) - dot(wx, wy, wx, wy) * 0.5
         before = (own >= 0.0).where(own, constant(builder, NO_PIECE))
+        before = (piece <= BEZIER_NUMBERS).where(at[HIT_S], before)
         end = Table(context, builder, signature.args[0], values[0]).column(values[4])
         for column, value in {
             OUT_X: px + upward * vx, OUT_VX: vx, OUT_VY: vy, OUT_BOUNCES: bounces, OUT_RAY: index

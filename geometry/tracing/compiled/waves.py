@@ -1,7 +1,7 @@
-"""Rays through hollows of lines and circles in waves: all rays that are inside hit their next piece, eight at once.
+"""Rays through hollows of lines, circles and Bezier pieces in waves: all rays that are inside hit their next piece.
 
-Every number is computed as by `rays`, so a ray has the same result by both, to the last bit. A ray for which rounding,
-a corner or a run of hits would matter has no result here. Loads numba.
+Eight rays are computed at once, with every number as by `rays`, so a ray has the same result by both, to the last bit.
+A ray for which rounding, a corner or a run of hits would matter has no result here. Loads numba.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import numpy as np
 
 from ...scene.boxes import BOXES
 from ...scene.columns import (
+    BEZIERS_END,
     CHORD_X,
     CHORD_Y,
     CIRCLES_END,
@@ -19,6 +20,7 @@ from ...scene.columns import (
     END_CORNER,
     END_X,
     END_Y,
+    FIRST_BEZIER,
     FIRST_CIRCLE,
     FIRST_JOINT,
     FIRST_PAIR,
@@ -40,17 +42,22 @@ from ...scene.columns import (
     START_Y,
     STARTS_LINE,
     TREE_LEVELS,
+    X3,
+    Y3,
 )
 from ...scene.tolerances import NEARBY_SLACKS
+from .beziers import gather_near, meet_cubic, meet_parabola
 from .lanes import (
     AT_CORNER,
     BEFORE,
     BEFORE_RUN,
+    BEZIER_NUMBERS,
     BOUNCES,
     CIRCLE_NUMBERS,
     DOUBT,
     FACE_X,
     FACE_Y,
+    HIT_S,
     HIT_X,
     HIT_Y,
     NO_LINE,
@@ -71,6 +78,7 @@ from .lanes import (
     VX,
     VY,
     WAVE,
+    WORK,
     advance,
     before_runs,
     clear_hits,
@@ -80,7 +88,7 @@ from .lanes import (
     meet_line,
 )
 from .lines import nearest_line_in_boxes
-from .options import inlined, inner
+from .options import inlined, inner, linked
 from .rays import scope_of
 from .records import CIRCLE, LINE, OPENING, Own, Slots
 from .runs import skip_chords, skip_crossings
@@ -90,6 +98,8 @@ from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
 MOST_WAVES = 64
 # Rays of a wave up to which the next rays come in.
 FEW = WAVE // 2
+# Number of Bezier pieces in a hollow from which on it is faster to gather the rays near each of them.
+MANY_BEZIERS = 6
 # Hits after which a ray is traced by itself: rays that stay long would keep the next ones out.
 MOST_HITS = 2**8
 # Above one by more than all rounding errors of the sine of incidence.
@@ -143,12 +153,61 @@ def meet_boxes(scope, work, i):
 
 
 @inlined
-def meet_pieces(scope, work, first, count):
-    """Find the nearest hits of eight rays on the circles and lines of a hollow."""
+def has_many_beziers(hollow):
+    """-> bool: whether rays of a hollow are gathered for each Bezier piece; circles come before, in the same order."""
+    many = hollow[BEZIERS_END] - hollow[FIRST_BEZIER] >= MANY_BEZIERS
+    return many and hollow[CIRCLES_END] == hollow[FIRST_CIRCLE]
+
+
+@linked
+def meet_bezier(beziers, k, slack, work, first):
+    """Find the nearest hits of eight rays on Bezier piece k."""
+    curve = beziers[k]
+    slacks = corner_slack(curve[START_CORNER], slack), corner_slack(curve[END_CORNER], slack)
+    if curve[X3] == 0.0 and curve[Y3] == 0.0:
+        meet_parabola(work, first, beziers, k, slacks, BEZIER_NUMBERS - k)
+    else:
+        meet_cubic(work, first, beziers, k, slacks, BEZIER_NUMBERS - k)
+
+
+@inlined
+def meet_gathered(scope, work, count):
+    """Find the nearest hits of all rays of a wave on many Bezier pieces; those that are near a piece are gathered."""
+    hollow, beziers, slack = scope.hollow, scope.tables.beziers, scope.slack
+    some = work[WORK:]
+    for first in range(0, count, BOXES):
+        clear_hits(work, first)
+    for k in range(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])):
+        number, chosen = BEZIER_NUMBERS - k, 0
+        for first in range(0, count, BOXES):
+            chosen += gather_near(work, first, count, beziers, k, number, WORK + chosen)
+        for j in range(chosen):
+            i = int(some[RAY + j])
+            for column in (PX, PY, VX, VY, OWN, BEFORE, TIME):
+                some[column + j] = work[column + i]
+            some[DOUBT + j] = 0.0
+        for j in range(chosen, chosen + BOXES):
+            # no rays, which meet nothing
+            some[TIME + j], some[OWN + j] = -np.inf, NO_PIECE
+        for first in range(0, chosen, BOXES):
+            meet_bezier(beziers, k, slack, some, first)
+        for j in range(chosen):
+            i = int(some[RAY + j])
+            if some[DOUBT + j] != 0.0:
+                work[DOUBT + i] = 1.0
+            if some[TIME + j] < work[TIME + i]:
+                for column in (TIME, PIECE, HIT_X, HIT_Y, FACE_X, FACE_Y, UNCERTAIN, HIT_S):
+                    work[column + i] = some[column + j]
+
+
+@inlined
+def meet_pieces(scope, work, first, count, is_gathered):
+    """Find the nearest hits of eight rays on the pieces of a hollow; without Bezier pieces after `meet_gathered`."""
     joints, lines, circles = scope.tables.joints, scope.tables.lines, scope.tables.circles
     hollow, slack = scope.hollow, scope.slack
     close = NEARBY_SLACKS * slack
-    clear_hits(work, first)
+    if not is_gathered:
+        clear_hits(work, first)
     for k in range(int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])):
         arc = circles[k]
         ends = arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]
@@ -158,6 +217,8 @@ def meet_pieces(scope, work, first, count):
             (arc[CHORD_X], arc[CHORD_Y], arc[SHORT_CHORD]), RUN_MARGIN * arc[RUN_SINE],
             (slack, at_start, at_end, close), CIRCLE_NUMBERS - k,
         )  # fmt: skip
+    for k in range(int(hollow[FIRST_BEZIER]), int(hollow[FIRST_BEZIER if is_gathered else BEZIERS_END])):
+        meet_bezier(scope.tables.beziers, k, slack, work, first)
     if hollow[TREE_LEVELS] > 0.0:
         for i in range(first, min(first + BOXES, count)):
             meet_boxes(scope, work, i)
@@ -176,12 +237,17 @@ def meet_pieces(scope, work, first, count):
 
 
 @inlined
-def begin_rays(work, following, entry, angle):
-    """Put rays, numbered from ``following``, into the wave whose work space begins at the first free place."""
+def begin_rays(work, following, entry, angle, opening):
+    """Put rays, numbered from ``following``, into the wave whose work space begins at the first free place.
+
+    A ray at an end of the opening has no result here: it begins with too many hits.
+    """
+    left, right = opening
     for i in range(entry.shape[0]):
         sine, cosine = sine_cosine(angle[i])
         work[PX + i], work[PY + i], work[VX + i], work[VY + i] = entry[i], 0.0, -cosine, -sine
-        work[OWN + i], work[BEFORE + i], work[BOUNCES + i], work[RAY + i] = NO_PIECE, NO_PIECE, 0.0, following + i
+        work[OWN + i], work[BEFORE + i], work[RAY + i] = NO_PIECE, NO_PIECE, following + i
+        work[BOUNCES + i] = 0.0 if left < entry[i] < right else MOST_HITS + 1.0
 
 
 @inlined
@@ -203,8 +269,11 @@ def next_hits(tables, scope, work, count, left, limit):
     """
     slack, opening, most = scope.slack, (scope.left, scope.right), float(min(limit, MOST_HITS))
     kept, gone = 0, 0
+    is_gathered = has_many_beziers(scope.hollow)
+    if is_gathered:
+        meet_gathered(scope, work, count)
     for first in range(0, count, BOXES):
-        meet_pieces(scope, work, first, count)
+        meet_pieces(scope, work, first, count, is_gathered)
         mask = before_runs(work, first)
         while mask != 0:
             i = first + first_bit(mask)
@@ -219,7 +288,7 @@ def next_hits(tables, scope, work, count, left, limit):
 
 @inner
 def cross_simple(tables, h, limit, entry, angle, hits, work):
-    """Reflect rays by a hollow of few lines and circles, with results as in `closed_forms.cross_arc`.
+    """Reflect rays by a hollow of lines, circles and Bezier pieces, with results as in `closed_forms.cross_arc`.
 
     The rays go through the hollow in waves: all rays that are inside hit their next piece, eight at once. The next rays
     take the places of those that have left. Rays with more than ``limit`` or `MOST_HITS` hits, or with runs of hits,
@@ -233,7 +302,7 @@ def cross_simple(tables, h, limit, entry, angle, hits, work):
     while waves < MOST_WAVES:
         if following < rays and count <= FEW:
             end = min(following + WAVE - count, rays)
-            begin_rays(work[count:], following, entry[following:end], angle[following:end])
+            begin_rays(work[count:], following, entry[following:end], angle[following:end], (scope.left, scope.right))
             count, following = count + end - following, end
         if count == 0:
             break
