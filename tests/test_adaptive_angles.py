@@ -12,7 +12,7 @@ from asperity import kernels as ker
 from asperity.kernels.bases.panels import ONE_PANEL
 from asperity.kernels.discretisation.method import Budget
 from asperity.kernels.discretisation.traced import KRONROD_FRACTION, traced_matrix
-from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES
+from asperity.kernels.expectations.angle_panels import GAUSS, KRONROD, NODES, NULL_RULES
 from asperity.kernels.walls.conditionals import adaptive_conditionals
 from plain_tracer import trace_plainly
 from random_curved_walls import random_curved_wall
@@ -149,3 +149,24 @@ def test_rows_of_a_wall_with_an_island_agree_with_traced_rays():
     # a midpoint sum over some hundred changes of itinerary, each of which shifts at most one point by a value of 2
     assert np.all(traced.escaped) and np.all(rows.error < 1e-4)
     assert np.all(np.abs(rows.mean(np.cos) - np.cos(traced.theta).mean(axis=1)) < 100 * 2.0 / 20_000)
+
+
+@pytest.mark.parametrize("depth", [0.5, 3.0])
+@pytest.mark.parametrize("basis", [ker.Bins(8), ker.Legendre(8)], ids=repr)
+def test_near_grazing_in_channels_where_nodes_sample_noise_errors_still_hold(depth: float, basis: ker.Basis) -> None:
+    """The law of rectangular teeth has no antisymmetric errors, so only the rules on the panels can show them."""
+    wall = geo.rectangular_teeth(depth)
+    exact = ker.discretise(ker.WallLaw(wall), basis)
+    for tolerance in (1e-2, 1e-3):
+        matrix, error, _ = traced_matrix(wall, basis, Budget(tolerance, segments=1_000_000))
+        assert np.linalg.norm(matrix - exact.symmetric) <= error + float(exact.error)
+
+
+def test_null_rules_vanish_for_polynomials_and_have_the_size_of_the_difference() -> None:
+    for number, rule in enumerate(NULL_RULES):
+        degree = len(NODES) - 2 - number
+        assert np.allclose(rule @ np.vander(NODES, degree + 1), 0.0, atol=1e-15)
+        assert abs(rule @ NODES ** (degree + 1)) > 1e-4
+    size = np.linalg.norm(KRONROD - GAUSS)
+    assert np.allclose(NULL_RULES @ NULL_RULES.T, size**2 * np.eye(len(NULL_RULES)), atol=1e-15)
+    assert np.allclose(np.abs(NULL_RULES[0]), np.abs(KRONROD - GAUSS), atol=1e-15)

@@ -20,7 +20,7 @@ from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.conditionals import WallConditionals
 from ..walls.wall_law import WallLaw
-from .method import MOST_SEGMENTS, Budget, MethodName, computed, rounding
+from .method import Budget, MethodName, computed, rounding
 
 if TYPE_CHECKING:
     from ...geometry import Wall
@@ -29,10 +29,12 @@ if TYPE_CHECKING:
 # the least such number. In some steep Bezier hollows a fiftieth does not complete an angle; in bottles with a neck of a
 # hundredth of their width no number does.
 ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
-# Guesses, not measurements, for the prediction of the cost; walls differ by more than a factor of ten.
-ANGLES_A_PIECE, SEGMENTS_A_CHANGE = 100, 400
+# Guesses, not measurements, for the prediction of the cost, in ray segments, and the limit on it; walls differ by more
+# than a factor of ten.
+ANGLES_A_PIECE, SEGMENTS_A_CHANGE, AFFORDABLE = 100, 400, 40_000_000
 # The asymmetry ||S - S^T|| shows the antisymmetric part of errors that the error estimates of panels and angles miss.
-# If the symmetric part has the same size, the whole error is sqrt(2)/2 times the asymmetry; the rest is a margin.
+# If the symmetric part has the same size, the whole error is sqrt(2)/2 times the asymmetry; the rest is a margin,
+# larger for few functions, whose pairs may agree by chance.
 ASYMMETRY_FACTOR, FEW_PAIRS = 1.25, 3.0
 # Error of Kronrod's rule as a fraction of its difference from Gauss's rule. Its root mean square over the positions of
 # a singularity is 0.38 for the square root at which a piece appears and 0.26 for a breakpoint; its mean is 0.
@@ -91,10 +93,7 @@ class Traced:
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error, rays = traced_matrix(cast(WallLaw, law).wall, basis, budget)
-        how = (
-            f"adaptive angles and panels, {rays} rays: Gauss against Kronrod and twice the asymmetry, "
-            "plus undecided entry points"
-        )
+        how = f"adaptive angles and panels, {rays} rays: null rules and asymmetry, plus undecided entry points"
         return computed(symmetric, basis, self.name, error + rounding(basis), how)
 
 
@@ -111,7 +110,7 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     cells = 1 if basis.is_polynomial else len(basis.edges) - 1
     predicted = ANGLES_A_PIECE * SEGMENTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
     overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
-    return bool(wall.closes) and not overhangs and predicted <= MOST_SEGMENTS
+    return bool(wall.closes) and not overhangs and predicted <= AFFORDABLE
 
 
 def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
@@ -119,10 +118,11 @@ def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, flo
 
     If the first angles predict an error above ``budget.fallback``, the computation ends with them.
 
-    The error of a panel is half the difference of Kronrod's and Gauss's rule if the expectations have a kink there. If
-    they are smooth, it is this difference scaled by a ratio measured when the panel was divided. The errors of panels
-    differ in sign, so they are added in quadrature, together with ASYMMETRY_FACTOR times the asymmetry of the result,
-    which shows other errors. The errors of the expectations are bounded whatever their signs.
+    The error of a panel is half the size of the null rules, of which the difference of Kronrod's and Gauss's rule is
+    one, if the expectations have a kink there, and twice their size if neighbouring nodes share few itineraries. If the
+    expectations are smooth, it is scaled by a ratio measured when the panel was divided. The errors of panels differ in
+    sign, so they are added in quadrature, together with a multiple of the asymmetry of the result, which shows other
+    errors. The errors of the expectations are bounded whatever their signs.
     """
     inner, fraction = basis, 1.0
     if basis.is_polynomial and basis.size < FEWEST_FUNCTIONS:

@@ -211,10 +211,10 @@ class WallConditionals:
     def shared(self, theta: Floats) -> Floats:
         """The probability of entry points whose itinerary also exists at the next of these known angles."""
         flat = self.wall.flat_top / self.wall.period if self.wall.closes else 0.0
-        return flat + sum(
-            fraction * conditionals.shared(theta)
-            for conditionals, fraction in zip(self._hollows, self._fractions, strict=True)
-        )
+        total = np.full(len(theta) - 1, flat)
+        for conditionals, fraction in zip(self._hollows, self._fractions, strict=True):
+            total += fraction * conditionals.shared(theta)
+        return total
 
     def critical_angles(self, low: float, high: float) -> Floats:
         """Known angles in (low, high), increasing, where the widest pieces appear or disappear."""
