@@ -12,7 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, finite_array, finite_number, instance, number_between, whole_number
+from ...core.checks import (
+    Floats,
+    angles,
+    finite_array,
+    finite_number,
+    instance,
+    number_between,
+    numbers,
+    whole_number,
+)
+from ...core.errors import InputError
 from ...core.kinds import explained
 from ..scene.columns import FORM, FORM_COLUMNS, LEFT, NO_FORM, RIGHT
 from ..walls.wall import Wall
@@ -172,7 +182,7 @@ def trace(
     0.750000000000 0.250000000000 2
     """
     _check_wall(wall)
-    x_all, theta_all = np.broadcast_arrays(finite_array("x", x), angles("theta", theta))
+    x_all, theta_all = np.broadcast_arrays(numbers("x", x), numbers("theta", theta))
     whole_number("max_collisions", max_collisions, 1)
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
     given, incoming = (np.require(array, requirements=["A", "C", "W"]).reshape(-1) for array in (x_all, theta_all))
@@ -183,13 +193,25 @@ def trace(
     stop = new_flag()
     trace_block = _block_tracer(scene, max_collisions, stop, _goes_in_waves(scene, len(starts)))
 
+    unresolved = []
+
     def run(block: slice) -> None:
+        # here and not for all rays before, because each thread checks its own
+        finite_array("x", given[block])
+        angles("theta", incoming[block])
         if starts is not given:
             starts[block] = entries(wall, given[block], incoming[block])
         trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], status[block])
+        found = status[block]
+        unresolved.append(found.any() and np.any((found == Status.CORNER) | (found == Status.GRAZING)))
 
-    in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
-    if status.any() and np.any((status == Status.CORNER) | (status == Status.GRAZING)):
+    try:
+        in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
+    except InputError:
+        # the message names the place among all rays
+        finite_array("x", x), angles("theta", theta)
+        raise
+    if any(unresolved):
         from .refinement import retrace
 
         interruptibly(lambda: retrace(scene, starts, incoming, max_collisions, out_x, out_theta, collisions, status))

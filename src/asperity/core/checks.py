@@ -19,15 +19,20 @@ SHOWN = 80
 DOUBLE = 8
 
 
-def finite_array(name: str, value: ArrayLike) -> Floats:
-    """Return ``value`` as float64, or raise an InputError that names the worst entry."""
+def numbers(name: str, value: ArrayLike) -> Floats:
+    """Return ``value`` as float64, finite or not."""
     try:
         array = np.asarray(value)
         if array.dtype.kind in "cSUmMV":
             raise TypeError("of another kind")
-        array = array.astype(np.float64, copy=False)
+        return array.astype(np.float64, copy=False)
     except Exception as reason:  # foreign objects fail in their own way
         raise InputError(f"{name}: expected numbers, got {shortened(value)}") from reason
+
+
+def finite_array(name: str, value: ArrayLike) -> Floats:
+    """Return ``value`` as float64, or raise an InputError that names the first entry that is not finite."""
+    array = numbers(name, value)
     with np.errstate(over="ignore", invalid="ignore"):
         # a sum with a term that is not finite is not finite; it takes a sixth of the time of a mask
         total = array.sum()
