@@ -2,6 +2,10 @@
 
 The judge is the same distance to 1e-7, so that the campaign shows errors that a rough run reports too small; the tests
 compare fine runs with closed forms. Pairs whose fine run reports more than 2e-5 are left out.
+
+The judge of a joint distance has 768 bins, whose edges are others, and twice the pairs of cells. The weighted
+sums of the specular law and of retroreflection have the joint distance pi - 2 times the difference of their weights.
+``--joint`` judges joint distances alone.
 """
 
 from __future__ import annotations
@@ -9,16 +13,21 @@ from __future__ import annotations
 import argparse
 import time
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.kernels.distances import cell_transport
+from asperity.kernels.distances.joint import joint_law_distance
 
 from .pages import print_table
 
 TOLERANCES, FINE, WORST_FINE = (1e-3, 1e-4, 1e-5), 1e-7, 2e-5
 KINDS: tuple[tuple[float, Any], ...] = ((1, "rows"), (2, "rows"), (1, "sup"))
+# Joint distances: wanted errors, that of the judge and its bins, and pairs with a closed form.
+JOINT_TOLERANCES, FINE_JOINT, JUDGE_BINS, KNOWN = (1e-2, 1e-3), 1e-4, 768, 12
 # Fraction of sums of two laws.
 SUMS = 0.35
 
@@ -72,13 +81,43 @@ def campaign(seed: int, seconds: float) -> list[str]:
     ]
 
 
+def joint_campaign(seed: int, seconds: float) -> list[str]:
+    """Rows of a table: tolerance of joint distances, runs, errors that did not hold, and the largest fraction."""
+    rng, end = np.random.default_rng(seed), time.monotonic() + seconds
+    known: dict[float, list[float]] = {tolerance: [] for tolerance in JOINT_TOLERANCES}
+    judged: dict[float, list[float]] = {tolerance: [] for tolerance in JOINT_TOLERANCES}
+    for _ in range(KNOWN):
+        weights = rng.random(2)
+        first, second = (a * ker.specular() + (1.0 - a) * ker.retroreflection() for a in weights)
+        truth = (np.pi - 2.0) * abs(weights[0] - weights[1])
+        for tolerance in JOINT_TOLERANCES:
+            found = ker.distance(first, second, kind="joint", tolerance=tolerance)
+            known[tolerance].append(abs(found.value - truth) / found.error)
+    while time.monotonic() < end:
+        pair = random_law(rng), random_law(rng)
+        with patch.object(cell_transport, "MOST_SPARSE", 2**19):
+            fine = joint_law_distance(*pair, 1.0, FINE_JOINT, JUDGE_BINS)
+        for tolerance in JOINT_TOLERANCES:
+            found = ker.distance(*pair, kind="joint", tolerance=tolerance)
+            judged[tolerance].append(abs(found.value - fine.value) / (found.error + fine.error))
+            if judged[tolerance][-1] > 1.0:
+                print(f"joint to {tolerance:g}: {found} for {fine}, {pair}", flush=True)
+    return [
+        f"joint to {tolerance:g}, {judge} | {len(found)} | {sum(part > 1.0 for part in found)} | "
+        f"{max(found, default=0.0):.2f}"
+        for judge, table in (("closed form", known), (f"{JUDGE_BINS} bins", judged))
+        for tolerance, found in table.items()
+    ]
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.distance_errors", description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seconds", type=float, default=240.0)
+    parser.add_argument("--joint", action="store_true")
     options = parser.parse_args()
-    rows = campaign(options.seed, options.seconds)
+    rows = (joint_campaign if options.joint else campaign)(options.seed, options.seconds)
     print_table("distance | runs | errors that did not hold | largest part of an error", rows)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from unittest.mock import patch
 
 import mpmath
 import numpy as np
@@ -18,7 +19,9 @@ from asperity import InputError
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.estimates import Estimate
+from asperity.kernels.distances import cell_transport
 from asperity.kernels.distances import joint as joint_distance
+from asperity.kernels.distances.cell_transport import levels_of_transport
 from asperity.kernels.distances.conditional import ConditionalDistance
 from asperity.kernels.distances.distributions import cells_error, entry_error, on_cells, outgoing_distributions
 from asperity.kernels.distances.pseudometric import flux_means
@@ -286,6 +289,46 @@ def test_beyond_the_guard_the_error_still_holds(monkeypatch, order):
     merged = ker.distance(*pair, order, "joint")
     assert "bracketed" in merged.method or "within" in merged.method
     assert 0.0 < abs(merged.value - exact.value) <= merged.error
+
+
+def random_masses(rng, cells):
+    """The difference of two measures: a third of the cells has a part of one, and a curve of cells the other."""
+    array = np.where(rng.random((cells, cells)) < 0.3, rng.random((cells, cells)), 0.0)
+    curve = np.zeros_like(array)
+    curve[np.arange(cells), rng.permutation(cells)] = rng.random(cells)
+    return array / array.sum() - curve / curve.sum()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_plans_on_merged_cells_bound_the_linear_programme_from_above(seed):
+    rng = np.random.default_rng(seed)
+    middle, difference = np.sort(np.pi * rng.random(32)), random_masses(rng, 32)
+    sides = [np.argwhere(sign * difference > 0.0) for sign in (1, -1)]
+    cost = np.hypot(*(middle[sides[0]][:, None] - middle[sides[1]]).transpose(2, 0, 1))
+    masses = [np.abs(difference[tuple(side.T)]) for side in sides]
+    exact = masses[0].sum() * ot.emd2(*(mass / mass.sum() for mass in masses), cost)
+    found = {level.cells: level.upper for level in levels_of_transport(middle, difference, 32)}
+    assert set(found) == {16, 32} and found[16] >= found[32] >= exact - 1e-12
+    assert found[32] == pytest.approx(exact, rel=0.02)
+    # with all pairs on the smallest cells
+    with patch.object(cell_transport, "CELLS_AT_START", 32):
+        (level,) = levels_of_transport(middle, difference, 32)
+    assert level.upper == pytest.approx(exact, rel=1e-9)
+
+
+@pytest.mark.parametrize(("weights", "tolerance"), [((1.0, 0.0), 1e-2), ((1.0, 0.0), 1e-3), ((0.3, 0.7), 1e-3)])
+def test_the_joint_distance_of_mirrors_and_retroreflectors_is_the_mean_of_their_distances(weights, tolerance):
+    pair = [a * ker.specular() + (1.0 - a) * ker.retroreflection() for a in weights]
+    found = ker.distance(*pair, kind="joint", tolerance=tolerance)
+    assert abs(found.value - abs(weights[0] - weights[1]) * (np.pi - 2)) <= found.error < max(tolerance, 1.1e-3)
+
+
+def test_the_joint_distance_of_an_arc_and_teeth_is_known_to_a_thousandth():
+    pair = ker.CircularArcLaw(1.2), ker.TriangularTeethLaw(0.7)
+    found, rough = (ker.distance(*pair, kind="joint", tolerance=tolerance) for tolerance in (1e-3, 1e-2))
+    assert found.error < 1e-3 and abs(found.value - rough.value) <= found.error + rough.error
+    # on 256 x 256 cells with up to a million pairs and 1024 bins: 0.28905(29)
+    assert abs(found.value - 0.28905) <= found.error + 3e-4
 
 
 # ---- samples -----------------------------------------------------------------------------------------------------
