@@ -323,6 +323,12 @@ def test_the_joint_distance_of_mirrors_and_retroreflectors_is_the_mean_of_their_
     assert abs(found.value - abs(weights[0] - weights[1]) * (np.pi - 2)) <= found.error < max(tolerance, 1.1e-3)
 
 
+@pytest.mark.parametrize("law", [ker.specular(), ker.maxwell(0.4)])
+def test_the_joint_distance_of_a_law_from_itself_is_nothing(law):
+    found = ker.distance(law, law, kind="joint", tolerance=1e-2)
+    assert found.value == 0.0 and found.error < 1e-9
+
+
 def test_the_joint_distance_of_an_arc_and_teeth_is_known_to_a_thousandth():
     pair = ker.CircularArcLaw(1.2), ker.TriangularTeethLaw(0.7)
     found, rough = (ker.distance(*pair, kind="joint", tolerance=tolerance) for tolerance in (1e-3, 1e-2))

@@ -92,7 +92,7 @@ def levels_of_transport(points: Floats, difference: Floats, most_cells: int) -> 
     cells = min(CELLS_AT_START, most_cells)
     one, other = (_Masses.of(points, sign * difference, cells) for sign in (1.0, -1.0))
     if not one.size or not other.size:
-        yield Level(most_cells, 0.0)
+        yield Level(cells, 0.0)
         return
     plan = _plan(one, other, np.indices((one.size, other.size)).reshape(2, -1))
     while plan is not None:
