@@ -165,7 +165,7 @@ def _next_pairs(
             i = rows[tuple((2 * source + offset[:2] + 1).T)]
             j = columns[tuple((2 * target + offset[2:] + 1).T)]
             both = (i >= 0) & (j >= 0)
-            keys.append(np.unique(i[both] * other.size + j[both]))
+            keys.append(i[both] * other.size + j[both])
     return np.stack(np.divmod(np.unique(np.concatenate(keys)), other.size))
 
 
