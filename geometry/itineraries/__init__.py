@@ -1,1 +1,1 @@
-"""The itineraries of rays at one incoming angle: entry points at which they change, and Gauss nodes between them."""
+"""The itineraries of rays at one incoming angle: the entry points at which they change, and the nodes between them."""

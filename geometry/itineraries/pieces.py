@@ -43,11 +43,11 @@ class Pieces(NamedTuple):
         number = number[single]
         return Pieces(angle, low, high, label, matters, key[number], 0.5 * (high[number] + low[number + 1]), number)
 
-    def middles(self, least: float, known: NDArray[np.int64] = np.empty(0, np.int64)) -> Floats:  # noqa: B008
+    def middles(self, least: float, known: NDArray[np.int64] | None = None) -> Floats:
         """The middles of the pieces wider than ``least``, unless the changes at both ends are among the known ones."""
         ends = np.zeros(len(self.low) + 1, dtype=np.bool_)
-        ends[[0, -1]] = len(known) > 0
-        ends[known + 1] = True
+        if known is not None:
+            ends[[0, -1]] = ends[known + 1] = True
         wanted = (self.high - self.low > least) & ~(ends[:-1] & ends[1:])
         return np.asarray(0.5 * (self.low + self.high)[wanted])
 

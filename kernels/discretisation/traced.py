@@ -290,7 +290,8 @@ class _Integrator:
         actual = np.linalg.norm(total - whole, axis=(1, 2))
         ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
         smooth = after < SMOOTH_SHRINKING * before[owner]
-        smooth &= children.error <= KRONROD_FRACTION * after
+        # not where the nodes sample noise
+        smooth &= children.error < 2.0 * KRONROD_FRACTION * after
         self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, children.error)
 
     def _cuts(self, low: float, high: float) -> Floats:

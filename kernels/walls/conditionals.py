@@ -18,7 +18,7 @@ from .hollow_conditionals import NO_LIMIT, HollowConditionals
 
 # Up to this number of pieces of a wall one conditional distribution takes a few milliseconds.
 MOST_PIECES = 64
-# Lowest Gauss rule on a piece that is used for polynomials on panels.
+# Lowest nested rule on a piece that is used for polynomials on panels.
 PANEL_LEVEL = 2
 # A pilot run at 12 angles detects chaotic hollows: these take 31,000 to 71,000 ray segments per angle, 28 other walls
 # 260 to 7,400. One angle stops at MOST_PILOT_SEGMENTS.
@@ -97,7 +97,7 @@ def adaptive_conditionals(
     Notes
     -----
     For fixed theta the map from the entry point to theta' is analytic between changes of the itinerary. Bisection finds
-    the changes; Gauss rules integrate between them. Near cusps and grazing there are infinitely many changes: the
+    the changes; nested rules integrate between them. Near cusps and grazing there are infinitely many changes: the
     undecided intervals count in the error. The error is an estimate: a piece narrower than the spacing of the samples
     can be missed, unless it was found at a neighbouring angle. Compared with a second method, the true error exceeded
     the reported one for 4 of 720 distributions of 24 walls; the median of reported over true error was 11.
@@ -133,7 +133,7 @@ class WallConditionals:
         self.degree = degree
         # for one angle in one hollow; the error includes the intervals undecided at the limit
         self.most_segments = most_segments
-        # lowest Gauss rule on a piece
+        # lowest nested rule on a piece
         self.least_level = least_level
         # a writable copy: numba would compile again for read-only arrays
         self.edges = np.array(edges, dtype=np.float64)

@@ -121,8 +121,8 @@ class HollowConditionals:
         return found_conditionals, outdated
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
-        from ...geometry.itineraries.compiled.gauss import gauss_tables
         from ...geometry.itineraries.compiled.march import marched_angles
+        from ...geometry.itineraries.compiled.rules import nested_rules
 
         # the width whose error is one tolerance
         unit = self.width / self._size
@@ -131,7 +131,7 @@ class HollowConditionals:
         ]
         found = _result(
             lambda: marched_angles(
-                theta, tolerances, self._setting, self.degree, gauss_tables(self.least_level),
+                theta, tolerances, self._setting, self.degree, nested_rules(self.least_level),
                 np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
             )
         )  # fmt: skip

@@ -1,1 +1,1 @@
-"""The compiled search for changes of itinerary, and the Gauss rules between them."""
+"""The compiled search for changes of itinerary, and the nested rules between them."""

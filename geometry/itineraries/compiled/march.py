@@ -1,4 +1,4 @@
-"""Compiled march along the entry points of one angle: intervals (pieces) of equal itinerary, and Gauss nodes on each.
+"""Compiled march along the entry points of one angle: intervals (pieces) of equal itinerary, and nodes on each.
 
 A node with another label than its piece reveals a missed change of itinerary; it is added to the samples.
 """
@@ -32,13 +32,13 @@ from .changes import (
     task_of,
     undecided,
 )
-from .gauss import MOST_NODES, SPARE, Rules, gauss_tables, integrate_piece
+from .rules import MOST_NODES, SPARE, Rules, integrate_piece, nested_rules
 
 # Rounding error of a mean, as a fraction of the opening, and of the position of a change, as a fraction of the hollow's
 # size. Rays have errors of a few EPS times the derivative of the map, which is seldom above some hundreds except next
 # to a change (measured, not proved).
 ROUNDING, EDGE_ROUNDING = 1024.0 * EPS, 64.0 * EPS
-# Fractions of the tolerance for the Gauss rules and for all gaps.
+# Fractions of the tolerance for the nested rules and for all gaps.
 RULE_FRACTION, GAP_FRACTION = 0.5, 0.25
 # Fraction of the tolerance of the gaps for the gaps at a missed change.
 LATE_FRACTION = 0.05
@@ -134,7 +134,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
 def march_address() -> int:
     """Return the address of `march_angle`."""
     pieces = np.empty(0), np.empty(0), np.empty(0, np.uint64)
-    rules, entries, nodes = gauss_tables(0), np.empty(0), (np.empty(0), np.empty(0))
+    rules, entries, nodes = nested_rules(0), np.empty(0), (np.empty(0), np.empty(0))
     return address_of(march_angle, (example_task(), 0.0, rules, entries, example_chain(), nodes, pieces))
 
 

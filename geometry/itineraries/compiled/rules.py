@@ -1,8 +1,8 @@
-"""Compiled Gauss rules between two neighbouring changes of itinerary.
+"""Compiled nested rules between two neighbouring changes of itinerary.
 
-The rules are Gauss rules in s with x = a + (b - a) s^2 (3 - 2 s), in which square roots at tangencies are analytic at
-both ends. ``rules`` is the result of `gauss_tables`. ``nodes`` are the outgoing angles and masses of a conditional
-distribution, with spare room.
+The rules are Fejér's second rules in s with x = a + (b - a) s^2 (3 - 2 s), in which square roots at tangencies are
+analytic at both ends. ``rules`` is the result of `nested_rules`. ``nodes`` are the outgoing angles and masses of a
+conditional distribution, with spare room.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from ...scene.columns import LEFT, RIGHT
 from ...tracing.compiled.options import linked, linked_allocating
 from .changes import BLOCK, FIRST_LABEL, is_spent, outcome, size_at, trace_block
 
+# Number of rules, and of the positions of the finest.
 LEVELS = 5
 MOST_POSITIONS = 2 ** (LEVELS + 1) - 1
 # Limit on the nodes of one incoming angle.
 MOST_NODES = 1 << 17
 # Further nodes for margins and gaps.
 SPARE = 4
-# Least ratio of differences in the error estimate of a Gauss rule, 2 x last difference x last ratio of differences:
+# Least ratio of differences in the error estimate of a rule, 2 x last difference x last ratio of differences:
 # smaller ratios, which also occur by chance, underestimate the error.
 LEAST_RATIO = 0.03
 # Width, as a fraction of the opening, below which pieces are not halved.
@@ -45,7 +46,7 @@ class Rules(NamedTuple):
     least: int
 
 
-def gauss_tables(least: int) -> Rules:
+def nested_rules(least: int) -> Rules:
     """Return the rules after the substitution, to be used from number ``least`` on."""
     positions, weights = np.empty(0), np.zeros((LEVELS, MOST_POSITIONS))
     for level in range(LEVELS):
@@ -78,12 +79,12 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     old0, old1, old2, old_step = 0.0, 0.0, 0.0, 0.0
     k = max(degree, 1)
     error = 2.0 * width
-    used = np.int64(0)
+    traced, used = np.int64(0), np.int64(0)
     for level in range(LEVELS):
         count = (4 << level) - 1
         if count > MOST_NODES - filled - 2 or is_spent(task):
             break
-        for first in range(used, count, BLOCK):
+        for first in range(traced, count, BLOCK):
             last = min(first + BLOCK, count)
             block = task.setting.tracer.entries[: last - first]
             for n in range(first, last):
@@ -93,11 +94,12 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
                 x = block[n - first]
                 out, here = outcome(n - first, x, task)
                 if strict and here != label:
-                    return used, error, x, np.int64(n)
+                    return used, error, x, np.int64(last)
                 node[filled + n] = out
-        used = count
+        traced = count
         if level < least:
             continue
+        used = count
         new0, new1, new2 = 0.0, 0.0, 0.0
         for n in range(count):
             weight, out = width * weights[level, n], node[filled + n]
@@ -106,7 +108,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
             new1 += weight * math.cos(k * out)
             new2 += weight * math.sin(k * out)
         if degree == 0 or label < FIRST_LABEL:
-            return used, 0.0, np.nan, used
+            return used, 0.0, np.nan, traced
         if level > least:
             step = max(abs(new0 - old0), max(abs(new1 - old1), abs(new2 - old2))) + EPS * width
             ratio = 1.0 if level == least + 1 else step / old_step
@@ -115,7 +117,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
                 break
             old_step = step
         old0, old1, old2 = new0, new1, new2
-    return used, error, np.nan, used
+    return used, error, np.nan, traced
 
 
 @linked_allocating
