@@ -38,9 +38,11 @@ class Pieces(NamedTuple):
         """The pieces at an angle, with the changes between them."""
         key = label[:-1] * KEY_FACTOR + label[1:]
         number = np.argsort(key)
-        differs = np.diff(key[number]) != 0
-        single = np.append(True, differs)[: len(key)] & np.append(differs, True)[: len(key)]
-        number = number[single]
+        differs = np.ones(len(key) + 1, dtype=np.bool_)
+        if len(key):
+            ordered = key[number]
+            differs[1:-1] = ordered[1:] != ordered[:-1]
+        number = number[differs[:-1] & differs[1:]]
         return Pieces(angle, low, high, label, matters, key[number], 0.5 * (high[number] + low[number + 1]), number)
 
     def middles(self, least: float, known: NDArray[np.int64] | None = None) -> Floats:
@@ -53,14 +55,20 @@ class Pieces(NamedTuple):
 
     def shared(self, other: Pieces) -> float:
         """The total width of the pieces whose itinerary also exists at the other angle."""
-        return float(np.sum((self.high - self.low)[np.isin(self.label, other.label)]))
+        _, same = _places(np.sort(other.label), self.label)
+        return float(np.sum((self.high - self.low)[same]))
 
     def places(self, keys: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         """The places of the changes with the keys, and whether there is such a change."""
-        if not len(self.keys):
-            return np.zeros(len(keys), np.int64), np.zeros(len(keys), np.bool_)
-        place = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
-        return place, self.keys[place] == keys
+        return _places(self.keys, keys)
+
+
+def _places(ordered: NDArray[np.uint64], wanted: NDArray[np.uint64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """The places of wanted numbers among increasing ones, and whether they are there; faster than `numpy.isin`."""
+    if not len(ordered):
+        return np.zeros(len(wanted), np.int64), np.zeros(len(wanted), np.bool_)
+    place = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
+    return place, ordered[place] == wanted
 
 
 def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[Pieces], least: float) -> Floats:
@@ -81,7 +89,8 @@ def samples_between(angle: float, nearest: tuple[Pieces, Pieces], farther: list[
     bends = []
     for far in farther:
         place, same = far.places(keys)
-        there = np.append(far.changes, np.nan)[np.where(same, place, -1)]
+        there = far.changes[place] if len(far.changes) else np.full(len(keys), np.nan)
+        there[~same] = np.nan
         bend = ((there - first) / (far.angle - before.angle) - slope) / (far.angle - after.angle)
         bends.append(bend)
         found = np.where(same, line + product * bend, found)

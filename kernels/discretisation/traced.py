@@ -263,7 +263,7 @@ class _Integrator:
         order = np.argsort(panels.error)
         together = np.sqrt(np.cumsum(panels.error[order] ** 2))
         chosen = np.zeros(len(order), dtype=np.bool_)
-        chosen[order[together > 0.25 * goal]] = True
+        chosen[order[together > 0.5 * goal]] = True
         # A panel with a much smaller error than the worst waits for a later round.
         chosen &= able & (panels.error > 0.02 * np.max(panels.error, where=able, initial=0.0))
         # At most the number of panels that the remaining segments allow, at the mean cost of an angle so far.

@@ -16,7 +16,7 @@ from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
 from ...tracing.compiled.options import linked, linked_allocating
-from .changes import BLOCK, FIRST_LABEL, is_spent, outcome, size_at, trace_block
+from .changes import BLOCK, FIRST_LABEL, is_spent, outcome, probe, size_at, trace_block
 
 # Number of rules, and of the positions of the finest.
 LEVELS = 5
@@ -30,6 +30,8 @@ SPARE = 4
 LEAST_RATIO = 0.03
 # Width, as a fraction of the opening, below which pieces are not halved.
 NARROWEST = 1e-9
+# Width, as a fraction of the opening, below which one ray checks a piece on which the functions are constant.
+NARROW = 1.0 / 32.0
 MOST_HALVINGS = 40
 # Least fraction of the tolerance for the rules of one piece, however narrow.
 LEAST_FRACTION = 0.05
@@ -132,6 +134,13 @@ def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     low_stack[0], high_stack[0] = ends
     out, label = sample
     node, mass = nodes
+    if task.degree == 0 and ends[1] - ends[0] < NARROW * whole and strict and MOST_NODES - filled > 2:
+        middle = 0.5 * (ends[0] + ends[1])
+        out, here = probe(middle, task)
+        if here != label:
+            return filled, 0.0, middle, np.int64(1)
+        node[filled], mass[filled] = out, ends[1] - ends[0]
+        return filled + 1, 0.0, np.nan, np.int64(1)
     size = size_at(out, task)
     depth, error, rays = np.int64(1), 0.0, np.int64(0)
     while depth > 0:
