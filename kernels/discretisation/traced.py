@@ -40,8 +40,9 @@ ASYMMETRY_FACTOR, FEW_PAIRS = 1.25, 3.0
 # a singularity is 0.38 for the square root at which a piece appears and 0.26 for a breakpoint; its mean is 0.
 KRONROD_FRACTION = 0.5
 # The same where neighbouring nodes share less than LEAST_SHARED of their itineraries: the nodes then sample noise, in
-# which the root mean square is 1, and one panel may dominate.
-ALIASED_FRACTION, LEAST_SHARED = 2.0, 0.8
+# which error and null rules have the same size, and one panel may dominate. 95 % quantile of Student's t for four null
+# rules.
+ALIASED_FRACTION, LEAST_SHARED = 2.8, 0.8
 # Incoming angles computed at a time, so that their nodes fit into memory.
 ANGLES_AT_ONCE = 1500
 # The errors of all conditional expectations together may be this fraction of the tolerance.
@@ -257,7 +258,7 @@ class _Integrator:
         return matrix, panels, conditionals, factor * float(np.linalg.norm(matrix - matrix.T))
 
     def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:
-        """The panels to divide: the worst ones, so many that the others together have an error below goal / 4."""
+        """The panels to divide: the worst ones, so many that the others have an error below goal / 2 together."""
         panels = self.panels
         able = (panels.high - panels.low > NARROWEST) & (panels.error > 0.5 * panels.mean_errors(self.basis))
         order = np.argsort(panels.error)

@@ -18,14 +18,13 @@ from ..bases.bins import Bins
 from ..discretisation.discretisation import discretise
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix, joint_kind
-from .cell_transport import Level, levels_of_transport
+from .cell_transport import MOST_PIVOTS, NO_MASS, Level, levels_of_transport
 from .resampling import cell_middles, matrices_error, stochastic_rows
 from .rowwise import matrix_distance
 from .transport import Distributions, power_mean, wasserstein
 
 # Limit on the pairs of occupied cells for an exact solution, at about 40 bytes per pair, 160 MB, and a few seconds.
 MOST_PAIRS = 2**22
-MOST_PIVOTS = 10**8
 # Bins on which laws are compared, for p > 1 and for p = 1, and the tolerance of their matrices.
 LAW_BINS, FINE_LAW_BINS, LAW_TOLERANCE = 128, 512, 1e-7
 # If the wanted error is at least this, half as many bins are enough for p = 1.
@@ -41,8 +40,6 @@ SOLVER_ROUNDING = 64.0 * EPS
 SMALL_DOUBT = 1e-6
 # Directions of the lower bound by projection.
 DIRECTIONS = 32
-# Masses below this fraction of the total count as 0.
-NO_MASS = 1e-15
 
 
 def joint_law_distance(first: Law, second: Law, order: float, tolerance: float, bins: int | None = None) -> Estimate:
