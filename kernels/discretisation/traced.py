@@ -14,7 +14,7 @@ from ...core.rounding import EPS
 from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
-from ..expectations.angle_panels import NODES, AnglePanels
+from ..expectations.angle_panels import NODES, NULL_RULES, AnglePanels
 from ..expectations.basis_means import VALUES_AT_ONCE, means_of_basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
@@ -276,7 +276,7 @@ class _Integrator:
 
     def _divide(self, chosen: NDArray[np.bool_]) -> None:
         parents = self.panels.selected(chosen)
-        before, whole = parents.differences(self.basis), parents.values(self.basis)
+        before, whole = parents.differences(self.basis, NULL_RULES), parents.values(self.basis)
         cuts = [self._cuts(low, high) for low, high in zip(parents.low.tolist(), parents.high.tolist(), strict=True)]
         parts = [
             np.concatenate(([low], cut, [high])) for low, cut, high in zip(parents.low, cuts, parents.high, strict=True)
@@ -285,7 +285,7 @@ class _Integrator:
         self.panels = self.panels.selected(~chosen)
         self._add_panels(np.concatenate([p[:-1] for p in parts]), np.concatenate([p[1:] for p in parts]))
         children = self.panels.selected(np.arange(-len(owner), 0))
-        after, value = children.differences(self.basis), children.values(self.basis)
+        after, value = children.differences(self.basis, NULL_RULES), children.values(self.basis)
         total = np.zeros_like(whole)
         np.add.at(total, owner, value)
         actual = np.linalg.norm(total - whole, axis=(1, 2))
@@ -336,4 +336,4 @@ class _Integrator:
         touched = np.unique(panel)
         shared = np.array([self.conditionals.shared(panels.angle[k]).min() for k in touched.tolist()])
         fraction = np.where(shared < LEAST_SHARED, ALIASED_FRACTION, KRONROD_FRACTION)
-        panels.error[touched] = fraction * panels.selected(touched).differences(self.basis)
+        panels.error[touched] = fraction * panels.selected(touched).differences(self.basis, NULL_RULES)

@@ -108,9 +108,12 @@ class AnglePanels:
         """The integrals by Kronrod's rule."""
         return self._integrals(KRONROD, basis)
 
-    def differences(self, basis: Basis) -> Floats:
-        """The root mean square of the norms of the null rules, shape (panels,)."""
-        squares = [np.sum(self._integrals(rule, basis) ** 2, axis=(1, 2)) for rule in NULL_RULES]
+    def differences(self, basis: Basis, rules: Floats = NULL_RULES[:1]) -> Floats:
+        """The norms of the differences between Kronrod's and Gauss's rule, shape (panels,).
+
+        For more null rules, the root mean square of their norms.
+        """
+        squares = [np.sum(self._integrals(rule, basis) ** 2, axis=(1, 2)) for rule in rules]
         return np.asarray(np.sqrt(np.mean(squares, axis=0)))
 
     def mean_errors(self, basis: Basis) -> Floats:
