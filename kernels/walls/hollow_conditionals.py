@@ -29,6 +29,8 @@ NO_LIMIT = 2**62
 MOST_ROUNDS = 8
 # Steps between the angles of a round of one computation: about those of a panel at first, then their middles.
 WIDEST_STEP, STEPS = 16, (8, 4, 2, 1)
+# Changes of itinerary from which on a prediction takes less time than the rays that it saves.
+MANY_CHANGES = 16
 # Least distance of a sample from a predicted change, in the error of the change that the tolerance allows.
 SAMPLE_DISTANCE = 0.1
 # Critical angles per search, and the least width of their pieces as a fraction of the widest piece.
@@ -80,6 +82,7 @@ class HollowConditionals:
     def __post_init__(self) -> None:
         self.rays, self.segments = 0, 0
         self._size = float(np.median(self.sizes))
+        self._has_many_changes = False
         self._theta = np.empty(0)
         self._pieces: dict[float, Pieces] = {}
         self._missed: dict[float, list[float]] = {}
@@ -110,9 +113,10 @@ class HollowConditionals:
         pending = np.ones(len(theta), dtype=np.bool_)
         for _ in range(MOST_ROUNDS):
             ordered = np.flatnonzero(pending)
-            for chosen in _rounds(len(ordered)):
+            for chosen in _rounds(len(ordered)) if self._has_many_changes else [slice(None)]:
                 own = ordered[chosen]
                 found_conditionals.update(self._march_once(theta[own], tolerances[own]))
+                self._has_many_changes |= any(len(self._pieces[angle].keys) >= MANY_CHANGES for angle in theta[own])
             missed = self._compare(theta[pending])
             outdated |= missed - asked
             pending = np.isin(theta, list(missed & asked))
@@ -167,7 +171,7 @@ class HollowConditionals:
             k = int(np.searchsorted(self._theta, angle))
             far, near = self._theta[max(0, k - 2) : k + 2].tolist(), self._theta[max(0, k - 1) : k + 1].tolist()
             known = [self._pieces[theta] for theta in near]
-            if len(known) == 2:
+            if len(known) == 2 and min(len(pieces.keys) for pieces in known) >= MANY_CHANGES:
                 farther = [self._pieces[theta] for theta in far if theta not in near]
                 entries.append(samples_between(angle, (known[0], known[1]), farther, SAMPLE_DISTANCE * least))
             else:
