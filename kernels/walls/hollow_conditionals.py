@@ -82,7 +82,6 @@ class HollowConditionals:
     def __post_init__(self) -> None:
         self.rays, self.segments = 0, 0
         self._size = float(np.median(self.sizes))
-        self._has_many_changes = False
         self._theta = np.empty(0)
         self._pieces: dict[float, Pieces] = {}
         self._missed: dict[float, list[float]] = {}
@@ -113,10 +112,9 @@ class HollowConditionals:
         pending = np.ones(len(theta), dtype=np.bool_)
         for _ in range(MOST_ROUNDS):
             ordered = np.flatnonzero(pending)
-            for chosen in _rounds(len(ordered)) if self._has_many_changes else [slice(None)]:
+            for chosen in _rounds(len(ordered)):
                 own = ordered[chosen]
                 found_conditionals.update(self._march_once(theta[own], tolerances[own]))
-                self._has_many_changes |= any(len(self._pieces[angle].keys) >= MANY_CHANGES for angle in theta[own])
             missed = self._compare(theta[pending])
             outdated |= missed - asked
             pending = np.isin(theta, list(missed & asked))
