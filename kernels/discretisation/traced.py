@@ -120,7 +120,7 @@ def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, flo
     If the first angles predict an error above ``budget.fallback``, the computation ends with them.
 
     The error of a panel is half the size of the null rules, of which the difference of Kronrod's and Gauss's rule is
-    one, if the expectations have a kink there, and twice their size if neighbouring nodes share few itineraries. If the
+    one, if the expectations have a kink there, and 2.8 times it if neighbouring nodes share few itineraries. If the
     expectations are smooth, it is scaled by a ratio measured when the panel was divided. The errors of panels differ in
     sign, so they are added in quadrature, together with a multiple of the asymmetry of the result, which shows other
     errors. The errors of the expectations are bounded whatever their signs.
