@@ -10,6 +10,7 @@ from asperity import geometry as geo
 from asperity.core.rounding import EPS
 from asperity.geometry.scene.columns import END_X, END_Y, SIZE, START_X, START_Y, X1, X2, X3, Y1, Y2, Y3
 from asperity.geometry.tracing.refinement import refined_trace
+from bezier_pieces import parabola_as_a_cubic, wall_with_inflections
 
 RAYS, BITS, NEAR = 100, 3_000, 2.0**-160
 # Errors in units of eps times the amplification and the number of segments; errors made on the way may grow by more.
@@ -17,19 +18,12 @@ MOST = 32.0
 BOTTOM = -np.sqrt(2.0)
 
 
-def elevated(start, middle, end, bump):
-    """A parabola as a cubic piece, off by ``bump``."""
-    start, middle, end = map(np.array, (start, middle, end))
-    second = start + (middle - start) * 2 / 3 + [0.0, bump]
-    return geo.Bezier([start, second, end + (middle - end) * 2 / 3, end])
-
-
 WALLS = {
     "double parabola": geo.double_parabola(),
     "nearly quadratic": geo.Wall(
         [
-            elevated((0, 0), (0, BOTTOM / 2), (0.5, BOTTOM), 1e-13),
-            elevated((0.5, BOTTOM), (1, BOTTOM / 2), (1, 0), -1e-6),
+            parabola_as_a_cubic((0, 0), (0, BOTTOM / 2), (0.5, BOTTOM), 1e-13),
+            parabola_as_a_cubic((0.5, BOTTOM), (1, BOTTOM / 2), (1, 0), -1e-6),
         ]
     ),
     "nearly linear": geo.Wall(
@@ -38,12 +32,7 @@ WALLS = {
             geo.Bezier([(0.4, -0.6), (0.6, -0.4 - 2e-15), (1, 0)]),
         ]
     ),
-    "inflections": geo.Wall(
-        [
-            geo.Bezier([(0, 0), (0.8, -0.3), (-0.1, -0.6), (0.5, -0.9)]),
-            geo.Bezier([(0.5, -0.9), (1.1, -0.6), (0.2, -0.3), (1, 0)]),
-        ]
-    ),
+    "inflections": wall_with_inflections(),
     "nearly a cusp": geo.Wall([geo.Bezier([(0, 0), (0.999, -1.2), (0.001, -1.2), (1, 0)])]),
     "vertical ends": geo.Wall([geo.Bezier([(0, 0), (0, -0.6), (1, -0.6), (1, 0)])]),
 }

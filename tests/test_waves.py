@@ -15,6 +15,7 @@ from asperity.geometry.tracing.compiled.pointers import Late
 from asperity.geometry.tracing.compiled.trigonometry import mirrored
 from asperity.geometry.tracing.compiled.waves import MOST_HITS
 from asperity.geometry.tracing.threads import new_flag
+from bezier_pieces import parabola_as_a_cubic, wall_with_inflections
 from test_runs import random_teeth
 
 RAYS = 5_000
@@ -37,13 +38,6 @@ def valley_of_arcs():
     return geo.Wall(pieces)
 
 
-def parabola_as_a_cubic(start, middle, end, bump=0.0):
-    """The quadratic Bezier piece of these points as a cubic one, whose second point is raised by ``bump``."""
-    start, middle, end = map(np.array, (start, middle, end))
-    second = start + (middle - start) * 2 / 3 + [0.0, bump]
-    return geo.Bezier([start, second, end + (middle - end) * 2 / 3, end])
-
-
 WALLS = {
     "mushroom": geo.mushrooms(0.3, 0.5),
     "koch": geo.koch(4),
@@ -60,12 +54,7 @@ WALLS = {
             parabola_as_a_cubic((0.5, -1.4), (1, -0.7), (1, 0)),
         ]
     ),
-    "inflections": geo.Wall(
-        [
-            geo.Bezier([(0, 0), (0.8, -0.3), (-0.1, -0.6), (0.5, -0.9)]),
-            geo.Bezier([(0.5, -0.9), (1.1, -0.6), (0.2, -0.3), (1, 0)]),
-        ]
-    ),
+    "inflections": wall_with_inflections(),
     "mixed": geo.Wall(
         [
             geo.Segment((0, 0), (0.2, -0.5)),

@@ -209,7 +209,8 @@ def trace(
         in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
     except InputError:
         # the message names the place among all rays
-        finite_array("x", x), angles("theta", theta)
+        finite_array("x", x)
+        angles("theta", theta)
         raise
     if any(unresolved):
         from .refinement import retrace

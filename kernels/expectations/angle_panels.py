@@ -118,7 +118,8 @@ class AnglePanels:
 
     def mean_errors(self, basis: Basis) -> Floats:
         """The errors of the integrals due to the errors of the expectations, shape (panels,)."""
-        return np.asarray(np.sum(self._linear_errors(basis), axis=1))
+        size = np.linalg.norm(basis.evaluate(self.angle), axis=2)
+        return np.asarray(np.sum(self._weights(KRONROD) * size * self.mean_error, axis=1))
 
     def mean_squares(self) -> Floats:
         """The integrals of the squared errors of the expectations, shape (panels,)."""
@@ -132,14 +133,13 @@ class AnglePanels:
         norm of the first array times the root of the sum of the weighted d^2. At a few nodes with large errors the sum
         of the changes by single nodes may be smaller; the bound uses it for the largest errors, as many as is best.
         """
-        weight, here = self._weights(KRONROD).ravel(), basis.evaluate(self.angle.ravel())
+        weight, here, error = (
+            self._weights(KRONROD).ravel(),
+            basis.evaluate(self.angle.ravel()),
+            self.mean_error.ravel(),
+        )
         norm = float(np.linalg.norm(here.T @ (weight[:, None] * here), 2))
-        order = np.argsort(-self.mean_error, axis=None)
-        single = np.append(0.0, np.cumsum(self._linear_errors(basis).ravel()[order]))
-        squares = np.append(np.cumsum((weight * self.mean_error.ravel() ** 2)[order[::-1]])[::-1], 0.0)
+        order = np.argsort(-error)
+        single = np.append(0.0, np.cumsum((weight * np.linalg.norm(here, axis=1) * error)[order]))
+        squares = np.append(np.cumsum((weight * error**2)[order[::-1]])[::-1], 0.0)
         return float(np.min(single + np.sqrt(norm * squares)))
-
-    def _linear_errors(self, basis: Basis) -> Floats:
-        """The changes of the integrals by the error at each node, shape (panels, 15)."""
-        size = np.linalg.norm(basis.evaluate(self.angle), axis=2)
-        return np.asarray(self._weights(KRONROD) * size * self.mean_error)

@@ -187,7 +187,8 @@ class HollowConditionals:
         linked = (np.diff(near) == 1) & (fresh[1:] | fresh[:-1])
         angles = self._theta[near]
         near_pieces = [self._pieces[angle] for angle in angles.tolist()]
-        pieces = tuple(np.concatenate(parts) for parts in zip(*(known[1:4] for known in near_pieces), strict=True))
+        columns = zip(*((known.low, known.high, known.label) for known in near_pieces), strict=True)
+        pieces = tuple(np.concatenate(column) for column in columns)
         starts = np.cumsum([0, *(len(known.low) for known in near_pieces)])
         least = np.array([known.matters for known in near_pieces])
         most = 2 * len(pieces[0])
