@@ -21,7 +21,7 @@ FLOORS = [
     *("core", "verification"),
     *("geometry.curves", "geometry.disk", "geometry.tables", "geometry.cells", "geometry.scene", "geometry.walls"),
     *("geometry.tracing.double_double", "geometry.tracing.compiled", "geometry.tracing"),
-    *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries", "geometry.itineraries.compiled"),
+    *("geometry.polygons.compiled", "geometry.polygons", "geometry.itineraries.compiled", "geometry.itineraries"),
     *("geometry.collisions.compiled", "geometry.collisions", "geometry.plotting", "geometry"),
     *("kernels.bases", "kernels.matrices", "kernels.expectations", "kernels.laws", "kernels.walls", "kernels.sampling"),
     *("kernels.discretisation", "kernels.distances", "kernels.positions", "kernels.thermal", "kernels.collisions"),

@@ -24,7 +24,7 @@ def pieces(angle, keep=(True, True, True)):
     """Pieces between these changes, each known within 1e-12; without a change its piece ends at the next one."""
     changes, labels = curves(angle)[list(keep)], LABELS[np.append(True, keep)]
     low, high = np.append(0.0, changes + 1e-12), np.append(changes - 1e-12, 1.0)
-    return Pieces.at(angle, low, high, labels, 1e-9)
+    return Pieces.at(angle, low, high, labels, low, 1e-9)
 
 
 def enclosures(angle, nearest, farther, least=1e-13):
@@ -60,7 +60,7 @@ def test_a_piece_that_is_absent_at_one_angle_gets_a_sample_in_its_middle():
 def test_equal_changes_at_one_angle_predict_nothing():
     """Two changes between the same labels cannot be told apart."""
     low, high = np.array([0.0, 0.3, 0.5, 0.8]), np.array([0.3, 0.5, 0.8, 1.0])
-    twice = Pieces.at(1.0, low, high, np.array([3, 5, 3, 5], dtype=np.uint64), 1e-9)
+    twice = Pieces.at(1.0, low, high, np.array([3, 5, 3, 5], dtype=np.uint64), low, 1e-9)
     assert len(twice.keys) == 1 and twice.changes.tolist() == [0.5]
 
 

@@ -20,6 +20,8 @@ CUBIC_DOUBT, PARABOLA_DOUBT, LINE_DOUBT = 0.1, 0.3, 0.05
 class Pieces(NamedTuple):
     """The pieces of one incoming angle in increasing order: their first and last positions, and their labels.
 
+    ``out`` are the outgoing angles of the rays at the first positions.
+
     ``matters`` is the width from which on a missed piece matters. The changes between the pieces are in the order of
     their keys: keys, positions, and the numbers of the pieces before them. Keys that occur twice are left out.
     """
@@ -28,13 +30,14 @@ class Pieces(NamedTuple):
     low: Floats
     high: Floats
     label: NDArray[np.uint64]
+    out: Floats
     matters: float
     keys: NDArray[np.uint64]
     changes: Floats
     number: NDArray[np.int64]
 
     @staticmethod
-    def at(angle: float, low: Floats, high: Floats, label: NDArray[np.uint64], matters: float) -> Pieces:
+    def at(angle: float, low: Floats, high: Floats, label: NDArray[np.uint64], out: Floats, matters: float) -> Pieces:
         """The pieces at an angle, with the changes between them."""
         key = label[:-1] * KEY_FACTOR + label[1:]
         number = np.argsort(key)
@@ -43,7 +46,8 @@ class Pieces(NamedTuple):
             ordered = key[number]
             differs[1:-1] = ordered[1:] != ordered[:-1]
         number = number[differs[:-1] & differs[1:]]
-        return Pieces(angle, low, high, label, matters, key[number], 0.5 * (high[number] + low[number + 1]), number)
+        position = 0.5 * (high[number] + low[number + 1])
+        return Pieces(angle, low, high, label, out, matters, key[number], position, number)
 
     def middles(self, least: float, known: NDArray[np.int64] | None = None) -> Floats:
         """The middles of the pieces wider than ``least``, unless the changes at both ends are among the known ones."""

@@ -18,6 +18,7 @@ from ..expectations.angle_panels import NODES, NULL_RULES, AnglePanels
 from ..expectations.basis_means import VALUES_AT_ONCE, means_of_basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
+from ..walls.cell_masses import CellMasses
 from ..walls.conditionals import WallConditionals
 from ..walls.wall_law import WallLaw
 from .method import Budget, MethodName, computed, rounding
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
 # the least such number. In some steep Bezier hollows a fiftieth does not complete an angle; in bottles with a neck of a
 # hundredth of their width no number does.
 ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
+# The same fraction for cells, where all nodes of a panel are computed together, and patches on their pieces sampled.
+CELL_FRACTION = 0.005
 # Guesses, not measurements, for the prediction of the cost, in ray segments, and the limit on it; walls differ by more
 # than a factor of ten.
 ANGLES_A_PIECE, SEGMENTS_A_CHANGE, AFFORDABLE = 100, 400, 40_000_000
@@ -51,9 +54,15 @@ SMALLEST_MEAN_TOLERANCE = 1e-14
 # The tolerance is approached in stages by this ratio, from a first one of at most COARSEST_STAGE. If only a coarse
 # result can be reached, its conditional expectations are coarse as well.
 STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
+# The same for cells, if the first panels need more than a fraction of the limit on segments at the wanted tolerance. The
+# patches need a multiple of the segments of the rows, of which some angles are a sample.
+CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.25, 3.0
+# Fraction of the remaining segments that is spent on better expectations before the limit is looked at again.
+CHUNK_FRACTION = 0.1
+SAMPLED_ANGLES = np.array([0.1, 0.5, 1.0, 1.5])
 # Conditional expectations on a panel of smaller measure may be coarser, up to the error of a panel of this measure.
 FAIR_FRACTION = 0.02
-COARSEST_MEAN = 1e-4
+COARSEST_MEAN = 1e-3
 # The integrand is not smooth if a part of a divided panel has at least this fraction of the panel's difference of the
 # rules. With halves, a kink leaves 1/8 or more, a smooth integrand 2^-14.
 SMOOTH_SHRINKING = 1e-3
@@ -157,18 +166,30 @@ class _Integrator:
         else:
             inside = basis.edges[1:-1]
             # Piecewise polynomials of this degree are integrated after a substitution of degree 3.
-            local = 0 if basis.is_partition else basis.nodes_per_interval
-            degree, least = (0, 0) if basis.is_partition else (1, 1 if local < 8 else 2)
+            local = basis.nodes_per_interval
+            degree, least = 1, 1 if local < 8 else 2
         fraction = FRACTION_WITH_FALLBACK if math.isfinite(budget.fallback) else ANGLE_FRACTION
+        if basis.is_partition:
+            fraction = min(fraction, CELL_FRACTION)
         longest = max(int(fraction * budget.segments), LEAST_SEGMENTS)
         self.sizes, _ = basis.magnitudes()
-        self.conditionals = WallConditionals(wall, degree, inside, least, longest, self.sizes)
+        self.cells: CellMasses | None = None
+        if basis.is_partition:
+            self.conditionals = WallConditionals(wall, 0, np.empty(0), 0, longest, np.array([np.median(self.sizes)]))
+            self.cells = CellMasses(self.conditionals, basis)
+        else:
+            self.conditionals = WallConditionals(wall, degree, inside, least, longest, self.sizes)
         edges = basis.edges
         self.sided = bool(np.any(np.abs(edges - 0.5 * np.pi) < 1e-12))
         if self.halved:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
         stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
         self.first_tolerance = self.tolerance / STAGE_RATIO**stages
+        self.ratio = STAGE_RATIO
+        if self.cells is not None:
+            costly = self._predicted(edges) > FIRST_FRACTION * budget.segments
+            self.first_tolerance = max(self.tolerance, COARSEST_CELLS) if costly else self.tolerance
+            self.ratio = CELL_RATIO
         self.mean_tolerance = MEAN_FRACTION * self.first_tolerance
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
         self._add_panels(edges[:-1], edges[1:])
@@ -191,6 +212,13 @@ class _Integrator:
             tolerance = following
             self._begin(tolerance)
 
+    def _predicted(self, edges: Floats) -> float:
+        """The ray segments that the first panels need at the wanted tolerance, from those of some angles."""
+        tolerance = MEAN_FRACTION * self.tolerance / math.sqrt(FAIR_FRACTION)
+        segments = self.conditionals(SAMPLED_ANGLES, tolerance).segments
+        self.segments += segments
+        return PATCH_COST * len(NODES) * (len(edges) - 1) * segments / len(SAMPLED_ANGLES)
+
     def _following(self, tolerance: float) -> float | None:
         """The tolerance of the next stage; None at the end, or if the fallback is likely to be as good.
 
@@ -198,7 +226,7 @@ class _Integrator:
         """
         if self.segments >= self.budget.segments or tolerance <= self.tolerance:
             return None
-        wanted = max(STAGE_RATIO * tolerance, self.tolerance)
+        wanted = max(self.ratio * tolerance, self.tolerance)
         if math.isinf(self.budget.fallback):
             return wanted
         error = self.best[1]
@@ -212,7 +240,18 @@ class _Integrator:
         mass = np.maximum(self.panels.mass, FAIR_FRACTION)
         coarse = self.panels.mean_errors(self.basis) > 2.0 * self.mean_tolerance * mass
         coarse &= self.panels.mean_squares() > (2.0 * self.mean_tolerance) ** 2 * mass
-        self._fill(self.panels, np.broadcast_to(coarse[:, None], self.panels.angle.shape))
+        step = len(coarse)
+        if self.cells is not None:
+            # a part of the remaining segments at a time
+            left = self.budget.segments - self.segments
+            step = max(1, int(CHUNK_FRACTION * left * self.angle_count / (len(NODES) * max(1, self.segments))))
+        chosen = np.flatnonzero(coarse)
+        for first in range(0, len(chosen), max(1, step)):
+            if first > 0 and self.segments >= self.budget.segments:
+                break
+            mask = np.zeros(self.panels.angle.shape, dtype=np.bool_)
+            mask[chosen[first : first + step]] = True
+            self._fill(self.panels, mask)
         self._recompute()
 
     def _meet(self, tolerance: float) -> None:
@@ -323,6 +362,9 @@ class _Integrator:
         fraction = FAIR_FRACTION / np.maximum(panels.mass, np.finfo(np.float64).tiny)
         coarsest = COARSEST_MEAN * float(np.median(self.sizes))
         tolerance = np.minimum(self.mean_tolerance * np.sqrt(np.maximum(1.0, fraction)), coarsest)
+        if self.cells is not None:
+            self._fill_cells(panels, mask.any(axis=1), tolerance)
+            return
         panel, node = np.nonzero(mask)
         for first in range(0, len(panel), ANGLES_AT_ONCE):
             few = slice(first, first + ANGLES_AT_ONCE)
@@ -333,7 +375,30 @@ class _Integrator:
                 self.basis, conditionals.nodes, conditionals.weights, conditionals.starts
             )
             panels.mean_error[panel[few], node[few]] = conditionals.error
-        touched = np.unique(panel)
+        self._estimate(panels, np.unique(panel))
+
+    def _fill_cells(self, panels: AnglePanels, mask: NDArray[np.bool_], tolerance: Floats) -> None:
+        """Compute the integrals and expectations of indicators of cells on the panels of the mask."""
+        chosen = np.flatnonzero(mask)
+        step = max(1, ANGLES_AT_ONCE // len(NODES))
+        for first in range(0, len(chosen), step):
+            few = chosen[first : first + step]
+            before = self.conditionals.spent()
+            found = self.cells(panels.low[few], panels.high[few], panels.angle[few], tolerance[few])
+            rays, segments = (now - then for now, then in zip(self.conditionals.spent(), before, strict=True))
+            self.rays, self.segments = self.rays + rays, self.segments + segments
+            self.angle_count += len(few) * len(NODES)
+            panels.image[few], panels.integral[few], panels.mean_error[few] = (
+                found.rest,
+                found.integrals,
+                found.mean_error,
+            )
+            self._estimate(panels, few)
+            here = np.linalg.norm(self.basis.evaluate(panels.angle[few, 0]), axis=1)
+            panels.error[few] = np.hypot(panels.error[few], here * found.error)
+
+    def _estimate(self, panels: AnglePanels, touched: NDArray[np.int64]) -> None:
+        """Estimate the errors of the quadrature over panels whose expectations were computed."""
         shared = np.array([self.conditionals.shared(panels.angle[k]).min() for k in touched.tolist()])
         fraction = np.where(shared < LEAST_SHARED, ALIASED_FRACTION, KRONROD_FRACTION)
         panels.error[touched] = fraction * panels.selected(touched).differences(self.basis, NULL_RULES)

@@ -64,6 +64,8 @@ class AnglePanels:
         The expectations of the basis functions, E[e_j(Theta') | theta], at the nodes.
     error : array, shape (panels,)
         Estimated error of the integral, without the errors of the expectations.
+    integral : array, shape (panels, size)
+        Integrals of parts of the expectations that ``image`` leaves out, if the basis is constant on each panel.
     """
 
     low: Floats
@@ -72,13 +74,16 @@ class AnglePanels:
     mean_error: Floats
     image: Floats
     error: Floats
+    integral: Floats
 
     @staticmethod
     def between(low: Floats, high: Floats, size: int) -> AnglePanels:
         """Panels whose expectations are not computed yet."""
         angle = low[:, None] + (high - low)[:, None] * STRETCHED
         shape = angle.shape
-        return AnglePanels(low, high, angle, np.zeros(shape), np.zeros((*shape, size)), np.zeros(len(low)))
+        return AnglePanels(
+            low, high, angle, np.zeros(shape), np.zeros((*shape, size)), np.zeros(len(low)), np.zeros((len(low), size))
+        )
 
     @property
     def mass(self) -> Floats:
@@ -105,8 +110,9 @@ class AnglePanels:
         return np.asarray(np.matmul(here.transpose(0, 2, 1), self.image))
 
     def values(self, basis: Basis) -> Floats:
-        """The integrals by Kronrod's rule."""
-        return self._integrals(KRONROD, basis)
+        """The integrals by Kronrod's rule, and those of the parts that ``image`` leaves out."""
+        here = basis.evaluate(self.angle[:, len(NODES) // 2])
+        return self._integrals(KRONROD, basis) + here[:, :, None] * self.integral[:, None, :]
 
     def differences(self, basis: Basis, rules: Floats = NULL_RULES[:1]) -> Floats:
         """The norms of the differences between Kronrod's and Gauss's rule, shape (panels,).

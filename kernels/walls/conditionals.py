@@ -12,9 +12,9 @@ from ...core.checks import Floats, angles, finite_number, instance
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ...geometry import Wall
+from ...geometry.itineraries.hollow import NO_LIMIT, HollowConditionals
 from ..bases.basis import AngleFunction
 from ..expectations.basis_means import Expectations, means_of_basis
-from .hollow_conditionals import NO_LIMIT, HollowConditionals
 
 # Up to this number of pieces of a wall one conditional distribution takes a few milliseconds.
 MOST_PIECES = 64
@@ -151,6 +151,16 @@ class WallConditionals:
         return [HollowConditionals(self.wall.scene, k, *task) for k, _ in self._shapes]
 
     @property
+    def hollows(self) -> list[tuple[HollowConditionals, float]]:
+        """One hollow of each shape, and the fraction of the period covered by all of this shape."""
+        return list(zip(self._hollows, self._fractions, strict=True))
+
+    @property
+    def flat_fraction(self) -> float:
+        """The fraction of the period covered by flat tops."""
+        return self.wall.flat_top / self.wall.period if self.wall.closes else 0.0
+
+    @property
     def _fractions(self) -> list[float]:
         return [fraction for _, fraction in self._shapes]
 
@@ -174,12 +184,12 @@ class WallConditionals:
         incoming, group = np.unique(np.asarray(theta, dtype=np.float64), return_inverse=True)
         tolerances = np.full(len(incoming), np.inf)
         np.minimum.at(tolerances, group, np.broadcast_to(tolerance, theta.shape))
-        before = self._spent()
-        flat = self.wall.flat_top / self.wall.period if self.wall.closes else 0.0
+        before = self.spent()
+        flat = self.flat_fraction
         nodes: list[list[Floats]] = [[] for _ in incoming]
         weights: list[list[Floats]] = [[] for _ in incoming]
         error, unresolved = np.zeros(len(incoming)), np.zeros(len(incoming))
-        for conditionals, fraction in zip(self._hollows, self._fractions, strict=True):
+        for conditionals, fraction in self.hollows:
             found, outdated = conditionals.march(incoming, tolerances)
             self.outdated |= outdated
             scale = fraction / conditionals.width
@@ -199,10 +209,10 @@ class WallConditionals:
             np.cumsum([0, *(sum(map(len, nodes[k])) for k in group.tolist())]),
             error[group],
             unresolved[group],
-            *(now - then for now, then in zip(self._spent(), before, strict=True)),
+            *(now - then for now, then in zip(self.spent(), before, strict=True)),
         )
 
-    def _spent(self) -> tuple[int, int]:
+    def spent(self) -> tuple[int, int]:
         """Rays and ray segments so far."""
         return sum(conditionals.rays for conditionals in self._hollows), sum(
             conditionals.segments for conditionals in self._hollows
@@ -210,9 +220,8 @@ class WallConditionals:
 
     def shared(self, theta: Floats) -> Floats:
         """The probability of entry points whose itinerary also exists at the next of these known angles."""
-        flat = self.wall.flat_top / self.wall.period if self.wall.closes else 0.0
-        total = np.full(len(theta) - 1, flat)
-        for conditionals, fraction in zip(self._hollows, self._fractions, strict=True):
+        total = np.full(len(theta) - 1, self.flat_fraction)
+        for conditionals, fraction in self.hollows:
             total += fraction * conditionals.shared(theta)
         return total
 

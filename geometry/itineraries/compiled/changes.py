@@ -198,11 +198,12 @@ def spread(first, second, task):
     """Return the largest difference of the functions between two outgoing angles.
 
     In one cell it is that of cos(angle), cos(k angle) and sin(k angle), k = ``task.degree``, times the functions' size;
-    in two cells the sum of the sizes.
+    in two cells the sum of the sizes. If the degree is 0 and there is one cell only, just the itineraries are wanted:
+    gaps then count with their full width wherever their rays lead.
     """
     k, edges, sizes = max(task.degree, 1), task.setting.edges, task.setting.sizes
     here, there = cell_of(first, edges), cell_of(second, edges)
-    if here != there:
+    if here != there or (task.degree == 0 and edges.shape[0] == 0):
         return sizes[here] + sizes[there]
     return sizes[here] * max(
         abs(math.cos(first) - math.cos(second)),

@@ -80,7 +80,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     """
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes
-    lows, highs, names = pieces
+    lows, highs, names, firsts = pieces
     hollow = task.setting.hollow
     left, right = hollow[LEFT], hollow[RIGHT]
     whole = right - left
@@ -113,7 +113,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
             if labels[i] < FIRST_LABEL:
                 unresolved += xs[j] - xs[i]
                 error += 2.0 * largest * (xs[j] - xs[i])
-        lows[number], highs[number], names[number] = xs[i], xs[j], labels[i]
+        lows[number], highs[number], names[number], firsts[number] = xs[i], xs[j], labels[i], outs[i]
         number += 1
         following = follow[j]
         if following >= 0:
@@ -133,7 +133,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
 @cache
 def march_address() -> int:
     """Return the address of `march_angle`."""
-    pieces = np.empty(0), np.empty(0), np.empty(0, np.uint64)
+    pieces = np.empty(0), np.empty(0), np.empty(0, np.uint64), np.empty(0)
     rules, entries, nodes = nested_rules(0), np.empty(0), (np.empty(0), np.empty(0))
     return address_of(march_angle, (example_task(), 0.0, rules, entries, example_chain(), nodes, pieces))
 
@@ -147,8 +147,8 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
     """
     chain, nodes, pieces = room
     node_starts, piece_starts = found.node_starts, found.piece_starts
-    (angles, masses), (lows, highs, labels) = nodes, pieces
-    (all_angles, all_masses), (all_lows, all_highs, all_labels) = found.nodes, found.pieces
+    (angles, masses), (lows, highs, labels, outs) = nodes, pieces
+    (all_angles, all_masses), (all_lows, all_highs, all_labels, all_outs) = found.nodes, found.pieces
     hollow = setting.hollow
     whole = hollow[RIGHT] - hollow[LEFT]
     for k in range(first, thetas.shape[0]):
@@ -165,6 +165,7 @@ def march_angles(thetas, tolerances, setting, degree, rules, seeds, seed_starts,
             all_angles[begin + i], all_masses[begin + i] = angles[i], masses[i]
         for i in range(number):
             all_lows[start + i], all_highs[start + i], all_labels[start + i] = lows[i], highs[i], labels[i]
+            all_outs[start + i] = outs[i]
         node_starts[k + 1], piece_starts[k + 1] = begin + filled, start + number
     return np.int64(thetas.shape[0])
 
@@ -184,11 +185,11 @@ def marched_angles(
 ) -> Found:
     """Compute the conditional distributions at incoming angles. The seeds are the first samples, which increase."""
     count = len(thetas)
-    nodes, pieces = (float, float), (float, float, np.uint64)
+    nodes, pieces = (float, float), (float, float, np.uint64, float)
     room = Room(empty_chain(), _arrays(MOST_NODES + SPARE, *nodes), _arrays(MOST_SAMPLES, *pieces))
     found = Found(
         (np.empty(0), np.empty(0)), np.zeros(count + 1, np.int64),
-        (np.empty(0), np.empty(0), np.empty(0, np.uint64)), np.zeros(count + 1, np.int64),
+        (np.empty(0), np.empty(0), np.empty(0, np.uint64), np.empty(0)), np.zeros(count + 1, np.int64),
         *_arrays(count, float, float, np.int64, np.int64),
     )  # fmt: skip
     done = 0

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from ...geometry.itineraries.pieces import Pieces, samples_between
-from ...geometry.scene.columns import LEFT, RIGHT, RUN_SINE
+from ..scene.columns import LEFT, RIGHT, RUN_SINE
+from .pieces import Pieces, samples_between
 
 if TYPE_CHECKING:
-    from ...geometry.itineraries.compiled.changes import Setting
-    from ...geometry.scene.scene import Scene
+    from .compiled.changes import Setting
+    from ..scene.scene import Scene
 
 Result = TypeVar("Result")
 
@@ -55,10 +55,10 @@ def _rounds(count: int) -> list[NDArray[np.int64]]:
     return [number[::WIDEST_STEP], *(number[step :: 2 * step] for step in STEPS if step < count)]
 
 
-def _result(call: Callable[[], Result]) -> Result:
+def compiled_result(call: Callable[[], Result]) -> Result:
     """Return the result of a compiled call that may take seconds."""
-    from ...geometry.tracing.compiled.pointers import checked
-    from ...geometry.tracing.threads import interruptibly
+    from ..tracing.compiled.pointers import checked
+    from ..tracing.threads import interruptibly
 
     return interruptibly(lambda: checked(call))
 
@@ -96,7 +96,7 @@ class HollowConditionals:
     @property
     def _setting(self) -> Setting:
         """Data of the compiled functions, new for each call: an interrupted call continues to use its own."""
-        from ...geometry.itineraries.compiled.changes import Limits, setting_of
+        from .compiled.changes import Limits, setting_of
 
         scene = self.scene
         has_channels = scene.pairs is not None
@@ -122,16 +122,34 @@ class HollowConditionals:
                 break
         return found_conditionals, outdated
 
+    def pieces(self, angle: float) -> Pieces:
+        """The pieces at an angle at which conditional distributions were computed."""
+        return self._pieces[angle]
+
+    def miss(self, angle: float, x: float) -> None:
+        """Note an entry point in a piece that is missing at this angle."""
+        self._missed.setdefault(angle, []).append(x)
+
+    def trace(self, entries: Floats, angles: Floats) -> tuple[Floats, NDArray[np.uint64]]:
+        """The outgoing angles and labels of rays."""
+        from .compiled.patches import trace_points
+
+        outs, labels = np.empty(len(entries)), np.empty(len(entries), np.uint64)
+        segments = np.zeros(1, np.int64)
+        compiled_result(lambda: trace_points(entries, angles, self._setting, outs, labels, segments))
+        self.rays, self.segments = self.rays + len(entries), self.segments + int(segments[0])
+        return outs, labels
+
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
-        from ...geometry.itineraries.compiled.march import marched_angles
-        from ...geometry.itineraries.compiled.rules import nested_rules
+        from .compiled.march import marched_angles
+        from .compiled.rules import nested_rules
 
         # the width whose error is one tolerance
         unit = self.width / self._size
         seeds = [
             self._seeds(angle, least) for angle, least in zip(theta.tolist(), (tolerances * unit).tolist(), strict=True)
         ]
-        found = _result(
+        found = compiled_result(
             lambda: marched_angles(
                 theta, tolerances, self._setting, self.degree, nested_rules(self.least_level),
                 np.concatenate(seeds), np.cumsum([0, *map(len, seeds)]),
@@ -145,10 +163,10 @@ class HollowConditionals:
             own = slice(node_starts[k], node_starts[k + 1])
             found_conditionals[angle] = Conditional(nodes[own], widths[own], float(errors[k]), float(unresolved[k]))
             own = slice(piece_starts[k], piece_starts[k + 1])
-            low, high, label = (part[own].copy() for part in pieces)
+            low, high, label, out = (part[own].copy() for part in pieces)
             # at the limit of ray segments pieces are missing, and the error reports it: no comparison
             matters = np.inf if segments[k] >= self.most_segments else float(tolerances[k] * unit)
-            self._pieces[angle] = Pieces.at(angle, low, high, label, matters)
+            self._pieces[angle] = Pieces.at(angle, low, high, label, out, matters)
         self._theta = np.union1d(self._theta, theta)
         return found_conditionals
 
@@ -158,8 +176,8 @@ class HollowConditionals:
         They include the points of missed pieces, and the changes of itinerary found before at this angle, else samples
         on both sides of the changes that are predicted from the neighbouring known angles.
         """
-        from ...geometry.itineraries.compiled.changes import MOST_SAMPLES
-        from ...geometry.itineraries.entry_nodes import first_nodes
+        from .compiled.changes import MOST_SAMPLES
+        from .entry_nodes import first_nodes
 
         left, right = self.scene.hollows[self.hollow, [LEFT, RIGHT]].tolist()
         entries = [first_nodes(angle, left, right, least), np.array(self._missed.get(angle, []), dtype=np.float64)]
@@ -179,7 +197,7 @@ class HollowConditionals:
 
     def _compare(self, theta: Floats) -> set[float]:
         """The angles among ``theta`` and their neighbours at which a piece was missed."""
-        from ...geometry.itineraries.compiled.neighbours import find_missed
+        from .compiled.neighbours import find_missed
 
         position = np.searchsorted(self._theta, theta)
         near = np.unique(np.clip(np.concatenate((position - 1, position, position + 1)), 0, len(self._theta) - 1))
@@ -193,13 +211,13 @@ class HollowConditionals:
         least = np.array([known.matters for known in near_pieces])
         most = 2 * len(pieces[0])
         found = np.empty(most, np.int64), np.empty(most), np.zeros(1, np.int64)
-        count, rays = _result(
+        count, rays = compiled_result(
             lambda: find_missed(angles, least, pieces, starts, linked, self._setting, self.degree, found)
         )
         owner, entries, segments = found[0][:count], found[1][:count], int(found[2][0])
         self.rays, self.segments = self.rays + rays, self.segments + segments
         for angle, x in zip(angles[owner].tolist(), entries.tolist(), strict=True):
-            self._missed.setdefault(angle, []).append(x)
+            self.miss(angle, x)
         return set(angles[owner].tolist())
 
     def shared(self, theta: Floats) -> Floats:
@@ -234,7 +252,7 @@ class HollowConditionals:
         return cuts
 
     def _located(self, label: int, present: float, absent: float, k: int) -> float:
-        from ...geometry.itineraries.compiled.neighbours import find_critical
+        from .compiled.neighbours import find_critical
 
         key = (label, min(present, absent), max(present, absent))
         for (name, low, high), angle in self._critical.items():
@@ -252,6 +270,6 @@ class HollowConditionals:
                 middle = 0.5 * float(there.low[other[0]] + there.high[other[0]])
                 drift = (0.5 * (low + high) - middle) / (present - beyond)
         piece = np.uint64(label), present, absent, low, high, drift
-        angle = float(_result(lambda: find_critical(*piece, self._setting, self.degree, np.zeros(1, np.int64))))
+        angle = float(compiled_result(lambda: find_critical(*piece, self._setting, self.degree, np.zeros(1, np.int64))))
         self._critical[key] = angle
         return angle

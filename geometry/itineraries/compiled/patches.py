@@ -1,0 +1,365 @@
+"""Compiled masses of cells of outgoing angles on patches: parts of the phase space with one itinerary.
+
+On a patch the outgoing angle is an analytic function of two variables in [0, 1], the position within the piece of entry
+points and the position within the panel of incoming angles. It is given at the positions of a nested rule and at the
+nodes of the panel, and interpolated in between by the barycentric formula. At one incoming angle the mass of a cell is
+the distance of two crossings of its edges, so no integral over the entry point is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....core.checks import Floats
+from ...tracing.compiled.options import compiled, linked
+from .changes import BLOCK, cell_of, outcome, task_of, trace_block
+
+# Steps towards a crossing of an edge, and towards an extremum of the outgoing angle.
+MOST_STEPS, EXTREMUM_STEPS = 60, 3
+# Least distance from a node at which the barycentric formula is used.
+AT_NODE = 1e-14
+# Gauss's rule with five nodes on (0, 1), and its null rules for polynomials of degree 3 and 2, of the same size.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+GAUSS_NODES, GAUSS_WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
+_NULL = GAUSS_WEIGHTS[:, None] * np.polynomial.legendre.legvander(_NODES, 4)[:, 3:]
+FINE_NULL, COARSE_NULL = (_NULL * np.linalg.norm(GAUSS_WEIGHTS) / np.linalg.norm(_NULL, axis=0)).T[::-1].copy()
+MOST_DEPTH = 12
+# Most crossings of edges at one angle; the rest of the piece then counts for the last cell.
+MOST_CROSSINGS = 1 << 14
+
+
+class Grid(NamedTuple):
+    """Increasing nodes in (0, 1) and their barycentric weights."""
+
+    nodes: Floats
+    weights: Floats
+
+
+class Cells(NamedTuple):
+    """The edges between the cells, and the norms of the functions in them."""
+
+    edges: Floats
+    sizes: Floats
+
+
+class Room(NamedTuple):
+    """Work space: crossings, their cells and slopes; cuts of a panel; values at positions, at nodes, and in cells."""
+
+    found: Floats
+    cells: NDArray[np.int64]
+    slopes: Floats
+    cuts: Floats
+    values: Floats
+    edge_values: Floats
+    samples: Floats
+    stack: Floats
+
+
+def room_for(cells: int, nodes: int, positions: int) -> Room:
+    """Return work space for patches in so many cells."""
+    most = MOST_CROSSINGS
+    return Room(
+        np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2), np.empty(positions),
+        np.empty(nodes), np.zeros((len(GAUSS_NODES), cells)), np.empty((MOST_DEPTH + 2, 3)),
+    )  # fmt: skip
+
+
+@compiled
+def trace_points(entries, angles, setting, outs, labels, segments):
+    """Trace rays with incoming angles of their own; set their outgoing angles and labels."""
+    task = task_of(setting, 0.0, np.int64(0), segments)
+    for first in range(0, entries.shape[0], BLOCK):
+        last = min(first + BLOCK, entries.shape[0])
+        for n in range(first, last):
+            setting.tracer.angles[n - first] = angles[n]
+        trace_block(entries[first:last], task)
+        for n in range(first, last):
+            outs[n], labels[n] = outcome(n - first, entries[n], task)
+
+
+@linked
+def value_at(t, grid, values):
+    """Return the value of the polynomial through ``values`` at t."""
+    nodes, weights = grid
+    above, below = 0.0, 0.0
+    for j in range(nodes.shape[0]):
+        step = t - nodes[j]
+        if abs(step) < AT_NODE:
+            return values[j]
+        ratio = weights[j] / step
+        above += ratio * values[j]
+        below += ratio
+    return above / below
+
+
+@linked
+def crossing_between(low, high, below, above, edge, grid, values):
+    """Return where the polynomial, with values on both sides of the edge at low and at high, crosses it."""
+    at_low, at_high = below - edge, above - edge
+    t = low
+    side = np.int64(0)
+    for _ in range(MOST_STEPS):
+        t = (at_high * low - at_low * high) / (at_high - at_low)
+        if not (low < t < high):
+            t = 0.5 * (low + high)
+        if high - low < 1e-13:
+            break
+        here = value_at(t, grid, values) - edge
+        if abs(here) < 1e-14:
+            break
+        if (here > 0.0) == (at_high > 0.0):
+            high, at_high = t, here
+            if side == 1:
+                at_low *= 0.5
+            side = np.int64(1)
+        else:
+            low, at_low = t, here
+            if side == -1:
+                at_high *= 0.5
+            side = np.int64(-1)
+    return t
+
+
+@linked
+def find_crossings(grid, values, edges, room):
+    """Find the crossings of edges by the polynomial through ``values`` on [0, 1], in increasing order.
+
+    Sets their positions, the cells before, between and after them, and |dt / df| there in ``room``. Returns their
+    number.
+    """
+    nodes, found, cells, slopes = grid.nodes, room.found, room.cells, room.slopes
+    count = np.int64(0)
+    m = nodes.shape[0]
+    before, at_before, at_end = 0.0, value_at(0.0, grid, values), value_at(1.0, grid, values)
+    cell = cell_of(at_before, edges)
+    cells[0] = cell
+    most = found.shape[0]
+    for i in range(m + 1):
+        t, at_t = (nodes[i], values[i]) if i < m else (1.0, at_end)
+        right, f_right = (nodes[i + 1], values[i + 1]) if i + 1 < m else (1.0, at_end)
+        if i < m and (at_t - at_before) * (f_right - at_t) < 0.0:
+            # an extremum near the node takes its place
+            left, f_left = before, at_before
+            for _ in range(EXTREMUM_STEPS):
+                u, v = (t - left) * (at_t - f_right), (t - right) * (at_t - f_left)
+                if u == v:
+                    break
+                vertex = t - 0.5 * ((t - left) * u - (t - right) * v) / (u - v)
+                if not (left < vertex < right) or abs(vertex - t) < 1e-9:
+                    break
+                at_vertex = value_at(vertex, grid, values)
+                if (at_vertex - at_t) * (values[i] - f_left) < 0.0:
+                    break
+                if vertex < t:
+                    right, f_right = t, at_t
+                else:
+                    left, f_left = t, at_t
+                t, at_t = vertex, at_vertex
+        slope = abs(t - before) / max(abs(at_t - at_before), 1e-300)
+        last, at_last = before, at_before
+        while count < most:
+            if at_t > at_before and cell < edges.shape[0] and edges[cell] < at_t:
+                edge, following = edges[cell], cell + 1
+            elif at_t < at_before and cell > 0 and edges[cell - 1] >= at_t:
+                edge, following = edges[cell - 1], cell - 1
+            else:
+                break
+            last = crossing_between(last, t, at_last, at_t, edge, grid, values)
+            at_last = edge
+            found[count] = last
+            slopes[count] = slope
+            cell = following
+            count += 1
+            cells[count] = cell
+        before, at_before = t, at_t
+    return count
+
+
+@linked
+def row_masses(ends, grid, values, cells, masses, room):
+    """Add the widths of the entry points that lead to the cells at one angle.
+
+    Returns the change of the masses by a shift of the outgoing angle of 1 / (4 s (1 - s)) at position s, and the error
+    due to the gaps at the ends, both as norms of the functions' integrals. ``ends`` are the middle of the gap before
+    the piece, its first and last sample, and the middle of the gap after it.
+    """
+    start, low, high, end = ends
+    edges, sizes = cells
+    count = find_crossings(grid, values, edges, room)
+    change, last = 0.0, start
+    for k in range(count):
+        s = room.found[k]
+        x = low + (high - low) * s * s * (3.0 - 2.0 * s)
+        before, after = room.cells[k], room.cells[k + 1]
+        masses[before] += x - last
+        last = x
+        change += 1.5 * room.slopes[k] * (high - low) * math.hypot(sizes[before], sizes[after])
+    masses[room.cells[count]] += end - last
+    gaps = (low - start) * sizes[room.cells[0]] + (end - high) * sizes[room.cells[count]]
+    return change, gaps
+
+
+@compiled
+def masses_of_rows(grid, ends, outs, owners, doubts, cells, masses, errors, room):
+    """Add the masses of pieces, each at one angle, to those of the angles' numbers ``owners``, and their errors."""
+    for i in range(owners.shape[0]):
+        k = owners[i]
+        four = ends[i, 0, 0], ends[i, 0, 1], ends[i, 0, 2], ends[i, 0, 3]
+        change, gaps = row_masses(four, grid, outs[i, 0], cells, masses[k], room)
+        errors[k] += doubts[i] * change + gaps
+
+
+@linked
+def interpolate(s, nodes, weights, ends, outs, values):
+    """-> ends of the piece at position s of the panel; sets the outgoing angles there."""
+    total = 0.0
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for j in range(values.shape[0]):
+        values[j] = 0.0
+    for k in range(nodes.shape[0]):
+        # cuts may be nodes
+        step = s - nodes[k]
+        ratio = weights[k] / (step if abs(step) > AT_NODE else AT_NODE)
+        total += ratio
+        a += ratio * ends[k, 0]
+        b += ratio * ends[k, 1]
+        c += ratio * ends[k, 2]
+        d += ratio * ends[k, 3]
+        for j in range(values.shape[0]):
+            values[j] += ratio * outs[k, j]
+    for j in range(values.shape[0]):
+        values[j] /= total
+    return a / total, b / total, c / total, d / total
+
+
+@linked
+def cut_patch(row_grid, grid, outs, edges, room):
+    """Set the positions in the panel where an edge reaches an end of the piece, with 0 and 1; return their number."""
+    cuts = room.cuts
+    number = np.int64(1)
+    cuts[0] = 0.0
+    for side in range(2):
+        for k in range(row_grid.nodes.shape[0]):
+            room.edge_values[k] = value_at(float(side), grid, outs[k])
+        count = find_crossings(row_grid, room.edge_values, edges, room)
+        for k in range(count):
+            cuts[number] = room.found[k]
+            number += 1
+    for k in range(1, number):
+        here, m = cuts[k], k
+        while m > 0 and cuts[m - 1] > here:
+            cuts[m] = cuts[m - 1]
+            m -= 1
+        cuts[m] = here
+    cuts[number] = 1.0
+    return number + 1
+
+
+@linked
+def gauss_masses(begin, end, panel, row_grid, grid, ends, outs, cells, room):
+    """Compute the masses per position at Gauss's nodes on a part of the panel, times the weight of the measure.
+
+    Returns the squared error of the rule, and the integral of the change by a shift of the outgoing angle.
+    """
+    low, high = panel
+    samples, sizes = room.samples, cells.sizes
+    moved = 0.0
+    for k in range(GAUSS_NODES.shape[0]):
+        for j in range(sizes.shape[0]):
+            samples[k, j] = 0.0
+        s = begin + (end - begin) * GAUSS_NODES[k]
+        four = interpolate(s, row_grid.nodes, row_grid.weights, ends, outs, room.values)
+        change, _ = row_masses(four, grid, room.values, cells, samples[k], room)
+        # the density of the measure is sin(theta) / 2
+        theta = low + (high - low) * s * s * (3.0 - 2.0 * s)
+        weight = 3.0 * (high - low) * s * (1.0 - s) * math.sin(theta) * (end - begin)
+        moved += GAUSS_WEIGHTS[k] * weight * change
+        for j in range(sizes.shape[0]):
+            samples[k, j] *= weight
+    fine, coarse = 0.0, 0.0
+    for j in range(sizes.shape[0]):
+        first, second = 0.0, 0.0
+        for k in range(GAUSS_NODES.shape[0]):
+            first += FINE_NULL[k] * samples[k, j]
+            second += COARSE_NULL[k] * samples[k, j]
+        fine += (first * sizes[j]) ** 2
+        coarse += (second * sizes[j]) ** 2
+    return fine + coarse, moved
+
+
+@linked
+def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
+    """Add the integrals over a patch to ``masses``; return the squared error, and the change as in `gauss_masses`."""
+    sizes, samples, stack = cells.sizes, room.samples, room.stack
+    values = room.values
+    squares, moved = 0.0, 0.0
+    number = cut_patch(row_grid, grid, outs, cells.edges, room)
+    for part in range(number - 1):
+        if room.cuts[part + 1] - room.cuts[part] <= AT_NODE:
+            continue
+        depth = np.int64(1)
+        stack[0, 0], stack[0, 1], stack[0, 2] = room.cuts[part], room.cuts[part + 1], 0.0
+        while depth > 0:
+            depth -= 1
+            begin, end, level = stack[depth, 0], stack[depth, 1], stack[depth, 2]
+            error, change = gauss_masses(begin, end, panel, row_grid, grid, ends, outs, cells, room)
+            if error > goal * goal and level < MOST_DEPTH - 1:
+                middle = 0.5 * (begin + end)
+                stack[depth, 0], stack[depth, 1], stack[depth, 2] = middle, end, level + 1.0
+                stack[depth + 1, 0], stack[depth + 1, 1], stack[depth + 1, 2] = begin, middle, level + 1.0
+                depth += 2
+                continue
+            squares += error
+            moved += change
+            for j in range(sizes.shape[0]):
+                for k in range(GAUSS_NODES.shape[0]):
+                    masses[j] += GAUSS_WEIGHTS[k] * samples[k, j]
+    return squares, moved
+
+
+@compiled
+def masses_of_patches(panels, row_grid, grid, strips, doubts, limits, goals, cells, found, room):
+    """Add the integrals over patches to those of their panels, and their errors.
+
+    ``panels`` are the lower and upper ends, and the measures of the panels; ``strips`` the ends, the outgoing angles
+    and the panel of every patch; ``doubts`` the errors of the angles at single nodes, of the interpolated angles, and
+    of the interpolated ends. A patch whose error is above the limit of its panel is not integrated: the masses at its
+    nodes are added to ``rest``. ``found`` are ``rest``, the integrals and their squared errors, the errors of the means
+    due to gaps, and the squared ones due to the outgoing angles at the nodes.
+    """
+    lows, highs, measures = panels
+    rest, integrals, squares, errors, node_squares = found
+    all_ends, all_outs, owners = strips
+    at_nodes, between, of_ends = doubts
+    middle = row_grid.nodes.shape[0] // 2
+    sizes = cells.sizes
+    for i in range(owners.shape[0]):
+        p = owners[i]
+        ends, outs = all_ends[i], all_outs[i]
+        for j in range(sizes.shape[0]):
+            room.samples[0, j] = 0.0
+        four = ends[middle, 0], ends[middle, 1], ends[middle, 2], ends[middle, 3]
+        change, _ = row_masses(four, grid, outs[middle], cells, room.samples[0], room)
+        at_ends = of_ends[i] * (
+            sizes[cell_of(value_at(0.0, grid, outs[middle]), cells.edges)]
+            + sizes[cell_of(value_at(1.0, grid, outs[middle]), cells.edges)]
+        )
+        if (at_nodes[i] + between[i]) * change + at_ends <= limits[p]:
+            panel = lows[p], highs[p]
+            error, moved = patch_masses(panel, row_grid, grid, ends, outs, cells, goals[p], integrals[p], room)
+            squares[p] += error + (between[i] * moved) ** 2 + (at_ends * measures[p]) ** 2
+            for k in range(row_grid.nodes.shape[0]):
+                gaps = (ends[k, 1] - ends[k, 0]) * sizes[cell_of(value_at(0.0, grid, outs[k]), cells.edges)]
+                gaps += (ends[k, 3] - ends[k, 2]) * sizes[cell_of(value_at(1.0, grid, outs[k]), cells.edges)]
+                errors[p, k] += gaps
+                node_squares[p, k] += (at_nodes[i] * moved / measures[p]) ** 2
+        else:
+            for k in range(row_grid.nodes.shape[0]):
+                four = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+                change, gaps = row_masses(four, grid, outs[k], cells, rest[p, k], room)
+                errors[p, k] += gaps
+                node_squares[p, k] += (at_nodes[i] * change) ** 2

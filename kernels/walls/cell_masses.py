@@ -1,0 +1,246 @@
+"""Masses of cells of outgoing angles over panels of incoming angles, for walls whose rays are traced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.checks import Floats
+from ...geometry.itineraries.hollow import HollowConditionals, compiled_result
+from ...geometry.itineraries.patches import Strips, common_pieces, ends_of, positions, sample, together, weight_at
+from ...geometry.scene.columns import LEFT, RIGHT
+from ..bases.basis import Basis
+from ..bases.measure import SINE
+from ..expectations.angle_panels import NODES
+from .conditionals import WallConditionals
+
+# Fractions of the tolerance of the expectations for the gaps between the pieces, for pieces that get one ray each, and
+# for the outgoing angles.
+GAP_FRACTION, TINY_FRACTION, ANGLE_FRACTION = 0.3, 0.3, 0.2
+# A patch is integrated if the error of its interpolant is below this multiple of the tolerance of the expectations.
+PATCH_FACTOR = 1.0
+# Error of the integral over a part of a patch, as a fraction of the tolerance.
+PART_FRACTION = 1e-2
+# Error of an interpolant as a multiple of the largest of its last coefficients, and their number.
+TAIL_FACTOR, TAIL = 1.0, 2
+MOST_ROUNDS = 8
+# Labels below this number are those of rays that did not escape.
+FIRST_LABEL = 4
+
+_PLACES = 0.5 * (1.0 + NODES)
+
+
+def _row_weights() -> Floats:
+    """The barycentric weights of the nodes of a panel."""
+    weights = np.array([1.0 / np.prod(4.0 * (x - np.delete(_PLACES, k))) for k, x in enumerate(_PLACES)])
+    return np.asarray(weights / np.abs(weights).max())
+
+
+_WEIGHTS = _row_weights()
+# The last Legendre coefficients of the polynomial through values at the nodes.
+_TAILS = np.linalg.inv(np.polynomial.legendre.legvander(NODES, len(NODES) - 1))[-TAIL:]
+
+
+class CellIntegrals(NamedTuple):
+    """Integrals over panels of the functions e_j(Theta'), each constant on a cell; the first axis runs over the panels.
+
+    ``rest``, shape (panels, nodes, cells), are the expectations at the nodes on the pieces that belong to no patch;
+    ``integrals`` and ``error``, shape (panels, cells) and (panels,), the integrals over the patches and the error of
+    their quadrature; ``mean_error``, shape (panels, nodes), the other errors, as errors of the expectations.
+    """
+
+    rest: Floats
+    integrals: Floats
+    error: Floats
+    mean_error: Floats
+
+
+class CellMasses:
+    """Integrals of the indicators of cells over panels, for one wall and one basis of indicators.
+
+    On a patch, the pieces of one itinerary at all nodes of a panel, the outgoing angle is analytic in both variables.
+    It is interpolated there, so the curves on which it crosses an edge are known without further rays.
+    """
+
+    def __init__(self, conditionals: WallConditionals, basis: Basis) -> None:
+        self.conditionals, self.basis = conditionals, basis
+        self.sizes = np.array(basis.magnitudes()[0])
+        self.edges = np.array(basis.edges[1:-1])
+
+    def __call__(self, low: Floats, high: Floats, angle: Floats, tolerance: Floats) -> CellIntegrals:
+        """The integrals over the panels between low and high, with nodes ``angle`` and tolerances of the means."""
+        found = CellIntegrals(
+            np.zeros((*angle.shape, self.basis.size)),
+            self._flat_tops(low, high),
+            np.zeros(len(low)),
+            np.zeros(angle.shape),
+        )
+        for hollow, fraction in self.conditionals.hollows:
+            todo, asked = np.arange(len(low)), np.unique(angle)
+            for number in range(MOST_ROUNDS):
+                panels = _Panels(hollow, self.sizes, self.edges, low[todo], high[todo], angle[todo], tolerance[todo])
+                self.conditionals.outdated |= panels.march(asked)
+                own, missed = panels.integrals(fraction)
+                complete = ~np.isin(angle[todo], list(missed)).any(axis=1) | (number == MOST_ROUNDS - 1)
+                for total, part in zip(found, own, strict=True):
+                    total[todo[complete]] += part[complete]
+                todo, asked = todo[~complete], np.array(sorted(missed))
+                if not len(todo):
+                    break
+        return found
+
+    def _flat_tops(self, low: Floats, high: Floats) -> Floats:
+        """The integrals over the rays that meet a flat top and leave at pi - theta."""
+        edges = self.basis.edges
+        below = np.maximum(low[:, None], np.pi - edges[None, 1:])
+        above = np.minimum(high[:, None], np.pi - edges[None, :-1])
+        mass = SINE.mass(below, np.maximum(below, above))
+        return np.asarray(self.conditionals.flat_fraction * mass * self.sizes)
+
+
+class _Sums(NamedTuple):
+    """Sums over the strips: as in `CellIntegrals`, but not normalised, and with squares of independent errors.
+
+    The errors of the expectations due to the gaps between pieces are added, those due to the outgoing angles squared.
+    """
+
+    rest: Floats
+    integrals: Floats
+    squares: Floats
+    gaps: Floats
+    mean_squares: Floats
+
+
+@dataclass
+class _Panels:
+    """The panels of one computation in one hollow."""
+
+    hollow: HollowConditionals
+    sizes: Floats
+    edges: Floats
+    low: Floats
+    high: Floats
+    angle: Floats
+    tolerance: Floats
+
+    def march(self, asked: Floats) -> set[float]:
+        """Find the pieces at the angles that are asked for; return earlier angles now known to miss a piece."""
+        place = np.minimum(np.searchsorted(asked, self.angle), len(asked) - 1)
+        tolerance = np.full(len(asked), np.inf)
+        here = asked[place] == self.angle
+        np.minimum.at(tolerance, place[here], np.broadcast_to(self.tolerance[:, None], here.shape)[here])
+        return self.hollow.march(asked, GAP_FRACTION * tolerance)[1]
+
+    def integrals(self, fraction: float) -> tuple[CellIntegrals, set[float]]:
+        """The integrals over the hollow, a fraction of the period, and the angles at which a piece was missed."""
+        patches, singles, tiny = self._strips()
+        size = len(self.sizes)
+        found = _Sums(
+            np.zeros((*self.angle.shape, size)), np.zeros((len(self.low), size)), np.zeros(len(self.low)),
+            np.zeros(self.angle.shape), np.zeros(self.angle.shape),
+        )  # fmt: skip
+        missed = self._add_patches(patches, found) | self._add_singles(singles, found)
+        self._add_tiny(*tiny, found)
+        scale = fraction / self.hollow.width
+        return CellIntegrals(
+            scale * self.sizes * found.rest,
+            scale * self.sizes * found.integrals,
+            scale * np.sqrt(found.squares),
+            scale * (found.gaps + np.sqrt(found.mean_squares)),
+        ), missed
+
+    def _strips(self) -> tuple[Strips, Strips, tuple[Strips, Floats]]:
+        """The patches; the other pieces with the numbers of their nodes; the tiny ones with their outgoing angles."""
+        left, right = self.hollow.scene.hollows[self.hollow.hollow, [LEFT, RIGHT]].tolist()
+        patches, singles, tiny, tiny_outs = [], [], [], []
+        for number, (angles, tolerance) in enumerate(zip(self.angle, self.tolerance.tolist(), strict=True)):
+            rows = [self.hollow.pieces(angle) for angle in angles.tolist()]
+            node = np.repeat(np.arange(len(rows)), [len(row.label) for row in rows])
+            label, out = np.concatenate([row.label for row in rows]), np.concatenate([row.out for row in rows])
+            ends = np.concatenate([ends_of(row, left, right) for row in rows])
+            limit = TINY_FRACTION * tolerance / self.sizes.max() * self.hollow.width
+            is_tiny = _narrowest(ends[:, 3] - ends[:, 0], node, limit) | (label < FIRST_LABEL)
+            common = common_pieces(rows)
+            common = common[~is_tiny[common].all(axis=1)]
+            alone = np.ones(len(label), dtype=np.bool_)
+            alone[common] = False
+            owner = np.full(len(common), number)
+            patches.append(Strips(np.tile(angles, (len(common), 1)), ends[common], label[common[:, 0]], owner))
+            others = Strips(angles[node][:, None], ends[:, None], label, number * len(rows) + node)
+            singles.append(others.chosen(alone & ~is_tiny))
+            tiny.append(others.chosen(alone & is_tiny))
+            tiny_outs.append(out[alone & is_tiny])
+        return together(patches), together(singles), (together(tiny), np.concatenate(tiny_outs))
+
+    def _wanted(self, strips: Strips, of_all: Floats) -> Floats:
+        """The wanted errors of the outgoing angles on strips; ``of_all`` is the width that shares the tolerance.
+
+        A shift of the angle by d moves a mass of about d/pi times the width of a strip over every edge.
+        """
+        edges = len(self.sizes) / np.pi * of_all / self.hollow.width
+        panel = strips.owner // (len(NODES) // strips.angle.shape[1])
+        return np.asarray(ANGLE_FRACTION * self.tolerance[panel] / (np.median(self.sizes) * edges))
+
+    def _add_patches(self, patches: Strips, found: _Sums) -> set[float]:
+        from ...geometry.itineraries.compiled.patches import Cells, Grid, masses_of_patches, room_for
+
+        measure = SINE.mass(self.low, self.high)
+        limits = PATCH_FACTOR * self.tolerance * self.hollow.width
+        goals = PART_FRACTION * self.tolerance * self.hollow.width * np.sqrt(measure)
+        width = (patches.ends[..., 3] - patches.ends[..., 0]).max(axis=1, initial=0.0)
+        # their errors count as independent ones
+        alike = np.bincount(patches.owner)[patches.owner]
+        sampled, missed = sample(self.hollow, patches, self._wanted(patches, width * np.sqrt(alike)), self.edges)
+        for level, strips, outs, error in sampled:
+            place, _ = grid = positions(level)
+            doubts = error, _tail(weight_at(place) * outs), _tail(strips.ends)
+            room = room_for(len(self.sizes), len(NODES), outs.shape[2])
+            own = strips.ends, outs, strips.owner
+            compiled_result(
+                lambda: masses_of_patches(
+                    (self.low, self.high, measure), Grid(_PLACES, _WEIGHTS), Grid(*grid), own, doubts,
+                    limits, goals, Cells(self.edges, self.sizes), tuple(found), room,
+                )
+            )  # fmt: skip
+        return missed
+
+    def _add_singles(self, singles: Strips, found: _Sums) -> set[float]:
+        from ...geometry.itineraries.compiled.patches import Cells, Grid, masses_of_rows, room_for
+
+        width = np.bincount(singles.owner, weights=singles.ends[:, 0, 3] - singles.ends[:, 0, 0])[singles.owner]
+        sampled, missed = sample(self.hollow, singles, self._wanted(singles, width), self.edges)
+        rest = found.rest.reshape(-1, len(self.sizes))
+        for level, strips, outs, error in sampled:
+            room = room_for(len(self.sizes), len(NODES), outs.shape[2])
+            compiled_result(
+                lambda: masses_of_rows(
+                    Grid(*positions(level)), strips.ends, outs, strips.owner, error, Cells(self.edges, self.sizes),
+                    rest, found.gaps.reshape(-1), room,
+                )
+            )  # fmt: skip
+        return missed
+
+    def _add_tiny(self, tiny: Strips, outs: Floats, found: _Sums) -> None:
+        """Add pieces by the outgoing angles of their first rays; their whole widths count as error."""
+        width = tiny.ends[:, 0, 3] - tiny.ends[:, 0, 0]
+        np.add.at(found.rest.reshape(-1, len(self.sizes)), (tiny.owner, np.searchsorted(self.edges, outs)), width)
+        np.add.at(found.gaps.reshape(-1), tiny.owner, 2.0 * self.sizes.max() * width)
+
+
+def _narrowest(width: Floats, node: NDArray[np.int64], limit: float) -> NDArray[np.bool_]:
+    """The pieces that are the narrowest ones of their node, as many as have at most this width together."""
+    order = np.lexsort((width, node))
+    sums = np.cumsum(width[order])
+    first = np.searchsorted(node[order], node[order])
+    chosen = np.zeros(len(width), dtype=np.bool_)
+    chosen[order] = sums - np.append(0.0, sums)[first] <= limit
+    return chosen
+
+
+def _tail(values: Floats) -> Floats:
+    """The error of interpolation between the nodes of the panel, for values of shape (patches, nodes, any)."""
+    last = np.abs(np.einsum("tk,pkj->ptj", _TAILS, values)).max(axis=(1, 2), initial=0.0)
+    return np.asarray(TAIL_FACTOR * last)
