@@ -19,7 +19,7 @@ from .conditionals import WallConditionals
 
 # Fractions of the tolerance of the expectations for the gaps between the pieces, for pieces that get one ray each, and
 # for the outgoing angles.
-GAP_FRACTION, TINY_FRACTION, ANGLE_FRACTION = 0.3, 0.3, 0.2
+GAP_FRACTION, TINY_FRACTION, ANGLE_FRACTION = 0.03, 0.3, 0.4
 # A patch is integrated if the error of its interpolant is below this multiple of the tolerance of the expectations.
 PATCH_FACTOR = 1.0
 # Error of the integral over a part of a patch, as a fraction of the tolerance.

@@ -32,6 +32,7 @@ MOST_SAMPLES = 1 << 13
 MOST_ROUNDS = 200
 # Gaps with an error below this fraction of the worst gap's wait for a later round.
 WORST_FRACTION = 0.1
+FLOOR = 0.01
 # Distance beyond the interpolated position of an edge, as a multiple of the squared width of the gap over the opening:
 # above the error of the interpolation where the outgoing angle has a curvature of at most 16 slopes over the opening.
 BEYOND_EDGE = 2.0
@@ -203,9 +204,11 @@ def spread(first, second, task):
     """
     k, edges, sizes = max(task.degree, 1), task.setting.edges, task.setting.sizes
     here, there = cell_of(first, edges), cell_of(second, edges)
-    if here != there or (task.degree == 0 and edges.shape[0] == 0):
+    if here != there:
         return sizes[here] + sizes[there]
+    floor = FLOOR if task.degree == 0 and edges.shape[0] == 0 else 0.0
     return sizes[here] * max(
+        floor,
         abs(math.cos(first) - math.cos(second)),
         max(abs(math.cos(k * first) - math.cos(k * second)), abs(math.sin(k * first) - math.sin(k * second))),
     )
