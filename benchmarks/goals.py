@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from asperity.spectral.work_diagrams.runs import measure
 from .memory import MemoryUse
 from .rays import Throughput
 from .robustness import Verdict
-from .wall_goals import wall_goals
+from .wall_goals import Goal, wall_goals
 
 # <u, P u> / <u, u> for u = cos(theta): closed forms and independent quadrature, see docs/theory/closed-forms.md
 TRIANGULAR_MOMENT, ARC_MOMENT = 0.134541971359171, 0.327558333378
@@ -48,16 +47,6 @@ BOUNCE_GOALS = {
     "profile, 10^5 lines": 2.4,
 }
 SPEED_UP = 1.9
-
-
-@dataclass(frozen=True)
-class Goal:
-    """One goal: its name, its required value, and the value reached."""
-
-    what: str
-    goal: str
-    reached: str
-    is_met: bool
 
 
 def all_goals(
@@ -92,8 +81,7 @@ def all_goals(
     goals += [_memory(memory)]
     for what, limit in (("import asperity", 0.3), ("first trace, warm cache", 1.5)):
         goals.append(Goal(what, f"{limit:g} s", f"{start[what]:.2f} s", start[what] < limit))
-    goals += [Goal(goal.what, goal.goal, goal.reached, goal.is_met) for goal in wall_goals()]
-    return goals
+    return goals + wall_goals()
 
 
 def goal_table(goals: Sequence[Goal]) -> str:

@@ -57,37 +57,21 @@ PROGRAMS = {
 
 
 @dataclass(frozen=True)
-class WallGoal:
-    """A tolerance and seconds that are wished, with the reported error and the seconds that were reached."""
+class Goal:
+    """One goal: its name, its required value, and the value reached."""
 
     what: str
-    tolerance: float
-    limit: float
-    error: float
-    seconds: float
-
-    @property
-    def goal(self) -> str:
-        """The wished tolerance, if there is one, and seconds."""
-        return f"{self.tolerance:.0e} in {self.limit:g} s" if self.tolerance else f"{self.limit:g} s"
-
-    @property
-    def reached(self) -> str:
-        """The reported error, if there is one, and seconds."""
-        return f"reported {self.error:.1e} in {self.seconds:.2g} s" if self.tolerance else f"{self.seconds:.2g} s"
-
-    @property
-    def is_met(self) -> bool:
-        """Whether both are."""
-        return self.error <= self.tolerance and self.seconds <= self.limit
+    goal: str
+    reached: str
+    is_met: bool
 
 
-def wall_goals() -> list[WallGoal]:
+def wall_goals() -> list[Goal]:
     """All of them, in about two minutes."""
     return [*_laws_and_resistances(), *_gaps(), *_koch(), *_distances(), *_large_matrices(), *_programs()]
 
 
-def _laws_and_resistances() -> list[WallGoal]:
+def _laws_and_resistances() -> list[Goal]:
     goals = []
     for name, make in WALLS.items():
         goals += [
@@ -108,7 +92,7 @@ def _matrix(wall: geo.Wall, tolerance: float) -> float:
     return float(ker.discretise(law, ker.Bins(64), method="quadrature", tolerance=tolerance).error)
 
 
-def _gaps() -> list[WallGoal]:
+def _gaps() -> list[Goal]:
     return [
         _within(
             f"gap of dispersing arcs of {half_angle:.2g}", 1e-9, 1.0,
@@ -120,7 +104,7 @@ def _gaps() -> list[WallGoal]:
     ]  # fmt: skip
 
 
-def _koch() -> list[WallGoal]:
+def _koch() -> list[Goal]:
     """Koch 5 as an exact law, with the mass of its unresolved beams, and Koch 8 by rays."""
     return [
         _within("Koch 5 as an exact law", 1e-6, 20.0, lambda _: _unresolved(geo.koch(5))),
@@ -137,7 +121,7 @@ def _unresolved(wall: geo.Wall) -> float:
     return float(law.unresolved)
 
 
-def _distances() -> list[WallGoal]:
+def _distances() -> list[Goal]:
     arc, teeth = ker.WallLaw(geo.focusing_arcs(1.2)), ker.WallLaw(geo.triangular_teeth(0.7))
     kinds: tuple[tuple[Any, float, float], ...] = (("rows", 1e-6, 1.0), ("joint", 1e-3, 5.0))
     return [
@@ -149,7 +133,7 @@ def _distances() -> list[WallGoal]:
     ]  # fmt: skip
 
 
-def _large_matrices() -> list[WallGoal]:
+def _large_matrices() -> list[Goal]:
     """Gaps with their proof; the time of making the matrix is not counted."""
     basis, arc = ker.Bins(LARGE), ker.CircularArcLaw(1.2)
     matrices = {
@@ -164,7 +148,7 @@ def _large_matrices() -> list[WallGoal]:
     ]
 
 
-def _programs() -> list[WallGoal]:
+def _programs() -> list[Goal]:
     """A large profile, and fresh processes."""
     goals = [_in_seconds(f"profile of {LARGE_PROFILE:,} points, wall to {FIRST_RAYS:,} rays", 4.0, first_rays)]
     with TemporaryDirectory() as folder:
@@ -183,12 +167,17 @@ def _run(arguments: list[str], environment: Any) -> None:
     subprocess.run([sys.executable, *arguments], check=True, env=environment, capture_output=True)
 
 
-def _within(what: str, tolerance: float, limit: float, solve: Callable[[float], float]) -> WallGoal:
+def _within(what: str, tolerance: float, limit: float, solve: Callable[[float], float]) -> Goal:
     solve(ROUGH)
-    error, seconds = timed(perf_counter, lambda: solve(tolerance))
-    return WallGoal(what, tolerance, limit, float(error), seconds)
+    return in_time(what, tolerance, limit, *timed(perf_counter, lambda: solve(tolerance)))
 
 
-def _in_seconds(what: str, limit: float, run: Callable[[], object]) -> WallGoal:
+def in_time(what: str, tolerance: float, limit: float, error: float, seconds: float) -> Goal:
+    """A goal of a tolerance and seconds, with the reported error and the seconds that were reached."""
+    reached = f"reported {error:.1e} in {seconds:.2g} s"
+    return Goal(what, f"{tolerance:.0e} in {limit:g} s", reached, error <= tolerance and seconds <= limit)
+
+
+def _in_seconds(what: str, limit: float, run: Callable[[], object]) -> Goal:
     _, seconds = timed(perf_counter, run)
-    return WallGoal(what, 0.0, limit, 0.0, seconds)
+    return Goal(what, f"{limit:g} s", f"{seconds:.2g} s", seconds <= limit)

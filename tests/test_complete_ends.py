@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from asperity import kernels as ker
 from asperity import spectral as spec
 from asperity.spectral.eigenvalues.completeness import Deflated, margin_below, norm_beyond
-from asperity.spectral.eigenvalues.dense import compressed, end_values, extremal
+from asperity.spectral.eigenvalues.dense import TILE, compressed, end_values, extremal, symmetric_half
 from asperity.spectral.eigenvalues.parity import parity_basis
 
 SIZE = 600
@@ -150,3 +150,12 @@ def test_matrices_are_compressed_by_pairs_as_by_the_products(size):
     for embedding in (csr_array(basis.coarsened()[1]), *(half.T.tocsr() for half in halves)):
         form = embedding.toarray() @ array @ embedding.toarray().T
         np.testing.assert_allclose(compressed(array, embedding), 0.5 * (form + form.T), rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("place", [(1, 0), (0, TILE + 1), (TILE + 3, TILE + 2)])
+def test_the_symmetric_part_is_the_mean_with_the_transpose_and_a_symmetric_matrix_itself(place):
+    array = np.random.default_rng(3).normal(size=(TILE + 7, TILE + 7))
+    array += array.T
+    assert symmetric_half(array) is array
+    array[place] = np.nextafter(array[place], np.inf) + 1.0
+    np.testing.assert_array_equal(symmetric_half(array), 0.5 * (array + array.T))

@@ -50,7 +50,7 @@ def test_a_goal_of_error_and_time_needs_both_and_an_error_that_holds():
 
 def test_a_goal_of_a_tolerance_needs_the_error_and_the_seconds():
     for error, seconds, is_met in ((1e-5, 4.0, True), (1e-3, 4.0, False), (1e-5, 6.0, False)):
-        goal = wall_goals.WallGoal("a law", 1e-4, 5.0, error, seconds)
+        goal = wall_goals.in_time("a law", 1e-4, 5.0, error, seconds)
         assert goal.is_met == is_met and goal.goal == "1e-04 in 5 s"
 
 

@@ -13,6 +13,7 @@ from scipy.linalg import eigh
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity import spectral as spec
+from asperity.spectral.bounds.oscillations import FREQUENCIES, PARTS, RAYS, least_quotient
 from asperity.spectral.essential.edge import essential_edge, grazing_symbol
 from asperity.spectral.essential.grazing import grazed, grazing_limit
 from asperity.spectral.gap.gap import held_against_oscillations
@@ -297,6 +298,29 @@ def test_a_gap_that_may_be_zero_is_not_called_isolated():
     edge = essential_edge(law)
     assert isolated(found, 0.5 * found.gap, "", edge, "paper") is not None
     assert isolated(found, found.gap, "", edge, "paper") is None
+
+
+@pytest.mark.parametrize("wall", [geo.focusing_arcs(1.2), geo.triangular_teeth(0.01)], ids=["arcs", "flat teeth"])
+def test_the_least_quotient_of_oscillations_is_that_of_plain_means_over_the_rays(wall):
+    law, least = ker.WallLaw(wall), 3.0
+    t, quotient, spread = least_quotient(law, least)
+    rng = np.random.default_rng(0)
+    theta = np.arccos(1.0 - 2.0 * (np.arange(RAYS) + rng.random(RAYS)) / RAYS)
+    out = law.sample(theta, rng)
+    move = np.sqrt(min(np.mean((out - theta) ** 2), np.mean((np.pi - out - theta) ** 2)))
+    tried = FREQUENCIES / move + max(least - FREQUENCIES[0] / move, 0.0)
+
+    def solved(frequency):
+        here, there = (np.array([np.cos(frequency * angle), np.sin(frequency * angle)]) for angle in (theta, out))
+        change = there - here
+        return change, *eigh(0.5 * change @ change.T / RAYS, np.cov(here, bias=True))
+
+    lowest = np.array([solved(frequency)[1][0] for frequency in tried])
+    np.testing.assert_allclose(quotient, lowest.min(), rtol=1e-10)
+    np.testing.assert_allclose(t, tried[lowest.argmin()], rtol=1e-12)
+    change, _, vectors = solved(t)
+    batches = np.mean((0.5 * (vectors[:, 0] @ change) ** 2).reshape(-1, PARTS), axis=0)
+    np.testing.assert_allclose(spread, np.std(batches, ddof=1) / np.sqrt(PARTS), rtol=1e-8)
 
 
 def test_a_true_gap_stands_against_oscillations():

@@ -120,3 +120,14 @@ def test_wrong_arguments_are_refused():
         WALLS[0].energy_accommodation(1.0)
     with pytest.raises(InputError, match="greater than 0"):
         WALLS[0].sample_polar(0.0, 1.0)
+
+
+@pytest.mark.parametrize("numbers", [(1e308, 1e308), (1.0, 1.0, 1e308), (1.0, 1e308, 1e-308), (1.0, 1.0, 1e10, 1e300)])
+def test_a_plate_whose_motion_overflows_is_refused(numbers):
+    with pytest.raises(InputError, match="acceleration is finite"):
+        ker.SpringWall(*numbers)
+
+
+def test_a_velocity_whose_motion_overflows_is_refused():
+    with pytest.raises(InputError, match=r"velocity: overflow .* against SpringWall"):
+        ker.SpringWall(1.0, 1.0).sample([[1.0, -1e308]], rng=0)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.files import regular_file, write_whole
+from ...core.files import text_of, write_whole
 from ...core.long_runs import counted
 from ..curves.arc import Arc
 from ..curves.bezier import Bezier
@@ -44,15 +44,13 @@ def save_wall(wall: Cell, path: str | PathLike[str], overwrite: bool = False) ->
 def read_wall(path: str | PathLike[str]) -> tuple[list[Curve], float, list[list[Curve]], str]:
     """Pieces, period, islands and unit of a wall file, not yet validated as a wall; see ``load_wall``."""
     file = Path(path)
+    text = text_of(file)
     try:
-        text = regular_file(file).read_text(encoding="utf-8")
         if DOTTED.search(text):
             raise ValueError("a key has more than 64 parts")
         document = tomllib.loads(text)
     except RecursionError as reason:
         raise InputError(f"{file}: tables or lists are nested too deeply to be those of a wall") from reason
-    except OSError as reason:
-        raise InputError(f"{file}: cannot read the file ({reason.strerror})") from reason
     except ValueError as reason:
         raise InputError(f"{file}: not a TOML file ({reason})") from reason
     try:

@@ -132,14 +132,19 @@ class Bins(Basis):
     def coarsened(self) -> tuple[Bins, Floats] | None:
         if self.size < 2:
             return None
+        coarse, owner, entries = self.joined()
+        restriction = np.zeros((coarse.size, self.size))
+        restriction[owner, np.arange(self.size)] = entries
+        return coarse, restriction
+
+    def joined(self) -> tuple[Bins, NDArray[np.intp], Floats]:
+        """`coarsened` of two bins or more without zeros: the row of the only entry of every column, and this entry."""
         if self._equal and self.size % 2 == 0:
             coarse = Bins(self.size // 2, self._measure.name)
         else:
             coarse = Bins(np.concatenate(([0.0], self._edges[2:-1:2], [np.pi])), self._measure.name)
         owner = np.minimum(np.arange(self.size) // 2, coarse.size - 1)
-        restriction = np.zeros((coarse.size, self.size))
-        restriction[owner, np.arange(self.size)] = np.sqrt(self._weights / coarse.weights[owner])
-        return coarse, restriction
+        return coarse, owner, np.sqrt(self._weights / coarse.weights[owner])
 
     def __repr__(self) -> str:
         weight = "" if self._measure == SINE else f", weight={self._measure.name!r}"

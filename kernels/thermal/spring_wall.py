@@ -23,6 +23,7 @@ MOST_STEPS = 100_000
 CELLS = 12
 # Draws of a Gaussian position above the level y = 0 that are repeated at most; depth 0 rejects one in two.
 MOST_DRAWS = 200
+OVERFLOW = "choose units in which they are moderate"
 
 
 @explained_class
@@ -50,7 +51,7 @@ class SpringWall:
     Raises
     ------
     InputError
-        If a number is out of range.
+        If a number is out of range, or the motion of the plate overflows.
 
     Notes
     -----
@@ -83,6 +84,9 @@ class SpringWall:
             object.__setattr__(self, name, value)
         if self.temperature == 0.0 and self.depth == 0.0:
             raise InputError("depth: expected a number greater than 0 for a plate at rest, got 0")
+        swing = self.depth + math.sqrt(self.temperature * self.mass_ratio) / self.frequency
+        if not math.isfinite(self.frequency * self.frequency * swing):
+            raise InputError(f"expected numbers for which the plate's acceleration is finite, got {self}; {OVERFLOW}")
 
     # ---- sampling --------------------------------------------------------------------------------------------
     @explained
@@ -92,7 +96,7 @@ class SpringWall:
         Raises
         ------
         InputError
-            If the shape is wrong or some v2 is not negative.
+            If the shape is wrong, some v2 is not negative, or the motion overflows.
         AccuracyError
             If a particle has not left after 10^5 steps.
         """
@@ -101,9 +105,14 @@ class SpringWall:
             raise InputError(f"velocity: expected shape (n, 2), got {incoming.shape}")
         if not np.all(incoming[:, 1] < 0.0):
             raise InputError(f"velocity: expected v2 < 0, got {float(incoming[:, 1].max())!r}")
-        position, pace = self._plate(len(incoming), generator(rng))
         outgoing = incoming.copy()
-        outgoing[:, 1] = self._return(incoming[:, 1].copy(), position, pace)
+        try:
+            with np.errstate(over="raise", invalid="raise"):
+                position, pace = self._plate(len(incoming), generator(rng))
+                outgoing[:, 1] = self._return(incoming[:, 1].copy(), position, pace)
+        except FloatingPointError as reason:
+            fastest = float(np.abs(incoming[:, 1]).max())
+            raise InputError(f"velocity: {reason} for a speed of {fastest:g} against {self}; {OVERFLOW}") from reason
         return outgoing
 
     @explained
@@ -163,7 +172,7 @@ class SpringWall:
                 np.where(touch, ((1.0 - ratio) * pace + 2.0 * ratio * v) / (1.0 + ratio), pace),
             )
             closing = v - pace
-            strongest = self.frequency**2 * np.hypot(position, pace / self.frequency)
+            strongest = self.frequency * self.frequency * np.hypot(position, pace / self.frequency)
             step = _safe_step(np.maximum(gap, 0.0), closing, strongest)
             with np.errstate(divide="ignore"):
                 exit_time = np.where(v > 0.0, (self.depth - y) / v, np.inf)

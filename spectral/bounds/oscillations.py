@@ -14,7 +14,7 @@ from ...kernels.bases.measure import SINE
 
 # Rays, and batches of them for the standard error.
 RAYS, PARTS = 2**12, 8
-# Frequencies per block.
+# Frequencies of one factor.
 AT_ONCE = 32
 # Frequencies times the root mean square of theta' - theta (or of its mirror image).
 FREQUENCIES = np.arange(0.5, 64.0, 0.1)
@@ -48,33 +48,34 @@ def least_quotient(law: Law, least: float = 0.0) -> tuple[float, float, float]:
     theta = SINE.quantile((np.arange(RAYS) + rng.random(RAYS)) / RAYS)
     out = law.sample(theta, rng)
     move = min(float(np.sqrt(np.mean((angle - theta) ** 2))) for angle in (out, np.pi - out))
-    best = (0.0, np.inf, np.inf)
     frequencies = FREQUENCIES / max(move, LEAST_MOVE)
     frequencies += max(least - frequencies[0], 0.0)
-    # exp(i t_k theta) = exp(i t_first theta) exp(i (t_k - t_first) theta), and frequencies are equally spaced
-    offsets = frequencies[:AT_ONCE] - frequencies[0]
-    steps = [np.exp(1j * offsets[:, None] * angle) for angle in (theta, out)]
-    for start in range(0, frequencies.size, AT_ONCE):
-        # cosines and sines as real and imaginary parts, shape (frequencies, rays)
-        t = frequencies[start : start + AT_ONCE]
-        here, there = (
-            np.exp(1j * t[0] * angle) * step[: t.size] for angle, step in zip((theta, out), steps, strict=True)
-        )
-        variance, form = _squares(here - here.mean(axis=1)[:, None]), 0.5 * _squares(there - here)
-        lower = np.linalg.cholesky(variance)
-        scaled = np.linalg.solve(lower, np.swapaxes(np.linalg.solve(lower, form), 1, 2))
-        values, vectors = np.linalg.eigh(scaled)
-        worst = int(np.argmin(values[:, 0]))
-        if values[worst, 0] < best[1]:
-            real, imaginary = np.linalg.solve(lower[worst].T, vectors[worst, :, 0])
-            change = (there - here)[worst]
-            # batches of interleaved angles
-            parts = (0.5 * (real * change.real + imaginary * change.imag) ** 2).reshape(-1, PARTS).mean(axis=0)
-            best = (float(t[worst]), float(values[worst, 0]), float(parts.std(ddof=1) / np.sqrt(PARTS)))
-    return best
+    # frequencies are equally spaced, and exp(i t_k theta) = exp(i t_first theta) exp(i (t_k - t_first) theta), so that
+    # a matrix product has the means of all of them
+    steps = frequencies[::AT_ONCE], frequencies[:AT_ONCE] - frequencies[0]
+    here, there = ([np.exp(1j * t[:, None] * angle) for t in steps] for angle in (theta, out))
+
+    def mean(values: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+        return np.asarray((values[0] @ values[1].T).ravel()[: frequencies.size] / RAYS)
+
+    centre, square = mean(here), mean([z * z for z in here])
+    # of the change w - z from z = exp(i t theta) to w = exp(i t theta')
+    modulus = 2.0 - 2.0 * mean([w * z.conj() for z, w in zip(here, there, strict=True)]).real
+    change = mean([w * w for w in there]) - 2.0 * mean([w * z for z, w in zip(here, there, strict=True)]) + square
+    variance = _products(1.0, square) - _products(np.abs(centre) ** 2, centre**2)
+    lower = np.linalg.cholesky(variance)
+    scaled = np.linalg.solve(lower, np.swapaxes(np.linalg.solve(lower, 0.5 * _products(modulus, change)), 1, 2))
+    values, vectors = np.linalg.eigh(scaled)
+    worst = int(np.argmin(values[:, 0]))
+    t = float(frequencies[worst])
+    cosine, sine = np.linalg.solve(lower[worst].T, vectors[worst, :, 0])
+    moved = cosine * (np.cos(t * out) - np.cos(t * theta)) + sine * (np.sin(t * out) - np.sin(t * theta))
+    # batches of interleaved angles
+    parts = (0.5 * moved**2).reshape(-1, PARTS).mean(axis=0)
+    return t, float(parts.mean()), float(parts.std(ddof=1) / np.sqrt(PARTS))
 
 
-def _squares(values: NDArray[np.complex128]) -> Floats:
-    """Mean products of real and imaginary parts, shape (frequencies, 2, 2)."""
-    parts = np.stack((values.real, values.imag), axis=1)
-    return np.asarray(parts @ np.swapaxes(parts, 1, 2) / values.shape[1])
+def _products(modulus: float | Floats, square: NDArray[np.complex128]) -> Floats:
+    """Mean products of real and imaginary parts of z, from the means of |z|^2 and z^2; shape (frequencies, 2, 2)."""
+    rows = (modulus + square.real, square.imag), (square.imag, modulus - square.real)
+    return np.asarray(0.5 * np.moveaxis(np.array(rows), 2, 0))

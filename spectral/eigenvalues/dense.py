@@ -101,13 +101,15 @@ def _on_pairs(array: Floats, first: slice, second: slice, weights: Floats) -> Fl
 
 
 def symmetric_half(array: Floats) -> Floats:
-    """The symmetric part (A + A^T)/2, tile by tile, so that memory is read along the rows."""
+    """The symmetric part (A + A^T)/2, tile by tile, so that memory is read along the rows; A itself if symmetric."""
+    starts = range(0, len(array), TILE)
+    tiles = [(slice(i, i + TILE), slice(j, j + TILE)) for i in starts for j in starts if j <= i]
+    if all(np.array_equal(array[here, there], array[there, here].T) for here, there in tiles):
+        return array
     found = np.empty_like(array)
-    for row in range(0, len(array), TILE):
-        for column in range(0, row + 1, TILE):
-            here, there = slice(row, row + TILE), slice(column, column + TILE)
-            found[here, there] = 0.5 * (array[here, there] + array[there, here].T)
-            found[there, here] = found[here, there].T
+    for here, there in tiles:
+        found[here, there] = 0.5 * (array[here, there] + array[there, here].T)
+        found[there, here] = found[here, there].T
     return found
 
 

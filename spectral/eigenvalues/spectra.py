@@ -15,7 +15,7 @@ from ...core.frames import data_frame
 from ...core.html import html_table
 from ...core.kinds import explained_class
 from ...core.rounding import EPS
-from ...kernels import Basis, KernelMatrix
+from ...kernels import Basis, Bins, KernelMatrix
 from ..plotting import draw_eigenfunctions, draw_eigenvalues
 from .dense import ExtremalEigenvalues, compressed, end_values
 from .parity import Parity, extremal_by_parity, parity_basis
@@ -62,10 +62,16 @@ def _coarser_grids(matrix: KernelMatrix, top: int, bottom: int, levels: int) -> 
     found: list[Floats] = []
     basis, array = matrix.basis, matrix.symmetric
     for _ in range(levels):
-        coarser = basis.coarsened()
-        if coarser is None:
-            break
-        basis, embedding = coarser[0], csr_array(coarser[1])
+        if isinstance(basis, Bins) and basis.size > 1:
+            # a large matrix of zeros would take longer than its products
+            joined, owner, entries = basis.joined()
+            embedding = csr_array((entries, (owner, np.arange(basis.size))), shape=(joined.size, basis.size))
+            basis = joined
+        else:
+            coarser = basis.coarsened()
+            if coarser is None:
+                break
+            basis, embedding = coarser[0], csr_array(coarser[1])
         array = compressed(array, embedding)
         upper, lower = end_values(array, np.asarray(basis.constant), top, bottom)
         found.append(np.concatenate([_padded(upper, top), _padded(lower, bottom)[::-1]]))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT, SIZE
-from ...tracing.compiled.options import allocating, compiled
+from ...tracing.compiled.options import compiled, inner
 from ...tracing.compiled.pointers import address_of, call_at
 from .changes import (
     FIRST_LABEL,
@@ -32,7 +32,7 @@ from .changes import (
     task_of,
     undecided,
 )
-from .rules import MOST_NODES, SPARE, Rules, integrate_piece, nested_rules
+from .rules import MOST_NODES, NODE_ROOM, SPARE, Rules, integrate_piece, nested_rules
 
 # Rounding error of a mean, as a fraction of the opening, and of the position of a change, as a fraction of the hollow's
 # size. Rays have errors of a few EPS times the derivative of the map, which is seldom above some hundreds except next
@@ -70,7 +70,7 @@ class Room(NamedTuple):
     pieces: tuple[NDArray[Any], ...]
 
 
-@allocating
+@inner
 def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     """Compute the nodes and masses of the conditional distribution at one incoming angle.
 
@@ -91,7 +91,9 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
     node[0], mass[0] = outs[0], xs[0] - left
     node[1], mass[1] = outs[last], right - xs[last]
     filled, number, unresolved = np.int64(2), np.int64(0), 0.0
-    largest = task.setting.sizes.max()
+    largest = 0.0
+    for size in task.setting.sizes:
+        largest = max(largest, size)
     error = ROUNDING * largest * whole
     error += mass[0] * spread(outs[0], outs[1], task) + mass[1] * spread(outs[last], outs[last - 1], task)
     i = np.int64(0)
@@ -186,7 +188,7 @@ def marched_angles(
     """Compute the conditional distributions at incoming angles. The seeds are the first samples, which increase."""
     count = len(thetas)
     nodes, pieces = (float, float), (float, float, np.uint64, float)
-    room = Room(empty_chain(), _arrays(MOST_NODES + SPARE, *nodes), _arrays(MOST_SAMPLES, *pieces))
+    room = Room(empty_chain(), _arrays(NODE_ROOM, *nodes), _arrays(MOST_SAMPLES, *pieces))
     found = Found(
         (np.empty(0), np.empty(0)), np.zeros(count + 1, np.int64),
         (np.empty(0), np.empty(0), np.empty(0, np.uint64), np.empty(0)), np.zeros(count + 1, np.int64),

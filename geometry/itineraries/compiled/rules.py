@@ -15,7 +15,7 @@ import numpy as np
 from ....core.checks import Floats
 from ....core.rounding import EPS
 from ...scene.columns import LEFT, RIGHT
-from ...tracing.compiled.options import linked, linked_allocating
+from ...tracing.compiled.options import linked
 from .changes import BLOCK, FIRST_LABEL, is_spent, outcome, probe, size_at, trace_block
 
 # Number of rules, and of the positions of the finest.
@@ -33,6 +33,8 @@ NARROWEST = 1e-9
 # Width, as a fraction of the opening, below which one ray checks a piece on which the functions are constant.
 NARROW = 1.0 / 32.0
 MOST_HALVINGS = 40
+# Size of the arrays of nodes: a stack of intervals lies behind the nodes, so that nothing is allocated.
+NODE_ROOM = MOST_NODES + SPARE + MOST_HALVINGS + 2
 # Least fraction of the tolerance for the rules of one piece, however narrow.
 LEAST_FRACTION = 0.05
 
@@ -122,7 +124,7 @@ def apply_rules(ends, label, goal, rules, task, nodes, filled, strict):
     return used, error, np.nan, traced
 
 
-@linked_allocating
+@linked
 def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     """Compute nodes on a piece, which is halved until the rules reach the tolerance.
 
@@ -130,10 +132,10 @@ def integrate_piece(ends, sample, goal, rules, task, nodes, filled, strict):
     position where a ray has another label (nan: none), and the number of rays.
     """
     whole = task.setting.hollow[RIGHT] - task.setting.hollow[LEFT]
-    low_stack, high_stack = np.empty(MOST_HALVINGS + 2), np.empty(MOST_HALVINGS + 2)
-    low_stack[0], high_stack[0] = ends
     out, label = sample
     node, mass = nodes
+    low_stack, high_stack = node[MOST_NODES + SPARE :], mass[MOST_NODES + SPARE :]
+    low_stack[0], high_stack[0] = ends
     if task.degree == 0 and ends[1] - ends[0] < NARROW * whole and strict and MOST_NODES - filled > 2:
         middle = 0.5 * (ends[0] + ends[1])
         out, here = probe(middle, task)

@@ -26,7 +26,7 @@ from ..double_double.sides import LINE as STRAIGHT
 from .arcs import arc_time, on_arc
 from .beziers import NO_BEZIER_HIT
 from .lines import first_boxes, line_time, next_leaf
-from .options import allocating, linked, linked_allocating
+from .options import allocating, inner, linked, linked_allocating
 from .pointers import address_at, call_at
 from .records import BEZIER, CIRCLE, ELLIPSE, LINE, NO_PIECE, OPENING, SIDE, Hit
 
@@ -63,7 +63,7 @@ def starts_in_front(tables, hit, own, px, py, vx, vy, slack):
     )  # fmt: skip
 
 
-@allocating
+@inner
 def line_starts_in_front(joints, line, own, px, py, vx, vy, slack):
     """-> bool: `starts_in_front` for a ray that left a line, and another line."""
     arrival = Arrival(own.flown, slack, slack)
@@ -124,7 +124,7 @@ def piece_nearby(scope, piece, own, px, py, vx, vy):
     return t, s, tangent, is_clear
 
 
-@linked_allocating
+@linked
 def nearer(scope, found, piece, own, px, py, vx, vy):
     """-> Hit: the earlier of a hit and of that on a nearby piece, given by kind and row, if the ray starts in front."""
     tables, slack = scope.tables, scope.slack
@@ -148,7 +148,7 @@ def nearer(scope, found, piece, own, px, py, vx, vy):
     return hit if is_front else found
 
 
-@allocating
+@inner
 def hit_nearby(scope, own, px, py, vx, vy):
     """-> Hit: the first hit on nearby pieces with the ray's start on their front side.
 

@@ -7,9 +7,11 @@ written again.
 
 from __future__ import annotations
 
+import gc
 import hashlib
 import logging
 import multiprocessing
+import operator
 import os
 import pickle
 import stat
@@ -21,7 +23,7 @@ from pathlib import Path
 from tempfile import gettempdir, mkdtemp
 from typing import Any, ClassVar
 
-from numba import njit
+from numba import njit, types
 from numba._dynfunc import make_function
 from numba.core.caching import CacheImpl, CompileResultCacheImpl, FunctionCache, _CacheLocator
 from numba.core.caching import _SourceFileBackedLocatorMixin as SourceStamp
@@ -31,9 +33,12 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.typing.context import Context
 from numba.core.untyped_passes import InlineClosureLikes
 
 logger = logging.getLogger("asperity")
+
+OPERATORS = frozenset(value for value in vars(operator).values() if callable(value))
 
 
 class _Same(Flags):
@@ -58,14 +63,55 @@ class _Same(Flags):
         return self.of(passed)
 
 
+class _Typing(Context):
+    """numba's types of calls, where all uses of an operator with operands of the same types are resolved once.
+
+    numba would try all signatures of the operator, those for arrays among them, at each use.
+    """
+
+    # the results by the number of the operator, whose hash is slow, with the operator, so that it keeps its number
+    known: ClassVar[dict[tuple[int, Any], tuple[Any, Any]]] = {}
+
+    def __init__(self, shared: Context) -> None:
+        self.__dict__ = shared.__dict__
+
+    @classmethod
+    @cache
+    def of(cls, shared: Context) -> _Typing:
+        """Return the same object for the same types, by which numba finds functions that it has compiled before."""
+        return cls(shared)
+
+    def resolve_function_type(self, function: Any, operands: Any, named: Any) -> Any:
+        resolve = super().resolve_function_type
+        if not isinstance(function, types.Function) or function.typing_key not in OPERATORS or named:
+            return resolve(function, operands, named)
+        key = id(function), operands
+        found = self.known.get(key)
+        if found is None:
+            found = self.known[key] = function, resolve(function, operands, named)
+        return found[1]
+
+
 class _Pipeline(CompilerBase):
-    """numba's passes without those for closures and for expressions of whole arrays, which find nothing here."""
+    """numba's passes without those for closures and for expressions of whole arrays, which find nothing here.
+
+    They make millions of objects, and almost no cycles of them: the garbage collection waits until they are done.
+    """
 
     unused = InlineClosureLikes, InlineOverloads, NopythonRewrites
     lowering = NativeLowering
 
     def __init__(self, typing: Any, target: Any, library: Any, arguments: Any, result: Any, flags: Any, kinds: Any):
-        super().__init__(typing, target, library, arguments, result, _Same.of(flags), kinds)
+        super().__init__(_Typing.of(typing), target, library, arguments, result, _Same.of(flags), kinds)
+
+    def _compile_core(self) -> Any:
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            return super()._compile_core()
+        finally:
+            if collects:
+                gc.enable()
 
     def define_pipelines(self) -> list[Any]:
         manager = DefaultPassBuilder.define_nopython_pipeline(self.state)

@@ -91,10 +91,11 @@ def text_of(path: Path) -> str:
     Traceback (most recent call last):
     asperity.errors.InputError: /dev/null: cannot read a pipe or a device; expected a file
     """
+    file = regular_file(path)
     try:
-        return regular_file(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as reason:
-        why = reason.strerror if isinstance(reason, OSError) else "it is not text in UTF-8"
+        return file.read_text(encoding="utf-8")
+    except (OSError, ValueError) as reason:
+        why = getattr(reason, "strerror", reason)
         raise InputError(f"{path}: cannot read it ({why}); expected a file of text") from reason
 
 

@@ -40,7 +40,7 @@ def save_pictures(study: StudyResult, paths: Sequence[Path], dpi: float = RESOLU
 
     drawings = ((draw_study_wall, (7.0, 5.0)), (_draw_kernel, (6.4, 5.0)), (_draw_spectrum, (7.0, 5.0)))
     for path, (draw, size) in zip(paths, drawings, strict=False):
-        figure = Figure(figsize=size, layout="constrained")
+        figure = Figure(figsize=size)
         draw(study, figure.subplots())
         figure.savefig(path, dpi=dpi, bbox_inches="tight")
     figure = Figure(figsize=(7.0, 6.0), layout="constrained")
