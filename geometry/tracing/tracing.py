@@ -50,6 +50,8 @@ FLAT, FAR = 2.0**-6, 2.0**6
 PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923, 10**64)
 # Bytes of results a ray; and the largest block of memory, in bytes, whose size glibc keeps in mind when it is freed.
 RESULT_BYTES, LARGEST_KEPT = 25, 2**25 - 2**16
+# Rays of a block that waves trace in one call, after the first ones, which tell whether they pay.
+LONG_PART = 2**14
 # No limit in effect: a ray ends after MOST_STEPS segments (`compiled/rays`), for any number of hits.
 MAX_COLLISIONS = 2**62
 
@@ -287,6 +289,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
             if in_waves and np.count_nonzero(found[-1] == UNDECIDED) > MOST_LEFT * len(entry):
                 crossings = (*CROSSINGS[:2], 0)
             first += size
+            size = LONG_PART
         rest = np.flatnonzero(results[-1][:first] == UNDECIDED)
         if len(rest):
             followed = tuple(np.empty(len(rest), result.dtype) for result in results)
