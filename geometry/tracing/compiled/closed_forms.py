@@ -54,6 +54,8 @@ from .waves import cross_simple
 UNDECIDED = 255
 ESCAPED = 0
 RAYS = WAVE
+# Numbers in a line of the cache.
+LINE = 8
 # Adding and then subtracting this number rounds a number below 2^51 to an integer.
 ROUNDER = 1.5 * 2.0**52
 # Of this type, because numba compiles a function again for a literal argument.
@@ -77,13 +79,20 @@ class Room(NamedTuple):
     walks: NDArray[np.int64]
 
 
+def _aligned(count: int) -> Floats:
+    """Return an array that begins at a line of the cache, as do its columns of whole lines."""
+    numbers = np.empty(count + LINE)
+    start = -(numbers.ctypes.data // numbers.itemsize) % LINE
+    return numbers[start : start + count]
+
+
 def room_for(hollows: Floats, block: int) -> Room:
     """Return the work space of `trace_closed`, for one thread and blocks of rays."""
     rays, others, met = np.empty((3, block), np.int64)
     # rays near one of many Bezier pieces are gathered in a second part
     parts = 2 if np.any(hollows[:, BEZIERS_END] > hollows[:, FIRST_BEZIER]) else 1
     walks = np.empty(WALKS if np.any(hollows[:, TREE_LEVELS] > 0.0) else 0, np.int64)
-    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(parts * WORK), walks)
+    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), _aligned(parts * WORK), walks)
 
 
 @inner
