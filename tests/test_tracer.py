@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import platform
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -325,3 +328,26 @@ def test_a_process_that_is_pinned_to_one_core_traces_on_one_thread():
     finally:
         os.sched_setaffinity(0, before)
     assert seen == {own}
+
+
+FAULTS = """
+import resource
+import numpy as np
+from asperity import geometry as geo
+x, theta = np.random.default_rng(0).random((2, 2**18)) + 0.1
+wall = geo.triangular_teeth(0.7)
+faults = []
+for _ in range(8):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    ray = geo.trace(wall, x, theta, threads=1)
+    faults.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+print(max(faults[4:]))
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="other allocators have other rules")
+def test_a_trace_takes_the_memory_of_the_results_before():
+    # in a process of its own, because the allocator remembers the largest block that was ever freed
+    done = subprocess.run([sys.executable, "-c", FAULTS], capture_output=True, text=True, check=True, timeout=60)
+    # the results have 1,600 pages
+    assert int(done.stdout) < 400

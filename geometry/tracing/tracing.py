@@ -48,6 +48,10 @@ MOST_LEFT = 0.4
 FLAT, FAR = 2.0**-6, 2.0**6
 # pi to 65 digits.
 PI = Fraction(31415926535897932384626433832795028841971693993751058209749445923, 10**64)
+# Bytes of results a ray; and the largest block of memory, in bytes, whose size glibc keeps in mind when it is freed.
+RESULT_BYTES, LARGEST_KEPT = 25, 2**25 - 2**16
+# Rays of a block that waves trace in one call, after the first ones, which tell whether they pay.
+LONG_PART = 2**14
 # No limit in effect: a ray ends after MOST_STEPS segments (`compiled/rays`), for any number of hits.
 MAX_COLLISIONS = 2**62
 
@@ -187,6 +191,7 @@ def trace(
     # the compiled functions take arrays of one kind: aligned, contiguous and writable
     given, incoming = (np.require(array, requirements=["A", "C", "W"]).reshape(-1) for array in (x_all, theta_all))
     starts = given if wall.origin == (0.0, 0.0) else np.empty_like(given)
+    _keep_freed_memory(len(starts))
     out_x, out_theta = np.empty_like(starts), np.empty_like(starts)
     collisions, status = np.empty(starts.shape, np.int64), np.empty(starts.shape, np.uint8)
     scene = wall.scene
@@ -228,6 +233,17 @@ def trace(
     for array in results:
         array.setflags(write=False)
     return Trace(*results)
+
+
+def _keep_freed_memory(rays: int) -> None:
+    """Let the allocator keep the memory of the results of a call, once freed, for those of the next one.
+
+    glibc returns free memory at the end of its heap to the system where this is more than twice the largest block that
+    was freed, at most 64 MB: with four arrays, of which none is half of all, at every second call. New pages cost up to
+    5 ns a ray. A block as long as all results together, never touched, is enough; see M_MMAP_THRESHOLD in mallopt(3).
+    """
+    if rays >= MANY_RAYS:
+        np.empty(min(RESULT_BYTES * rays, LARGEST_KEPT), np.uint8)
 
 
 def _work(scene: Scene) -> int:
@@ -273,6 +289,7 @@ def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in
             if in_waves and np.count_nonzero(found[-1] == UNDECIDED) > MOST_LEFT * len(entry):
                 crossings = (*CROSSINGS[:2], 0)
             first += size
+            size = LONG_PART
         rest = np.flatnonzero(results[-1][:first] == UNDECIDED)
         if len(rest):
             followed = tuple(np.empty(len(rest), result.dtype) for result in results)

@@ -37,12 +37,13 @@ from ...scene.columns import (
     NO_FORM,
     RADIUS,
     RIGHT,
+    TREE_LEVELS,
     WEDGE,
     WEDGE_X,
     WEDGE_Y,
 )
 from ...scene.scene import NO_TABLES
-from .lanes import WAVE, WORK
+from .lanes import WALKS, WAVE, WORK
 from .options import compiled, inlined, inner
 from .pointers import Late, address_at, call_at
 from .rays import FLAT_TOP, TOP_CORNER, opening_at
@@ -53,6 +54,8 @@ from .waves import cross_simple
 UNDECIDED = 255
 ESCAPED = 0
 RAYS = WAVE
+# Numbers in a line of the cache.
+LINE = 8
 # Adding and then subtracting this number rounds a number below 2^51 to an integer.
 ROUNDER = 1.5 * 2.0**52
 # Of this type, because numba compiles a function again for a literal argument.
@@ -63,7 +66,8 @@ class Room(NamedTuple):
     """Work space: six arrays, as long as a block has rays.
 
     Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, of which ``heads``
-    is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and the work space of waves.
+    is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and the work space of waves, and of
+    their rays in trees of boxes.
     """
 
     numbers: Floats
@@ -72,6 +76,14 @@ class Room(NamedTuple):
     met: NDArray[np.int64]
     heads: NDArray[np.int64]
     waves: Floats
+    walks: NDArray[np.int64]
+
+
+def _aligned(count: int) -> Floats:
+    """Return an array that begins at a line of the cache, as do its columns of whole lines."""
+    numbers = np.empty(count + LINE)
+    start = -(numbers.ctypes.data // numbers.itemsize) % LINE
+    return numbers[start : start + count]
 
 
 def room_for(hollows: Floats, block: int) -> Room:
@@ -79,7 +91,8 @@ def room_for(hollows: Floats, block: int) -> Room:
     rays, others, met = np.empty((3, block), np.int64)
     # rays near one of many Bezier pieces are gathered in a second part
     parts = 2 if np.any(hollows[:, BEZIERS_END] > hollows[:, FIRST_BEZIER]) else 1
-    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), np.empty(parts * WORK))
+    walks = np.empty(WALKS if np.any(hollows[:, TREE_LEVELS] > 0.0) else 0, np.int64)
+    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), _aligned(parts * WORK), walks)
 
 
 @inner
@@ -181,7 +194,7 @@ def _crossings() -> tuple[Late, Late, Late]:
     return (
         Late(cross_wedge, (form, *[work] * 6)),
         Late(cross_arc, (form, *[work] * 5)),
-        Late(cross_simple, (NO_TABLES, 0, 0, *[work] * 4)),
+        Late(cross_simple, (NO_TABLES, 0, 0, *[work] * 4, np.empty(1, np.int64))),
     )
 
 
@@ -218,7 +231,7 @@ def cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings):
         for j in range(entry.shape[0]):
             hits[j] = 0.0
     else:
-        call_at(address, None, (tables, h, limit, entry, angle, hits, room.waves))
+        call_at(address, None, (tables, h, limit, entry, angle, hits, room.waves, room.walks))
 
 
 @inlined
@@ -245,7 +258,7 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     """
     hollows, cell = tables.hollows, tables.cell
     out_x, out_theta, bounces, status = results
-    numbers, rays, others, met, heads, _ = room
+    numbers, rays, others, met, heads, _, _ = room
     whole = (
         is_crossed(hollows[0], closed, FIRST_HOLLOW, crossings)
         and hollows.shape[0] == 1

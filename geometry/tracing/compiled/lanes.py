@@ -226,7 +226,14 @@ ROOM = WAVE + BOXES
 PX, PY, VX, VY, OWN, BEFORE, BOUNCES, RAY = (ROOM * k for k in range(8))
 TIME, PIECE, HIT_X, HIT_Y, FACE_X, FACE_Y, UNCERTAIN, DOUBT = (ROOM * k for k in range(8, 16))
 OUT_X, OUT_VX, OUT_VY, OUT_BOUNCES, OUT_RAY, OUT_ANGLE, HIT_S = (ROOM * k for k in range(16, 23))
-WORK = ROOM * 23
+# Of rays in trees of boxes: times of the nearest hits so far, fractions on their lines, times at which to stop.
+NEAREST, FRACTION, MOST = (ROOM * k for k in range(23, 26))
+WORK = ROOM * 26
+# Columns of whole numbers of the rays in trees; the last two are lists of rays. Columns are not close to each other
+# modulo 4 kB, where the processor takes a number that it reads for one that it has just written.
+WALK_ROOM = WAVE + 7 * BOXES
+ROW, LEVEL, WAITING, FOUND, LEAF, AT_NODES, AT_LEAVES = (WALK_ROOM * k for k in range(7))
+WALKS = WALK_ROOM * 7
 # Values of UNCERTAIN.
 BEFORE_RUN, AT_CORNER = 1.0, 2.0
 # Numbers of pieces in OWN, PIECE and BEFORE: of lines their rows, of the opening -1; -2 for no line;

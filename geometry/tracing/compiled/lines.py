@@ -20,14 +20,39 @@ from ...scene.columns import (
     TREE_ROOT,
 )
 from ...scene.tolerances import NEARBY_SLACKS
-from .lanes import boxes_met, first_bit, last_bit, lines_met
+from .lanes import (
+    AT_LEAVES,
+    AT_NODES,
+    BOUNCES,
+    DOUBT,
+    FOUND,
+    FRACTION,
+    LEAF,
+    LEVEL,
+    MOST,
+    NEAREST,
+    OWN,
+    PX,
+    PY,
+    ROW,
+    TIME,
+    VX,
+    VY,
+    WAITING,
+    boxes_met,
+    first_bit,
+    last_bit,
+    lines_met,
+)
 from .options import inlined
-from .records import LINE
+from .records import LINE, OPENING, Own
 
 # Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.
 LEAST_FRACTION = 5e-324
 # Mask of all boxes of a row.
 ALL_BOXES = (1 << BOXES) - 1
+# Mask that tells the compiler that an index is not negative, so that it need not count from the end.
+NATURAL = (1 << 40) - 1
 
 
 @inlined
@@ -170,3 +195,104 @@ def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
                     most = min(best, time) + 2.0 * slack
             elif t >= -close:
                 nearby = True
+
+
+@inlined
+def begin_walks(scope, work, walks, count):
+    """Put all rays of a wave at the root of the tree."""
+    root, top = int(scope.hollow[TREE_ROOT]), int(scope.hollow[TREE_LEVELS]) - 1
+    for i in range(count):
+        walks[ROW + i], walks[LEVEL + i], walks[WAITING + i] = root, top, ALL_BOXES << BOXES * top
+        walks[FOUND + i], walks[AT_NODES + i] = -1, i
+        work[NEAREST + i], work[MOST + i] = np.inf, work[TIME + i] + 2.0 * scope.slack
+
+
+@inlined
+def step_on(boxes, work, walks, i, waiting, nodes, leaves):
+    """-> (nodes, leaves): numbers of rays at nodes and at leaves, with ray i at its next one if there is one.
+
+    The walk is that of `next_leaf`, one step at a time, and without branches, which the processor could not predict.
+    ``waiting`` are the boxes still to visit, eight bits for each level.
+    """
+    row, level = walks[ROW + i] & NATURAL, walks[LEVEL + i]
+    place = BOXES * level
+    mask = waiting >> place & ALL_BOXES
+    up = np.int64(mask == 0)
+    box = first_bit(mask | up) if work[VX + i] > 0.0 else last_bit(mask | up)
+    to_leaf = np.int64(level == 1) & ~up
+    down = 1 - up - to_leaf
+    # the node above, or the box; bit 0 stands for no box
+    following = int(boxes[row, PARENT if up != 0 else CONTENT]) + box
+    waiting ^= (1 - up) << (place + box)
+    walks[WAITING + i] = waiting | (down * ALL_BOXES) << (place - BOXES)
+    walks[LEVEL + i] = level + up - down
+    walks[ROW + i] = row if to_leaf != 0 else following
+    walks[LEAF + i] = following
+    # written in any case, counted if true
+    walks[AT_NODES + nodes] = walks[AT_LEAVES + leaves] = i
+    return nodes + (down | (up & np.int64(waiting != 0))), leaves + to_leaf
+
+
+@inlined
+def meet_leaf(scope, work, walks, i):
+    """Find the nearest hit of ray i of a wave on the lines of its leaf, if that is nearer."""
+    joints, slack, leaf = scope.tables.joints, scope.slack, walks[LEAF + i] & NATURAL
+    px, py, vx, vy, own = work[PX + i], work[PY + i], work[VX + i], work[VY + i], work[OWN + i]
+    close = NEARBY_SLACKS * slack
+    met = lines_met(scope.tables.boxes, leaf, px, py, vx, vy, slack)
+    if met == 0:
+        return
+    first = int(scope.tables.boxes[leaf, CONTENT]) & NATURAL
+    at_end, met = met >> BOXES, met & ALL_BOXES
+    while at_end != 0:
+        j = first + first_bit(at_end)
+        at_end &= at_end - 1
+        start = Own(OPENING, -1, -1.0, 0.0, -1, int(work[BOUNCES + i]))
+        _, ahead = joint_side(joints, j, start, px, py, vx, vy, slack)
+        if joints[j, STARTS_LINE] > 0.0:
+            _, other = joint_side(joints, j + 1, start, px, py, vx, vy, slack)
+            ahead = min(ahead, other)
+        if ahead < np.inf:
+            work[DOUBT + i] = 1.0
+    while met != 0:
+        j = first + first_bit(met)
+        met &= met - 1
+        if own == j:
+            continue
+        c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
+        c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
+        t, fraction = line_time(scope.tables, j, (c_before, c_after), px, py, vx, vy)
+        # of two lines at equal distance the first along the wall is hit, as without boxes
+        if t > close:
+            best = work[NEAREST + i]
+            if t < best or (t == best and j < walks[FOUND + i]):
+                work[NEAREST + i], work[FRACTION + i], walks[FOUND + i] = t, fraction, j
+                work[MOST + i] = min(t, work[TIME + i]) + 2.0 * slack
+        elif t >= -close:
+            work[DOUBT + i] = 1.0
+
+
+@inlined
+def nearest_lines_in_boxes(scope, work, walks, count):
+    """Find the first lines that all rays of a wave meet, as `nearest_line_in_boxes`; a corner or a near start is doubt.
+
+    All rays take a step in turn, so that the processor works on some while it waits for the others.
+    """
+    boxes, close = scope.tables.boxes, NEARBY_SLACKS * scope.slack
+    begin_walks(scope, work, walks, count)
+    nodes, leaves = count, 0
+    while nodes + leaves > 0:
+        rays, leaves = leaves, 0
+        for k in range(rays):
+            i = walks[AT_LEAVES + k] & NATURAL
+            meet_leaf(scope, work, walks, i)
+            nodes, leaves = step_on(boxes, work, walks, i, walks[WAITING + i], nodes, leaves)
+        rays, nodes = nodes, 0
+        for k in range(rays):
+            i = walks[AT_NODES + k] & NATURAL
+            met = boxes_met(
+                boxes, walks[ROW + i] & NATURAL, work[PX + i], work[PY + i], work[VX + i], work[VY + i], -close,
+                work[MOST + i],
+            )  # fmt: skip
+            others = ~((ALL_BOXES ^ met) << BOXES * walks[LEVEL + i])
+            nodes, leaves = step_on(boxes, work, walks, i, walks[WAITING + i] & others, nodes, leaves)

@@ -41,7 +41,6 @@ from ...scene.columns import (
     START_X,
     START_Y,
     STARTS_LINE,
-    TREE_LEVELS,
     X3,
     Y3,
 )
@@ -57,9 +56,12 @@ from .lanes import (
     DOUBT,
     FACE_X,
     FACE_Y,
+    FOUND,
+    FRACTION,
     HIT_S,
     HIT_X,
     HIT_Y,
+    NEAREST,
     NO_LINE,
     NO_PIECE,
     OUT_ANGLE,
@@ -87,10 +89,10 @@ from .lanes import (
     meet_corner,
     meet_line,
 )
-from .lines import nearest_line_in_boxes
+from .lines import nearest_lines_in_boxes
 from .options import inlined, inner, linked
 from .rays import scope_of
-from .records import CIRCLE, LINE, OPENING, Own, Slots
+from .records import Slots
 from .runs import skip_chords, skip_crossings
 from .trigonometry import LAST_ANGLE, direction_angle, sine_cosine
 
@@ -131,25 +133,21 @@ def corner_slack(is_corner, slack):
 
 
 @inlined
-def meet_boxes(scope, work, i):
-    """Find the nearest hit of ray i of a wave on the lines in the boxes along it, if that is nearer."""
+def meet_boxes(scope, work, walks, count):
+    """Find the nearest hits of all rays of a wave on the lines in the boxes along them, where those are nearer."""
     joints, lines = scope.tables.joints, scope.tables.lines
-    piece, bounces = int(work[OWN + i]), int(work[BOUNCES + i])
-    kind = OPENING if bounces == 0 else (LINE if piece >= 0 else CIRCLE)
-    own = Own(kind, piece, -1.0, 0.0, -1, bounces)
-    px, py, vx, vy, time = work[PX + i], work[PY + i], work[VX + i], work[VY + i], work[TIME + i]
-    t, line, fraction, corner, nearby = nearest_line_in_boxes(scope, own, px, py, vx, vy, time)
-    if nearby or corner < np.inf:
-        work[DOUBT + i] = 1.0
-    if t < time:
-        near = line if fraction >= 0.0 else line + 1
-        work[TIME + i], work[PIECE + i] = t, line
-        work[HIT_X + i] = joints[near, JOINT_X] + fraction * lines[line, EDGE_X]
-        work[HIT_Y + i] = joints[near, JOINT_Y] + fraction * lines[line, EDGE_Y]
-        work[FACE_X + i], work[FACE_Y + i] = lines[line, LINE_NORMAL_X], lines[line, LINE_NORMAL_Y]
-        may_run = work[BEFORE + i] == line and lines[line, PAIRS_END] > 0.0
-        at_corner = abs(fraction) * lines[line, LENGTH] <= scope.slack and joints[near, IS_CORNER] > 0.0
-        work[UNCERTAIN + i] = AT_CORNER if at_corner else (BEFORE_RUN if may_run else 0.0)
+    nearest_lines_in_boxes(scope, work, walks, count)
+    for i in range(count):
+        if work[NEAREST + i] < work[TIME + i]:
+            line, fraction = walks[FOUND + i], work[FRACTION + i]
+            near = line if fraction >= 0.0 else line + 1
+            work[TIME + i], work[PIECE + i] = work[NEAREST + i], line
+            work[HIT_X + i] = joints[near, JOINT_X] + fraction * lines[line, EDGE_X]
+            work[HIT_Y + i] = joints[near, JOINT_Y] + fraction * lines[line, EDGE_Y]
+            work[FACE_X + i], work[FACE_Y + i] = lines[line, LINE_NORMAL_X], lines[line, LINE_NORMAL_Y]
+            may_run = work[BEFORE + i] == line and lines[line, PAIRS_END] > 0.0
+            at_corner = abs(fraction) * lines[line, LENGTH] <= scope.slack and joints[near, IS_CORNER] > 0.0
+            work[UNCERTAIN + i] = AT_CORNER if at_corner else (BEFORE_RUN if may_run else 0.0)
 
 
 @inlined
@@ -201,8 +199,11 @@ def meet_gathered(scope, work, count):
 
 
 @inlined
-def meet_pieces(scope, work, first, count, is_gathered):
-    """Find the nearest hits of eight rays on the pieces of a hollow; without Bezier pieces after `meet_gathered`."""
+def meet_pieces(scope, work, first, is_gathered):
+    """Find the nearest hits of eight rays on the pieces of a hollow; without Bezier pieces after `meet_gathered`.
+
+    The lines of a tree of boxes are left to `meet_boxes`.
+    """
     joints, lines, circles = scope.tables.joints, scope.tables.lines, scope.tables.circles
     hollow, slack = scope.hollow, scope.slack
     close = NEARBY_SLACKS * slack
@@ -219,9 +220,7 @@ def meet_pieces(scope, work, first, count, is_gathered):
         )  # fmt: skip
     for k in range(int(hollow[FIRST_BEZIER]), int(hollow[FIRST_BEZIER if is_gathered else BEZIERS_END])):
         meet_bezier(scope.tables.beziers, k, slack, work, first)
-    if hollow[TREE_LEVELS] > 0.0:
-        for i in range(first, min(first + BOXES, count)):
-            meet_boxes(scope, work, i)
+    if scope.has_tree:
         return
     for j in range(int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])):
         x, y, at_joint = joints[j, JOINT_X], joints[j, JOINT_Y], corner_slack(joints[j, IS_CORNER], slack)
@@ -262,7 +261,7 @@ def end_rays(work, left, entry, angle, hits):
 
 
 @inlined
-def next_hits(tables, scope, work, count, left, limit):
+def next_hits(tables, scope, work, walks, count, left, limit):
     """-> (kept, gone): numbers of the rays of a wave that go on after their next hit, and that leave.
 
     Before, ``count`` rays were in the wave and ``left`` had left.
@@ -273,7 +272,10 @@ def next_hits(tables, scope, work, count, left, limit):
     if is_gathered:
         meet_gathered(scope, work, count)
     for first in range(0, count, BOXES):
-        meet_pieces(scope, work, first, count, is_gathered)
+        meet_pieces(scope, work, first, is_gathered)
+    if scope.has_tree:
+        meet_boxes(scope, work, walks, count)
+    for first in range(0, count, BOXES):
         mask = before_runs(work, first)
         while mask != 0:
             i = first + first_bit(mask)
@@ -287,7 +289,7 @@ def next_hits(tables, scope, work, count, left, limit):
 
 
 @inner
-def cross_simple(tables, h, limit, entry, angle, hits, work):
+def cross_simple(tables, h, limit, entry, angle, hits, work, walks):
     """Reflect rays by a hollow of lines, circles and Bezier pieces, with results as in `closed_forms.cross_arc`.
 
     The rays go through the hollow in waves: all rays that are inside hit their next piece, eight at once. The next rays
@@ -311,6 +313,6 @@ def cross_simple(tables, h, limit, entry, angle, hits, work):
         if left + count > WAVE:
             end_rays(work, left, entry, angle, hits)
             left = 0
-        count, gone = next_hits(tables, scope, work, count, left, limit)
+        count, gone = next_hits(tables, scope, work, walks, count, left, limit)
         left += gone
     end_rays(work, left, entry, angle, hits)

@@ -128,8 +128,10 @@ def check_memory(name: str, what: str, numbers: int) -> None:
 
 def angles(name: str, value: ArrayLike) -> Floats:
     """Return ``value`` as angles in radians, every one in the open interval (0, pi)."""
-    array = finite_array(name, value)
+    array = numbers(name, value)
+    # NaN is the least and the largest number of an array that has it
     if array.size and not (array.min() > 0.0 and array.max() < np.pi):
+        finite_array(name, array)
         bad = ~((array > 0.0) & (array < np.pi))
         where = tuple(int(i) for i in np.argwhere(bad)[0])
         index_text = f" at index {where}" if where else ""
