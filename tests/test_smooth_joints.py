@@ -105,3 +105,23 @@ def test_rays_along_the_tangent_at_a_smooth_joint_hit_what_50_digits_say(kinds, 
         found = geo.trace(wall, x, theta, max_collisions=MOST_HITS)
         for i in np.flatnonzero(found.escaped):
             assert found.collisions[i] == trace_precisely(wall.scene, x[i], theta[i], MOST_HITS).bounces
+
+
+def test_a_ray_that_leaves_a_line_away_from_the_curve_joined_to_it_does_not_hit_the_curve():
+    # it leaves the line 2.5e-9 beyond the joint, and its line met the bump 7.4e-9 before, 1e-15 below the joint
+    joint, bump = (0.3630046248162585, -0.15667392007609374), (0.46326412897069547, -0.21654692885660887)
+    start, handles = (
+        (0.1, -0.2575073835284527),
+        [(0.3804122570205817, -0.15), (0.4268948512243287, -0.15689090503182399)],
+    )
+    wall = geo.Wall(
+        [
+            geo.Segment((0, 0), start),
+            geo.Segment(start, joint),
+            geo.Bezier([joint, *handles, bump]),
+            geo.Segment(bump, (0.9, -1.0174602992946238)),
+            geo.Segment((0.9, -1.0174602992946238), (1, 0)),
+        ]
+    )
+    x, theta = 0.7716582203553766, 0.36610638681898505
+    assert geo.trace(wall, x, theta).collisions == trace_precisely(wall.scene, x, theta, MOST_HITS).bounces == 2

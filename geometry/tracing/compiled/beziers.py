@@ -223,14 +223,18 @@ def extrema(a1, a2, a3):
 
 
 @inlined
-def is_close_by(curve, g, s, t, spread, slack):
-    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start."""
-    _, a1, a2, a3 = g
-    # the height in front of the curve is t times the sine of incidence, g' / |b'|
-    fall = -bezier_slope(a1, a2, a3, s)
+def is_close_by(curve, s, t, vx, vy, spread, slack):
+    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start.
+
+    A hit behind the start is not if the start lies beyond an end of the piece: the ray has left the next piece, and
+    rounding across the two pieces does not change the end that it has passed.
+    """
     tx, ty = bezier_tangent(curve, s)
-    reach = slack * math.sqrt(tx * tx + ty * ty)
-    return abs(t) <= NEARBY * spread and abs(t) * fall <= reach
+    size = math.sqrt(tx * tx + ty * ty)
+    # the height in front of the curve is t times the sine of incidence
+    close = abs(t) <= NEARBY * spread and abs(t * (ty * vx - tx * vy)) <= slack * size
+    behind = t * (tx * vx + ty * vy)
+    return close and (t >= 0.0 or -slack * size <= s * size * size - behind <= size * size + slack * size)
 
 
 @inlined
@@ -284,7 +288,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                 s = falling_root(a0, a1, a2, a3, low, high, value_low, value_high)
             t = bezier_time(curve, s, px, py, vx, vy)
             if t < best_t:
-                if is_close_by(curve, g, s, t, spread, slack):
+                if is_close_by(curve, s, t, vx, vy, spread, slack):
                     near_s = s
                 elif t > 0.0:
                     best_t, best_s, tangent = t, s, 0
