@@ -90,11 +90,8 @@ from .columns import (
     table_of,
 )
 from .facing import facing_pairs
-from .tolerances import NEARBY_MARGIN
+from .tolerances import NEARBY_MARGIN, SMOOTH_JOINT
 
-# Largest angle, radians, between the tangents at a smooth joint. Both pieces then reflect a ray at the joint alike,
-# within twice this angle. Tangents at joints meant to be smooth agree to a few rounding errors.
-SMOOTH_JOINT = 1e-9
 # Half angle below which it is computed from the chord and the radius, more exactly than from two parameters.
 SHALLOW_ARC = 0.5
 # Largest span of an arc; longer arcs are cut in two, so that the side of the chord decides which points are on the arc.

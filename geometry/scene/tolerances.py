@@ -7,9 +7,13 @@ from ...core.rounding import EPS
 # Distance from a joint, in eps times the hollow's size, within which double precision does not resolve a hit:
 # positions have a few rounding errors of one ulp of the size each.
 JOINT_ULPS = 16.0
-# Relative error, in eps, below which a tangent hit and a miss are not distinguished. D = B^2 + 2 kappa |v|^2 F has
-# about eight rounding errors of B^2; so has g of a Bezier piece at its extrema.
+# Error, in eps times the size of the terms, below which a tangent hit and a miss are not distinguished. Each of B and F
+# in D = B^2 + 2 kappa |v|^2 F has about eight rounding errors of its terms, see `arcs.tangent_error`; so has g of a
+# Bezier piece at its extrema and at its ends.
 TANGENT_ULPS = 16.0
+# Largest angle, radians, between the tangents at a smooth joint. Both pieces then reflect a ray at the joint alike,
+# within twice this angle. Tangents at joints meant to be smooth agree to a few rounding errors.
+SMOOTH_JOINT = 1e-9
 # Distance from the start of a ray, as a fraction of the hollow's size, within which a hit is tested again: rounding may
 # have put the start on either side of the piece. From a start within 16 ulps of a piece, a ray at an angle of 1e-8 or
 # more to the piece meets it within this distance.

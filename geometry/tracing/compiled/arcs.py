@@ -26,8 +26,24 @@ from ...scene.columns import (
     START_X,
     START_Y,
 )
-from ...scene.tolerances import TANGENT_ULPS
+from ...scene.tolerances import NEARBY_SLACKS, SMOOTH_JOINT, TANGENT_ULPS
 from .options import inlined
+
+# Bound, times B^2 + |v|^2, on the error of D that `tangent_error` gives for a ray near a tangency: there kappa |r| is
+# at most |B| and the chord over the radius.
+NEARLY_TANGENT = 4.0 * TANGENT_ULPS * EPS
+
+
+@inlined
+def tangent_error(arc, b, rx, ry, speed2):
+    """-> float: the size of D up to which a tangent hit and a miss are not distinguished.
+
+    B has rounding errors of 3 + 4 kappa |r| eps, and F of (3 + 2 kappa |r|) |r| eps; kappa |r| is about |B|. At a
+    smooth joint of two arcs a ray between their tangents is tangent to neither, and D is at most the square of their
+    angle.
+    """
+    size = abs(arc[CURVATURE]) * (abs(rx) + abs(ry))
+    return TANGENT_ULPS * EPS * (b * b + (abs(b) + size) * math.sqrt(speed2)) + SMOOTH_JOINT * SMOOTH_JOINT * speed2
 
 
 @inlined
@@ -49,7 +65,8 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
     f = arc[NORMAL_X] * rx + arc[NORMAL_Y] * ry - 0.5 * curvature * (rx * rx + ry * ry)
     d = b * b + 2.0 * curvature * speed2 * f
     tangent = 0
-    if curvature < 0.0 and b < 0.0 and abs(d) <= TANGENT_ULPS * EPS * b * b:
+    is_near = curvature < 0.0 and b < 0.0 and abs(d) <= NEARLY_TANGENT * (b * b + speed2)
+    if is_near and abs(d) <= tangent_error(arc, b, rx, ry, speed2):
         tangent = 1
         d = 0.0
     if d < 0.0:
@@ -65,22 +82,54 @@ def arc_time(arc, own, px, py, vx, vy, stretch):
 @inlined
 def on_arc(arc, qx, qy, slack):
     """-> bool: whether the point q of the full circle, relative to the first joint, is on the arc."""
+    return beyond_end(arc, qx, qy) <= slack
+
+
+@inlined
+def beyond_end(arc, qx, qy):
+    """-> float: how far the point q of the full circle, relative to the first joint, is beyond an end of the arc.
+
+    The distance is along or across the chord, inf on the far side of the circle, and at most 0 on the arc.
+    """
     if arc[SHORT_CHORD] > 0.0:
         # up to a half angle of pi/4: by the position along the chord, on the arc's side of the circle
         along = qx * arc[CHORD_X] + qy * arc[CHORD_Y]
         nx, ny = arc[NORMAL_X] - arc[CURVATURE] * qx, arc[NORMAL_Y] - arc[CURVATURE] * qy
         facing = ny * arc[CHORD_X] - nx * arc[CHORD_Y]
-        return -slack <= along <= arc[SHORT_CHORD] + slack and facing > 0.0
+        return max(-along, along - arc[SHORT_CHORD]) if facing > 0.0 else np.inf
     # larger half angles: by the side of the chord; the arc curves away from its free side exactly if it is focusing
     height = qy * arc[CHORD_X] - qx * arc[CHORD_Y]
-    return height <= slack if arc[CURVATURE] > 0.0 else height >= -slack
+    return height if arc[CURVATURE] > 0.0 else -height
 
 
 @inlined
 def on_arc_after(arc, t, px, py, vx, vy, stretch, slack):
-    """-> bool: whether the point of the full circle after the time t is on the arc."""
+    """-> bool: whether the point of the full circle after the time t is on the arc.
+
+    At grazing incidence rounding moves the point along the arc by more than the slack; at a smooth joint of two arcs it
+    would be on neither.
+    """
     qx, qy = px + t * vx - arc[START_X], stretch * (py + t * vy - arc[START_Y])
-    return on_arc(arc, qx, qy, slack * max(1.0, stretch))
+    beyond, room = beyond_end(arc, qx, qy), slack * max(1.0, stretch)
+    if room < beyond <= NEARBY_SLACKS * room:
+        ex, ey = arc[END_X] - arc[START_X], stretch * (arc[END_Y] - arc[START_Y])
+        is_late = 2.0 * (qx * ex + qy * ey) > ex * ex + ey * ey
+        is_corner = arc[END_CORNER if is_late else START_CORNER] > 0.0
+        return not is_corner and beyond * arc_incidence(arc, t, px, py, vx, vy, stretch) <= room
+    return beyond <= room
+
+
+@inlined
+def may_touch_arc(arc, t, px, py, vx, vy, stretch, slack):
+    """-> bool: whether a ray whose line touches the full circle after the time t may touch the arc.
+
+    The hits that rounding does not distinguish from a tangent one lie up to sqrt(D) / (kappa |v|) beside it.
+    """
+    rx, ry, wy = px - arc[START_X], stretch * (py - arc[START_Y]), stretch * vy
+    b = arc[NORMAL_X] * vx + arc[NORMAL_Y] * wy - arc[CURVATURE] * (rx * vx + ry * wy)
+    speed2 = vx * vx + wy * wy
+    reach = math.sqrt(tangent_error(arc, b, rx, ry, speed2) / speed2) / abs(arc[CURVATURE])
+    return on_arc(arc, rx + t * vx, ry + t * wy, slack * max(1.0, stretch) + reach)
 
 
 @inlined

@@ -18,11 +18,13 @@ from numba.extending import intrinsic
 from ....core.rounding import EPS
 from ...scene.boxes import BOXES
 from ...scene.columns import (
+    END_CORNER,
     END_X,
     END_Y,
     MIDDLE_X,
     MIDDLE_Y,
     REACH,
+    START_CORNER,
     START_X,
     START_Y,
     X1,
@@ -32,14 +34,14 @@ from ...scene.columns import (
     Y2,
     Y3,
 )
-from ...scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, TANGENT_ULPS
+from ...scene.tolerances import JOINT_ULPS, NEARBY, NEARBY_MARGIN, SMOOTH_JOINT, TANGENT_ULPS
 from ..double_double.beziers import curve_size
 from .lanes import BEFORE, HIT_S, LANES, NUMBER, RAY, TIME, WORD, Lanes, Ray, Table, constant, cross, dot, repeated
 from .options import inlined, inner
 
 ROOT_STEPS = 80
 # What `nearest_bezier` returns for a ray that meets no piece.
-NO_BEZIER_HIT = np.inf, -1, 0.0, 0, -1.0
+NO_BEZIER_HIT = np.inf, -1, 0.0, np.inf, -1.0
 # Size, in eps times that of its products, from which on g is not 0: twice that of a contact. Each value of g has about
 # eight rounding errors.
 NO_ZERO_ULPS = 2.0 * TANGENT_ULPS
@@ -132,9 +134,34 @@ def contact_time(curve, bend, s, px, py, vx, vy):
     curve runs along the ray at a minimum of g or against the ray at a maximum.
     """
     tx, ty = bezier_tangent(curve, s)
-    if not 0.0 < s < 1.0 or bend * (tx * vx + ty * vy) <= 0.0:
+    if bend * (tx * vx + ty * vy) <= 0.0:
         return np.inf
     return bezier_time(curve, s, px, py, vx, vy)
+
+
+@inlined
+def joint_contact_time(curve, g, s, px, py, vx, vy, room):
+    """-> float: time to the end s, 0 or 1, of a piece, if it is no corner and the ray runs along it there, else inf.
+
+    The ray's line passes the end within rounding, and ``room`` bounds the rounding errors of g. If the slope of g there
+    were certain, hit and miss would be, because the next piece has the same number g and nearly the same slope. Else an
+    extremum of g lies at the joint within rounding, on either piece or, where their tangents differ, on none.
+    """
+    _, a1, a2, a3 = g
+    tx, ty = bezier_tangent(curve, s)
+    is_steep = abs(bezier_slope(a1, a2, a3, s)) > SMOOTH_JOINT * (abs(tx) + abs(ty)) + room
+    if is_steep or curve[START_CORNER if s == 0.0 else END_CORNER] > 0.0:
+        return np.inf
+    return bezier_time(curve, s, px, py, vx, vy)
+
+
+@inlined
+def own_error(size, b0, b1, b2):
+    """-> float: bound on the rounding error of b1^2 - 4 b2 b0 in `hit_from_own`.
+
+    Each b has up to ten rounding errors of the size of the piece, `curve_size`.
+    """
+    return TANGENT_ULPS * EPS * (b1 * b1 + abs(4.0 * b2 * b0) + size * (abs(b0) + abs(b1) + abs(2.0 * b2)))
 
 
 @inlined
@@ -151,11 +178,15 @@ def hit_from_own(curve, g, own_s, px, py, vx, vy, slack):
     b2 = a3
     best_t, best_s = np.inf, 0.0
     disc = b1 * b1 - 4.0 * b2 * b0
-    if abs(disc) <= TANGENT_ULPS * EPS * (b1 * b1 + 4.0 * abs(b2 * b0)) and b2 != 0.0:
-        s = own_s - 0.5 * b1 / b2
-        t = contact_time(curve, 6.0 * a3 * s + 2.0 * a2, s, px, py, vx, vy)
-        if t > slack:
-            return t, s, 1
+    error = own_error(curve_size(curve), b0, b1, b2)
+    if abs(disc) <= error and b2 != 0.0:
+        # the roots that rounding does not distinguish from a double one lie up to ``reach`` beside it
+        s, reach = own_s - 0.5 * b1 / b2, 0.5 * math.sqrt(error) / abs(b2)
+        if -reach <= s <= 1.0 + reach:
+            s = min(max(s, 0.0), 1.0)
+            t = contact_time(curve, 6.0 * a3 * s + 2.0 * a2, s, px, py, vx, vy)
+            if t > slack:
+                return t, s, 1
     if disc < 0.0:
         return best_t, best_s, 0
     root = math.sqrt(disc)
@@ -192,14 +223,18 @@ def extrema(a1, a2, a3):
 
 
 @inlined
-def is_close_by(curve, g, s, t, spread, slack):
-    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start."""
-    _, a1, a2, a3 = g
-    # the height in front of the curve is t times the sine of incidence, g' / |b'|
-    fall = -bezier_slope(a1, a2, a3, s)
+def is_close_by(curve, s, t, vx, vy, spread, slack):
+    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start.
+
+    A hit behind the start is not if the start lies beyond an end of the piece: the ray has left the next piece, and
+    rounding across the two pieces does not change the end that it has passed.
+    """
     tx, ty = bezier_tangent(curve, s)
-    reach = slack * math.sqrt(tx * tx + ty * ty)
-    return abs(t) <= NEARBY * spread and abs(t) * fall <= reach
+    size = math.sqrt(tx * tx + ty * ty)
+    # the height in front of the curve is t times the sine of incidence
+    close = abs(t) <= NEARBY * spread and abs(t * (ty * vx - tx * vy)) <= slack * size
+    behind = t * (tx * vx + ty * vy)
+    return close and (t >= 0.0 or -slack * size <= s * size * size - behind <= size * size + slack * size)
 
 
 @inlined
@@ -215,8 +250,14 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
     # g can fall through zero once on each part of [0, 1] between its extrema
     c1, c2 = extrema(a1, a2, a3)
     best_t, best_s, tangent, near_s = np.inf, 0.0, 0, -1.0
+    room = TANGENT_ULPS * EPS * spread
     low, touches = 0.0, False
     value_low = a0
+    if abs(a0) <= room:
+        t = joint_contact_time(curve, g, 0.0, px, py, vx, vy, room)
+        touches = t > slack and t < np.inf
+        if touches:
+            best_t, best_s, tangent = t, 0.0, 1
     for part in range(3):
         high = 1.0 if part == 2 else (c1 if part == 0 else c2)
         if high <= low or high > 1.0:
@@ -227,9 +268,14 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
         if high == 1.0:
             # computed from the joint, so that the next piece has the same number
             value_high = (curve[END_X] - px) * vy - (curve[END_Y] - py) * vx
+            if abs(value_high) <= room:
+                t = joint_contact_time(curve, g, 1.0, px, py, vx, vy, room)
+                touches = t > slack and t < np.inf
+                if touches and t < best_t:
+                    best_t, best_s, tangent = t, 1.0, 1
         else:
             value_high = bezier_value(a0, a1, a2, a3, high)
-            if abs(value_high) <= TANGENT_ULPS * EPS * spread:
+            if abs(value_high) <= room:
                 t = contact_time(curve, 6.0 * a3 * high + 2.0 * a2, high, px, py, vx, vy)
                 touches = t > slack and t < np.inf
                 if touches and t < best_t:
@@ -242,7 +288,7 @@ def hit_from_afar(curve, g, px, py, vx, vy, slack):
                 s = falling_root(a0, a1, a2, a3, low, high, value_low, value_high)
             t = bezier_time(curve, s, px, py, vx, vy)
             if t < best_t:
-                if is_close_by(curve, g, s, t, spread, slack):
+                if is_close_by(curve, s, t, vx, vy, spread, slack):
                     near_s = s
                 elif t > 0.0:
                     best_t, best_s, tangent = t, s, 0
@@ -271,12 +317,13 @@ def bezier_hit(curve, own_s, px, py, vx, vy, slack):
 
 @inner
 def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack, time):
-    """-> (t, number, s, tangent, near_s): the first hit before ``time`` on the pieces from ``first`` to ``end``.
+    """-> (t, number, s, contact, near_s): the first hit before ``time`` on the pieces from ``first`` to ``end``.
 
-    ``near_s`` is that of the last piece that has one, else -1; for all else see `bezier_hit`. The ray starts on the
-    piece ``own_number`` at ``own_s``; the number is -1 if it starts elsewhere.
+    ``contact`` is the time to the first tangent hit, which is not counted, or inf. ``near_s`` is that of the last piece
+    that has one, else -1; for all else see `bezier_hit`. The ray starts on the piece ``own_number`` at ``own_s``; the
+    number is -1 if it starts elsewhere.
     """
-    number, hit_s, doubt, near = -1, 0.0, 0, -1.0
+    number, hit_s, contact, near = -1, 0.0, np.inf, -1.0
     for k in range(first, end):
         curve = beziers[k]
         # whether the ray meets the circle about the piece before ``time``; if not, `hit_from_afar` finds nothing
@@ -286,11 +333,13 @@ def nearest_bezier(beziers, first, end, own_number, own_s, px, py, vx, vy, slack
         if (k != own_number) & ((abs(dx * vy - dy * vx) > room) | (along < -room) | (along - room > time)):
             continue
         t, s, tangent, near_s = bezier_hit(curve, own_s if k == own_number else -1.0, px, py, vx, vy, slack)
-        if t < time:
-            time, number, hit_s, doubt = t, k, s, tangent
+        if tangent != 0:
+            contact = min(contact, t)
+        elif t < time:
+            time, number, hit_s = t, k, s
         if near_s >= 0.0:
             near = near_s
-    return time, number, hit_s, doubt, near
+    return time, number, hit_s, contact, near
 
 
 @inlined
@@ -456,9 +505,16 @@ class _Meeting:
         fast = (abs(ray.vx) > abs(ray.vy)).where(abs(ray.vx), abs(ray.vy))
         return fast * (abs(curve[START_X] - ray.px) + abs(curve[START_Y] - ray.py) + size)
 
-    def touch(self, inside: Lanes, value: Lanes, spread: Lanes) -> None:
-        """Doubt rays whose line may touch the piece at an extremum of g."""
-        self.ray.doubt(self.far & inside & (abs(value) <= (TANGENT_ULPS * EPS) * spread))
+    def touch(self, ends: Any, extrema: Any) -> None:
+        """Doubt rays whose line passes an end of the piece, or touches it at an extremum of g, within rounding.
+
+        ``ends`` are the values of g there, and of each extremum whether it is on the piece and the value.
+        """
+        room = (TANGENT_ULPS * EPS) * self.spread()
+        near = (abs(ends[0]) <= room) | (abs(ends[1]) <= room)
+        for inside, value in extrema:
+            near = near | (inside & (abs(value) <= room))
+        self.ray.doubt(self.far & near)
 
     def hit(self, s: Lanes, chosen: Lanes) -> None:
         """Take the hits at s that are nearer."""
@@ -513,7 +569,7 @@ def meet_parabola(typing, work, first, beziers, k, corners, number):
                 c = a1 / (-2.0 * a2)
                 lowest = bezier_value.py_func(a0, a1, a2, a3, c)
                 inside = (c > 0.0) & (c < 1.0)
-                all_.touch(inside, lowest, all_.spread())
+                all_.touch((a0, last), [(inside, lowest)])
                 early = (a0 >= 0.0) & (lowest <= 0.0) & (a0 > lowest)
                 late = (lowest >= 0.0) & (last <= 0.0) & (lowest > last)
                 whole = (a0 >= 0.0) & (last <= 0.0) & (a0 > last)
@@ -559,7 +615,7 @@ def _meet_own_cubic(all_: _Meeting, g: Any) -> None:
     own_s = all_.ray.at[BEFORE]
     b0, b1 = bezier_slope.py_func(a1, a2, a3, own_s), 3.0 * a3 * own_s + a2
     disc = b1 * b1 - 4.0 * a3 * b0
-    all_.ray.doubt(all_.own & (abs(disc) <= (TANGENT_ULPS * EPS) * (b1 * b1 + 4.0 * abs(a3 * b0))))
+    all_.ray.doubt(all_.own & (abs(disc) <= own_error.py_func(curve_size.py_func(all_.curve), b0, b1, a3)))
     root = disc.root()
     q = -0.5 * (b1 + (b1 >= 0.0).where(root, -root))
     for shift in (q / a3, b0 / q):
@@ -576,15 +632,14 @@ def _meet_far_cubic(all_: _Meeting, g: Any) -> None:
     c1, c2 = q / (3.0 * a3), a1 / q
     # NaN, if there are no extrema, is not inside
     first_at, second_at = (c1 < c2).where(c1, c2), (c1 < c2).where(c2, c1)
-    spread = all_.spread()
     values = []
     insides = []
     for c in (first_at, second_at):
         inside = (disc > 0.0) & (c > 0.0) & (c < 1.0)
         value = bezier_value.py_func(*g, c)
-        all_.touch(inside, value, spread)
         values.append(value)
         insides.append(inside)
+    all_.touch((a0, last), zip(insides, values, strict=True))
     low, value_low = insides[0].where(first_at, zero), insides[0].where(values[0], a0)
     high, value_high = insides[1].where(second_at, one), insides[1].where(values[1], last)
     first = (a0 >= 0.0) & (value_low <= 0.0) & (a0 > value_low)

@@ -13,9 +13,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from ....core.rounding import EPS
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, OTHER_X, OTHER_Y
-from ...scene.tolerances import TANGENT_ULPS
+from .arcs import NEARLY_TANGENT
 
 WORD, NUMBER, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
 LANES = ir.VectorType(NUMBER, BOXES)
@@ -346,20 +345,19 @@ def meet_line(typing, work, first, start, end, edge, normal, length, close, numb
 
 
 @intrinsic
-def meet_circle(typing, work, first, ends, normal, curvature, chord, sines, slacks, number):
+def meet_circle(typing, work, first, ends, normal, curvature, chord, sine, close, number):
     """Find the hits of eight rays on a circular arc that are nearer, as `arcs` does for one ray.
 
     ``ends`` are the start and the end of the arc, ``chord`` the direction and SHORT_CHORD; the one sine is that below
-    which a run may begin. ``slacks`` are the slack, those of the two ends, negative where there is no corner, and the
-    time within which a hit is in doubt.
+    which a run may begin. A hit before the time ``close``, or within this distance of an end, is in doubt.
     """
 
     def meet(context, builder, signature, values):
         ray = Ray(context, builder, signature, values)
         px, py, vx, vy = ray.px, ray.py, ray.vx, ray.vy
-        parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[k])] for k in (2, 3, 5, 7)]
-        (x0, y0, x1, y1), (nx, ny), (chord_x, chord_y, short), (slack, slack0, slack1, close) = parts
-        k, run_sine, number = (repeated(builder, values[k]) for k in (4, 6, 8))
+        parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[k])] for k in (2, 3, 5)]
+        (x0, y0, x1, y1), (nx, ny), (chord_x, chord_y, short) = parts
+        k, run_sine, close, number = (repeated(builder, values[k]) for k in (4, 6, 7, 8))
         zero, focusing = constant(builder, 0.0), k > 0.0
         rx, ry = px - x0, py - y0
         b = dot(nx, ny, vx, vy) - k * dot(rx, ry, vx, vy)
@@ -367,7 +365,7 @@ def meet_circle(typing, work, first, ends, normal, curvature, chord, sines, slac
         f = dot(nx, ny, rx, ry) - k * 0.5 * dot(rx, ry, rx, ry)
         d = b * b + k * 2.0 * speed2 * f
         own = ray.own.equals(number)
-        ray.doubt(~focusing & ~own & (b < 0.0) & (abs(d) <= b * (TANGENT_ULPS * EPS) * b))
+        ray.doubt(~focusing & ~own & (b < 0.0) & (abs(d) <= (b * b + speed2) * NEARLY_TANGENT))
         root, far = d.root(), focusing & (b >= 0.0)
         top = own.where(b * 2.0, far.where(b + root, f * 2.0))
         time = top / (own | far).where(k * speed2, root - b)
@@ -377,8 +375,9 @@ def meet_circle(typing, work, first, ends, normal, curvature, chord, sines, slac
         qx, qy = px + time * vx - x0, py + time * vy - y0
         mx, my = nx - k * qx, ny - k * qy
         along, height = dot(qx, qy, chord_x, chord_y), cross(qy, qx, chord_y, chord_x)
-        on_short = (along >= -slack) & (along <= short + slack) & (cross(my, mx, chord_y, chord_x) > 0.0)
-        on_long = (focusing & (height <= slack)) | (~focusing & (height >= -slack))
+        # at grazing incidence rounding moves the point along the arc by more than the slack
+        on_short = (along >= -close) & (along <= short + close) & (cross(my, mx, chord_y, chord_x) > 0.0)
+        on_long = (focusing & (height <= close)) | (~focusing & (height >= -close))
         is_short = short > 0.0
         on_arc = (is_short & on_short) | (~is_short & on_long)
         nearer = possible & on_arc & (time >= 0.0) & (time < ray.at[TIME])
@@ -390,16 +389,14 @@ def meet_circle(typing, work, first, ends, normal, curvature, chord, sines, slac
             scale = constant(builder, 1.0) / dot(mx, my, mx, my).root()
             mx, my, x, y = mx * scale, my * scale, x0 + qx, y0 + qy
             from_start, from_end = dot(x - x0, y - y0, x - x0, y - y0), dot(x - x1, y - y1, x - x1, y - y1)
-            at_end = ((slack0 > 0.0) & (from_start <= slack0 * slack0)) | (
-                (slack1 > 0.0) & (from_end <= slack1 * slack1)
-            )
+            at_end = (from_start <= close * close * 4.0) | (from_end <= close * close * 4.0)
             begins_run = (run_sine > zero) & (abs(dot(vx, vy, mx, my)) <= run_sine)
             ray.hit(nearer, number, time, (x, y), (mx, my), at_end, begins_run)
         return context.get_dummy_value()
 
     number_, pairs = types.float64, types.UniTuple
     four, three, two = (pairs(number_, size) for size in (4, 3, 2))
-    return types.void(work, types.int64, four, two, number_, three, number_, four, number_), meet
+    return types.void(work, types.int64, four, two, number_, three, number_, number_, number_), meet
 
 
 @intrinsic

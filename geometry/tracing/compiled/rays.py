@@ -52,8 +52,8 @@ from ...scene.columns import (
 )
 from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
-from .arcs import arc_incidence, arc_reflect, arc_time, near_end, on_arc_after
-from .beziers import NO_BEZIER_HIT, bend_number, bezier_reflect, nearest_bezier
+from .arcs import arc_incidence, arc_reflect, arc_time, may_touch_arc, near_end, on_arc_after
+from .beziers import NO_BEZIER_HIT, bend_number, bezier_reflect, bezier_tangent, nearest_bezier
 from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_boxes
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined
@@ -119,51 +119,64 @@ def scope_of(tables, h, slots):
 
 @inlined
 def nearest_curve(scope, own, px, py, vx, vy):
-    """-> (Hit, nearby): the first hit on a circle, ellipse or Bezier piece; for ``nearby`` see `nearest_line`."""
+    """-> (Hit, contact, nearby): the first hit on a curve that is not tangent, and the time to the first tangent one.
+
+    Both times are inf if there is none. For ``nearby`` see `nearest_line`.
+    """
     tables, slack = scope.tables, scope.slack
     circles, ellipses, beziers = tables.circles, tables.ellipses, tables.beziers
     close = NEARBY_SLACKS * slack
-    time, kind, number, hit_s, doubt, nearby = np.inf, NO_PIECE, -1, 0.0, 0, False
+    time, kind, number, hit_s, contact, nearby = np.inf, NO_PIECE, -1, 0.0, np.inf, False
     first, end = scope.circles
     for k in range(first, end):
         is_own = own.kind == CIRCLE and own.number == k
         t, tangent, _ = arc_time(circles[k], is_own, px, py, vx, vy, 1.0)
         if abs(t) <= close and not is_own:
             nearby = True
+        elif tangent != 0:
+            if may_touch_arc(circles[k], t, px, py, vx, vy, 1.0, slack):
+                contact = min(contact, t)
         elif 0.0 <= t < time and on_arc_after(circles[k], t, px, py, vx, vy, 1.0, slack):
-            time, kind, number, doubt = t, CIRCLE, k, tangent
+            time, kind, number = t, CIRCLE, k
     first, end = scope.ellipses
     for k in range(first, end):
         is_own = own.kind == ELLIPSE and own.number == k
         t, tangent, _ = arc_time(ellipses[k], is_own, px, py, vx, vy, ellipses[k, STRETCH])
         if abs(t) <= close and not is_own:
             nearby = True
+        elif tangent != 0:
+            if may_touch_arc(ellipses[k], t, px, py, vx, vy, ellipses[k, STRETCH], slack):
+                contact = min(contact, t)
         elif 0.0 <= t < time and on_arc_after(ellipses[k], t, px, py, vx, vy, ellipses[k, STRETCH], slack):
-            time, kind, number, doubt = t, ELLIPSE, k, tangent
+            time, kind, number = t, ELLIPSE, k
     first, end = scope.beziers
     if first < end:
         address = address_at(scope.slots.bezier)
         if address == 0:
-            return Hit(0.0, BEZIER, first, 0.0, DOUBTFUL), False
+            return Hit(0.0, BEZIER, first, 0.0, DOUBTFUL), np.inf, False
         own_number = own.number if own.kind == BEZIER else -1
         arguments = beziers, first, end, own_number, own.s, px, py, vx, vy, slack, time
-        t, k, s, tangent, near_s = call_at(address, NO_BEZIER_HIT, arguments)
+        t, k, s, touch, near_s = call_at(address, NO_BEZIER_HIT, arguments)
+        contact = min(contact, touch)
         if k >= 0:
-            time, kind, number, hit_s, doubt = t, BEZIER, k, s, tangent
+            time, kind, number, hit_s = t, BEZIER, k, s
         nearby = nearby or near_s >= 0.0
-    return Hit(time, kind, number, hit_s, doubt), nearby
+    return Hit(time, kind, number, hit_s, 0), contact, nearby
 
 
 @inlined
 def nearest_piece(scope, own, px, py, vx, vy):
     """-> (Hit, corner): the first hit on a piece, and the time to the first corner within the slack of the ray."""
-    hit, nearby = nearest_curve(scope, own, px, py, vx, vy)
+    hit, contact, nearby = nearest_curve(scope, own, px, py, vx, vy)
     if scope.has_tree:
         t, line, fraction, corner, near = nearest_line_in_boxes(scope, own, px, py, vx, vy, hit.time)
     else:
         t, line, fraction, corner, near = nearest_line(scope, own, px, py, vx, vy, hit.time)
     if t < hit.time:
         hit = Hit(t, LINE, line, fraction, 0)
+    if contact < np.inf and is_beside(scope, hit, contact, px, py, vx, vy):
+        # of no piece in particular
+        hit = Hit(min(contact, hit.time), BEZIER, -1, 0.0, 1)
     if nearby or near:
         address = address_at(scope.slots.nearby)
         if address == 0:
@@ -172,6 +185,35 @@ def nearest_piece(scope, own, px, py, vx, vy):
         if close_by.time < hit.time:
             hit = close_by
     return hit, corner
+
+
+@inlined
+def is_beside(scope, hit, contact, px, py, vx, vy):
+    """-> bool: whether a tangent hit after the time ``contact`` comes before a hit, or may be the same for rounding.
+
+    At a smooth joint the ray may touch one piece and seem to hit the other before. At the hit, the point of contact is
+    then in front of the tangent by rounding, and by far less than the bound here.
+    """
+    sine = incidence(scope, hit, px, py, vx, vy)
+    return contact <= hit.time or (contact - hit.time) * sine <= NEARBY_SLACKS * scope.slack
+
+
+@inlined
+def incidence(scope, hit, px, py, vx, vy):
+    """-> float: sine of the angle between the velocity and the piece that is hit; of the opening and the sides |vy|."""
+    tables = scope.tables
+    if hit.kind == LINE:
+        lines = tables.lines
+        return abs(vx * lines[hit.number, LINE_NORMAL_X] + vy * lines[hit.number, LINE_NORMAL_Y])
+    if hit.kind == CIRCLE:
+        return arc_incidence(tables.circles[hit.number], hit.time, px, py, vx, vy, 1.0)
+    if hit.kind == ELLIPSE:
+        stretch = tables.ellipses[hit.number, STRETCH]
+        return arc_incidence(tables.ellipses[hit.number], hit.time, px, py, vx, vy, stretch)
+    if hit.kind == BEZIER:
+        tx, ty = bezier_tangent(tables.beziers[hit.number], hit.s)
+        return abs(tx * vy - ty * vx) / math.sqrt(tx * tx + ty * ty)
+    return abs(vy)
 
 
 @inlined
@@ -199,19 +241,13 @@ def meets_corner(scope, hit, corner, px, py, vx, vy):
     """-> bool: whether a ray meets the corner that it passes after the time ``corner``, besides or before its hit."""
     if corner == np.inf:
         return False
-    tables, time, slack = scope.tables, hit.time, scope.slack
+    time, slack = hit.time, scope.slack
     if corner <= time + slack:
         return True
     # at grazing incidence a corner within the slack of the ray may lie far beyond the hit
-    sine = abs(vy)
-    if hit.kind == LINE:
-        lines = tables.lines
-        sine = abs(vx * lines[hit.number, LINE_NORMAL_X] + vy * lines[hit.number, LINE_NORMAL_Y])
-    elif hit.kind == CIRCLE:
-        sine = arc_incidence(tables.circles[hit.number], time, px, py, vx, vy, 1.0)
-    elif hit.kind == ELLIPSE:
-        sine = arc_incidence(tables.ellipses[hit.number], time, px, py, vx, vy, tables.ellipses[hit.number, STRETCH])
-    return hit.kind != BEZIER and hit.kind != SIDE and (corner - time) * sine <= 2.0 * slack
+    if hit.kind in (BEZIER, SIDE):
+        return False
+    return (corner - time) * incidence(scope, hit, px, py, vx, vy) <= 2.0 * slack
 
 
 @inlined

@@ -212,11 +212,10 @@ def meet_pieces(scope, work, first, is_gathered):
     for k in range(int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])):
         arc = circles[k]
         ends = arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]
-        at_start, at_end = corner_slack(arc[START_CORNER], slack), corner_slack(arc[END_CORNER], slack)
         meet_circle(
             work, first, ends, (arc[NORMAL_X], arc[NORMAL_Y]), arc[CURVATURE],
             (arc[CHORD_X], arc[CHORD_Y], arc[SHORT_CHORD]), RUN_MARGIN * arc[RUN_SINE],
-            (slack, at_start, at_end, close), CIRCLE_NUMBERS - k,
+            close, CIRCLE_NUMBERS - k,
         )  # fmt: skip
     for k in range(int(hollow[FIRST_BEZIER]), int(hollow[FIRST_BEZIER if is_gathered else BEZIERS_END])):
         meet_bezier(scope.tables.beziers, k, slack, work, first)

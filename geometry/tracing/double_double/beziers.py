@@ -124,11 +124,16 @@ def extrema(a1, a2, a3):
 
 @_compile
 def is_close_by(coefficients, s, t, vx, vy, size, slack):
-    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start."""
+    """-> bool: whether a hit at s after the time t (of either sign) is within the slack of the ray's start.
+
+    A hit behind the start is not if the start lies beyond an end of the piece, see `compiled/beziers`.
+    """
     _, _, ax1, ay1, ax2, ay2, ax3, ay3 = coefficients
     tx, ty = cubic_slope(ax1, ax2, ax3, s), cubic_slope(ay1, ay2, ay3, s)
-    reach = slack * math.hypot(tx[0], ty[0])
-    return abs(t[0]) <= NEARBY * size and abs(t[0] * cross(tx, ty, vx, vy)[0]) <= reach
+    speed = math.hypot(tx[0], ty[0])
+    close = abs(t[0]) <= NEARBY * size and abs(t[0] * cross(tx, ty, vx, vy)[0]) <= slack * speed
+    behind = t[0] * dot(tx, ty, vx, vy)[0]
+    return close and (t[0] >= 0.0 or -slack * speed <= s[0] * speed * speed - behind <= speed * (speed + slack))
 
 
 @_compile
