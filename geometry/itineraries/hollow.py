@@ -15,8 +15,8 @@ from ..scene.columns import LEFT, RIGHT, RUN_SINE
 from .pieces import Pieces, samples_between
 
 if TYPE_CHECKING:
-    from .compiled.changes import Setting
     from ..scene.scene import Scene
+    from .compiled.changes import Setting
 
 Result = TypeVar("Result")
 

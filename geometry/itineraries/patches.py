@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import Floats
-from .hollow import HollowConditionals, compiled_result
+from .hollow import HollowConditionals
 from .pieces import Pieces
 
 # Mix a label, the number of its occurrences at one angle, and the number of one of them to a key.
@@ -34,12 +34,13 @@ class Strips(NamedTuple):
 
     def chosen(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> Strips:
         """The strips of a mask or of these numbers."""
-        return Strips(*(field[mask] for field in self))
+        return Strips(self.angle[mask], self.ends[mask], self.label[mask], self.owner[mask])
 
 
 def together(parts: list[Strips]) -> Strips:
     """All strips of several lists."""
-    return Strips(*map(np.concatenate, zip(*parts, strict=True)))
+    angles, ends, labels, owners = zip(*parts, strict=True)
+    return Strips(np.concatenate(angles), np.concatenate(ends), np.concatenate(labels), np.concatenate(owners))
 
 
 class Sampled(NamedTuple):
@@ -102,9 +103,9 @@ def sample(
 ) -> tuple[list[Sampled], set[float]]:
     """The outgoing angles on strips, at the positions of the first rule whose interpolant reaches the tolerance.
 
-    The tolerances, one for each strip, are errors of the outgoing angle times `weight_at`. If all angles, and others as far from them as
-    they differ, lie between two edges, the first rule is enough. Also returns the angles at which a ray has another
-    label than its strip; the missed piece is noted there.
+    The tolerances, one for each strip, are errors of the outgoing angle times `weight_at`. If all angles, and others as
+    far from them as they differ, lie between two edges, the first rule is enough. Also returns the angles at which a
+    ray has another label than its strip; the missed piece is noted there.
     """
     found, missed = [], set[float]()
     known = np.empty((*strips.angle.shape, 0))

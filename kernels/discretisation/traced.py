@@ -54,8 +54,8 @@ SMALLEST_MEAN_TOLERANCE = 1e-14
 # The tolerance is approached in stages by this ratio, from a first one of at most COARSEST_STAGE. If only a coarse
 # result can be reached, its conditional expectations are coarse as well.
 STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
-# The same for cells, if the first panels need more than a fraction of the limit on segments at the wanted tolerance. The
-# patches need a multiple of the segments of the rows, of which some angles are a sample.
+# The same for cells, but from COARSEST_CELLS on, and only if the first panels need more than a fraction of the limit on
+# segments at the wanted tolerance. This is predicted from some angles; patches cost a multiple of the rows.
 CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.25, 3.0
 # Fraction of the remaining segments that is spent on better expectations before the limit is looked at again.
 CHUNK_FRACTION = 0.1
@@ -328,9 +328,11 @@ class _Integrator:
         total = np.zeros_like(whole)
         np.add.at(total, owner, value)
         actual = np.linalg.norm(total - whole, axis=(1, 2))
+        before = np.maximum(before, np.finfo(np.float64).tiny)
         ratio = np.clip(RATIO_MARGIN * actual / before, LEAST_RATIO, 1.0)[owner]
         smooth = after < SMOOTH_SHRINKING * before[owner]
-        # not where the nodes sample noise
+        # not where the nodes sample noise, and not for the errors of patches
+        smooth &= self.cells is None
         smooth &= children.error < 2.0 * KRONROD_FRACTION * after
         self.panels.error[-len(owner) :] = np.where(smooth, ratio * after, children.error)
 
@@ -363,7 +365,7 @@ class _Integrator:
         coarsest = COARSEST_MEAN * float(np.median(self.sizes))
         tolerance = np.minimum(self.mean_tolerance * np.sqrt(np.maximum(1.0, fraction)), coarsest)
         if self.cells is not None:
-            self._fill_cells(panels, mask.any(axis=1), tolerance)
+            self._fill_cells(self.cells, panels, np.flatnonzero(mask.any(axis=1)), tolerance)
             return
         panel, node = np.nonzero(mask)
         for first in range(0, len(panel), ANGLES_AT_ONCE):
@@ -377,22 +379,18 @@ class _Integrator:
             panels.mean_error[panel[few], node[few]] = conditionals.error
         self._estimate(panels, np.unique(panel))
 
-    def _fill_cells(self, panels: AnglePanels, mask: NDArray[np.bool_], tolerance: Floats) -> None:
-        """Compute the integrals and expectations of indicators of cells on the panels of the mask."""
-        chosen = np.flatnonzero(mask)
+    def _fill_cells(self, cells: CellMasses, panels: AnglePanels, chosen: NDArray[np.int64], tolerance: Floats) -> None:
+        """Compute the integrals and expectations of indicators of cells on chosen panels."""
         step = max(1, ANGLES_AT_ONCE // len(NODES))
         for first in range(0, len(chosen), step):
             few = chosen[first : first + step]
             before = self.conditionals.spent()
-            found = self.cells(panels.low[few], panels.high[few], panels.angle[few], tolerance[few])
+            found = cells(panels.low[few], panels.high[few], panels.angle[few], tolerance[few])
             rays, segments = (now - then for now, then in zip(self.conditionals.spent(), before, strict=True))
             self.rays, self.segments = self.rays + rays, self.segments + segments
             self.angle_count += len(few) * len(NODES)
-            panels.image[few], panels.integral[few], panels.mean_error[few] = (
-                found.rest,
-                found.integrals,
-                found.mean_error,
-            )
+            panels.image[few], panels.integral[few] = found.rest, found.integrals
+            panels.mean_error[few] = found.mean_error
             self._estimate(panels, few)
             here = np.linalg.norm(self.basis.evaluate(panels.angle[few, 0]), axis=1)
             panels.error[few] = np.hypot(panels.error[few], here * found.error)

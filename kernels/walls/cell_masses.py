@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -185,6 +186,7 @@ class _Panels:
         return np.asarray(ANGLE_FRACTION * self.tolerance[panel] / (np.median(self.sizes) * edges))
 
     def _add_patches(self, patches: Strips, found: _Sums) -> set[float]:
+        """Add the patches, or their rows if they are not interpolated well; return the angles that miss a piece."""
         from ...geometry.itineraries.compiled.patches import Cells, Grid, masses_of_patches, room_for
 
         measure = SINE.mass(self.low, self.high)
@@ -199,28 +201,26 @@ class _Panels:
             doubts = error, _tail(weight_at(place) * outs), _tail(strips.ends)
             room = room_for(len(self.sizes), len(NODES), outs.shape[2])
             own = strips.ends, outs, strips.owner
+            panels, cells = (self.low, self.high, measure), Cells(self.edges, self.sizes)
+            grids = Grid(_PLACES, _WEIGHTS), Grid(*grid)
             compiled_result(
-                lambda: masses_of_patches(
-                    (self.low, self.high, measure), Grid(_PLACES, _WEIGHTS), Grid(*grid), own, doubts,
-                    limits, goals, Cells(self.edges, self.sizes), tuple(found), room,
-                )
-            )  # fmt: skip
+                partial(masses_of_patches, panels, *grids, own, doubts, limits, goals, cells, tuple(found), room)
+            )
         return missed
 
     def _add_singles(self, singles: Strips, found: _Sums) -> set[float]:
+        """Add pieces at single angles; return the angles that miss a piece."""
         from ...geometry.itineraries.compiled.patches import Cells, Grid, masses_of_rows, room_for
 
-        width = np.bincount(singles.owner, weights=singles.ends[:, 0, 3] - singles.ends[:, 0, 0])[singles.owner]
-        sampled, missed = sample(self.hollow, singles, self._wanted(singles, width), self.edges)
+        width = singles.ends[:, 0, 3] - singles.ends[:, 0, 0]
+        of_all = np.asarray(np.bincount(singles.owner, weights=width)[singles.owner], np.float64)
+        sampled, missed = sample(self.hollow, singles, self._wanted(singles, of_all), self.edges)
         rest = found.rest.reshape(-1, len(self.sizes))
         for level, strips, outs, error in sampled:
             room = room_for(len(self.sizes), len(NODES), outs.shape[2])
-            compiled_result(
-                lambda: masses_of_rows(
-                    Grid(*positions(level)), strips.ends, outs, strips.owner, error, Cells(self.edges, self.sizes),
-                    rest, found.gaps.reshape(-1), room,
-                )
-            )  # fmt: skip
+            grid, cells = Grid(*positions(level)), Cells(self.edges, self.sizes)
+            pieces = strips.ends, outs, strips.owner, error
+            compiled_result(partial(masses_of_rows, grid, *pieces, cells, rest, found.gaps.reshape(-1), room))
         return missed
 
     def _add_tiny(self, tiny: Strips, outs: Floats, found: _Sums) -> None:

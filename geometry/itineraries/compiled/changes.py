@@ -32,7 +32,8 @@ MOST_SAMPLES = 1 << 13
 MOST_ROUNDS = 200
 # Gaps with an error below this fraction of the worst gap's wait for a later round.
 WORST_FRACTION = 0.1
-FLOOR = 0.01
+# Least difference of the functions on both sides of a gap where the itineraries themselves are wanted.
+LEAST_SPREAD = 0.01
 # Distance beyond the interpolated position of an edge, as a multiple of the squared width of the gap over the opening:
 # above the error of the interpolation where the outgoing angle has a curvature of at most 16 slopes over the opening.
 BEYOND_EDGE = 2.0
@@ -199,16 +200,16 @@ def spread(first, second, task):
     """Return the largest difference of the functions between two outgoing angles.
 
     In one cell it is that of cos(angle), cos(k angle) and sin(k angle), k = ``task.degree``, times the functions' size;
-    in two cells the sum of the sizes. If the degree is 0 and there is one cell only, just the itineraries are wanted:
-    gaps then count with their full width wherever their rays lead.
+    in two cells the sum of the sizes. If the degree is 0 and there is one cell only, the itineraries themselves are
+    wanted, also where a change hardly changes the angle.
     """
     k, edges, sizes = max(task.degree, 1), task.setting.edges, task.setting.sizes
     here, there = cell_of(first, edges), cell_of(second, edges)
     if here != there:
         return sizes[here] + sizes[there]
-    floor = FLOOR if task.degree == 0 and edges.shape[0] == 0 else 0.0
+    least = LEAST_SPREAD if task.degree == 0 and edges.shape[0] == 0 else 0.0
     return sizes[here] * max(
-        floor,
+        least,
         abs(math.cos(first) - math.cos(second)),
         max(abs(math.cos(k * first) - math.cos(k * second)), abs(math.sin(k * first) - math.sin(k * second))),
     )

@@ -295,7 +295,6 @@ def gauss_masses(begin, end, panel, row_grid, grid, ends, outs, cells, room):
 def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
     """Add the integrals over a patch to ``masses``; return the squared error, and the change as in `gauss_masses`."""
     sizes, samples, stack = cells.sizes, room.samples, room.stack
-    values = room.values
     squares, moved = 0.0, 0.0
     number = cut_patch(row_grid, grid, outs, cells.edges, room)
     for part in range(number - 1):
