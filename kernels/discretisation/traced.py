@@ -397,6 +397,11 @@ class _Integrator:
 
     def _estimate(self, panels: AnglePanels, touched: NDArray[np.int64]) -> None:
         """Estimate the errors of the quadrature over panels whose expectations were computed."""
-        shared = np.array([self.conditionals.shared(panels.angle[k]).min() for k in touched.tolist()])
-        fraction = np.where(shared < LEAST_SHARED, ALIASED_FRACTION, KRONROD_FRACTION)
+        shared = np.array([self.conditionals.shared(panels.angle[k]) for k in touched.tolist()])
+        least = shared.min(axis=1, initial=1.0)
+        if self.cells is not None:
+            # of the entry points outside patches, which share all their itineraries
+            outside = np.sum(panels.image[touched] @ self.basis.constant, axis=1)
+            least = np.minimum(least, 1.0 - np.sum(1.0 - shared, axis=1) / np.maximum(outside, EPS))
+        fraction = np.where(least < LEAST_SHARED, ALIASED_FRACTION, KRONROD_FRACTION)
         panels.error[touched] = fraction * panels.selected(touched).differences(self.basis, NULL_RULES)

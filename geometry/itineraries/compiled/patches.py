@@ -47,8 +47,12 @@ class Cells(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Work space: crossings, their cells and slopes; cuts of a panel; values at positions, at nodes, and in cells."""
+    """Work space: crossings, their cells and slopes; cuts of a panel; values at positions, at nodes, and in cells.
 
+    ``marks``, of shape (2, positions + 4), are those of `set_marks`.
+    """
+
+    marks: Floats
     found: Floats
     cells: NDArray[np.int64]
     slopes: Floats
@@ -62,7 +66,9 @@ class Room(NamedTuple):
 def room_for(cells: int, nodes: int, positions: int) -> Room:
     """Return work space for patches in so many cells."""
     most = MOST_CROSSINGS
+    marks = np.empty((2, max(nodes, positions) + 4))
     return Room(
+        marks,
         np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2), np.empty(positions),
         np.empty(nodes), np.zeros((len(GAUSS_NODES), cells)), np.empty((MOST_DEPTH + 2, 3)),
     )  # fmt: skip
@@ -125,57 +131,87 @@ def crossing_between(low, high, below, above, edge, grid, values):
 
 
 @linked
+def vertex_of(a, at_a, b, at_b, c, at_c):
+    """Return the extremum of the parabola through three points, or b if they lie on a line."""
+    first, second = (b - a) * (at_b - at_c), (b - c) * (at_b - at_a)
+    if first == second:
+        return b
+    return b - 0.5 * ((b - a) * first - (b - c) * second) / (first - second)
+
+
+@linked
+def set_marks(grid, values, room):
+    """Set positions from 0 to 1, and the values there, between which the polynomial is monotone; return their number.
+
+    They are the ends, and the nodes, of which an extremum nearby takes the place. Extrema between an end and the first
+    or last node are added.
+    """
+    nodes, marks = grid.nodes, room.marks
+    m = nodes.shape[0]
+    last, at_last = 1.0, value_at(1.0, grid, values)
+    marks[0, 0], marks[1, 0] = 0.0, value_at(0.0, grid, values)
+    count = np.int64(1)
+    for i in range(m + 1):
+        right, at_right = (nodes[i], values[i]) if i < m else (last, at_last)
+        left, at_left = marks[0, count - 1], marks[1, count - 1]
+        if i == 0 or i == m:
+            other = 1 if i == 0 else m - 2
+            vertex = vertex_of(left, at_left, right, at_right, nodes[other], values[other])
+            if left < vertex < right:
+                marks[0, count], marks[1, count] = vertex, value_at(vertex, grid, values)
+                count += 1
+        if i == m:
+            break
+        t, at_t = right, at_right
+        right, at_right = (nodes[i + 1], values[i + 1]) if i + 1 < m else (last, at_last)
+        left, at_left = marks[0, count - 1], marks[1, count - 1]
+        sign = at_t - at_left
+        if sign * (at_right - at_t) < 0.0:
+            for _ in range(EXTREMUM_STEPS):
+                vertex = vertex_of(left, at_left, t, at_t, right, at_right)
+                at_vertex = value_at(vertex, grid, values)
+                if not (left < vertex < right) or abs(vertex - t) < 1e-9 or (at_vertex - at_t) * sign < 0.0:
+                    break
+                if vertex < t:
+                    right, at_right = t, at_t
+                else:
+                    left, at_left = t, at_t
+                t, at_t = vertex, at_vertex
+        marks[0, count], marks[1, count] = t, at_t
+        count += 1
+    marks[0, count], marks[1, count] = last, at_last
+    return count + 1
+
+
+@linked
 def find_crossings(grid, values, edges, room):
     """Find the crossings of edges by the polynomial through ``values`` on [0, 1], in increasing order.
 
     Sets their positions, the cells before, between and after them, and |dt / df| there in ``room``. Returns their
     number.
     """
-    nodes, found, cells, slopes = grid.nodes, room.found, room.cells, room.slopes
-    count = np.int64(0)
-    m = nodes.shape[0]
-    before, at_before, at_end = 0.0, value_at(0.0, grid, values), value_at(1.0, grid, values)
-    cell = cell_of(at_before, edges)
+    marks, found, cells, slopes = room.marks, room.found, room.cells, room.slopes
+    number = set_marks(grid, values, room)
+    count, most = np.int64(0), found.shape[0]
+    cell = cell_of(marks[1, 0], edges)
     cells[0] = cell
-    most = found.shape[0]
-    for i in range(m + 1):
-        t, at_t = (nodes[i], values[i]) if i < m else (1.0, at_end)
-        right, f_right = (nodes[i + 1], values[i + 1]) if i + 1 < m else (1.0, at_end)
-        if i < m and (at_t - at_before) * (f_right - at_t) < 0.0:
-            # an extremum near the node takes its place
-            left, f_left = before, at_before
-            for _ in range(EXTREMUM_STEPS):
-                u, v = (t - left) * (at_t - f_right), (t - right) * (at_t - f_left)
-                if u == v:
-                    break
-                vertex = t - 0.5 * ((t - left) * u - (t - right) * v) / (u - v)
-                if not (left < vertex < right) or abs(vertex - t) < 1e-9:
-                    break
-                at_vertex = value_at(vertex, grid, values)
-                if (at_vertex - at_t) * (values[i] - f_left) < 0.0:
-                    break
-                if vertex < t:
-                    right, f_right = t, at_t
-                else:
-                    left, f_left = t, at_t
-                t, at_t = vertex, at_vertex
-        slope = abs(t - before) / max(abs(at_t - at_before), 1e-300)
-        last, at_last = before, at_before
+    for i in range(1, number):
+        last, at_last, t, at_t = marks[0, i - 1], marks[1, i - 1], marks[0, i], marks[1, i]
+        rise = at_t - at_last
+        slope = (t - last) / max(abs(rise), 1e-300)
         while count < most:
-            if at_t > at_before and cell < edges.shape[0] and edges[cell] < at_t:
+            if rise > 0.0 and cell < edges.shape[0] and edges[cell] < at_t:
                 edge, following = edges[cell], cell + 1
-            elif at_t < at_before and cell > 0 and edges[cell - 1] >= at_t:
+            elif rise < 0.0 and cell > 0 and edges[cell - 1] >= at_t:
                 edge, following = edges[cell - 1], cell - 1
             else:
                 break
             last = crossing_between(last, t, at_last, at_t, edge, grid, values)
             at_last = edge
-            found[count] = last
-            slopes[count] = slope
+            found[count], slopes[count] = last, slope
             cell = following
             count += 1
             cells[count] = cell
-        before, at_before = t, at_t
     return count
 
 
