@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.itineraries.compiled.patches import Cells, Grid, masses_of_patches, masses_of_rows, room_for
