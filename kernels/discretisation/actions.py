@@ -92,7 +92,7 @@ def action_matrix(law: HasAction, basis: Basis, tolerance: float) -> tuple[Float
             difference = panels.differences(basis)
             done = last | (difference <= max(PANEL_FRACTION * tolerance, CONVERGED))
             converged[start : start + step] = done
-            total += panels.selected(done).values(basis).sum(axis=0)
+            total += panels.selected(done).total(basis)
             error += float(difference[done].sum())
         middle = 0.5 * (low + high)[~converged]
         low, high = np.append(low[~converged], middle), np.append(middle, high[~converged])

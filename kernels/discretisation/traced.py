@@ -15,7 +15,7 @@ from ..bases.basis import Basis
 from ..bases.legendre import Legendre
 from ..bases.mirror import is_mirror_symmetric, reflection_matrix
 from ..expectations.angle_panels import NODES, NULL_RULES, AnglePanels
-from ..expectations.basis_means import VALUES_AT_ONCE, means_of_basis
+from ..expectations.basis_means import means_of_basis
 from ..laws.law import Law
 from ..matrices.matrix import KernelMatrix
 from ..walls.cell_masses import CellMasses
@@ -57,6 +57,8 @@ STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
 # The same for cells, but from COARSEST_CELLS on, and only if the first panels need more than a fraction of the limit on
 # segments at the wanted tolerance. This is predicted from some angles; patches cost a multiple of the rows.
 CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.25, 3.0
+# Factor of the tolerance of expectations, if their errors have more than this fraction of the tolerance together.
+TIGHTENING, MOST_MEANS = 0.2, 0.4
 # Fraction of the remaining segments that is spent on better expectations before the limit is looked at again.
 CHUNK_FRACTION = 0.1
 SAMPLED_ANGLES = np.array([0.1, 0.5, 1.0, 1.5])
@@ -185,10 +187,10 @@ class _Integrator:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
         stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
         self.first_tolerance = self.tolerance / STAGE_RATIO**stages
-        self.ratio = STAGE_RATIO
+        self.ratio, self.tightens = STAGE_RATIO, False
         if self.cells is not None:
-            costly = self._predicted(edges) > FIRST_FRACTION * budget.segments
-            self.first_tolerance = max(self.tolerance, COARSEST_CELLS) if costly else self.tolerance
+            self.tightens = self._predicted(edges) <= FIRST_FRACTION * budget.segments
+            self.first_tolerance = self.tolerance if self.tightens else max(self.tolerance, COARSEST_CELLS)
             self.ratio = CELL_RATIO
         self.mean_tolerance = MEAN_FRACTION * self.first_tolerance
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
@@ -256,11 +258,16 @@ class _Integrator:
 
     def _meet(self, tolerance: float) -> None:
         """Divide panels until the error is below the tolerance, or no segments are left."""
-        goal = tolerance
+        goal = means = tolerance
         while True:
             error, panels, conditionals, hidden = self._measure()
             if error <= tolerance or self.segments >= self.budget.segments:
                 return
+            if self.tightens and conditionals > MOST_MEANS * tolerance and means > 0.01 * tolerance:
+                # gaps where a change hardly changes the angle may count more in cells
+                means *= TIGHTENING
+                self._begin(means)
+                continue
             # Errors that only the asymmetry shows lie in panels whose rules agree by chance.
             goal = min(goal, max(tolerance - hidden, 0.25 * (panels + conditionals)))
             chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
@@ -278,14 +285,7 @@ class _Integrator:
 
     def _state(self) -> tuple[Floats, float, float, float]:
         """The matrix and its errors from the panels, from the expectations, and from the asymmetry."""
-        matrix = np.zeros((self.basis.size, self.basis.size))
-        step = max(1, VALUES_AT_ONCE // self.basis.size**2)
-        for first in range(0, len(self.panels.low), step):
-            matrix += (
-                self.panels.selected(np.arange(first, min(first + step, len(self.panels.low))))
-                .values(self.basis)
-                .sum(0)
-            )
+        matrix = self.panels.total(self.basis)
         panels = float(np.linalg.norm(self.panels.error))
         conditionals = self.panels.total_mean_error(self.basis)
         if self.halved:

@@ -104,15 +104,37 @@ class AnglePanels:
         """The weights of a rule at the nodes for the measure, shape (panels, 15)."""
         return np.asarray((self.high - self.low)[:, None] * SLOPES * SINE.density(self.angle) * rule)
 
+    def _means(self, rule: Floats) -> Floats:
+        """The integrals of E[e_j(Theta') | theta] by a rule, shape (panels, size)."""
+        return np.asarray(np.matmul(self._weights(rule)[:, None, :], self.image)[:, 0])
+
+    def _here(self, basis: Basis) -> Floats:
+        """The values of the functions in the middle of the panels, on all of each for indicators."""
+        return basis.evaluate(self.angle[:, len(NODES) // 2])
+
     def _integrals(self, rule: Floats, basis: Basis) -> Floats:
-        """The integrals of e_i(theta) E[e_j(Theta') | theta] over each panel, shape (panels, size, size)."""
+        """The integrals of e_i(theta) E[e_j(Theta') | theta] over each panel, shape (panels, size, size).
+
+        For indicators, one row of each matrix is not 0; the shape is (panels, 1, size) then.
+        """
+        if basis.is_partition:
+            return np.asarray(np.linalg.norm(self._here(basis), axis=1)[:, None, None] * self._means(rule)[:, None, :])
         here = basis.evaluate(self.angle) * self._weights(rule)[..., None]
         return np.asarray(np.matmul(here.transpose(0, 2, 1), self.image))
 
     def values(self, basis: Basis) -> Floats:
-        """The integrals by Kronrod's rule, and those of the parts that ``image`` leaves out."""
-        here = basis.evaluate(self.angle[:, len(NODES) // 2])
-        return self._integrals(KRONROD, basis) + here[:, :, None] * self.integral[:, None, :]
+        """The integrals over each panel by Kronrod's rule, as `_integrals`, with those that ``image`` leaves out."""
+        found = self._integrals(KRONROD, basis)
+        if basis.is_partition:
+            found += np.linalg.norm(self._here(basis), axis=1)[:, None, None] * self.integral[:, None, :]
+        return found
+
+    def total(self, basis: Basis) -> Floats:
+        """The sum of the integrals over all panels, shape (size, size)."""
+        if basis.is_partition:
+            return np.asarray(self._here(basis).T @ (self._means(KRONROD) + self.integral))
+        here = basis.evaluate(self.angle) * self._weights(KRONROD)[..., None]
+        return np.asarray(here.reshape(-1, basis.size).T @ self.image.reshape(-1, basis.size))
 
     def differences(self, basis: Basis, rules: Floats = NULL_RULES[:1]) -> Floats:
         """The norms of the differences between Kronrod's and Gauss's rule, shape (panels,).
@@ -144,7 +166,10 @@ class AnglePanels:
             basis.evaluate(self.angle.ravel()),
             self.mean_error.ravel(),
         )
-        norm = float(np.linalg.norm(here.T @ (weight[:, None] * here), 2))
+        # indicators are orthogonal
+        norm = float(
+            np.max(weight @ here**2) if basis.is_partition else np.linalg.norm(here.T @ (weight[:, None] * here), 2)
+        )
         order = np.argsort(-error)
         single = np.append(0.0, np.cumsum((weight * np.linalg.norm(here, axis=1) * error)[order]))
         squares = np.append(np.cumsum((weight * error**2)[order[::-1]])[::-1], 0.0)
