@@ -56,7 +56,7 @@ SMALLEST_MEAN_TOLERANCE = 1e-14
 STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
 # The same for cells, but from COARSEST_CELLS on, and only if the first panels need more than a fraction of the limit on
 # segments at the wanted tolerance. This is predicted from some angles; patches cost a multiple of the rows.
-CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.25, 3.0
+CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.1, 3.0
 # Factor of the tolerance of expectations, if their errors have more than this fraction of the tolerance together.
 TIGHTENING, MOST_MEANS = 0.2, 0.4
 # Fraction of the remaining segments that is spent on better expectations before the limit is looked at again.
