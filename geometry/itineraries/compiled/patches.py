@@ -28,6 +28,12 @@ GAUSS_NODES, GAUSS_WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 _NULL = GAUSS_WEIGHTS[:, None] * np.polynomial.legendre.legvander(_NODES, 4)[:, 3:]
 FINE_NULL, COARSE_NULL = (_NULL * np.linalg.norm(GAUSS_WEIGHTS) / np.linalg.norm(_NULL, axis=0)).T[::-1].copy()
 MOST_DEPTH = 12
+# Columns of the ends of a piece: the middle of the gap before it, its first and last sample, the middle of the next gap.
+START, LOW, HIGH, STOP = range(4)
+# Rows of the marks, columns of the stack of parts of a panel, and the only node of a piece at one angle.
+PLACE, VALUE = range(2)
+BEGIN, END, LEVEL = range(3)
+ALONE = FIRST = 0
 # Most crossings of edges at one angle; the rest of the piece then counts for the last cell.
 MOST_CROSSINGS = 1 << 14
 
@@ -149,22 +155,22 @@ def set_marks(grid, values, room):
     nodes, marks = grid.nodes, room.marks
     m = nodes.shape[0]
     last, at_last = 1.0, value_at(1.0, grid, values)
-    marks[0, 0], marks[1, 0] = 0.0, value_at(0.0, grid, values)
+    marks[PLACE, FIRST], marks[VALUE, FIRST] = 0.0, value_at(0.0, grid, values)
     count = np.int64(1)
     for i in range(m + 1):
         right, at_right = (nodes[i], values[i]) if i < m else (last, at_last)
-        left, at_left = marks[0, count - 1], marks[1, count - 1]
+        left, at_left = marks[PLACE, count - 1], marks[VALUE, count - 1]
         if i == 0 or i == m:
             other = 1 if i == 0 else m - 2
             vertex = vertex_of(left, at_left, right, at_right, nodes[other], values[other])
             if left < vertex < right:
-                marks[0, count], marks[1, count] = vertex, value_at(vertex, grid, values)
+                marks[PLACE, count], marks[VALUE, count] = vertex, value_at(vertex, grid, values)
                 count += 1
         if i == m:
             break
         t, at_t = right, at_right
         right, at_right = (nodes[i + 1], values[i + 1]) if i + 1 < m else (last, at_last)
-        left, at_left = marks[0, count - 1], marks[1, count - 1]
+        left, at_left = marks[PLACE, count - 1], marks[VALUE, count - 1]
         sign = at_t - at_left
         if sign * (at_right - at_t) < 0.0:
             for _ in range(EXTREMUM_STEPS):
@@ -177,9 +183,9 @@ def set_marks(grid, values, room):
                 else:
                     left, at_left = t, at_t
                 t, at_t = vertex, at_vertex
-        marks[0, count], marks[1, count] = t, at_t
+        marks[PLACE, count], marks[VALUE, count] = t, at_t
         count += 1
-    marks[0, count], marks[1, count] = last, at_last
+    marks[PLACE, count], marks[VALUE, count] = last, at_last
     return count + 1
 
 
@@ -193,10 +199,10 @@ def find_crossings(grid, values, edges, room):
     marks, found, cells, slopes = room.marks, room.found, room.cells, room.slopes
     number = set_marks(grid, values, room)
     count, most = np.int64(0), found.shape[0]
-    cell = cell_of(marks[1, 0], edges)
+    cell = cell_of(marks[VALUE, FIRST], edges)
     cells[0] = cell
     for i in range(1, number):
-        last, at_last, t, at_t = marks[0, i - 1], marks[1, i - 1], marks[0, i], marks[1, i]
+        last, at_last, t, at_t = marks[PLACE, i - 1], marks[VALUE, i - 1], marks[PLACE, i], marks[VALUE, i]
         rise = at_t - at_last
         slope = (t - last) / max(abs(rise), 1e-300)
         while count < most:
@@ -244,8 +250,8 @@ def masses_of_rows(grid, ends, outs, owners, doubts, cells, masses, errors, room
     """Add the masses of pieces, each at one angle, to those of the angles' numbers ``owners``, and their errors."""
     for i in range(owners.shape[0]):
         k = owners[i]
-        four = ends[i, 0, 0], ends[i, 0, 1], ends[i, 0, 2], ends[i, 0, 3]
-        change, gaps = row_masses(four, grid, outs[i, 0], cells, masses[k], room)
+        four = ends[i, ALONE, START], ends[i, ALONE, LOW], ends[i, ALONE, HIGH], ends[i, ALONE, STOP]
+        change, gaps = row_masses(four, grid, outs[i, ALONE], cells, masses[k], room)
         errors[k] += doubts[i] * change + gaps
 
 
@@ -261,10 +267,10 @@ def interpolate(s, nodes, weights, ends, outs, values):
         step = s - nodes[k]
         ratio = weights[k] / (step if abs(step) > AT_NODE else AT_NODE)
         total += ratio
-        a += ratio * ends[k, 0]
-        b += ratio * ends[k, 1]
-        c += ratio * ends[k, 2]
-        d += ratio * ends[k, 3]
+        a += ratio * ends[k, START]
+        b += ratio * ends[k, LOW]
+        c += ratio * ends[k, HIGH]
+        d += ratio * ends[k, STOP]
         for j in range(values.shape[0]):
             values[j] += ratio * outs[k, j]
     for j in range(values.shape[0]):
@@ -337,15 +343,15 @@ def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
         if room.cuts[part + 1] - room.cuts[part] <= AT_NODE:
             continue
         depth = np.int64(1)
-        stack[0, 0], stack[0, 1], stack[0, 2] = room.cuts[part], room.cuts[part + 1], 0.0
+        stack[0, BEGIN], stack[0, END], stack[0, LEVEL] = room.cuts[part], room.cuts[part + 1], 0.0
         while depth > 0:
             depth -= 1
-            begin, end, level = stack[depth, 0], stack[depth, 1], stack[depth, 2]
+            begin, end, level = stack[depth, BEGIN], stack[depth, END], stack[depth, LEVEL]
             error, change = gauss_masses(begin, end, panel, row_grid, grid, ends, outs, cells, room)
             if error > goal * goal and level < MOST_DEPTH - 1:
                 middle = 0.5 * (begin + end)
-                stack[depth, 0], stack[depth, 1], stack[depth, 2] = middle, end, level + 1.0
-                stack[depth + 1, 0], stack[depth + 1, 1], stack[depth + 1, 2] = begin, middle, level + 1.0
+                stack[depth, BEGIN], stack[depth, END], stack[depth, LEVEL] = middle, end, level + 1.0
+                stack[depth + 1, BEGIN], stack[depth + 1, END], stack[depth + 1, LEVEL] = begin, middle, level + 1.0
                 depth += 2
                 continue
             squares += error
@@ -377,7 +383,7 @@ def masses_of_patches(panels, row_grid, grid, strips, doubts, limits, goals, cel
         ends, outs = all_ends[i], all_outs[i]
         for j in range(sizes.shape[0]):
             room.samples[0, j] = 0.0
-        four = ends[middle, 0], ends[middle, 1], ends[middle, 2], ends[middle, 3]
+        four = ends[middle, START], ends[middle, LOW], ends[middle, HIGH], ends[middle, STOP]
         change, _ = row_masses(four, grid, outs[middle], cells, room.samples[0], room)
         at_ends = of_ends[i] * (
             sizes[cell_of(value_at(0.0, grid, outs[middle]), cells.edges)]
@@ -388,13 +394,13 @@ def masses_of_patches(panels, row_grid, grid, strips, doubts, limits, goals, cel
             error, moved = patch_masses(panel, row_grid, grid, ends, outs, cells, goals[p], integrals[p], room)
             squares[p] += error + (between[i] * moved) ** 2 + (at_ends * measures[p]) ** 2
             for k in range(row_grid.nodes.shape[0]):
-                gaps = (ends[k, 1] - ends[k, 0]) * sizes[cell_of(value_at(0.0, grid, outs[k]), cells.edges)]
-                gaps += (ends[k, 3] - ends[k, 2]) * sizes[cell_of(value_at(1.0, grid, outs[k]), cells.edges)]
+                gaps = (ends[k, LOW] - ends[k, START]) * sizes[cell_of(value_at(0.0, grid, outs[k]), cells.edges)]
+                gaps += (ends[k, STOP] - ends[k, HIGH]) * sizes[cell_of(value_at(1.0, grid, outs[k]), cells.edges)]
                 errors[p, k] += gaps
                 node_squares[p, k] += (at_nodes[i] * moved / measures[p]) ** 2
         else:
             for k in range(row_grid.nodes.shape[0]):
-                four = ends[k, 0], ends[k, 1], ends[k, 2], ends[k, 3]
+                four = ends[k, START], ends[k, LOW], ends[k, HIGH], ends[k, STOP]
                 change, gaps = row_masses(four, grid, outs[k], cells, rest[p, k], room)
                 errors[p, k] += gaps
                 node_squares[p, k] += (at_nodes[i] * change) ** 2
