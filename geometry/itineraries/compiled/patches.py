@@ -28,7 +28,7 @@ GAUSS_NODES, GAUSS_WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 _NULL = GAUSS_WEIGHTS[:, None] * np.polynomial.legendre.legvander(_NODES, 4)[:, 3:]
 FINE_NULL, COARSE_NULL = (_NULL * np.linalg.norm(GAUSS_WEIGHTS) / np.linalg.norm(_NULL, axis=0)).T[::-1].copy()
 MOST_DEPTH = 12
-# Columns of the ends of a piece: the middles of the gaps before and after it, and between them its first and last sample.
+# Columns of the ends of a piece: the middles of the gaps before and after it, between them its first and last sample.
 START, LOW, HIGH, STOP = range(4)
 # Rows of the marks, columns of the stack of parts of a panel, and the only node of a piece at one angle.
 PLACE, VALUE = range(2)
