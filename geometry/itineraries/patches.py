@@ -32,6 +32,11 @@ class Strips(NamedTuple):
     label: NDArray[np.uint64]
     owner: NDArray[np.int64]
 
+    @property
+    def width(self) -> Floats:
+        """The widths of the pieces with half of the gaps around them, shape (strips, nodes)."""
+        return np.asarray(self.ends[..., 3] - self.ends[..., 0])
+
     def chosen(self, mask: NDArray[np.bool_] | NDArray[np.int64]) -> Strips:
         """The strips of a mask or of these numbers."""
         return Strips(self.angle[mask], self.ends[mask], self.label[mask], self.owner[mask])

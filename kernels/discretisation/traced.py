@@ -248,7 +248,7 @@ class _Integrator:
             left = self.budget.segments - self.segments
             step = max(1, int(CHUNK_FRACTION * left * self.angle_count / (len(NODES) * max(1, self.segments))))
         chosen = np.flatnonzero(coarse)
-        for first in range(0, len(chosen), max(1, step)):
+        for first in range(0, len(chosen), step):
             if first > 0 and self.segments >= self.budget.segments:
                 break
             mask = np.zeros(self.panels.angle.shape, dtype=np.bool_)

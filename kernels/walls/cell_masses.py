@@ -18,8 +18,8 @@ from ..bases.measure import SINE
 from ..expectations.angle_panels import NODES
 from .conditionals import WallConditionals
 
-# Fractions of the tolerance of the expectations for the gaps between the pieces, for pieces that get one ray each, and
-# for the outgoing angles.
+# Fractions of the tolerance of the expectations for the gaps between the pieces, for pieces of which the outgoing angle
+# of one end counts, and for the outgoing angles.
 GAP_FRACTION, TINY_FRACTION, ANGLE_FRACTION = 0.03, 0.3, 0.4
 # A patch is integrated if the error of its interpolant is below this multiple of the tolerance of the expectations.
 PATCH_FACTOR = 1.0
@@ -28,8 +28,6 @@ PART_FRACTION = 1e-2
 # Error of an interpolant as a multiple of the largest of its last coefficients, and their number.
 TAIL_FACTOR, TAIL = 1.0, 2
 MOST_ROUNDS = 8
-# Labels below this number are those of rays that did not escape.
-FIRST_LABEL = 4
 
 _PLACES = 0.5 * (1.0 + NODES)
 
@@ -155,6 +153,8 @@ class _Panels:
 
     def _strips(self) -> tuple[Strips, Strips, tuple[Strips, Floats]]:
         """The patches; the other pieces with the numbers of their nodes; the tiny ones with their outgoing angles."""
+        from ...geometry.itineraries.compiled.changes import FIRST_LABEL
+
         left, right = self.hollow.scene.hollows[self.hollow.hollow, [LEFT, RIGHT]].tolist()
         patches, singles, tiny, tiny_outs = [], [], [], []
         for number, (angles, tolerance) in enumerate(zip(self.angle, self.tolerance.tolist(), strict=True)):
@@ -162,15 +162,15 @@ class _Panels:
             node = np.repeat(np.arange(len(rows)), [len(row.label) for row in rows])
             label, out = np.concatenate([row.label for row in rows]), np.concatenate([row.out for row in rows])
             ends = np.concatenate([ends_of(row, left, right) for row in rows])
+            others = Strips(angles[node][:, None], ends[:, None], label, number * len(rows) + node)
             limit = TINY_FRACTION * tolerance / self.sizes.max() * self.hollow.width
-            is_tiny = _narrowest(ends[:, 3] - ends[:, 0], node, limit) | (label < FIRST_LABEL)
+            is_tiny = _narrowest(others.width[:, 0], node, limit) | (label < FIRST_LABEL)
             common = common_pieces(rows)
             common = common[~is_tiny[common].all(axis=1)]
             alone = np.ones(len(label), dtype=np.bool_)
             alone[common] = False
             owner = np.full(len(common), number)
             patches.append(Strips(np.tile(angles, (len(common), 1)), ends[common], label[common[:, 0]], owner))
-            others = Strips(angles[node][:, None], ends[:, None], label, number * len(rows) + node)
             singles.append(others.chosen(alone & ~is_tiny))
             tiny.append(others.chosen(alone & is_tiny))
             tiny_outs.append(out[alone & is_tiny])
@@ -192,7 +192,7 @@ class _Panels:
         measure = SINE.mass(self.low, self.high)
         limits = PATCH_FACTOR * self.tolerance * self.hollow.width
         goals = PART_FRACTION * self.tolerance * self.hollow.width * np.sqrt(measure)
-        width = (patches.ends[..., 3] - patches.ends[..., 0]).max(axis=1, initial=0.0)
+        width = patches.width.max(axis=1, initial=0.0)
         # their errors count as independent ones
         alike = np.bincount(patches.owner)[patches.owner]
         sampled, missed = sample(self.hollow, patches, self._wanted(patches, width * np.sqrt(alike)), self.edges)
@@ -212,8 +212,7 @@ class _Panels:
         """Add pieces at single angles; return the angles that miss a piece."""
         from ...geometry.itineraries.compiled.patches import Cells, Grid, masses_of_rows, room_for
 
-        width = singles.ends[:, 0, 3] - singles.ends[:, 0, 0]
-        of_all = np.asarray(np.bincount(singles.owner, weights=width)[singles.owner], np.float64)
+        of_all = np.asarray(np.bincount(singles.owner, weights=singles.width[:, 0])[singles.owner], np.float64)
         sampled, missed = sample(self.hollow, singles, self._wanted(singles, of_all), self.edges)
         rest = found.rest.reshape(-1, len(self.sizes))
         for level, strips, outs, error in sampled:
@@ -225,7 +224,7 @@ class _Panels:
 
     def _add_tiny(self, tiny: Strips, outs: Floats, found: _Sums) -> None:
         """Add pieces by the outgoing angles of their first rays; their whole widths count as error."""
-        width = tiny.ends[:, 0, 3] - tiny.ends[:, 0, 0]
+        width = tiny.width[:, 0]
         np.add.at(found.rest.reshape(-1, len(self.sizes)), (tiny.owner, np.searchsorted(self.edges, outs)), width)
         np.add.at(found.gaps.reshape(-1), tiny.owner, 2.0 * self.sizes.max() * width)
 

@@ -47,9 +47,9 @@ LATE_FRACTION = 0.05
 class Found(NamedTuple):
     """What is found angle by angle.
 
-    Outgoing angles and masses of the nodes, and the start of each angle; first positions, last positions and labels of
-    the pieces, and the start of each angle; and for each angle the error, the width of unresolved rays, and the numbers
-    of rays and of ray segments.
+    Outgoing angles and masses of the nodes, and the start of each angle; first positions, last positions, labels
+    and first outgoing angles of the pieces, and the start of each angle; and for each angle the error, the width of
+    unresolved rays, and the numbers of rays and of ray segments.
     """
 
     nodes: tuple[Floats, ...]
@@ -76,7 +76,7 @@ def march_angle(task, goal, rules, entries, chain, nodes, pieces):
 
     Returns the number of nodes, the error, the width of unresolved rays, and the numbers of pieces and of rays. If the
     limit of ray segments is reached, the error includes the gaps that remain. ``pieces`` receives the first and last
-    position and the label of every piece.
+    position, the label and the first outgoing angle of every piece.
     """
     xs, outs, labels, follow, _, _ = chain
     node, mass = nodes

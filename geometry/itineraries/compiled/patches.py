@@ -222,6 +222,19 @@ def find_crossings(grid, values, edges, room):
 
 
 @linked
+def ends_at(ends, k):
+    """-> (start, low, high, stop): the ends of the piece at node k, see `row_masses`."""
+    return ends[k, START], ends[k, LOW], ends[k, HIGH], ends[k, STOP]
+
+
+@linked
+def sizes_at_ends(grid, values, cells):
+    """-> (first, last): the norms of the functions in the cells of the outgoing angles at both ends."""
+    first, last = cell_of(value_at(0.0, grid, values), cells.edges), cell_of(value_at(1.0, grid, values), cells.edges)
+    return cells.sizes[first], cells.sizes[last]
+
+
+@linked
 def row_masses(ends, grid, values, cells, masses, room):
     """Add the widths of the entry points that lead to the cells at one angle.
 
@@ -250,8 +263,7 @@ def masses_of_rows(grid, ends, outs, owners, doubts, cells, masses, errors, room
     """Add the masses of pieces, each at one angle, to those of the angles' numbers ``owners``, and their errors."""
     for i in range(owners.shape[0]):
         k = owners[i]
-        four = ends[i, ALONE, START], ends[i, ALONE, LOW], ends[i, ALONE, HIGH], ends[i, ALONE, STOP]
-        change, gaps = row_masses(four, grid, outs[i, ALONE], cells, masses[k], room)
+        change, gaps = row_masses(ends_at(ends[i], ALONE), grid, outs[i, ALONE], cells, masses[k], room)
         errors[k] += doubts[i] * change + gaps
 
 
@@ -383,24 +395,19 @@ def masses_of_patches(panels, row_grid, grid, strips, doubts, limits, goals, cel
         ends, outs = all_ends[i], all_outs[i]
         for j in range(sizes.shape[0]):
             room.samples[0, j] = 0.0
-        four = ends[middle, START], ends[middle, LOW], ends[middle, HIGH], ends[middle, STOP]
-        change, _ = row_masses(four, grid, outs[middle], cells, room.samples[0], room)
-        at_ends = of_ends[i] * (
-            sizes[cell_of(value_at(0.0, grid, outs[middle]), cells.edges)]
-            + sizes[cell_of(value_at(1.0, grid, outs[middle]), cells.edges)]
-        )
+        change, _ = row_masses(ends_at(ends, middle), grid, outs[middle], cells, room.samples[0], room)
+        first, last = sizes_at_ends(grid, outs[middle], cells)
+        at_ends = of_ends[i] * (first + last)
         if (at_nodes[i] + between[i]) * change + at_ends <= limits[p]:
             panel = lows[p], highs[p]
             error, moved = patch_masses(panel, row_grid, grid, ends, outs, cells, goals[p], integrals[p], room)
             squares[p] += error + (between[i] * moved) ** 2 + (at_ends * measures[p]) ** 2
             for k in range(row_grid.nodes.shape[0]):
-                gaps = (ends[k, LOW] - ends[k, START]) * sizes[cell_of(value_at(0.0, grid, outs[k]), cells.edges)]
-                gaps += (ends[k, STOP] - ends[k, HIGH]) * sizes[cell_of(value_at(1.0, grid, outs[k]), cells.edges)]
-                errors[p, k] += gaps
+                first, last = sizes_at_ends(grid, outs[k], cells)
+                errors[p, k] += (ends[k, LOW] - ends[k, START]) * first + (ends[k, STOP] - ends[k, HIGH]) * last
                 node_squares[p, k] += (at_nodes[i] * moved / measures[p]) ** 2
         else:
             for k in range(row_grid.nodes.shape[0]):
-                four = ends[k, START], ends[k, LOW], ends[k, HIGH], ends[k, STOP]
-                change, gaps = row_masses(four, grid, outs[k], cells, rest[p, k], room)
+                change, gaps = row_masses(ends_at(ends, k), grid, outs[k], cells, rest[p, k], room)
                 errors[p, k] += gaps
                 node_squares[p, k] += (at_nodes[i] * change) ** 2
