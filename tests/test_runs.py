@@ -158,12 +158,12 @@ def test_the_cost_of_a_run_does_not_grow_with_its_hits():
     import time
 
     x, _ = rays(4, 100_000)
-    depths = (1e4, 1e8, 1e9)
-    least = dict.fromkeys(depths, np.inf)
+    walls = {depth: geo.rectangular_teeth(depth) for depth in (1e4, 1e8, 1e9)}
+    least = dict.fromkeys(walls, np.inf)
     for _ in range(3):
-        for depth in depths:
+        for depth, wall in walls.items():
             start = time.process_time()
-            traced = geo.trace(geo.rectangular_teeth(depth), x, 1.0, max_collisions=NO_LIMIT, threads=1)
+            traced = geo.trace(wall, x, 1.0, max_collisions=NO_LIMIT, threads=1)
             least[depth] = min(least[depth], time.process_time() - start)
             assert traced.escaped.mean() > 0.9999
     # 1e5 times and 10 times the hits
