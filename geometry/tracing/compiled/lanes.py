@@ -118,6 +118,7 @@ class Table:
     def __init__(self, context: Any, builder: Any, kind: Any, table: Any, count: int = BOXES) -> None:
         self._array = context.make_array(kind)(context, builder, table)
         self.builder, self._lanes = builder, ir.VectorType(NUMBER, count)
+        self._features: str = context.codegen().magic_tuple()[-1]
 
     def row(self, number: Any) -> Table:
         stride = cgutils.unpack_tuple(self.builder, self._array.strides)[0]
@@ -136,12 +137,19 @@ class Table:
         self.builder.store(value.value, self._at(place), align=8)
 
     def pack(self, place: int, value: Lanes, chosen: Lanes) -> None:
-        """Store the chosen lanes one after the other."""
-        start = self.builder.gep(self._start, [WORD(place)])
-        bits = ir.VectorType(BIT, BOXES)
-        kind = ir.FunctionType(ir.VoidType(), [LANES, NUMBER.as_pointer(), bits])
-        store = self.builder.module.declare_intrinsic(f"llvm.masked.compressstore.v{BOXES}f64", (), kind)
-        self.builder.call(store, [value.value, start, chosen.value])
+        """Store the chosen lanes one after the other; the following places, eight in all, may then have any value."""
+        builder, bits = self.builder, ir.VectorType(BIT, BOXES)
+        if "+avx512f" in self._features:
+            # some processors take a hundred cycles for the instruction that also stores
+            kind = ir.FunctionType(LANES, [LANES, LANES, bits])
+            compress = builder.module.declare_intrinsic(f"llvm.x86.avx512.mask.compress.v{BOXES}f64", (), kind)
+            packed = builder.call(compress, [value.value, ir.Constant(LANES, ir.Undefined), chosen.value])
+            self[place] = Lanes(builder, packed)
+        else:
+            start = builder.gep(self._start, [WORD(place)])
+            kind = ir.FunctionType(ir.VoidType(), [LANES, NUMBER.as_pointer(), bits])
+            store = builder.module.declare_intrinsic(f"llvm.masked.compressstore.v{BOXES}f64", (), kind)
+            builder.call(store, [value.value, start, chosen.value])
 
     def number(self, place: int) -> Lanes:
         """Return one number of the table in all lanes."""
