@@ -22,11 +22,17 @@ from .changes import BLOCK, cell_of, outcome, task_of, trace_block
 MOST_STEPS, EXTREMUM_STEPS = 60, 3
 # Least distance from a node at which the barycentric formula is used.
 AT_NODE = 1e-14
-# Gauss's rule with five nodes on (0, 1), and its null rules for polynomials of degree 3 and 2, of the same size.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-GAUSS_NODES, GAUSS_WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
-_NULL = GAUSS_WEIGHTS[:, None] * np.polynomial.legendre.legvander(_NODES, 4)[:, 3:]
-FINE_NULL, COARSE_NULL = (_NULL * np.linalg.norm(GAUSS_WEIGHTS) / np.linalg.norm(_NULL, axis=0)).T[::-1].copy()
+# Gauss's rules with these numbers of nodes on (0, 1), and two null rules of the same size for each, for polynomials of
+# degree n - 2 and n - 3. The second rule is used where the error of the first is too large.
+NUMBERS = (5, 10)
+GAUSS_NODES, GAUSS_WEIGHTS, FINE_NULL, COARSE_NULL = np.zeros((4, len(NUMBERS), max(NUMBERS)))
+for _rule, _n in enumerate(NUMBERS):
+    _nodes, _weights = np.polynomial.legendre.leggauss(_n)
+    GAUSS_NODES[_rule, :_n], GAUSS_WEIGHTS[_rule, :_n] = 0.5 * (1.0 + _nodes), 0.5 * _weights
+    _null = _weights[:, None] * np.polynomial.legendre.legvander(_nodes, _n - 1)[:, -2:]
+    _null *= 0.5 * np.linalg.norm(_weights) / np.linalg.norm(_null, axis=0)
+    COARSE_NULL[_rule, :_n], FINE_NULL[_rule, :_n] = _null.T
+# Limit on the depth of parts of a panel; on the first level parts are not divided yet.
 MOST_DEPTH = 12
 # Columns of the ends of a piece: the middles of the gaps before and after it, between them its first and last sample.
 START, LOW, HIGH, STOP = range(4)
@@ -55,7 +61,8 @@ class Cells(NamedTuple):
 class Room(NamedTuple):
     """Work space: crossings, their cells and slopes; cuts of a panel; values at positions, at nodes, and in cells.
 
-    ``marks``, of shape (2, positions + 4), are those of `set_marks`.
+    ``marks``, of shape (2, positions + 4), are those of `set_marks`. The values in cells are 0 but between the cells
+    ``span``, the first and the last one used.
     """
 
     marks: Floats
@@ -66,6 +73,7 @@ class Room(NamedTuple):
     values: Floats
     edge_values: Floats
     samples: Floats
+    span: NDArray[np.int64]
     stack: Floats
 
 
@@ -76,7 +84,7 @@ def room_for(cells: int, nodes: int, positions: int) -> Room:
     return Room(
         marks,
         np.empty(most), np.empty(most + 1, np.int64), np.empty(most), np.empty(2 * most + 2), np.empty(positions),
-        np.empty(nodes), np.zeros((len(GAUSS_NODES), cells)), np.empty((MOST_DEPTH + 2, 3)),
+        np.empty(nodes), np.zeros((max(NUMBERS), cells)), np.array([cells, -1]), np.empty((MOST_DEPTH + 2, 3)),
     )  # fmt: skip
 
 
@@ -239,8 +247,8 @@ def row_masses(ends, grid, values, cells, masses, room):
     """Add the widths of the entry points that lead to the cells at one angle.
 
     Returns the change of the masses by a shift of the outgoing angle of 1 / (4 s (1 - s)) at position s, and the error
-    due to the gaps at the ends, both as norms of the functions' integrals. ``ends`` are the middle of the gap before
-    the piece, its first and last sample, and the middle of the gap after it.
+    due to the gaps at the ends, both as norms of the functions' integrals, and the number of crossings of edges.
+    ``ends`` are the middle of the gap before the piece, its first and last sample, and the middle of the gap after it.
     """
     start, low, high, end = ends
     edges, sizes = cells
@@ -255,7 +263,7 @@ def row_masses(ends, grid, values, cells, masses, room):
         change += 1.5 * room.slopes[k] * (high - low) * math.hypot(sizes[before], sizes[after])
     masses[room.cells[count]] += end - last
     gaps = (low - start) * sizes[room.cells[0]] + (end - high) * sizes[room.cells[count]]
-    return change, gaps
+    return change, gaps, count
 
 
 @compiled
@@ -263,7 +271,7 @@ def masses_of_rows(grid, ends, outs, owners, doubts, cells, masses, errors, room
     """Add the masses of pieces, each at one angle, to those of the angles' numbers ``owners``, and their errors."""
     for i in range(owners.shape[0]):
         k = owners[i]
-        change, gaps = row_masses(ends_at(ends[i], ALONE), grid, outs[i, ALONE], cells, masses[k], room)
+        change, gaps, _ = row_masses(ends_at(ends[i], ALONE), grid, outs[i, ALONE], cells, masses[k], room)
         errors[k] += doubts[i] * change + gaps
 
 
@@ -314,32 +322,49 @@ def cut_patch(row_grid, grid, outs, edges, room):
 
 
 @linked
-def gauss_masses(begin, end, panel, row_grid, grid, ends, outs, cells, room):
+def clear_samples(room):
+    """Set the values in cells to 0."""
+    for j in range(room.span[0], room.span[1] + 1):
+        for k in range(room.samples.shape[0]):
+            room.samples[k, j] = 0.0
+    room.span[0], room.span[1] = room.samples.shape[1], -1
+
+
+@linked
+def sample_masses(k, four, grid, values, cells, room):
+    """Add the widths at one angle to row k of the values in cells; return the change of `row_masses`."""
+    change, _, count = row_masses(four, grid, values, cells, room.samples[k], room)
+    for i in range(count + 1):
+        room.span[0], room.span[1] = min(room.span[0], room.cells[i]), max(room.span[1], room.cells[i])
+    return change
+
+
+@linked
+def gauss_masses(rule, begin, end, panel, row_grid, grid, ends, outs, cells, room):
     """Compute the masses per position at Gauss's nodes on a part of the panel, times the weight of the measure.
 
-    Returns the squared error of the rule, and the integral of the change by a shift of the outgoing angle.
+    Returns the squared error of the rule, and the integral of the change by a shift of the outgoing angle. The values
+    in cells were 0.
     """
     low, high = panel
-    samples, sizes = room.samples, cells.sizes
+    samples, sizes, span = room.samples, cells.sizes, room.span
     moved = 0.0
-    for k in range(GAUSS_NODES.shape[0]):
-        for j in range(sizes.shape[0]):
-            samples[k, j] = 0.0
-        s = begin + (end - begin) * GAUSS_NODES[k]
+    for k in range(NUMBERS[rule]):
+        s = begin + (end - begin) * GAUSS_NODES[rule, k]
         four = interpolate(s, row_grid.nodes, row_grid.weights, ends, outs, room.values)
-        change, _ = row_masses(four, grid, room.values, cells, samples[k], room)
+        change = sample_masses(k, four, grid, room.values, cells, room)
         # the density of the measure is sin(theta) / 2
         theta = low + (high - low) * s * s * (3.0 - 2.0 * s)
         weight = 3.0 * (high - low) * s * (1.0 - s) * math.sin(theta) * (end - begin)
-        moved += GAUSS_WEIGHTS[k] * weight * change
-        for j in range(sizes.shape[0]):
+        moved += GAUSS_WEIGHTS[rule, k] * weight * change
+        for j in range(span[0], span[1] + 1):
             samples[k, j] *= weight
     fine, coarse = 0.0, 0.0
-    for j in range(sizes.shape[0]):
+    for j in range(span[0], span[1] + 1):
         first, second = 0.0, 0.0
-        for k in range(GAUSS_NODES.shape[0]):
-            first += FINE_NULL[k] * samples[k, j]
-            second += COARSE_NULL[k] * samples[k, j]
+        for k in range(NUMBERS[rule]):
+            first += FINE_NULL[rule, k] * samples[k, j]
+            second += COARSE_NULL[rule, k] * samples[k, j]
         fine += (first * sizes[j]) ** 2
         coarse += (second * sizes[j]) ** 2
     return fine + coarse, moved
@@ -348,7 +373,7 @@ def gauss_masses(begin, end, panel, row_grid, grid, ends, outs, cells, room):
 @linked
 def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
     """Add the integrals over a patch to ``masses``; return the squared error, and the change as in `gauss_masses`."""
-    sizes, samples, stack = cells.sizes, room.samples, room.stack
+    samples, stack, span = room.samples, room.stack, room.span
     squares, moved = 0.0, 0.0
     number = cut_patch(row_grid, grid, outs, cells.edges, room)
     for part in range(number - 1):
@@ -359,18 +384,23 @@ def patch_masses(panel, row_grid, grid, ends, outs, cells, goal, masses, room):
         while depth > 0:
             depth -= 1
             begin, end, level = stack[depth, BEGIN], stack[depth, END], stack[depth, LEVEL]
-            error, change = gauss_masses(begin, end, panel, row_grid, grid, ends, outs, cells, room)
-            if error > goal * goal and level < MOST_DEPTH - 1:
-                middle = 0.5 * (begin + end)
-                stack[depth, BEGIN], stack[depth, END], stack[depth, LEVEL] = middle, end, level + 1.0
-                stack[depth + 1, BEGIN], stack[depth + 1, END], stack[depth + 1, LEVEL] = begin, middle, level + 1.0
-                depth += 2
-                continue
-            squares += error
-            moved += change
-            for j in range(sizes.shape[0]):
-                for k in range(GAUSS_NODES.shape[0]):
-                    masses[j] += GAUSS_WEIGHTS[k] * samples[k, j]
+            rule = 0 if level == 0.0 else 1
+            error, change = gauss_masses(rule, begin, end, panel, row_grid, grid, ends, outs, cells, room)
+            if error > goal * goal and level < MOST_DEPTH:
+                # the second rule takes the whole part first
+                middle = 0.5 * (begin + end) if rule == 1 else end
+                if middle < end:
+                    stack[depth, BEGIN], stack[depth, END], stack[depth, LEVEL] = middle, end, level + 1.0
+                    depth += 1
+                stack[depth, BEGIN], stack[depth, END], stack[depth, LEVEL] = begin, middle, level + 1.0
+                depth += 1
+            else:
+                squares += error
+                moved += change
+                for j in range(span[0], span[1] + 1):
+                    for k in range(NUMBERS[rule]):
+                        masses[j] += GAUSS_WEIGHTS[rule, k] * samples[k, j]
+            clear_samples(room)
     return squares, moved
 
 
@@ -389,13 +419,11 @@ def masses_of_patches(panels, row_grid, grid, strips, doubts, limits, goals, cel
     all_ends, all_outs, owners = strips
     at_nodes, between, of_ends = doubts
     middle = row_grid.nodes.shape[0] // 2
-    sizes = cells.sizes
     for i in range(owners.shape[0]):
         p = owners[i]
         ends, outs = all_ends[i], all_outs[i]
-        for j in range(sizes.shape[0]):
-            room.samples[0, j] = 0.0
-        change, _ = row_masses(ends_at(ends, middle), grid, outs[middle], cells, room.samples[0], room)
+        change = sample_masses(0, ends_at(ends, middle), grid, outs[middle], cells, room)
+        clear_samples(room)
         first, last = sizes_at_ends(grid, outs[middle], cells)
         at_ends = of_ends[i] * (first + last)
         if (at_nodes[i] + between[i]) * change + at_ends <= limits[p]:
@@ -408,6 +436,6 @@ def masses_of_patches(panels, row_grid, grid, strips, doubts, limits, goals, cel
                 node_squares[p, k] += (at_nodes[i] * moved / measures[p]) ** 2
         else:
             for k in range(row_grid.nodes.shape[0]):
-                change, gaps = row_masses(ends_at(ends, k), grid, outs[k], cells, rest[p, k], room)
+                change, gaps, _ = row_masses(ends_at(ends, k), grid, outs[k], cells, rest[p, k], room)
                 errors[p, k] += gaps
                 node_squares[p, k] += (at_nodes[i] * change) ** 2
