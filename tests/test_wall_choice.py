@@ -5,6 +5,9 @@ import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
+from asperity.bench.quantities.walls import wall_of
+from asperity.kernels.discretisation.method import QUICK_SEGMENTS, Budget
+from asperity.kernels.discretisation.traced import traced_matrix
 from random_curved_walls import random_curved_wall
 
 # A rough profile of 200 pieces, whose beams resolve completely, and a curve whose beams never do.
@@ -25,8 +28,9 @@ def test_a_rough_matrix_takes_few_rays_and_keeps_its_tolerance(basis):
 
 def test_a_look_that_finds_rays_too_few_changes_no_result():
     basis, generators = ker.Legendre(2), [np.random.default_rng(5) for _ in range(2)]
-    looked = ker.discretise(MUSHROOMS, basis, tolerance=1e-8, rng=generators[0])
-    asked = ker.discretise(MUSHROOMS, basis, method="qmc", rng=generators[1])
+    law = ker.WallLaw(KOCH)
+    looked = ker.discretise(law, basis, tolerance=1e-5, rng=generators[0])
+    asked = ker.discretise(law, basis, method="qmc", rng=generators[1])
     # but for the order of sums
     assert looked.method == "qmc" and np.allclose(looked.symmetric, asked.symmetric, rtol=0.0, atol=1e-15)
 
@@ -61,6 +65,29 @@ def test_a_tighter_tolerance_that_is_out_of_reach_gives_no_worse_a_matrix():
     law, basis = ker.WallLaw(geo.focusing_arcs(1.2).foreshorten(geo.Disk(1.0, 0.5))), ker.Legendre(2)
     loose, tight = (float(ker.discretise(law, basis, tolerance=tolerance).error) for tolerance in (1e-4, 1e-10))
     assert loose <= 1e-4 and tight <= loose
+
+
+@pytest.mark.parametrize("wall", [geo.dispersing_arcs(1.0), geo.mushrooms(0.3)], ids=["dispersing", "mushrooms"])
+def test_curved_walls_in_bins_are_left_to_quadrature_where_it_is_far_more_exact(wall):
+    law, basis = ker.WallLaw(wall), ker.Bins(32)
+    chosen, rays = (ker.discretise(law, basis, method=how) for how in ("auto", "qmc"))
+    assert chosen.method == "quadrature" and float(chosen.error) <= 0.01 * float(rays.error)
+    # Student's distribution, as above
+    assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= 2.5 * float(rays.error)
+
+
+def test_quadrature_whose_first_panels_would_take_too_long_leaves_its_work_to_rays():
+    wall, many = geo.dispersing_arcs(1.0), ker.Bins(1024)
+    _, error, rays = traced_matrix(wall, many, Budget(1e-8, segments=QUICK_SEGMENTS, fallback=1.0))
+    assert np.isinf(error) and rays == 0
+    assert ker.discretise(ker.WallLaw(wall), many, samples=2**12).method == "qmc"
+
+
+def test_a_wall_of_different_hollows_takes_rays_of_the_whole_for_a_rough_answer():
+    law, basis = ker.WallLaw(wall_of("mixed")), ker.Legendre(2)
+    rough, fine = (ker.discretise(law, basis, tolerance=tolerance) for tolerance in (4e-3, 1e-6))
+    assert rough.method == "qmc" and rough.samples < 2**17 and float(rough.error) <= 4e-3
+    assert "exact" in fine.method and abs(rough.symmetric[1, 1] - fine.symmetric[1, 1]) <= 2.5 * float(rough.error)
 
 
 def test_where_few_rays_are_allowed_the_more_exact_of_rows_and_rays_is_returned():

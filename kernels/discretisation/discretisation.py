@@ -116,7 +116,8 @@ def discretise(
     14. ``MonteCarlo`` (monte-carlo): any law.
 
     Methods 1 to 9 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the other
-    frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 14 come last.
+    frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 14 come last. A
+    wall with different hollows is a sum, unless up to 2^17 rays that enter anywhere meet the tolerance.
 
     For a composition the result is the Galerkin matrix of the product, not the product of Galerkin matrices, which
     differs unless the basis is invariant. Compositions are first simplified by the algebra: isometries are moved

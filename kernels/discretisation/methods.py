@@ -18,7 +18,7 @@ from ..matrices.matrix import KernelMatrix
 from ..walls.simplification import law_of, words_of
 from .actions import Actions
 from .arcs import Arcs
-from .auto_wall import AutoWall
+from .auto_wall import AutoWall, rays_of_whole
 from .densities import Densities, LeastResistance, Maps
 from .entry_points import EntryPoints
 from .isometries import Isometries
@@ -46,6 +46,9 @@ def recipe(law: Law, wanted: MethodName) -> Callable[[Basis, Budget], KernelMatr
     """
 
     def made(basis: Basis, budget: Budget) -> KernelMatrix:
+        rough = rays_of_whole(law, basis, budget) if wanted == "auto" else None
+        if rough is not None:
+            return rough
         # Independent rays use the law without simplification.
         found = _Law(law) if wanted == "monte-carlo" else _simplified(law)
         if wanted != "auto" and not found.has(wanted, basis):
@@ -129,7 +132,7 @@ class _Sum:
         return all(part.without_rays(basis) for _, part in self.parts)
 
     def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
-        made = [(weight, part.matrix(wanted, basis, budget)) for weight, part in self.parts]
+        made = self._matrices(wanted, basis, budget)
         total = sum((weight * matrix for weight, matrix in made[1:]), start=made[0][0] * made[0][1])
         sampled = [(weight, matrix) for weight, matrix in made if matrix.samples]
         single = sampled[0] if len(sampled) == 1 else None
@@ -144,6 +147,16 @@ class _Sum:
             error=replace(total.error, method="sum over the terms: " + total.error.method),
             norm_bound=1.0,
         )
+
+    def _matrices(self, wanted: MethodName, basis: Basis, budget: Budget) -> list[tuple[float, KernelMatrix]]:
+        """The matrices of the terms; those that may need rays come last and share what the others leave over."""
+        found: dict[int, KernelMatrix] = {}
+        left, weight_left = budget.tolerance, sum(weight for weight, _ in self.parts)
+        for k, (weight, part) in sorted(enumerate(self.parts), key=lambda one: not one[1][1].without_rays(basis)):
+            share = max(budget.tolerance, left / weight_left) if weight_left > 0.0 else budget.tolerance
+            found[k] = part.matrix(wanted, basis, replace(budget, tolerance=share))
+            left, weight_left = left - weight * float(found[k].error), weight_left - weight
+        return [(weight, found[k]) for k, (weight, _) in enumerate(self.parts)]
 
 
 class _Mirrored:

@@ -57,6 +57,11 @@ STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
 # The same for cells, but from COARSEST_CELLS on, and only if the first panels need more than a fraction of the limit on
 # segments at the wanted tolerance. This is predicted from some angles; patches cost a multiple of the rows.
 CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.1, 3.0
+# If another method can take over, the coarse panels of bases with edges may need this fraction of the limit: on cusps,
+# which need .7 of it in 32 bins, rays were four times as fast.
+FRACTION_OF_PANELS = 0.5
+# Fraction of the limit before which nothing is predicted: the first few panels of polynomials miss most changes.
+PATIENCE = 1.0 / 16.0
 # Factor of the tolerance of expectations, if their errors have more than this fraction of the tolerance together.
 TIGHTENING, MOST_MEANS = 0.2, 0.4
 # Fraction of the remaining segments that is spent on better expectations before the limit is looked at again.
@@ -73,8 +78,8 @@ SMOOTH_SHRINKING = 1e-3
 LEAST_RATIO = 1e-3
 RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
-# A stage begins only if its predicted error is below WORTHWHILE times the present error and tolerance, and below
-# LARGEST_JUMP times the fallback error.
+# A stage begins only if its predicted error is below WORTHWHILE times the present error and tolerance, or the present
+# error below LARGEST_JUMP times the fallback error; it goes on only if its predicted error is below that multiple.
 WORTHWHILE, LARGEST_JUMP = 0.5, 4.0
 # Least distance of cuts from each other and from the ends of a panel, as a fraction of the panel.
 LEAST_CUT = 1e-7
@@ -115,20 +120,28 @@ def is_affordable(wall: Wall, basis: Basis) -> bool:
     Each incoming angle has several changes of itinerary per piece, each found by about 30 rays. An error of 1e-6 needs
     about a thousand angles and one breakpoint in theta per piece, so the cost grows like the square of the pieces. At
     each angle a change of cell costs as much as a change of itinerary, and each cell in theta is integrated separately.
-    In overhanging walls rays stay in cavities for long, with an unbounded number of changes. In walls that do not
-    close, rays near grazing pass arbitrarily many cells; on three walls with islands sampled rays were better.
+    In overhanging walls rays stay in cavities for long, with an unbounded number of changes.
+    """
+    cells = 1 if basis.is_polynomial else len(basis.edges) - 1
+    overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
+    return may_be_affordable(wall, cells) and not overhangs
+
+
+def may_be_affordable(wall: Wall, cells: int = 1) -> bool:
+    """Whether adaptive quadrature beats the sampling of rays on some walls like this, which its first segments tell.
+
+    In walls that do not close, rays near grazing pass arbitrarily many cells; on three walls with islands sampled rays
+    were better.
     """
     pieces = len(wall.pieces) + sum(map(len, wall.islands))
-    cells = 1 if basis.is_polynomial else len(basis.edges) - 1
     predicted = ANGLES_A_PIECE * SEGMENTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
-    overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
-    return bool(wall.closes) and not overhangs and predicted <= AFFORDABLE
+    return bool(wall.closes) and predicted <= AFFORDABLE
 
 
 def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
     """<e_i, P e_j> of a wall's law, an estimate of its Frobenius error, and the number of rays used.
 
-    If the first angles predict an error above ``budget.fallback``, the computation ends with them.
+    If the first sixteenth of the segments predicts an error above ``budget.fallback``, the computation ends with it.
 
     The error of a panel is half the size of the null rules, of which the difference of Kronrod's and Gauss's rule is
     one, if the expectations have a kink there, and 2.8 times it if neighbouring nodes share few itineraries. If the
@@ -188,23 +201,34 @@ class _Integrator:
         stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
         self.first_tolerance = self.tolerance / STAGE_RATIO**stages
         self.ratio, self.tightens = STAGE_RATIO, False
+        least_segments = 0.0
         if self.cells is not None:
-            self.tightens = self._predicted(edges) <= FIRST_FRACTION * budget.segments
-            self.first_tolerance = self.tolerance if self.tightens else max(self.tolerance, COARSEST_CELLS)
             self.ratio = CELL_RATIO
+            self.first_tolerance = max(self.tolerance, COARSEST_CELLS)
+            least_segments = self._predicted(edges, self.first_tolerance)
+            more = self._predicted(edges, self.tolerance)
+            self.tightens = least_segments + more <= FIRST_FRACTION * budget.segments
+            if self.tightens:
+                self.first_tolerance = self.tolerance
+        elif not basis.is_polynomial and math.isfinite(budget.fallback):
+            least_segments = self._predicted(edges, self.first_tolerance)
         self.mean_tolerance = MEAN_FRACTION * self.first_tolerance
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
-        self._add_panels(edges[:-1], edges[1:])
+        if math.isinf(budget.fallback) or least_segments <= FRACTION_OF_PANELS * budget.segments:
+            self._add_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
         """Divide panels, in stages of decreasing tolerance, until the error is small enough or no segments are left.
 
-        The matrix with the least error is returned, because an interrupted stage may increase the error.
+        The matrix with the least error is returned, because an interrupted stage may increase the error. Without panels
+        its error is inf.
         """
+        if not len(self.panels.low):
+            return *self.best, self.rays
         tolerance = self.first_tolerance
         self._begin(tolerance)
         error, *_ = self._measure()
-        if self.budget.out_of_reach(error, self.segments):
+        if self._is_out_of_reach(error):
             return *self.best, self.rays
         while True:
             self._meet(tolerance)
@@ -214,12 +238,23 @@ class _Integrator:
             tolerance = following
             self._begin(tolerance)
 
-    def _predicted(self, edges: Floats) -> float:
-        """The ray segments that the first panels need at the wanted tolerance, from those of some angles."""
-        tolerance = MEAN_FRACTION * self.tolerance / math.sqrt(FAIR_FRACTION)
-        segments = self.conditionals(SAMPLED_ANGLES, tolerance).segments
+    def _is_out_of_reach(self, error: float) -> bool:
+        """Whether enough segments were spent to tell that another method is likely to be more exact."""
+        enough = self.segments >= PATIENCE * self.budget.segments
+        return enough and self.budget.out_of_reach(error / LARGEST_JUMP, self.segments)
+
+    def _predicted(self, edges: Floats, tolerance: float) -> float:
+        """The ray segments that the first panels need at a tolerance, beyond those already spent, from some angles."""
+        of_means = min(MEAN_FRACTION * tolerance / math.sqrt(FAIR_FRACTION), self._coarsest_mean)
+        segments = self.conditionals(SAMPLED_ANGLES, of_means).segments
         self.segments += segments
-        return PATCH_COST * len(NODES) * (len(edges) - 1) * segments / len(SAMPLED_ANGLES)
+        patches = PATCH_COST if self.cells is not None else 1.0
+        return patches * len(NODES) * (len(edges) - 1) * segments / len(SAMPLED_ANGLES)
+
+    @property
+    def _coarsest_mean(self) -> float:
+        """The largest tolerance of an expectation."""
+        return COARSEST_MEAN * float(np.median(self.sizes))
 
     def _following(self, tolerance: float) -> float | None:
         """The tolerance of the next stage; None at the end, or if the fallback is likely to be as good.
@@ -231,10 +266,12 @@ class _Integrator:
         wanted = max(self.ratio * tolerance, self.tolerance)
         if math.isinf(self.budget.fallback):
             return wanted
-        error = self.best[1]
+        error, most = self.best[1], LARGEST_JUMP * self.budget.fallback
         predicted = self.budget.predicted(error, self.segments)
-        hoped = min(WORTHWHILE * min(error, tolerance), LARGEST_JUMP * self.budget.fallback)
-        return max(wanted, predicted) if predicted < hoped else None
+        hoped = min(WORTHWHILE * min(error, tolerance), most)
+        if predicted < hoped:
+            return max(wanted, predicted)
+        return wanted if error <= most else None
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
@@ -261,7 +298,7 @@ class _Integrator:
         goal = means = tolerance
         while True:
             error, panels, conditionals, hidden = self._measure()
-            if error <= tolerance or self.segments >= self.budget.segments:
+            if error <= tolerance or self.segments >= self.budget.segments or self._is_out_of_reach(error):
                 return
             if self.tightens and conditionals > MOST_MEANS * tolerance and means > 0.01 * tolerance:
                 # gaps where a change hardly changes the angle may count more in cells
@@ -362,8 +399,7 @@ class _Integrator:
     def _fill(self, panels: AnglePanels, mask: NDArray[np.bool_]) -> None:
         """Compute the expectations at the nodes of the mask, and the errors of their panels."""
         fraction = FAIR_FRACTION / np.maximum(panels.mass, np.finfo(np.float64).tiny)
-        coarsest = COARSEST_MEAN * float(np.median(self.sizes))
-        tolerance = np.minimum(self.mean_tolerance * np.sqrt(np.maximum(1.0, fraction)), coarsest)
+        tolerance = np.minimum(self.mean_tolerance * np.sqrt(np.maximum(1.0, fraction)), self._coarsest_mean)
         if self.cells is not None:
             self._fill_cells(self.cells, panels, np.flatnonzero(mask.any(axis=1)), tolerance)
             return
