@@ -7,13 +7,15 @@ import platform
 import subprocess
 import sys
 import threading
+import time
+import weakref
 
 import numpy as np
 import pytest
 
 from asperity import geometry as geo
 from asperity.errors import InputError
-from asperity.geometry.tracing.threads import in_blocks
+from asperity.geometry.tracing.threads import in_blocks, interruptibly
 from plain_tracer import trace_plainly
 
 EPS = np.finfo(float).eps
@@ -328,6 +330,78 @@ def test_a_process_that_is_pinned_to_one_core_traces_on_one_thread():
     finally:
         os.sched_setaffinity(0, before)
     assert seen == {own}
+
+
+def test_threads_wait_for_the_next_call():
+    x, theta = rays(13, 2**15)
+    wall = geo.focusing_arcs(0.8)
+    geo.trace(wall, x, theta, threads=2)
+    before = threading.active_count()
+    for _ in range(20):
+        geo.trace(wall, x, theta, threads=2)
+    assert threading.active_count() == before
+
+
+def test_a_waiting_thread_holds_nothing_of_the_last_call():
+    class Large:
+        def read(self):
+            return 7
+
+    held = Large()
+    there = weakref.ref(held)
+    assert interruptibly(held.read) == 7
+    del held
+    limit = time.monotonic() + 10.0
+    while there() is not None and time.monotonic() < limit:
+        time.sleep(0.001)
+    assert there() is None
+
+
+def test_a_failure_on_a_waiting_thread_reaches_the_caller_and_leaves_the_thread():
+    def fail():
+        raise ArithmeticError("seven")
+
+    assert interruptibly(lambda: 1) == 1
+    before = threading.active_count()
+    for _ in range(5):
+        with pytest.raises(ArithmeticError, match="seven"):
+            interruptibly(fail)
+        assert interruptibly(lambda: 2) == 2
+    assert threading.active_count() == before
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="processes cannot be pinned here")
+def test_a_call_runs_on_the_processors_of_its_caller():
+    before = os.sched_getaffinity(0)
+    interruptibly(lambda: None)
+    try:
+        os.sched_setaffinity(0, {min(before)})
+        pinned = interruptibly(lambda: os.sched_getaffinity(0))
+    finally:
+        os.sched_setaffinity(0, before)
+    assert pinned == {min(before)}
+    assert interruptibly(lambda: os.sched_getaffinity(0)) == before
+
+
+FORKED = """
+import os
+import numpy as np
+from asperity import geometry as geo
+wall, x = geo.focusing_arcs(0.8), np.linspace(0.1, 0.9, 2**15)
+before = geo.trace(wall, x, 1.0, threads=2)
+child = os.fork()
+after = geo.trace(wall, x, 1.0, threads=2)
+assert np.array_equal(after.theta, before.theta)
+if child == 0:
+    os._exit(0)
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes cannot be forked here")
+def test_a_forked_process_starts_threads_of_its_own():
+    # Python 3.12 warns of every fork of a process with threads
+    subprocess.run([sys.executable, "-W", "ignore", "-c", FORKED], check=True, timeout=60)
 
 
 FAULTS = """
