@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 
 from ...core.checks import whole_number
 
-# Rays in one block. Passing a block to a thread costs about 30 us, as much as a thousand of the cheapest rays, and is
-# serial; smaller blocks balance the threads better.
-LEAST_BLOCK, MOST_BLOCK = 2**13, 2**15
-BLOCKS_PER_THREAD = 4
+# Rays in one block. Passing a block to a thread costs about 30 us, as much as a few thousand of the cheapest rays, and
+# is serial; smaller blocks balance the threads better.
+LEAST_BLOCK, MOST_BLOCK = 2**13, 2**17
+BLOCKS_PER_THREAD = 2
 # Seconds of one wait of the main thread, the largest delay of Ctrl-C if waiting cannot be interrupted.
 MOMENT = 0.1
 

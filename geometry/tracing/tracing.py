@@ -22,7 +22,6 @@ from ...core.checks import (
     numbers,
     whole_number,
 )
-from ...core.errors import InputError
 from ...core.kinds import explained
 from ..scene.columns import FORM, FORM_COLUMNS, LEFT, NO_FORM, RIGHT
 from ..walls.wall import Wall
@@ -201,18 +200,16 @@ def trace(
     unresolved = []
 
     def run(block: slice) -> None:
-        # here and not for all rays before, because each thread checks its own
-        finite_array("x", given[block])
-        angles("theta", incoming[block])
         if starts is not given:
+            _check_rays(given[block], incoming[block])
             starts[block] = entries(wall, given[block], incoming[block])
-        trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], status[block])
         found = status[block]
+        trace_block(starts[block], incoming[block], out_x[block], out_theta[block], collisions[block], found)
         unresolved.append(found.any() and np.any((found == Status.CORNER) | (found == Status.GRAZING)))
 
     try:
         in_blocks(run, len(starts), threads, stop=None if len(starts) * _work(scene) <= LITTLE_WORK else stop)
-    except InputError:
+    except InvalidRays:
         # the message names the place among all rays
         finite_array("x", x)
         angles("theta", theta)
@@ -233,6 +230,17 @@ def trace(
     for array in results:
         array.setflags(write=False)
     return Trace(*results)
+
+
+class InvalidRays(Exception):
+    """Some rays of a block have an angle outside (0, pi) or an entry that is not finite."""
+
+
+def _check_rays(x: Floats, theta: Floats) -> None:
+    """Raise `InvalidRays` if an entry is not finite or an angle not in (0, pi)."""
+    # NaN is the least and the largest number of an array that has it
+    if len(x) and not (theta.min() > 0.0 and theta.max() < np.pi and np.isfinite(x).all()):
+        raise InvalidRays
 
 
 def _keep_freed_memory(rays: int) -> None:
@@ -263,33 +271,43 @@ def _goes_in_waves(scene: Scene, rays: int) -> bool:
 
 
 def _block_tracer(scene: Scene, max_collisions: int, stop: NDArray[np.int64], in_waves: bool) -> Callable[..., None]:
-    """Return a function of x, theta and four arrays to fill, which traces by closed forms where possible."""
+    """Return a function of x, theta and four arrays to fill, which traces by closed forms where possible.
+
+    It checks the rays, block by block because each thread checks its own, and raises `InvalidRays`.
+    """
 
     def follow(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.pointers import checked
         from .compiled.rays import SLOTS, trace_rays
         from .compiled.records import NOT_WANTED, Results
 
+        _check_rays(x, theta)
         out_x, out_theta, collisions, status = results
         wanted = Results(out_x, out_theta, collisions, status, *NOT_WANTED)
         checked(lambda: trace_rays(x, theta, scene.tables, max_collisions, stop, wanted, SLOTS))
+
+    rooms: list[Any] = []
 
     def close(x: Floats, theta: Floats, *results: NDArray[Any]) -> None:
         from .compiled.closed_forms import CROSSINGS, RAYS, UNDECIDED, room_for, trace_closed
         from .compiled.pointers import checked
 
-        tables, room = scene.tables, room_for(scene.hollows, MANY_RAYS if in_waves else RAYS)
+        tables = scene.tables
+        # of an earlier block, if another thread does not use it
+        room = rooms.pop() if rooms else room_for(scene.hollows, MANY_RAYS if in_waves else RAYS)
         closed = np.empty((0, FORM_COLUMNS)) if scene.closed is None else scene.closed
         crossings = CROSSINGS if in_waves else (*CROSSINGS[:2], 0)
         first, size = 0, MANY_RAYS if in_waves else len(x)
         while first < len(x) and not stop[0]:
             part = slice(first, first + size)
             entry, angle, found = x[part], theta[part], tuple(result[part] for result in results)
-            checked(partial(trace_closed, entry, angle, tables, closed, max_collisions, found, room, crossings))
+            if not checked(partial(trace_closed, entry, angle, tables, closed, max_collisions, found, room, crossings)):
+                raise InvalidRays
             if in_waves and np.count_nonzero(found[-1] == UNDECIDED) > MOST_LEFT * len(entry):
                 crossings = (*CROSSINGS[:2], 0)
             first += size
             size = LONG_PART
+        rooms.append(room)
         rest = np.flatnonzero(results[-1][:first] == UNDECIDED)
         if len(rest):
             followed = tuple(np.empty(len(rest), result.dtype) for result in results)

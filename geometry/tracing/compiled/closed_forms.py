@@ -249,12 +249,22 @@ def cell_of(x, cell):
     return np.floor(x / cell) * cell
 
 
+@inlined
+def count_invalid(x, theta):
+    """-> int: number of rays whose angle is not in (0, pi) or whose entry is not finite."""
+    count = 0
+    for j in range(x.shape[0]):
+        count += 0 if 0.0 < theta[j] < PI and abs(x[j]) < np.inf else 1
+    return count
+
+
 @compiled
 def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
-    """Trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
+    """-> bool: trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
 
-    ``closed`` are the closed forms, empty if no hollow has one. ``results`` are four arrays to fill: x, theta,
-    collisions, status. ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
+    False if an angle is not in (0, pi) or an entry not finite; the results are then incomplete. ``closed`` are the
+    closed forms, empty if no hollow has one. ``results`` are four arrays to fill: x, theta, collisions, status.
+    ``room`` is `room_for`, ``crossings`` is `CROSSINGS`.
     """
     hollows, cell = tables.hollows, tables.cell
     out_x, out_theta, bounces, status = results
@@ -269,6 +279,8 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     for first in range(0, x.shape[0], block):
         count = min(block, x.shape[0] - first)
         starts = x[first : first + count]
+        if count_invalid(starts, theta[first : first + count]) > 0:
+            return False
         if whole:
             # a single hollow without flat tops: compute in the arrays of the results, without gathering
             entry, angle, hits = out_x[first : first + count], out_theta[first : first + count], numbers[3, :count]
@@ -314,3 +326,4 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
                 i = rays[j]
                 out_x[i], out_theta[i], bounces[i] = entry[j] + cell_of(x[i], cell), angle[j], int(hits[j])
                 status[i] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
+    return True
