@@ -71,6 +71,8 @@ from .columns import (
     RUN_SINE,
     SHORT_CHORD,
     SIZE,
+    SKY_LEFT,
+    SKY_RIGHT,
     SMOOTH_EDGE,
     SPAN,
     START_CORNER,
@@ -90,6 +92,7 @@ from .columns import (
     table_of,
 )
 from .facing import facing_pairs
+from .sky import sky_of
 from .tolerances import NEARBY_MARGIN, SMOOTH_JOINT
 
 # Half angle below which it is computed from the chord and the radius, more exactly than from two parameters.
@@ -358,6 +361,8 @@ class _Tables:
             self._mark_pairs(lines, chains, size)
         if np.count_nonzero(joints[:, STARTS_LINE]) >= TREE_LINES:
             self._add_tree(joints, size)
+            if is_closed and chains[0].is_line.all():
+                lines[:-1, [SKY_RIGHT, SKY_LEFT]] = sky_of(chains[0].vertices, size)
         self.joints.append(joints)
         self.lines.append(lines)
         self.circles.append(circles)

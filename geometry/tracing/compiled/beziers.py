@@ -533,8 +533,7 @@ class _Meeting:
             at_corner = (start > 0.0) & (dot(dx, dy, dx, dy) <= start * start)
             dx, dy = x - curve[END_X], y - curve[END_Y]
             at_corner = at_corner | ((end > 0.0) & (dot(dx, dy, dx, dy) <= end * end))
-            no_run = self.zero > 0.0
-            ray.hit(nearer, self.number, time, (x, y), (-ty * scale, tx * scale), at_corner, no_run)
+            ray.hit(nearer, self.number, time, (x, y), (-ty * scale, tx * scale), at_corner)
             ray.at[HIT_S] = nearer.where(s, ray.at[HIT_S])
 
     def hit_from_own(self, g: Any, shift: Lanes, chosen: Lanes) -> None:

@@ -44,9 +44,10 @@ from ...scene.columns import (
 )
 from ...scene.scene import NO_TABLES
 from .lanes import WALKS, WAVE, WORK
+from .lines import NATURAL
 from .options import compiled, inlined, inner
 from .pointers import Late, address_at, call_at
-from .rays import FLAT_TOP, TOP_CORNER, opening_at
+from .rays import TOP_CORNER, last_hollow, opening_at
 from .trigonometry import PI, PI_REST, arcsine, mirrored, sine_cosine
 from .waves import cross_simple
 
@@ -54,6 +55,8 @@ from .waves import cross_simple
 UNDECIDED = 255
 ESCAPED = 0
 RAYS = WAVE
+# Number of hollows up to which their left ends are compared with many rays at once, without a search for each ray.
+FEW_HOLLOWS = 16
 # Numbers in a line of the cache.
 LINE = 8
 # Adding and then subtracting this number rounds a number below 2^51 to an integer.
@@ -63,11 +66,11 @@ FIRST_HOLLOW = np.int64(0)
 
 
 class Room(NamedTuple):
-    """Work space: six arrays, as long as a block has rays.
+    """Work space: seven arrays, as long as a block has rays.
 
-    Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, of which ``heads``
-    is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and the work space of waves, and of
-    their rays in trees of boxes.
+    Then the numbers of the rays of one hollow; linked lists of the rays of each hollow in a block, and of those that
+    meet none, of which ``heads`` is the first ray (-1 for none), ``others`` the next; the hollows that rays meet; and
+    the work space of waves, and of their rays in trees of boxes.
     """
 
     numbers: Floats
@@ -92,7 +95,8 @@ def room_for(hollows: Floats, block: int) -> Room:
     # rays near one of many Bezier pieces are gathered in a second part
     parts = 2 if np.any(hollows[:, BEZIERS_END] > hollows[:, FIRST_BEZIER]) else 1
     walks = np.empty(WALKS if np.any(hollows[:, TREE_LEVELS] > 0.0) else 0, np.int64)
-    return Room(np.empty((6, block)), rays, others, met, np.full(len(hollows), -1), _aligned(parts * WORK), walks)
+    heads = np.full(len(hollows) + 1, -1)
+    return Room(np.empty((7, block)), rays, others, met, heads, _aligned(parts * WORK), walks)
 
 
 @inner
@@ -258,6 +262,50 @@ def count_invalid(x, theta):
     return count
 
 
+@inlined
+def put_into_hollows(starts, theta, hollows, cell, results, room):
+    """-> int: the number of hollows that the rays of a block meet; list the rays of each, after those of flat tops.
+
+    The last list, of number ``hollows.shape[0]``, has the rays that meet a flat top or a corner. Their results are
+    stored, and overwritten where a ray meets a hollow. Rays are spread, so the processor could not predict branches.
+    """
+    ends, gone, bounces, status = results
+    bases, others, met, heads = room.numbers[6], room.others, room.met, room.heads
+    count, flat, kinds = starts.shape[0], hollows.shape[0], 0
+    for j in range(count):
+        bases[j] = cell_of(starts[j], cell)
+    for j in range(count):
+        ends[j] = starts[j]
+    for j in range(count):
+        gone[j] = mirrored(theta[j])
+    for j in range(count):
+        bounces[j] = 1
+    for j in range(count):
+        status[j] = ESCAPED
+    # of a few hollows the left ends before each ray are counted, for many rays at once
+    places, searched = room.numbers[4], flat > FEW_HOLLOWS
+    for k in range(1, 0 if searched else flat):
+        for j in range(count):
+            found = places[j] if k > 1 else 0.0
+            places[j] = found + 1.0 if starts[j] - bases[j] >= hollows[k, LEFT] else found
+    for j in range(count if flat > 0 else 0):
+        entry, h = starts[j] - bases[j], 0
+        if flat > 1:
+            h = max(last_hollow(entry, hollows), 0) if searched else int(places[j]) & NATURAL
+        left, right = hollows[h, LEFT], hollows[h, RIGHT]
+        place = h if (left < entry) & (entry < right) else flat
+        if (entry == left) | (entry == right):
+            h = opening_at(entry, hollows)
+            place = h if h >= 0 else flat
+            if h == TOP_CORNER:
+                status[j] = UNDECIDED
+        met[kinds] = place
+        kinds += np.int64(heads[place] < 0)
+        others[j] = heads[place]
+        heads[place] = j
+    return kinds
+
+
 @compiled
 def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
     """-> bool: trace a block of rays by flat tops and closed forms; all other rays get the status `UNDECIDED`.
@@ -275,55 +323,50 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
         and hollows[0, LEFT] == 0.0
         and hollows[0, RIGHT] == cell
     )
-    block = numbers.shape[1]
+    block, flat = numbers.shape[1], hollows.shape[0]
     for first in range(0, x.shape[0], block):
-        count = min(block, x.shape[0] - first)
-        starts = x[first : first + count]
-        if count_invalid(starts, theta[first : first + count]) > 0:
+        end = min(first + block, x.shape[0])
+        starts, incoming, count = x[first:end], theta[first:end], end - first
+        ends, gone, collisions, states = out_x[first:end], out_theta[first:end], bounces[first:end], status[first:end]
+        if count_invalid(starts, incoming) > 0:
             return False
         if whole:
             # a single hollow without flat tops: compute in the arrays of the results, without gathering
-            entry, angle, hits = out_x[first : first + count], out_theta[first : first + count], numbers[3, :count]
+            hits = numbers[3, :count]
             for j in range(count):
-                entry[j] = starts[j] - cell_of(starts[j], cell)
+                ends[j] = starts[j] - cell_of(starts[j], cell)
             for j in range(count):
-                angle[j] = theta[first + j]
-            cross_hollow(tables, closed, FIRST_HOLLOW, limit, entry, angle, hits, room, crossings)
+                gone[j] = incoming[j]
+            cross_hollow(tables, closed, FIRST_HOLLOW, limit, ends, gone, hits, room, crossings)
             for j in range(count):
-                entry[j] += cell_of(starts[j], cell)
+                ends[j] += cell_of(starts[j], cell)
             for j in range(count):
-                bounces[first + j] = int(hits[j])
-                status[first + j] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
+                collisions[j] = int(hits[j])
+                states[j] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
             continue
-        kinds = 0
-        for j in range(count):
-            i = first + j
-            h = opening_at(x[i] - cell_of(x[i], cell), hollows)
-            if h == FLAT_TOP:
-                out_x[i], out_theta[i], bounces[i], status[i] = x[i], mirrored(theta[i]), 1, ESCAPED
-            elif h == TOP_CORNER or not is_crossed(hollows[h], closed, h, crossings):
-                status[i] = UNDECIDED
-            else:
-                if heads[h] < 0:
-                    met[kinds] = h
-                    kinds += 1
-                others[j] = heads[h]
-                heads[h] = j
+        kinds = put_into_hollows(starts, incoming, hollows, cell, (ends, gone, collisions, states), room)
+        bases = numbers[6]
         for k in range(kinds):
             h = met[k]
             j, count = heads[h], 0
             heads[h] = -1
+            if h == flat:
+                continue
             while j >= 0:
-                rays[count] = first + j
+                rays[count] = j
                 count += 1
                 j = others[j]
+            if not is_crossed(hollows[h], closed, h, crossings):
+                for j in range(count):
+                    states[rays[j]] = UNDECIDED
+                continue
             entry, angle, hits = numbers[4, :count], numbers[5, :count], numbers[3, :count]
             for j in range(count):
-                entry[j] = x[rays[j]] - cell_of(x[rays[j]], cell)
-                angle[j] = theta[rays[j]]
+                i = rays[j] & NATURAL
+                entry[j], angle[j] = starts[i] - bases[i], incoming[i]
             cross_hollow(tables, closed, h, limit, entry, angle, hits, room, crossings)
             for j in range(count):
-                i = rays[j]
-                out_x[i], out_theta[i], bounces[i] = entry[j] + cell_of(x[i], cell), angle[j], int(hits[j])
-                status[i] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
+                i = rays[j] & NATURAL
+                ends[i], gone[i], collisions[i] = entry[j] + bases[i], angle[j], int(hits[j])
+                states[i] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
     return True

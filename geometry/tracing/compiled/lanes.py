@@ -6,18 +6,39 @@ by `lines`, `arcs` and `rays`, so with the same rounding. Comparisons with NaN, 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.extending import intrinsic, models, register_model
 
 from ...scene.boxes import ANCHOR_X, ANCHOR_Y, BOXES, OTHER_X, OTHER_Y
 from .arcs import NEARLY_TANGENT
 
 WORD, NUMBER, BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
 LANES = ir.VectorType(NUMBER, BOXES)
+# Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.
+LEAST_FRACTION = 5e-324
+
+
+class Eight(types.Type):
+    """The type of eight numbers in a register."""
+
+    def __init__(self) -> None:
+        super().__init__("eight numbers")
+
+
+@register_model(Eight)
+class EightModel(models.PrimitiveModel):
+    """Eight numbers are a vector in compiled code."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, LANES)
+
+
+EIGHT = Eight()
 
 
 class Lanes:
@@ -207,6 +228,85 @@ def lines_met(typing, table, row, px, py, vx, vy, slack):
     return types.int64(table, types.int64, *[types.float64] * 5), met
 
 
+def chosen(builder: Any, condition: Any, values: list[Any], compute: Callable[[], list[Any]]) -> list[Any]:
+    """Return the values that ``compute`` returns where a condition of the compiled code holds, else ``values``."""
+    before = builder.block
+    with builder.if_then(condition):
+        computed = compute()
+        after = builder.block
+    return [joined(builder, (old, before), (new, after)) for old, new in zip(values, computed, strict=True)]
+
+
+def joined(builder: Any, *choices: tuple[Any, Any]) -> Any:
+    """Return the value that comes with the block of the compiled code from which it is reached."""
+    first = choices[0][0]
+    if isinstance(first, Lanes):
+        return Lanes(builder, joined(builder, *((value.value, block) for value, block in choices)))
+    one = builder.phi(first.type)
+    for value, block in choices:
+        one.add_incoming(value, block)
+    return one
+
+
+def least(values: Lanes) -> Any:
+    """Return the least of eight numbers, in compiled code."""
+    builder, index, rest = values.builder, ir.IntType(32), values
+    while rest.count > 1:
+        half = rest.count // 2
+        low, high = (
+            Lanes(
+                builder, builder.shuffle_vector(rest.value, rest.value, ir.Constant(ir.VectorType(index, half), places))
+            )
+            for places in (list(range(half)), list(range(half, 2 * half)))
+        )
+        rest = (low < high).where(low, high)
+    return builder.extract_element(rest.value, index(0))
+
+
+@intrinsic
+def nearest_of_lines(typing, table, row, own, px, py, vx, vy, slack, close):
+    """-> (time, fraction, line, masks): the first hit of a ray on the lines in a row of a tree after a time ``close``.
+
+    Without a hit the time is inf. The fraction is that of `lines.line_time`, the line its place in the row; ``own`` is
+    the place of the line on which the ray starts. Bit k of the masks tells whether an end of line k is within the slack
+    of the ray's line, bit 8 + k whether line k is hit within the time ``close`` of the start.
+    """
+
+    def met(context, builder, signature, values):
+        at = Table(context, builder, signature.args[0], values[0]).row(values[1])
+        own = repeated(builder, builder.sitofp(values[2], NUMBER))
+        px, py, vx, vy, slack, close = (repeated(builder, value) for value in values[3:])
+        lane = Lanes(builder, ir.Constant(LANES, [float(k) for k in range(BOXES)]))
+        x0, y0, x1, y1 = at[ANCHOR_X], at[ANCHOR_Y], at[OTHER_X], at[OTHER_Y]
+        before, after = cross(x0 - px, y0 - py, vx, vy), cross(x1 - px, y1 - py, vx, vy)
+        crossed = (before >= 0.0) & (after <= 0.0) & (before > after) & ~lane.equals(own)
+        at_end = (abs(before) <= slack) | (abs(after) <= slack)
+        nothing = [NUMBER(float("inf")), NUMBER(0.0), WORD(0), WORD(0)]
+
+        def first_hit() -> list[Any]:
+            across = before - after
+            late = before > across * 0.5
+            fraction = late.where(after, before) / across
+            x, y = late.where(x1, x0) + fraction * (x1 - x0), late.where(y1, y0) + fraction * (y1 - y0)
+            time = dot(x - px, y - py, vx, vy)
+            ahead = (crossed & (time > close)).where(time, constant(builder, float("inf")))
+            first = least(ahead)
+            # of equal times the first; some lane has the least time
+            place = builder.cttz(ahead.equals(repeated(builder, first)).mask(), BIT(1))
+            most = constant(builder, -LEAST_FRACTION)
+            fraction = (late & (fraction > most)).where(most, fraction)
+            near = builder.shl((crossed & (abs(time) <= close)).mask(), WORD(BOXES))
+            return [first, builder.extract_element(fraction.value, place), place, near]
+
+        time, fraction, place, near = chosen(builder, crossed.any(), nothing, first_hit)
+        found = [time, fraction, place, builder.or_(near, at_end.mask())]
+        return context.make_tuple(builder, signature.return_type, found)
+
+    number, integer = types.float64, types.int64
+    result = types.Tuple((number, number, integer, integer))
+    return result(table, integer, integer, *[number] * 6), met
+
+
 @intrinsic
 def first_bit(typing, mask):
     """-> int: the number of the lowest bit of a mask that is not 0."""
@@ -261,21 +361,11 @@ class Ray:
         with builder.if_then(doubtful.any(), likely=False):
             self.at[DOUBT] = doubtful.where(constant(builder, 1.0), self.at[DOUBT])
 
-    def hit(
-        self,
-        nearer: Lanes,
-        piece: Lanes,
-        time: Lanes,
-        place: Any,
-        normal: Any,
-        at_corner: Lanes,
-        before_run: Lanes,
-    ) -> None:
-        builder = self.at.builder
-        flag = before_run.where(constant(builder, BEFORE_RUN), constant(builder, 0.0))
-        flag = at_corner.where(constant(builder, AT_CORNER), flag)
-        new = {TIME: time, PIECE: piece, HIT_X: place[0], HIT_Y: place[1], UNCERTAIN: flag}
-        for column, value in {**new, FACE_X: normal[0], FACE_Y: normal[1]}.items():
+    def hit(self, nearer: Lanes, piece: Lanes, time: Lanes, place: Any, normal: Any, at_corner: Lanes) -> None:
+        """Put hits, none of which begins a run, in the place of those that are farther."""
+        zero, at_end = constant(self.at.builder, 0.0), constant(self.at.builder, AT_CORNER)
+        flag = at_corner.where(at_end, zero)
+        for column, value in zip(HIT_COLUMNS, (time, piece, *place, *normal, flag), strict=True):
             self.at[column] = nearer.where(value, self.at[column])
 
 
@@ -290,6 +380,78 @@ def clear_hits(typing, work, first):
         return context.get_dummy_value()
 
     return types.void(work, types.int64), clear
+
+
+# The nearest hits so far of eight rays, in registers: time, piece, position, unit normal and UNCERTAIN.
+HIT_COLUMNS = TIME, PIECE, HIT_X, HIT_Y, FACE_X, FACE_Y, UNCERTAIN
+HITS = types.UniTuple(EIGHT, len(HIT_COLUMNS))
+# Their nearest hits on arcs so far: time and piece; start, end, normal at the start, curvature and sine of that arc.
+ARCS = types.UniTuple(EIGHT, 10)
+
+
+def unpacked(builder: Any, value: Any) -> list[Lanes]:
+    """Return vectors, or numbers in all lanes, from a tuple in compiled code."""
+    parts = cgutils.unpack_tuple(builder, value)
+    return [Lanes(builder, part) if part.type == LANES else repeated(builder, part) for part in parts]
+
+
+def packed(context: Any, builder: Any, kind: Any, parts: Any) -> Any:
+    """Return vectors as a tuple in compiled code."""
+    return context.make_tuple(builder, kind, [part.value for part in parts])
+
+
+def either(condition: Lanes, yes: Any, no: Any) -> list[Lanes]:
+    """Return vectors of one or of the other list, lane by lane."""
+    return [condition.where(new, old) for new, old in zip(yes, no, strict=True)]
+
+
+def uncertainty(at_corner: Lanes, before_run: Lanes) -> Lanes:
+    """Return the numbers UNCERTAIN of hits."""
+    builder = at_corner.builder
+    flag = before_run.where(constant(builder, BEFORE_RUN), constant(builder, 0.0))
+    return at_corner.where(constant(builder, AT_CORNER), flag)
+
+
+@intrinsic
+def hits_at(typing, work, first):
+    """-> HITS: the nearest hits so far of eight rays of a wave."""
+
+    def read(context, builder, signature, values):
+        at = Table(context, builder, signature.args[0], values[0]).column(values[1])
+        return packed(context, builder, HITS, [at[column] for column in HIT_COLUMNS])
+
+    return HITS(work, types.int64), read
+
+
+@intrinsic
+def keep_hits(typing, work, first, hits):
+    """Store the nearest hits so far of eight rays of a wave."""
+
+    def store(context, builder, signature, values):
+        at = Table(context, builder, signature.args[0], values[0]).column(values[1])
+        for column, value in zip(HIT_COLUMNS, unpacked(builder, values[2]), strict=True):
+            at[column] = value
+        return context.get_dummy_value()
+
+    return types.void(work, types.int64, HITS), store
+
+
+@intrinsic
+def no_hits(typing):
+    """-> HITS: of rays that have met nothing so far."""
+    return HITS(), lambda context, builder, signature, values: nothing_met(context, builder, HITS)
+
+
+def nothing_met(context: Any, builder: Any, kind: Any) -> Any:
+    """Return HITS or ARCS of rays that have met nothing so far."""
+    zeros = [constant(builder, 0.0)] * (kind.count - 1)
+    return packed(context, builder, kind, [constant(builder, float("inf")), *zeros])
+
+
+@intrinsic
+def no_arcs(typing):
+    """-> ARCS: of rays that have met no arc so far."""
+    return ARCS(), lambda context, builder, signature, values: nothing_met(context, builder, ARCS)
 
 
 @intrinsic
@@ -317,8 +479,8 @@ def doubt_at_corner(ray: Ray, dx: Lanes, dy: Lanes, slack: Lanes) -> Lanes:
 
 
 @intrinsic
-def meet_line(typing, work, first, start, end, edge, normal, length, close, numbers):
-    """Find the hits of eight rays on a line that are nearer.
+def meet_line(typing, work, first, hits, start, end, edge, normal, length, close, numbers):
+    """-> HITS: with those of eight rays on a line that are nearer.
 
     ``start`` and ``end`` are joints (x, y, slack), where the slack is negative if the joint is no corner; a hit before
     the time ``close`` is in doubt. ``numbers`` are that of the line, and the
@@ -326,16 +488,15 @@ def meet_line(typing, work, first, start, end, edge, normal, length, close, numb
     """
 
     def meet(context, builder, signature, values):
-        ray = Ray(context, builder, signature, values)
-        parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, value)] for value in values[2:6]]
-        (x0, y0, corner0), (x1, y1, corner1), (edge_x, edge_y), normal = parts
-        length = repeated(builder, values[6])
-        close = repeated(builder, values[7])
-        number, with_runs = (repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[8]))
+        ray, hits = Ray(context, builder, signature, values), unpacked(builder, values[2])
+        (x0, y0, corner0), (x1, y1, corner1), (edge_x, edge_y), normal = (unpacked(builder, v) for v in values[3:7])
+        length, close = (repeated(builder, value) for value in values[7:9])
+        number, with_runs = unpacked(builder, values[9])
         before = doubt_at_corner(ray, x0 - ray.px, y0 - ray.py, corner0)
         after = cross(x1 - ray.px, y1 - ray.py, ray.vx, ray.vy)
         crossed = (before >= 0.0) & (after <= 0.0) & (before > after) & ~ray.own.equals(number)
-        with builder.if_then(crossed.any()):
+
+        def nearer_hits() -> list[Lanes]:
             across = before - after
             late = before > across * 0.5
             fraction = late.where(after, before) / across
@@ -343,54 +504,85 @@ def meet_line(typing, work, first, start, end, edge, normal, length, close, numb
             time = dot(x - ray.px, y - ray.py, ray.vx, ray.vy)
             ray.doubt(crossed & (abs(time) <= close))
             at_corner = abs(fraction) * length <= late.where(corner1, corner0)
-            nearer = crossed & (time > close) & (time < ray.at[TIME])
-            ray.hit(nearer, number, time, (x, y), normal, at_corner, ray.at[BEFORE].equals(with_runs))
-        return context.get_dummy_value()
+            nearer = crossed & (time > close) & (time < hits[0])
+            flag = uncertainty(at_corner, ray.at[BEFORE].equals(with_runs))
+            return either(nearer, (time, number, x, y, *normal, flag), hits)
+
+        return packed(context, builder, HITS, chosen(builder, crossed.any(), hits, nearer_hits))
 
     number = types.float64
     three, two = types.UniTuple(number, 3), types.UniTuple(number, 2)
-    return types.void(work, types.int64, three, three, two, two, number, number, two), meet
+    return HITS(work, types.int64, HITS, three, three, two, two, number, number, two), meet
 
 
 @intrinsic
-def meet_circle(typing, work, first, ends, normal, curvature, chord, sine, close, number):
-    """Find the hits of eight rays on a circular arc that are nearer, as `arcs` does for one ray.
+def meet_circle(typing, work, first, arcs, ends, normal, curvature, chord, sine, close, number):
+    """-> ARCS: with the hits of eight rays on an arc that are nearer, as `arcs` does for one ray.
 
     ``ends`` are the start and the end of the arc, ``chord`` the direction and SHORT_CHORD; the one sine is that below
-    which a run may begin. A hit before the time ``close``, or within this distance of an end, is in doubt.
+    which a run may begin. A hit before the time ``close`` is in doubt.
     """
 
     def meet(context, builder, signature, values):
-        ray = Ray(context, builder, signature, values)
+        ray, arcs = Ray(context, builder, signature, values), unpacked(builder, values[2])
         px, py, vx, vy = ray.px, ray.py, ray.vx, ray.vy
-        parts = [[repeated(builder, v) for v in cgutils.unpack_tuple(builder, values[k])] for k in (2, 3, 5)]
-        (x0, y0, x1, y1), (nx, ny), (chord_x, chord_y, short) = parts
-        k, run_sine, close, number = (repeated(builder, values[k]) for k in (4, 6, 7, 8))
-        zero, focusing = constant(builder, 0.0), k > 0.0
+        (x0, y0, x1, y1), (nx, ny) = (unpacked(builder, values[k]) for k in (3, 4))
+        *chord, short = cgutils.unpack_tuple(builder, values[6])
+        chord_x, chord_y = (repeated(builder, value) for value in chord)
+        k, run_sine, close, number = (repeated(builder, values[k]) for k in (5, 7, 8, 9))
+        focusing, own = k > 0.0, ray.own.equals(number)
         rx, ry = px - x0, py - y0
         b = dot(nx, ny, vx, vy) - k * dot(rx, ry, vx, vy)
         speed2 = dot(vx, vy, vx, vy)
         f = dot(nx, ny, rx, ry) - k * 0.5 * dot(rx, ry, rx, ry)
         d = b * b + k * 2.0 * speed2 * f
-        own = ray.own.equals(number)
         ray.doubt(~focusing & ~own & (b < 0.0) & (abs(d) <= (b * b + speed2) * NEARLY_TANGENT))
-        root, far = d.root(), focusing & (b >= 0.0)
-        top = own.where(b * 2.0, far.where(b + root, f * 2.0))
-        time = top / (own | far).where(k * speed2, root - b)
-        forward = own.where(b, constant(builder, -1.0))
-        possible = (own & focusing & (forward > 0.0)) | (~own & (d >= 0.0) & (focusing | (b < 0.0)))
-        ray.doubt(possible & ~own & (abs(time) <= close))
-        qx, qy = px + time * vx - x0, py + time * vy - y0
-        mx, my = nx - k * qx, ny - k * qy
-        along, height = dot(qx, qy, chord_x, chord_y), cross(qy, qx, chord_y, chord_x)
-        # at grazing incidence rounding moves the point along the arc by more than the slack
-        on_short = (along >= -close) & (along <= short + close) & (cross(my, mx, chord_y, chord_x) > 0.0)
-        on_long = (focusing & (height <= close)) | (~focusing & (height >= -close))
-        is_short = short > 0.0
-        on_arc = (is_short & on_short) | (~is_short & on_long)
-        nearer = possible & on_arc & (time >= 0.0) & (time < ray.at[TIME])
-        with builder.if_then(nearer.any()):
-            # one Newton step puts the point back on the arc
+        possible = (own & focusing & (b > 0.0)) | (~own & (d >= 0.0) & (focusing | (b < 0.0)))
+
+        def nearer_arcs() -> list[Lanes]:
+            root, far = d.root(), focusing & (b >= 0.0)
+            top = own.where(b * 2.0, far.where(b + root, f * 2.0))
+            time = top / (own | far).where(k * speed2, root - b)
+            ray.doubt(possible & ~own & (abs(time) <= close))
+            qx, qy = px + time * vx - x0, py + time * vy - y0
+            # at grazing incidence rounding moves the point along the arc by more than the slack
+            with builder.if_else(builder.fcmp_ordered(">", short, NUMBER(0.0))) as (is_short, is_long):
+                with is_short:
+                    along = dot(qx, qy, chord_x, chord_y)
+                    on_near_half = cross(ny - k * qy, nx - k * qx, chord_y, chord_x) > 0.0
+                    on_short = (along >= -close) & (along <= repeated(builder, short) + close) & on_near_half
+                    short_end = builder.block
+                with is_long:
+                    height = cross(qy, qx, chord_y, chord_x)
+                    on_long = (focusing & (height <= close)) | (~focusing & (height >= -close))
+                    long_end = builder.block
+            on_arc = joined(builder, (on_short, short_end), (on_long, long_end))
+            nearer = possible & on_arc & (time >= 0.0) & (time < arcs[0])
+            return either(nearer, (time, number, x0, y0, x1, y1, nx, ny, k, run_sine), arcs)
+
+        return packed(context, builder, ARCS, chosen(builder, possible.any(), arcs, nearer_arcs))
+
+    number_, pairs = types.float64, types.UniTuple
+    four, three, two = (pairs(number_, size) for size in (4, 3, 2))
+    return ARCS(work, types.int64, ARCS, four, two, number_, three, number_, number_, number_), meet
+
+
+@intrinsic
+def hits_on_arcs(typing, work, first, arcs, close):
+    """-> HITS: those of eight rays on arcs, put back on them by one Newton step.
+
+    A hit within the distance ``close`` of an end is uncertain.
+    """
+
+    def put(context, builder, signature, values):
+        ray, hits = Ray(context, builder, signature, values), unpacked(builder, nothing_met(context, builder, HITS))
+        time, number, x0, y0, x1, y1, nx, ny, k, run_sine = unpacked(builder, values[2])
+        px, py, vx, vy = ray.px, ray.py, ray.vx, ray.vy
+        close, met = repeated(builder, values[3]), time < hits[0]
+
+        def hits_there() -> list[Lanes]:
+            qx, qy = px + time * vx - x0, py + time * vy - y0
+            mx, my = nx - k * qx, ny - k * qy
             f = dot(nx, ny, qx, qy) - k * 0.5 * dot(qx, qy, qx, qy)
             qx, qy = qx - f * mx, qy - f * my
             mx, my = nx - k * qx, ny - k * qy
@@ -398,13 +590,12 @@ def meet_circle(typing, work, first, ends, normal, curvature, chord, sine, close
             mx, my, x, y = mx * scale, my * scale, x0 + qx, y0 + qy
             from_start, from_end = dot(x - x0, y - y0, x - x0, y - y0), dot(x - x1, y - y1, x - x1, y - y1)
             at_end = (from_start <= close * close * 4.0) | (from_end <= close * close * 4.0)
-            begins_run = (run_sine > zero) & (abs(dot(vx, vy, mx, my)) <= run_sine)
-            ray.hit(nearer, number, time, (x, y), (mx, my), at_end, begins_run)
-        return context.get_dummy_value()
+            begins_run = (run_sine > 0.0) & (abs(dot(vx, vy, mx, my)) <= run_sine)
+            return [time, number, x, y, mx, my, uncertainty(at_end, begins_run)]
 
-    number_, pairs = types.float64, types.UniTuple
-    four, three, two = (pairs(number_, size) for size in (4, 3, 2))
-    return types.void(work, types.int64, four, two, number_, three, number_, number_, number_), meet
+        return packed(context, builder, HITS, chosen(builder, met.any(), hits, hits_there))
+
+    return HITS(work, types.int64, ARCS, types.float64), put
 
 
 @intrinsic
@@ -461,6 +652,6 @@ def before_runs(typing, work, first):
 
     def read(context, builder, signature, values):
         at = Table(context, builder, signature.args[0], values[0]).column(values[1])
-        return at[UNCERTAIN].equals(BEFORE_RUN).mask()
+        return (at[UNCERTAIN].equals(BEFORE_RUN) & (at[TIME] < float("inf"))).mask()
 
     return types.int64(work, types.int64), read

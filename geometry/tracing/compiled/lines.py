@@ -15,10 +15,13 @@ from ...scene.columns import (
     IS_CORNER,
     JOINT_X,
     JOINT_Y,
+    SKY_LEFT,
+    SKY_RIGHT,
     STARTS_LINE,
     TREE_LEVELS,
     TREE_ROOT,
 )
+from ...scene.sky import MOST_LINES, SKY_ROOM
 from ...scene.tolerances import NEARBY_SLACKS
 from .lanes import (
     AT_LEAVES,
@@ -28,6 +31,7 @@ from .lanes import (
     FOUND,
     FRACTION,
     LEAF,
+    LEAST_FRACTION,
     LEVEL,
     MOST,
     NEAREST,
@@ -43,16 +47,16 @@ from .lanes import (
     first_bit,
     last_bit,
     lines_met,
+    nearest_of_lines,
 )
 from .options import inlined
 from .records import LINE, OPENING, Own
 
-# Least absolute value of a fraction from a line's end, so that it is negative even if the ray meets that end.
-LEAST_FRACTION = 5e-324
 # Mask of all boxes of a row.
 ALL_BOXES = (1 << BOXES) - 1
-# Mask that tells the compiler that an index is not negative, so that it need not count from the end.
-NATURAL = (1 << 40) - 1
+# Mask that tells the compiler that an index is not negative, so that it need not count from the end. A longer mask is
+# an instruction whose register of one byte makes a step of a ray wait for that of the ray before, in some compilations.
+NATURAL = (1 << 31) - 1
 
 
 @inlined
@@ -198,13 +202,34 @@ def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
 
 
 @inlined
+def leaves_to_sky(tables, own, room, px, py, vx, vy):
+    """-> bool: whether a ray that starts on line ``own`` certainly meets no piece; see `sky`.
+
+    ``room`` is the distance from the ends of the line from which on this is known.
+    """
+    joints, lines, j = tables.joints, tables.lines, own
+    x0, y0 = abs(joints[j, JOINT_X] - px), abs(joints[j, JOINT_Y] - py)
+    x1, y1 = abs(joints[j + 1, JOINT_X] - px), abs(joints[j + 1, JOINT_Y] - py)
+    is_inside = (max(x0, y0) > room) & (max(x1, y1) > room)
+    is_free = (vx < lines[j, SKY_RIGHT] * vy) & (-vx < lines[j, SKY_LEFT] * vy)
+    return is_inside & is_free
+
+
+@inlined
 def begin_walks(scope, work, walks, count):
-    """Put all rays of a wave at the root of the tree."""
-    root, top = int(scope.hollow[TREE_ROOT]), int(scope.hollow[TREE_LEVELS]) - 1
+    """-> int: the number of rays of a wave that begin at the root of the tree; the other ones meet no line."""
+    root, top, room = int(scope.hollow[TREE_ROOT]), int(scope.hollow[TREE_LEVELS]) - 1, SKY_ROOM * scope.slack
+    first, end = scope.joints
+    nodes, has_sky = 0, end - first <= MOST_LINES + 1
     for i in range(count):
         walks[ROW + i], walks[LEVEL + i], walks[WAITING + i] = root, top, ALL_BOXES << BOXES * top
-        walks[FOUND + i], walks[AT_NODES + i] = -1, i
+        walks[FOUND + i], walks[AT_NODES + nodes] = -1, i
         work[NEAREST + i], work[MOST + i] = np.inf, work[TIME + i] + 2.0 * scope.slack
+        nodes += 1
+        if has_sky and work[OWN + i] >= 0.0:
+            own, px, py, vx, vy = int(work[OWN + i]) & NATURAL, work[PX + i], work[PY + i], work[VX + i], work[VY + i]
+            nodes -= np.int64(leaves_to_sky(scope.tables, own, room, px, py, vx, vy))
+    return nodes
 
 
 @inlined
@@ -234,42 +259,42 @@ def step_on(boxes, work, walks, i, waiting, nodes, leaves):
 
 
 @inlined
-def meet_leaf(scope, work, walks, i):
-    """Find the nearest hit of ray i of a wave on the lines of its leaf, if that is nearer."""
-    joints, slack, leaf = scope.tables.joints, scope.slack, walks[LEAF + i] & NATURAL
-    px, py, vx, vy, own = work[PX + i], work[PY + i], work[VX + i], work[VY + i], work[OWN + i]
-    close = NEARBY_SLACKS * slack
-    met = lines_met(scope.tables.boxes, leaf, px, py, vx, vy, slack)
-    if met == 0:
-        return
-    first = int(scope.tables.boxes[leaf, CONTENT]) & NATURAL
-    at_end, met = met >> BOXES, met & ALL_BOXES
+def doubt_at_ends(scope, work, i, first, at_end):
+    """Doubt ray i of a wave if it meets a corner at an end of the lines of a leaf that a mask tells."""
+    joints, slack = scope.tables.joints, scope.slack
+    px, py, vx, vy = work[PX + i], work[PY + i], work[VX + i], work[VY + i]
+    start = Own(OPENING, -1, -1.0, 0.0, -1, int(work[BOUNCES + i]))
     while at_end != 0:
         j = first + first_bit(at_end)
         at_end &= at_end - 1
-        start = Own(OPENING, -1, -1.0, 0.0, -1, int(work[BOUNCES + i]))
         _, ahead = joint_side(joints, j, start, px, py, vx, vy, slack)
         if joints[j, STARTS_LINE] > 0.0:
             _, other = joint_side(joints, j + 1, start, px, py, vx, vy, slack)
             ahead = min(ahead, other)
         if ahead < np.inf:
             work[DOUBT + i] = 1.0
-    while met != 0:
-        j = first + first_bit(met)
-        met &= met - 1
-        if own == j:
-            continue
-        c_before = (joints[j, JOINT_X] - px) * vy - (joints[j, JOINT_Y] - py) * vx
-        c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
-        t, fraction = line_time(scope.tables, j, (c_before, c_after), px, py, vx, vy)
-        # of two lines at equal distance the first along the wall is hit, as without boxes
-        if t > close:
-            best = work[NEAREST + i]
-            if t < best or (t == best and j < walks[FOUND + i]):
-                work[NEAREST + i], work[FRACTION + i], walks[FOUND + i] = t, fraction, j
-                work[MOST + i] = min(t, work[TIME + i]) + 2.0 * slack
-        elif t >= -close:
+
+
+@inlined
+def meet_leaf(scope, work, walks, i):
+    """Find the nearest hit of ray i of a wave on the lines of its leaf, if that is nearer."""
+    slack, leaf = scope.slack, walks[LEAF + i] & NATURAL
+    px, py, vx, vy = work[PX + i], work[PY + i], work[VX + i], work[VY + i]
+    first = int(scope.tables.boxes[leaf, CONTENT]) & NATURAL
+    t, fraction, place, masks = nearest_of_lines(
+        scope.tables.boxes, leaf, int(work[OWN + i]) - first, px, py, vx, vy, slack, NEARBY_SLACKS * slack
+    )
+    if masks != 0:
+        doubt_at_ends(scope, work, i, first, masks & ALL_BOXES)
+        if masks > ALL_BOXES:
             work[DOUBT + i] = 1.0
+    # of two lines at equal distance the first along the wall is hit, as without boxes
+    j, best, found = first + place, work[NEAREST + i], walks[FOUND + i]
+    is_nearer = (t < best) | ((t == best) & (j < found))
+    work[NEAREST + i] = t if is_nearer else best
+    work[FRACTION + i] = fraction if is_nearer else work[FRACTION + i]
+    walks[FOUND + i] = j if is_nearer else found
+    work[MOST + i] = min(min(t, best), work[TIME + i]) + 2.0 * slack
 
 
 @inlined
@@ -279,8 +304,7 @@ def nearest_lines_in_boxes(scope, work, walks, count):
     All rays take a step in turn, so that the processor works on some while it waits for the others.
     """
     boxes, close = scope.tables.boxes, NEARBY_SLACKS * scope.slack
-    begin_walks(scope, work, walks, count)
-    nodes, leaves = count, 0
+    nodes, leaves = begin_walks(scope, work, walks, count), 0
     while nodes + leaves > 0:
         rays, leaves = leaves, 0
         for k in range(rays):

@@ -54,7 +54,8 @@ from ...scene.scene import NO_TABLES
 from ...scene.tolerances import JOINT_ULPS, NEARBY_SLACKS
 from .arcs import arc_incidence, arc_reflect, arc_time, may_touch_arc, near_end, on_arc_after
 from .beziers import NO_BEZIER_HIT, bend_number, bezier_reflect, bezier_tangent, nearest_bezier
-from .lines import LEAST_FRACTION, nearest_line, nearest_line_in_boxes
+from .lanes import LEAST_FRACTION
+from .lines import nearest_line, nearest_line_in_boxes
 from .nearby import DOUBTFUL, hit_nearby, line_starts_in_front, starts_in_front
 from .options import compiled, inlined
 from .pointers import Late, address_at, address_of, call_at, is_raised

@@ -85,9 +85,14 @@ from .lanes import (
     before_runs,
     clear_hits,
     first_bit,
+    hits_at,
+    hits_on_arcs,
+    keep_hits,
     meet_circle,
     meet_corner,
     meet_line,
+    no_arcs,
+    no_hits,
 )
 from .lines import nearest_lines_in_boxes
 from .options import inlined, inner, linked
@@ -199,39 +204,63 @@ def meet_gathered(scope, work, count):
 
 
 @inlined
+def meet_arcs(scope, work, first):
+    """-> HITS: the nearest hits of eight rays on the circular arcs of a hollow."""
+    circles, close, arcs = scope.tables.circles, NEARBY_SLACKS * scope.slack, no_arcs()
+    for k in range(int(scope.hollow[FIRST_CIRCLE]), int(scope.hollow[CIRCLES_END])):
+        arc = circles[k]
+        arcs = meet_circle(
+            work, first, arcs, (arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]), (arc[NORMAL_X], arc[NORMAL_Y]),
+            arc[CURVATURE], (arc[CHORD_X], arc[CHORD_Y], arc[SHORT_CHORD]), RUN_MARGIN * arc[RUN_SINE],
+            close, CIRCLE_NUMBERS - k,
+        )  # fmt: skip
+    return hits_on_arcs(work, first, arcs, close)
+
+
+@inlined
+def meet_lines(scope, work, first, hits):
+    """-> HITS: the nearest hits of eight rays, also on the lines of a hollow; rays that meet corners are doubted."""
+    joints, lines, hollow, slack = scope.tables.joints, scope.tables.lines, scope.hollow, scope.slack
+    for j in range(int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])):
+        x, y, at_joint = joints[j, JOINT_X], joints[j, JOINT_Y], corner_slack(joints[j, IS_CORNER], slack)
+        if joints[j, STARTS_LINE] > 0.0:
+            end = joints[j + 1, JOINT_X], joints[j + 1, JOINT_Y], corner_slack(joints[j + 1, IS_CORNER], slack)
+            hits = meet_line(
+                work, first, hits, (x, y, at_joint), end, (lines[j, EDGE_X], lines[j, EDGE_Y]),
+                (lines[j, LINE_NORMAL_X], lines[j, LINE_NORMAL_Y]), lines[j, LENGTH], NEARBY_SLACKS * slack,
+                (float(j), float(j) if lines[j, PAIRS_END] > 0.0 else NO_LINE),
+            )  # fmt: skip
+        elif at_joint > 0.0:
+            meet_corner(work, first, x, y, slack)
+    return hits
+
+
+@inlined
 def meet_pieces(scope, work, first, is_gathered):
     """Find the nearest hits of eight rays on the pieces of a hollow; without Bezier pieces after `meet_gathered`.
 
     The lines of a tree of boxes are left to `meet_boxes`.
     """
-    joints, lines, circles = scope.tables.joints, scope.tables.lines, scope.tables.circles
-    hollow, slack = scope.hollow, scope.slack
-    close = NEARBY_SLACKS * slack
+    hollow = scope.hollow
+    arcs, curves = hollow[CIRCLES_END] - hollow[FIRST_CIRCLE], hollow[BEZIERS_END] - hollow[FIRST_BEZIER]
+    has_arcs, has_curves = arcs > 0.0, curves > 0.0
+    # the chain of a hollow has one joint more than pieces
+    has_lines = not scope.has_tree and hollow[JOINTS_END] - hollow[FIRST_JOINT] - 1.0 > arcs + curves
     if not is_gathered:
         clear_hits(work, first)
-    for k in range(int(hollow[FIRST_CIRCLE]), int(hollow[CIRCLES_END])):
-        arc = circles[k]
-        ends = arc[START_X], arc[START_Y], arc[END_X], arc[END_Y]
-        meet_circle(
-            work, first, ends, (arc[NORMAL_X], arc[NORMAL_Y]), arc[CURVATURE],
-            (arc[CHORD_X], arc[CHORD_Y], arc[SHORT_CHORD]), RUN_MARGIN * arc[RUN_SINE],
-            close, CIRCLE_NUMBERS - k,
-        )  # fmt: skip
-    for k in range(int(hollow[FIRST_BEZIER]), int(hollow[FIRST_BEZIER if is_gathered else BEZIERS_END])):
-        meet_bezier(scope.tables.beziers, k, slack, work, first)
-    if scope.has_tree:
-        return
-    for j in range(int(hollow[FIRST_JOINT]), int(hollow[JOINTS_END])):
-        x, y, at_joint = joints[j, JOINT_X], joints[j, JOINT_Y], corner_slack(joints[j, IS_CORNER], slack)
-        if joints[j, STARTS_LINE] > 0.0:
-            end = joints[j + 1, JOINT_X], joints[j + 1, JOINT_Y], corner_slack(joints[j + 1, IS_CORNER], slack)
-            meet_line(
-                work, first, (x, y, at_joint), end, (lines[j, EDGE_X], lines[j, EDGE_Y]),
-                (lines[j, LINE_NORMAL_X], lines[j, LINE_NORMAL_Y]), lines[j, LENGTH], close,
-                (float(j), float(j) if lines[j, PAIRS_END] > 0.0 else NO_LINE),
-            )  # fmt: skip
-        elif at_joint > 0.0:
-            meet_corner(work, first, x, y, slack)
+    hits = meet_arcs(scope, work, first) if has_arcs else no_hits()
+    if has_curves:
+        if has_arcs:
+            keep_hits(work, first, hits)
+        if not is_gathered:
+            for k in range(int(hollow[FIRST_BEZIER]), int(hollow[BEZIERS_END])):
+                meet_bezier(scope.tables.beziers, k, scope.slack, work, first)
+        if has_lines:
+            hits = hits_at(work, first)
+    if not scope.has_tree:
+        hits = meet_lines(scope, work, first, hits)
+    if has_lines or (has_arcs and not has_curves):
+        keep_hits(work, first, hits)
 
 
 @inlined
