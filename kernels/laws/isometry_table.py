@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, angles, frozen
+from ...core.checks import Floats, angles
 from ...core.errors import InputError
 from ...core.rounding import EPS
 from ..bases.angles import clipped_inside
@@ -24,6 +24,8 @@ SAME_OFFSET = 64.0 * np.pi * EPS
 ROUNDED_SUM = 1e-9
 # Limit on the candidate pieces of a query in memory at a time.
 CHUNK = 2**21
+# Number of angles up to which all pieces are compared with the angles, before there is an index.
+FEW_ANGLES = 4
 # Approximate number of entries in the index for each piece.
 ENTRIES_PER_PIECE = 4.0
 
@@ -92,12 +94,14 @@ class IsometryTable:
         shapes = {column.shape for column in columns}
         if len(shapes) != 1 or columns[0].ndim != 1:
             raise InputError(f"table: expected columns of the same length, got shapes {sorted(shapes)}")
-        columns[4:] = (np.maximum(column, 0.0) for column in columns[4:])
+        columns[4:] = (_fixed(np.maximum(column, 0.0)) for column in columns[4:])
         used = (columns[3] > columns[2]) & ((columns[4] > 0.0) | (columns[5] > 0.0))
         if np.any(columns[3] - columns[2] > 0.5 * np.pi * (1.0 + 1e-15)):
             raise InputError("table: expected pieces not longer than pi/2; cut the others at pi/2")
+        everything = bool(used.all())
         for name, column in zip(names, columns, strict=True):
-            object.__setattr__(self, name, frozen(column[used]))
+            shared = everything and not column.flags.writeable
+            object.__setattr__(self, name, column if shared else _fixed(column[used]))
 
     # ---- constructors ------------------------------------------------------------------------------------------
     @classmethod
@@ -113,13 +117,19 @@ class IsometryTable:
     ) -> IsometryTable:
         """The table of pieces of any length with probability ``sine + cosine cot(theta)``; pieces are cut at pi/2."""
         columns = np.broadcast_arrays(*np.atleast_1d(sign, offset, low, high, sine, cosine))
-        sign, offset, low, high, sine, cosine = (np.asarray(column, dtype=np.float64) for column in columns)
+        sign, offset, low, high, sine, cosine = (_fixed(np.array(column, dtype=np.float64)) for column in columns)
         right = 0.5 * np.pi
-        lows = np.concatenate([low, np.maximum(low, right)])
-        highs = np.concatenate([np.minimum(high, right), high])
-        sines, cosines = np.tile(sine, 2), np.tile(cosine, 2)
-        start, end = (sines * np.sin(at) + cosines * np.cos(at) for at in (lows, highs))
-        return cls(np.tile(sign, 2), np.tile(offset, 2), lows, highs, start, end, unresolved=unresolved)
+        cut = (low < right) & (high > right)
+        if cut.any():
+            low, high = (
+                np.concatenate([low, np.full(cut.sum(), right)]),
+                np.concatenate([np.where(cut, right, high), high[cut]]),
+            )
+            sign, offset, sine, cosine = (
+                np.concatenate([column, column[cut]]) for column in (sign, offset, sine, cosine)
+            )
+        start, end = (sine * np.sin(at) + cosine * np.cos(at) for at in (low, high))
+        return cls(sign, offset, low, high, start, end, unresolved=unresolved)
 
     @classmethod
     def flat(cls, fraction: float) -> IsometryTable:
@@ -177,13 +187,16 @@ class IsometryTable:
         """
         sign = np.concatenate([[-1.0, 1.0], self.sign])
         offset = np.concatenate([[np.pi, 0.0], self.offset])
-        order = np.lexsort((offset, sign))
-        fresh = np.diff(sign[order], prepend=0.0) != 0.0
-        fresh |= np.diff(offset[order], prepend=-np.inf) > SAME_OFFSET
-        number = np.empty(order.size, dtype=np.int64)
-        number[order] = np.cumsum(fresh) - 1
+        number, groups = np.empty(sign.size, dtype=np.int64), 0
+        for one in np.unique(sign).tolist():
+            ours = sign == one
+            ordered = np.sort(offset[ours])
+            least = ordered[np.diff(ordered, prepend=-np.inf) > SAME_OFFSET]
+            number[ours] = groups + np.searchsorted(least, offset[ours], side="right") - 1
+            groups += least.size
         # Each group takes the offset of its first piece. The ideal isometries come first and keep exact offsets.
-        _, first = np.unique(number, return_index=True)
+        first = np.empty(groups, dtype=np.int64)
+        first[number[::-1]] = np.arange(number.size)[::-1]
         rank = np.argsort(np.argsort(first))
         where = np.sort(first)
         return sign[where], offset[where], np.asarray(rank[number][2:], dtype=np.int64)
@@ -243,7 +256,11 @@ class IsometryTable:
     def _entries(self, theta: Floats) -> tuple[Whole, Whole, Floats]:
         """All (angle, isometry, probability); pieces with the same isometry are not yet merged."""
         number = self.isometries[2]
-        first, members = self._index
+        if theta.size <= FEW_ANGLES and "_index" not in self.__dict__:
+            # all pieces in one bucket, which is faster than their distribution
+            first, members = np.array([0, self.low.size]), np.arange(self.low.size)
+        else:
+            first, members = self._index
         buckets = first.size - 1
         found: list[tuple[Whole, Whole, Floats]] = []
         bucket = np.clip((theta * (buckets / np.pi)).astype(np.int64), 0, buckets - 1)
@@ -273,11 +290,14 @@ class IsometryTable:
         """The pieces that meet each bucket of angles: the offset of each bucket's list, and the joined lists."""
         width = float(np.sum(self.high - self.low))
         buckets = int(np.clip(ENTRIES_PER_PIECE * self.low.size * np.pi / max(width, 1e-300), 1, 2**20))
-        left = np.clip((self.low * (buckets / np.pi)).astype(np.int64) - 1, 0, buckets - 1)
-        right = np.clip((self.high * (buckets / np.pi)).astype(np.int64) + 1, 0, buckets - 1)
+        # the same monotone function as that of the angles, so an angle between the ends is in one of these buckets
+        left, right = (
+            np.clip((end * (buckets / np.pi)).astype(np.int64), 0, buckets - 1) for end in (self.low, self.high)
+        )
         piece, group = joined_lists(right - left + 1)
         bucket = left[piece] + group
-        order = np.argsort(bucket, kind="stable")
+        # sorting numbers is faster than a stable order of indices; a list has less than 2^32 entries
+        order = np.sort((bucket << 32) | np.arange(bucket.size)) & (2**32 - 1)
         first = np.concatenate([[0], np.cumsum(np.bincount(bucket, minlength=buckets))])
         return np.asarray(first, dtype=np.int64), np.asarray(piece[order], dtype=np.int64)
 
@@ -298,3 +318,9 @@ class IsometryTable:
         # Drop the breakpoints nearest to grazing.
         found, beyond = without_extremal(found, surplus)
         return found, min(left_out + beyond, 1.0)
+
+
+def _fixed(array: Floats) -> Floats:
+    """Make an array of one's own read-only."""
+    array.setflags(write=False)
+    return array
