@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.core.checks import Floats, angles, frozen, number_between, whole_number
 from asperity.geometry.polygons.compiled.codes import FIRST_WALL, OPENING
-from asperity.geometry.polygons.compiled.splitting import offset_of, reduced, wall_lines
+from asperity.geometry.polygons.compiled.pieces import offset_of
+from asperity.geometry.polygons.compiled.unfolding import reduced
 from asperity.geometry.polygons.triangulation import triangulated
 from asperity.geometry.tracing.compiled.growing import longer, taller
 from asperity.geometry.tracing.double_double.arithmetic import add
@@ -21,6 +22,17 @@ from asperity.geometry.tracing.threads import interruptibly
 STEPS_A_BOUNCE = 64
 
 _compile = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@_compile
+def wall_lines(x, y, turn_high):
+    """Lines of a hollow's edges: unit normal and distance from the origin, computed at the nearer end."""
+    lines = np.empty((turn_high.shape[0], 3))
+    for e in range(turn_high.shape[0]):
+        lines[e, 0], lines[e, 1] = -math.sin(turn_high[e]), math.cos(turn_high[e])
+        k = e if abs(x[e]) + abs(y[e]) <= abs(x[e + 1]) + abs(y[e + 1]) else e + 1
+        lines[e, 2] = lines[e, 0] * x[k] + lines[e, 1] * y[k]
+    return lines
 
 
 @_compile
@@ -222,7 +234,9 @@ def exact_rows(
     incoming = np.ascontiguousarray(np.ravel(angles("theta", theta)))
     limit = whole_number("max_intervals", max_intervals, 1)
     bounce_limit = whole_number("max_bounces", max_bounces, 1)
-    tables = triangulated(hollow_vertices).tables
+    cut = triangulated(hollow_vertices)
+    x, y = np.ascontiguousarray(cut.vertices.T)
+    tables = x, y, cut.corners, cut.beyond, cut.turn_high, cut.turn_low, cut.entrance
     first, high, offset, tags = interruptibly(lambda: march(*tables, incoming, limit, bounce_limit))
     low = np.concatenate([[0.0], high[:-1]])
     low[first[:-1]] = 0.0

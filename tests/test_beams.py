@@ -8,6 +8,7 @@ from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.cells.hollow_shape import distinct_hollows
 from asperity.geometry.polygons.beams import beams_of
+from interval_marching import exact_row
 from random_hollows import random_hollow, wall_with
 
 RANDOM = 50
@@ -152,3 +153,51 @@ def test_the_unresolved_flux_between_parallel_sides_falls_as_the_square_of_the_n
     hollow = max((shape for shape, _ in distinct_hollows(geo.koch(3))), key=lambda shape: len(shape.vertices))
     few, many = (beams_of(hollow.vertices, max_beams=count).unresolved for count in (8_000, 32_000))
     assert many < few / 4**1.7
+
+
+def largest_hollow(generation):
+    return max((shape.vertices for shape, _ in distinct_hollows(geo.koch(generation))), key=len)
+
+
+def test_beams_do_not_depend_on_the_number_of_threads():
+    one, two = (beams_of(largest_hollow(3), max_beams=20_000, threads=threads) for threads in (1, 2))
+    for name in ("sign", "offset", "low", "high", "sine", "cosine", "leaf", "bounces", "unresolved_sine"):
+        assert np.array_equal(getattr(one, name), getattr(two, name))
+    assert one.unresolved == two.unresolved and one.rounding == two.rounding
+
+
+def test_beams_that_skip_periods_between_parallel_sides_have_the_itineraries_of_single_rays():
+    hollow = largest_hollow(3)
+    beams = beams_of(hollow, max_beams=100_000)
+    rng, seen = np.random.default_rng(5), 0
+    long = rng.choice(np.flatnonzero((beams.bounces > 100) & (beams.flux() > 1e-13)), 60, replace=False)
+    for k in long:
+        theta = beams.low[k] + rng.uniform(0.1, 0.9) * (beams.high[k] - beams.low[k])
+        found = exact_row(hollow, theta, max_bounces=100_000)
+        here = (beams.low <= theta) & (theta < beams.high) & (beams.bounces == beams.bounces[k])
+        here &= beams.sign == beams.sign[k]
+        probability = (beams.sine + beams.cosine / np.tan(theta))[here]
+        same = (found.bounces == beams.bounces[k]) & (found.sign == beams.sign[k])
+        wanted = np.diff(found.edges)[same]
+        # beams that are left could hide a part
+        missing = unresolved_at(beams, theta)
+        assert abs(probability.sum() - wanted.sum()) < 1e-12 + missing
+        mean = probability @ (beams.sign * theta + beams.offset)[here]
+        assert abs(mean - wanted @ found.outgoing[same]) < 4.0 * (1e-12 + missing)
+        seen += wanted.sum() > 100.0 * missing
+    assert seen > 30
+
+
+def test_long_ways_between_parallel_sides_cost_no_triangles():
+    # without skipped periods the limit of triangles is reached before that of beams
+    beams = beams_of(largest_hollow(3), max_beams=100_000, mirror_symmetric=True)
+    assert beams.leaf[-1] > 70_000 and beams.unresolved < 2e-7
+    assert beams.bounces.max() > 2_000
+
+
+def test_the_tolerance_is_met_whatever_the_limit_on_beams():
+    assert beams_of([(0, 0), (0.5, -0.5), (1, 0)], tolerance=0.0).unresolved == 0.0
+    assert beams_of(random_hollow(2), tolerance=0.0, max_beams=2000).unresolved < 1e-12
+    for tolerance in (1e-3, 1e-5):
+        beams = beams_of(largest_hollow(3), tolerance=tolerance, max_beams=10**7)
+        assert beams.complete and 0.2 * tolerance < beams.unresolved <= tolerance

@@ -87,3 +87,19 @@ def test_parallel_walls_have_equal_directions():
 def test_a_profile_of_hundreds_of_vertices_is_cut():
     triangulation = triangulated(graph_hollow(200, np.random.default_rng(3)))
     assert signed_areas(triangulation).min() >= 0.0
+
+
+@pytest.mark.parametrize("hollow", HOLLOWS)
+def test_no_diagonal_is_longer_than_the_other_one_of_its_convex_quadrilateral(hollow):
+    triangulation = triangulated(hollow)
+    points, corners, beyond = triangulation.vertices, triangulation.corners, triangulation.beyond
+
+    def turn(i, j, k):
+        (ax, ay), (bx, by) = points[j] - points[i], points[k] - points[i]
+        return ax * by - ay * bx
+
+    for edge in np.flatnonzero(beyond > np.arange(beyond.size)):
+        (triangle, k), (other, j) = divmod(edge, 3), divmod(beyond[edge], 3)
+        a, b, c, d = *np.roll(corners[triangle], -k), corners[other, (j + 2) % 3]
+        if turn(d, b, c) > 1e-12 and turn(c, a, d) > 1e-12:
+            assert np.linalg.norm(points[a] - points[b]) <= np.linalg.norm(points[c] - points[d]) * (1.0 + 1e-8)

@@ -2,29 +2,57 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import Floats, frozen, number_between, whole_number
-from ..tracing.threads import interruptibly
+from ...core.checks import Floats, number_between, whole_number
+from ...core.rounding import EPS
+from ..tracing.threads import in_blocks, interruptibly
 from .compiled.columns import (
+    COUNT,
+    CUT_X,
+    EDGE,
+    FIRST,
+    FLUX,
+    LINE_C,
+    LINE_P,
+    LINE_S,
+    PIECE_COLUMNS,
     PIECE_COSINE,
     PIECE_HIGH,
     PIECE_LOW,
     PIECE_OFFSET,
     PIECE_SINE,
+    PRIORITY,
+    REAL_COLUMNS,
+    SIGN,
     TAG_BOUNCES,
+    TAG_COLUMNS,
     TAG_LEAF,
-    TAG_LEFT,
     TAG_SIGN,
+    VERTEX_COLUMNS,
+    WHOLE_COLUMNS,
 )
-from .triangulation import triangulated
+from .triangulation import Triangulation, triangulated
+
+if TYPE_CHECKING:
+    from .compiled.store import Store
+    from .compiled.unfolding import Hollow
 
 TOLERANCE = 1e-13
 MAX_BEAMS = 200_000
+# Limit on the triangles passed by all beams, per beam allowed: they then take about as long as the divisions.
+STEPS_A_BEAM = 256
+# Number of beams from which a round is cut into parts.
+MANY, PARTS = 1024, 16
+# Factor between the thresholds of priority of two rounds, of few and of many beams, and next to the tolerance.
+STEP_OF_FEW, STEP_OF_MANY, LEAST_STEP = 4.0, 2.0, 1.1
+# Stands for a tolerance of 0.
+TINY = float(np.finfo(np.float64).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +119,13 @@ def beams_of(
     tolerance: float = TOLERANCE,
     max_beams: int = MAX_BEAMS,
     mirror_symmetric: bool = False,
+    threads: int | None = None,
 ) -> Beams:
     """Divide the rays into a polygonal hollow into beams of equal itinerary.
 
     The hollow is triangulated, and the triangles are unfolded along the rays. A beam is a convex polygon in the
-    projective plane of lines; every triangle divides it by the line through its third vertex. The beam
-    that has the largest flux, divided by the number of slivers that it has lost in a row, is divided first.
+    projective plane of lines; every triangle divides it by the line through its third vertex. The priority of a beam is
+    its flux, divided by the number of slivers that it has lost in a row; beams of high priority are divided first.
 
     Parameters
     ----------
@@ -105,10 +134,12 @@ def beams_of(
     tolerance : float
         Largest unresolved fraction of the flux.
     max_beams : int
-        Limit on the number of beams, and on the triangles that they pass, 64 for each; cavities with narrow necks never
-        resolve completely.
+        Limit on the number of beams, and on the triangles that they pass, 256 for each; cavities with narrow necks
+        never resolve completely.
     mirror_symmetric : bool
         Whether the hollow is its own mirror image: then only rays with theta < pi/2 are divided, and mirrored.
+    threads : int, optional
+        By default one for each processor that this process may use. The result does not depend on it.
 
     Returns
     -------
@@ -123,7 +154,7 @@ def beams_of(
 
     Notes
     -----
-    Cost: about 1 microsecond per beam, once compiled.
+    Cost: 2 to 4 microseconds a beam and thread, once compiled; about 500 bytes a beam.
 
     Examples
     --------
@@ -135,39 +166,218 @@ def beams_of(
     >>> beams.unresolved, bool(abs(beams.resolved() - 1.0) < 1e-15)
     (0.0, True)
     """
-    from .compiled.splitting import DONE, pieces_of, split_beams
-
     number_between("tolerance", tolerance, 0.0, 1.0, closed="low")
     whole_number("max_beams", max_beams, 2)
-    triangulation = triangulated(hollow_vertices)
-    width = triangulation.width
     entrances = 1 if mirror_symmetric else 2
-    corners, real, whole, used, rounding, _, status = interruptibly(
-        lambda: split_beams(triangulation.tables, tolerance, max_beams * entrances // 2, entrances)
+    triangulation = triangulated(hollow_vertices)
+    division = interruptibly(lambda: _divided(triangulation, tolerance, max_beams * entrances // 2, entrances, threads))
+    leaving = _mirrored(division.leaving) if mirror_symmetric else division.leaving
+    rest = _mirrored(division.rest) if mirror_symmetric else division.rest
+    images = 2.0 if mirror_symmetric else 1.0
+    flux, unresolved = (
+        images * float(_flux(part.low, part.high, part.sine, part.cosine).sum())
+        for part in (division.leaving, division.rest)
     )
-    rows, tags = pieces_of(corners, real, whole, used, width)
-    if mirror_symmetric:
-        rows, tags, rounding = *_with_mirror_images(rows, tags), 2.0 * rounding
-    out = tags[:, TAG_LEFT] == 1
-    leaving, rest = rows[out], rows[~out]
-    unresolved = float(_flux_of(rest).sum())
     return Beams(
-        sign=_fixed(tags[out, TAG_SIGN].astype(np.int8)),
-        offset=frozen(leaving[:, PIECE_OFFSET]),
-        low=frozen(leaving[:, PIECE_LOW]),
-        high=frozen(leaving[:, PIECE_HIGH]),
-        sine=frozen(leaving[:, PIECE_SINE]),
-        cosine=frozen(leaving[:, PIECE_COSINE]),
-        leaf=_fixed(tags[out, TAG_LEAF]),
-        bounces=_fixed(tags[out, TAG_BOUNCES]),
+        sign=_fixed(leaving.sign.astype(np.int8)),
+        offset=_fixed(leaving.offset),
+        low=_fixed(leaving.low),
+        high=_fixed(leaving.high),
+        sine=_fixed(leaving.sine),
+        cosine=_fixed(leaving.cosine),
+        leaf=_fixed(leaving.leaf),
+        bounces=_fixed(leaving.bounces),
         unresolved=unresolved,
-        unresolved_low=frozen(rest[:, PIECE_LOW]),
-        unresolved_high=frozen(rest[:, PIECE_HIGH]),
-        unresolved_sine=frozen(rest[:, PIECE_SINE]),
-        unresolved_cosine=frozen(rest[:, PIECE_COSINE]),
-        defect=abs(float(_flux_of(rows).sum()) - 1.0),
-        rounding=float(rounding) / (2.0 * width),
-        complete=bool(status == DONE),
+        unresolved_low=_fixed(rest.low),
+        unresolved_high=_fixed(rest.high),
+        unresolved_sine=_fixed(rest.sine),
+        unresolved_cosine=_fixed(rest.cosine),
+        defect=abs(flux + unresolved - 1.0),
+        rounding=0.5 * images * division.rounding / triangulation.width,
+        complete=division.complete,
+    )
+
+
+class _Pieces(NamedTuple):
+    """Pieces of beams; see `Beams`."""
+
+    low: Floats
+    high: Floats
+    sine: Floats
+    cosine: Floats
+    offset: Floats
+    leaf: NDArray[np.int64]
+    sign: NDArray[np.int64]
+    bounces: NDArray[np.int64]
+
+
+class _Division(NamedTuple):
+    """All rays as pieces; ``rounding`` in units of dp dtheta, others see `Beams`."""
+
+    leaving: _Pieces
+    rest: _Pieces
+    rounding: float
+    complete: bool
+
+
+class _Heap:
+    """The beams that are not finished, in tables, and which of them have been taken."""
+
+    def __init__(self, store: Store) -> None:
+        self._tables: list[tuple[Store, NDArray[np.bool_]]] = []
+        self.put([store])
+
+    def put(self, stores: list[Store]) -> None:
+        """Add beams."""
+        self._tables += [(store, np.ones(len(store.real), bool)) for store in stores if len(store.real)]
+
+    def column(self, number: int) -> Floats:
+        """Return the numbers in a column of ``real`` of all beams."""
+        return np.concatenate([np.empty(0), *(store.real[here, number] for store, here in self._tables)])
+
+    def take(self, threshold: float) -> list[Store]:
+        """Remove and return all beams above a threshold of priority."""
+        taken = []
+        for store, here in self._tables:
+            chosen = np.flatnonzero(here & (store.real[:, PRIORITY] > threshold))
+            if chosen.size:
+                here[chosen] = False
+                taken.append(_selected(store, chosen))
+        self._tables = [(store, here) for store, here in self._tables if here.any()]
+        return taken
+
+
+def _divided(
+    triangulation: Triangulation, tolerance: float, max_beams: int, entrances: int, threads: int | None
+) -> _Division:
+    """Divide all beams above a threshold of priority, lower the threshold, and so on.
+
+    What becomes of a beam does not depend on other beams. So the parts into which a round is cut, whose number depends
+    on the number of beams alone, may run on any number of threads.
+    """
+    from .compiled.pieces import pieces_of
+    from .compiled.splitting import LEAVES, STEPS, divide
+
+    hollow = _hollow(triangulation)
+    heap = _Heap(_entrance(triangulation.entrance, hollow.width, entrances))
+    total, rounding, steps, leaves = float(heap.column(FLUX).sum()), 0.0, 0, 0
+    rows: list[Floats] = []
+    tags: list[NDArray[np.int64]] = []
+    while True:
+        flux, best = heap.column(FLUX), heap.column(PRIORITY).max(initial=0.0)
+        room, spare = max_beams - leaves - flux.size, STEPS_A_BEAM * max_beams - steps
+        complete = float(flux.sum()) <= tolerance * total
+        if complete or room <= 0 or spare <= 0 or best <= 0.0:
+            break
+        parts = PARTS if min(flux.size, room) >= MANY else 1
+        threshold = best / _step(float(flux.sum()) / max(tolerance * total, TINY), parts > 1)
+        store, limits = _together(heap.take(threshold)), (room // parts, max(spare // parts, 1))
+        found: list[Any] = [None] * parts
+
+        def run(part: slice, store: Any = store, rule: Any = (threshold, *limits), found: list[Any] = found) -> None:
+            for k in range(part.start, part.stop):
+                found[k] = divide(hollow, store, k, len(found), *rule)
+
+        in_blocks(run, parts, threads, block=1)
+        for _, part_rows, part_tags, counts, part_rounding in found:
+            part_tags[:, TAG_LEAF] += leaves
+            rows.append(part_rows)
+            tags.append(part_tags)
+            leaves, steps, rounding = leaves + counts[LEAVES], steps + counts[STEPS], rounding + part_rounding
+        heap.put([part[0] for part in found])
+    rest = [pieces_of(store, hollow.width) for store in heap.take(-np.inf)]
+    found = _columns([row for row, _ in rest], [tag for _, tag in rest])
+    return _Division(_columns(rows, tags), found, rounding, complete)
+
+
+def _step(excess: float, many: bool) -> float:
+    """Return the factor by which the threshold falls, from the flux that is left as a multiple of the wanted flux.
+
+    In the end the n-th sliver between parallel sides has a flux of the order n^-3, and those after it n^-2.
+    """
+    return min(max(excess**1.5, LEAST_STEP), STEP_OF_MANY) if many else STEP_OF_FEW
+
+
+def _hollow(triangulation: Triangulation) -> Hollow:
+    """Return a triangulation as beams see it; the distance of a wall is computed at its end nearer to the origin."""
+    from .compiled.unfolding import STEP_ULPS, Hollow
+
+    (x, y), corners, beyond = triangulation.vertices.T, triangulation.corners, triangulation.beyond
+    edge = np.arange(beyond.size)
+    apex = corners[edge // 3, (edge + 2) % 3]
+    exits = (3 * (edge // 3)[:, None] + (edge[:, None] + [1, 2]) % 3).ravel()
+    size = np.abs(x) + np.abs(y)
+    near = np.arange(size.size - 1) + (size[:-1] > size[1:])
+    turns = triangulation.turn_high.tolist()
+    sine, cosine = np.array([math.sin(turn) for turn in turns]), np.array([math.cos(turn) for turn in turns])
+    twice = 2.0 * (cosine * y[near] - sine * x[near])
+    return Hollow(
+        apex_x=x[apex],
+        apex_y=y[apex],
+        exits=exits,
+        behind=beyond[exits],
+        beyond=beyond.copy(),
+        turn_high=triangulation.turn_high.copy(),
+        turn_low=triangulation.turn_low.copy(),
+        normal_x=-sine * twice,
+        normal_y=cosine * twice,
+        slack=STEP_ULPS * EPS * size[near],
+        width=triangulation.width,
+    )
+
+
+def _entrance(edge: int, width: float, halves: int) -> Store:
+    """Return the beams of rays with theta < pi/2, or, of two halves, of all rays."""
+    from .compiled.store import Store
+
+    vertices, real, whole = (
+        np.zeros((6, VERTEX_COLUMNS)),
+        np.zeros((2, REAL_COLUMNS)),
+        np.zeros((2, WHOLE_COLUMNS), int),
+    )
+    # the lines along the opening and, vertical, through its left and its right end; then these and those along it again
+    vertices[[0, 4], LINE_C], vertices[[1, 2, 3, 5], LINE_S] = (1.0, -1.0), 1.0
+    vertices[[2, 5], LINE_P] = vertices[[2, 4], CUT_X] = width
+    real[:, FLUX] = real[:, PRIORITY] = width
+    whole[:, FIRST], whole[:, COUNT], whole[:, EDGE], whole[:, SIGN] = (0, 3), 3, edge, 1
+    return Store(vertices[: 3 * halves], real[:halves], whole[:halves])
+
+
+def _selected(store: Store, beams: NDArray[np.int64]) -> Store:
+    """Return some beams of a store."""
+    whole = store.whole[beams]
+    end = np.cumsum(whole[:, COUNT])
+    begin = end - whole[:, COUNT]
+    vertices = np.arange(end[-1]) + np.repeat(whole[:, FIRST] - begin, whole[:, COUNT])
+    whole[:, FIRST] = begin
+    return type(store)(store.vertices[vertices], store.real[beams], whole)
+
+
+def _together(stores: list[Store]) -> Store:
+    """Return the beams of several stores."""
+    if len(stores) == 1:
+        return stores[0]
+    begin = 0
+    for vertices, _, whole in stores:
+        whole[:, FIRST] += begin
+        begin += len(vertices)
+    return type(stores[0])(*(np.concatenate(table) for table in zip(*stores, strict=True)))
+
+
+def _columns(rows: list[Floats], tags: list[NDArray[np.int64]]) -> _Pieces:
+    """Return the pieces of several tables."""
+    none = np.empty(0), np.empty(0, np.int64)
+    real = [np.concatenate([none[0], *(table[:, k] for table in rows)]) for k in range(PIECE_COLUMNS)]
+    whole = [np.concatenate([none[1], *(table[:, k] for table in tags)]) for k in range(TAG_COLUMNS)]
+    return _Pieces(
+        real[PIECE_LOW],
+        real[PIECE_HIGH],
+        real[PIECE_SINE],
+        real[PIECE_COSINE],
+        real[PIECE_OFFSET],
+        whole[TAG_LEAF],
+        whole[TAG_SIGN],
+        whole[TAG_BOUNCES],
     )
 
 
@@ -177,18 +387,20 @@ def _flux(low: Floats, high: Floats, sine: Floats, cosine: Floats) -> Floats:
     return np.asarray(half * (sine * np.sin(middle) + cosine * np.cos(middle)))
 
 
-def _flux_of(rows: Floats) -> Floats:
-    """Return the flux of each row of `pieces_of`."""
-    return _flux(*rows[:, (PIECE_LOW, PIECE_HIGH, PIECE_SINE, PIECE_COSINE)].T)
-
-
-def _with_mirror_images(rows: Floats, tags: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the rows and tags of `pieces_of` and of the mirror image, with theta and theta' replaced by pi - theta."""
-    low, high, sine, cosine, offset = rows.T
-    offset = np.where(tags[:, TAG_SIGN] > 0, -offset, 2.0 * np.pi - offset)
-    images, named = np.column_stack([np.pi - high, np.pi - low, sine, -cosine, offset]), tags.copy()
-    named[:, TAG_LEAF] += tags[tags[:, TAG_LEFT] == 1, TAG_LEAF].max(initial=-1) + 1
-    return np.concatenate([rows, images]), np.concatenate([tags, named])
+def _mirrored(pieces: _Pieces) -> _Pieces:
+    """Return the pieces and their mirror images, with theta and theta' replaced by pi - theta."""
+    low, high, sine, cosine, offset, leaf, sign, bounces = pieces
+    images = _Pieces(
+        np.pi - high,
+        np.pi - low,
+        sine,
+        -cosine,
+        np.where(sign > 0, -offset, 2.0 * np.pi - offset),
+        leaf + leaf.max(initial=-1) + 1,
+        sign,
+        bounces,
+    )
+    return _Pieces(*(np.concatenate(pair) for pair in zip(pieces, images, strict=True)))
 
 
 def _fixed(array: NDArray[Any]) -> NDArray[Any]:

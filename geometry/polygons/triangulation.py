@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
-from math import frexp, ldexp
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,18 +18,8 @@ from .predicates import ExactPoints
 Integers = NDArray[np.int64]
 # Difference up to which edges are tested for being parallel, a few rounding errors of directions in (0, pi].
 PARALLEL = 32.0 * UNIT_ROUNDOFF
-
-
-class Mesh(NamedTuple):
-    """A triangulation for compiled functions: coordinates of the vertices, and the arrays of `Triangulation`."""
-
-    x: Floats
-    y: Floats
-    triangles: Integers
-    beyond: Integers
-    turn_high: Floats
-    turn_low: Floats
-    entrance: int
+# A diagonal is exchanged for one that is shorter by more than rounding, so the exchanges come to an end.
+SHORTER = 1.0 - 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +60,6 @@ class Triangulation:
         """Width of the opening in units of ``unit``."""
         return float(self.vertices[-1, 0])
 
-    @property
-    def tables(self) -> Mesh:
-        """The triangulation for compiled functions."""
-        x, y = np.ascontiguousarray(self.vertices.T)
-        return Mesh(x, y, self.corners, self.beyond, self.turn_high, self.turn_low, self.entrance)
-
 
 def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     """Cut a polygonal hollow into triangles.
@@ -100,7 +83,8 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     Notes
     -----
     By ear clipping; cost n^2 for common walls, n^3 at worst. Signs that double precision does not resolve are computed
-    in exact rational arithmetic.
+    in exact rational arithmetic. Then the diagonals of convex quadrilaterals are exchanged as long as they become
+    shorter, because a ray crosses diagonals in proportion to their length.
 
     Examples
     --------
@@ -110,8 +94,9 @@ def triangulated(hollow_vertices: ArrayLike) -> Triangulation:
     """
     points = _checked(hollow_vertices)
     relative = points - points[0]
-    unit = ldexp(1.0, frexp(float(np.abs(relative).max()))[1])
+    unit = math.ldexp(1.0, math.frexp(float(np.abs(relative).max()))[1])
     corners, beyond = _clipped(ExactPoints(points / unit))
+    _shorten(ExactPoints(points / unit), corners, beyond)
     entrance = int(np.flatnonzero(beyond == OPENING)[0])
     high, low = _directions(ExactPoints(points))
     for array in (corners, beyond):
@@ -173,6 +158,34 @@ def _clipped(chain: ExactPoints, slits_first: bool = False) -> tuple[Integers, I
         del ring[k]
         first = k + 1
     return corners, beyond
+
+
+def _shorten(chain: ExactPoints, corners: Integers, beyond: Integers) -> None:
+    """Exchange diagonals of strictly convex quadrilaterals for the other ones, as long as these are shorter."""
+    points = chain.points
+    open_edges = [edge for edge in range(beyond.size) if beyond[edge] > edge]
+    while open_edges:
+        edge = open_edges.pop()
+        if beyond[edge] < 0:
+            continue
+        (triangle, k), (other, j) = divmod(edge, 3), divmod(int(beyond[edge]), 3)
+        a, b, c = corners[triangle, [k, (k + 1) % 3, (k + 2) % 3]].tolist()
+        d = int(corners[other, (j + 2) % 3])
+        if math.dist(points[c], points[d]) >= SHORTER * math.dist(points[a], points[b]):
+            continue
+        if chain.turn(d, b, c) <= 0 or chain.turn(c, a, d) <= 0:
+            continue
+        bc, ca = beyond[[3 * triangle + (k + 1) % 3, 3 * triangle + (k + 2) % 3]].tolist()
+        ad, db = beyond[[3 * other + (j + 1) % 3, 3 * other + (j + 2) % 3]].tolist()
+        corners[triangle], corners[other] = (c, d, b), (d, c, a)
+        sides = (3 * other, db, bc, 3 * triangle, ca, ad)
+        for place, neighbour in zip(
+            [*range(3 * triangle, 3 * triangle + 3), *range(3 * other, 3 * other + 3)], sides, strict=True
+        ):
+            beyond[place] = neighbour
+            if neighbour >= 0:
+                beyond[neighbour] = place
+        open_edges += [3 * triangle + 1, 3 * triangle + 2, 3 * other + 1, 3 * other + 2]
 
 
 def _next_ear(chain: ExactPoints, ring: list[int], first: int, slits_first: bool) -> int:

@@ -1,0 +1,161 @@
+"""The isometry that unfolds a hollow along a beam, and the vertices of its triangles: compiled. Loads numba."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....core.checks import Floats
+from ....core.compilation import jit
+from ....core.rounding import EPS
+from ...tracing.compiled.options import inlined
+from ...tracing.compiled.trigonometry import PI, PI_REST
+from ...tracing.double_double.arithmetic import add
+from .codes import FIRST_WALL, OPENING
+
+_compile = jit()
+# Rounding error of f, in eps times the sum of the absolute terms: five products of numbers with one to three errors.
+FUNCTIONAL_ULPS = 8.0
+# Rounding error of R n, by which a reflection changes T: n has two errors, R, the product and the sum one each. The
+# length of n, twice the distance of a wall, has eight units of roundoff of the coordinates of its end.
+STEP_ULPS = 4.0
+
+
+class Hollow(NamedTuple):
+    """A triangulated hollow, as beams see it.
+
+    ``apex_x``, ``apex_y`` are the third vertex of the triangle of each edge. A beam that enters through ``edge`` leaves
+    the triangle through ``exits[2 edge]`` if the apex lies on its right, seen in the hollow, else through
+    ``exits[2 edge + 1]``; ``behind`` is what lies there, and ``beyond`` what lies behind each edge, see
+    `Triangulation`. The normal of each wall has twice the length of the distance of its line from the origin, with an
+    error of ``slack``.
+    """
+
+    apex_x: Floats
+    apex_y: Floats
+    exits: NDArray[np.int64]
+    behind: NDArray[np.int64]
+    beyond: NDArray[np.int64]
+    turn_high: Floats
+    turn_low: Floats
+    normal_x: Floats
+    normal_y: Floats
+    slack: Floats
+    width: float
+
+
+class Unfolding(NamedTuple):
+    """The isometry V -> R V + T that unfolds the hollow, where R reflects first if ``sign`` is -1.
+
+    The angle of R and T are unevaluated sums; ``sine`` and ``cosine`` are those of the angle. The errors bound the
+    rounding of T.
+    """
+
+    sign: float
+    turn: float
+    turn_low: float
+    sine: float
+    cosine: float
+    x: float
+    x_low: float
+    y: float
+    y_low: float
+    error_x: float
+    error_y: float
+
+
+class Course(NamedTuple):
+    """Where a beam is: the edge through which it enters a triangle, the unfolding there, and its reflections so far."""
+
+    edge: int
+    bounces: int
+    unfolding: Unfolding
+
+
+class Apex(NamedTuple):
+    """The third vertex of a beam's triangle, unfolded, bounds on its rounding errors, and the two edges at the vertex.
+
+    ``left`` is the edge on the left of the vertex as seen by the beam, ``right`` the edge on its right.
+    """
+
+    x: float
+    y: float
+    error_x: float
+    error_y: float
+    left: int
+    right: int
+
+
+@_compile
+def reduced(high, low):
+    """Return an angle, given as two doubles, modulo 2 pi in [-pi, pi] within rounding."""
+    turns = np.rint(high / (2.0 * PI))
+    if turns != 0.0:
+        # turns is at most 2, so its products are exact
+        high, low = add((high, low), (-2.0 * turns * PI, -2.0 * turns * PI_REST))
+    return high, low
+
+
+@inlined
+def sine_and_cosine(high, low):
+    """Return the sine and the cosine of an angle, given as two doubles."""
+    sine, cosine = math.sin(high), math.cos(high)
+    return sine + low * cosine, cosine - low * sine
+
+
+@inlined
+def unfolded(sign, turn, turn_low, x, x_low, y, y_low, error_x, error_y):
+    """-> Unfolding: with the sine and the cosine of its angle."""
+    sine, cosine = sine_and_cosine(turn, turn_low)
+    return Unfolding(sign, turn, turn_low, sine, cosine, x, x_low, y, y_low, error_x, error_y)
+
+
+@inlined
+def reflected(unfolding, wall, hollow):
+    """-> Unfolding: the isometry beyond a wall that the beam hits."""
+    sign = unfolding.sign
+    # twice the distance of the wall along the image of its unit normal, whose angle is turn + sign (direction + pi / 2)
+    nx, ny = hollow.normal_x[wall], hollow.normal_y[wall]
+    xx, xy = unfolding.cosine * nx, -sign * unfolding.sine * ny
+    yx, yy = unfolding.sine * nx, sign * unfolding.cosine * ny
+    x, y = add((unfolding.x, unfolding.x_low), (xx + xy, 0.0)), add((unfolding.y, unfolding.y_low), (yx + yy, 0.0))
+    turn = 2.0 * sign * hollow.turn_high[wall], 2.0 * sign * hollow.turn_low[wall]
+    high, low = add((unfolding.turn, unfolding.turn_low), turn)
+    high, low = reduced(high, low)
+    error_x = unfolding.error_x + hollow.slack[wall] + STEP_ULPS * EPS * (abs(xx) + abs(xy))
+    error_y = unfolding.error_y + hollow.slack[wall] + STEP_ULPS * EPS * (abs(yx) + abs(yy))
+    return unfolded(-sign, high, low, x[0], x[1], y[0], y[1], error_x, error_y)
+
+
+@inlined
+def crossed(edge, course, hollow):
+    """-> (course, left): the course beyond an edge of the triangle, and whether the beam has left the hollow."""
+    code = hollow.beyond[edge]
+    if code >= 0:
+        return Course(code, course.bounces, course.unfolding), False
+    if code == OPENING:
+        return Course(edge, course.bounces, course.unfolding), True
+    return Course(edge, course.bounces + 1, reflected(course.unfolding, FIRST_WALL - code, hollow)), False
+
+
+@inlined
+def apex_of(course, hollow):
+    """-> Apex: the apex of the triangle that a beam enters."""
+    edge, isometry = course.edge, course.unfolding
+    x, y = hollow.apex_x[edge], hollow.apex_y[edge]
+    xx, xy = isometry.cosine * x, -isometry.sign * isometry.sine * y
+    yx, yy = isometry.sine * x, isometry.sign * isometry.cosine * y
+    left, right = hollow.exits[2 * edge], hollow.exits[2 * edge + 1]
+    if isometry.sign < 0.0:
+        left, right = right, left
+    return Apex(
+        xx + xy + isometry.x,
+        yx + yy + isometry.y,
+        FUNCTIONAL_ULPS * EPS * (abs(xx) + abs(xy) + abs(isometry.x)) + isometry.error_x,
+        FUNCTIONAL_ULPS * EPS * (abs(yx) + abs(yy) + abs(isometry.y)) + isometry.error_y,
+        left,
+        right,
+    )
