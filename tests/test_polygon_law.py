@@ -169,6 +169,21 @@ def test_what_is_not_resolved_is_sent_back_and_reported() -> None:
         assert np.linalg.norm(found.symmetric - exact.symmetric) <= float(found.error) + float(exact.error)
 
 
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_the_tolerance_bounds_the_unresolved_flux_of_the_whole_wall(tolerance: float) -> None:
+    law = ker.PolygonLaw(geo.koch(3), tolerance=tolerance, max_beams=10**7)
+    assert 0.1 * tolerance < float(law.unresolved) <= tolerance
+
+
+def test_few_angles_are_answered_as_many() -> None:
+    theta = np.random.default_rng(6).uniform(0.01, 3.13, 3)
+    law, same = (ker.PolygonLaw(geo.koch(2), max_beams=3000) for _ in range(2))
+    at_once, _ = same.branches(np.concatenate([theta, np.linspace(0.1, 3.0, 500)]))
+    for k, angle in enumerate(theta):
+        probability, _ = law.branches(angle)
+        assert np.array_equal(probability, at_once[k][: probability.size]) and not at_once[k][probability.size :].any()
+
+
 def test_walls_that_are_curved_or_open_are_refused_with_advice() -> None:
     with pytest.raises(InputError, match="WallLaw"):
         ker.PolygonLaw(geo.focusing_arcs(1.0))

@@ -42,9 +42,11 @@ class PolygonLaw(BranchLaw):
     wall : Wall
         A polygonal wall that closes (conditions B5 and B5': it has no islands).
     tolerance : float
-        Fraction of a hollow's flux that may stay unresolved.
+        Fraction of the flux that may stay unresolved.
     max_beams : int
-        Limit on the beams per hollow; the rest of the flux stays unresolved.
+        Limit on the beams per hollow, which the default reaches within about a second; the rest of the flux stays
+        unresolved. Cavities with narrow necks never resolve completely: for those give a larger limit, and the
+        tolerance that you want. A million beams take about half a gigabyte.
 
     Attributes
     ----------
@@ -99,19 +101,28 @@ class PolygonLaw(BranchLaw):
         from ...geometry.cells.hollow_shape import distinct_hollows
 
         wall = self.wall
-        parts = [IsometryTable.flat(wall.flat_top / wall.period)]
-        known: list[tuple[HollowShape, IsometryTable]] = []
+        # the widths of each shape and of its mirror image, as fractions of the period
+        found: list[tuple[HollowShape, list[float]]] = []
         for shape, hollows in distinct_hollows(wall):
-            image = shape.mirrored()
-            table = next((found.mirrored() for other, found in known if image.same_as(other)), None)
-            if table is None:
-                table = self._of_shape(shape, image.same_as(shape))
-                known.append((shape, table))
-            parts.append(table.scaled(math.fsum(hollow.width for hollow in hollows) / wall.period))
+            width, image = math.fsum(hollow.width for hollow in hollows) / wall.period, shape.mirrored()
+            known = next((widths for other, widths in found if image.same_as(other)), None)
+            if known is None:
+                found.append((shape, [width, 0.0]))
+            else:
+                known[1] += width
+        size = sum(len(shape.vertices) for shape, _ in found)
+        parts = [IsometryTable.flat(wall.flat_top / wall.period)]
+        for shape, widths in found:
+            table = self._of_shape(shape, len(shape.vertices) / size / math.fsum(widths))
+            images = (table, table.mirrored() if widths[1] else table)
+            parts += [part.scaled(width) for part, width in zip(images, widths, strict=True) if width]
         return IsometryTable.joined(parts)
 
-    def _of_shape(self, shape: HollowShape, symmetric: bool) -> IsometryTable:
-        """The table of a hollow, scaled so that its opening is the whole period."""
+    def _of_shape(self, shape: HollowShape, share: float) -> IsometryTable:
+        """The table of a hollow, scaled so that its opening is the whole period, with ``share`` times the tolerance.
+
+        Every hollow may leave a part of the tolerance unresolved, in proportion to its vertices.
+        """
         if shape.height_to_width is not None:
             return IsometryTable.of_crevice(1.0, shape.height_to_width)
         if shape.apex_angle is not None:
@@ -120,7 +131,12 @@ class PolygonLaw(BranchLaw):
                 return table
         from ...geometry.polygons.beams import beams_of
 
-        beams = beams_of(shape.vertices, tolerance=self.tolerance, max_beams=self.max_beams, mirror_symmetric=symmetric)
+        beams = beams_of(
+            shape.vertices,
+            tolerance=min(share * self.tolerance, 1.0),
+            max_beams=self.max_beams,
+            mirror_symmetric=shape.mirrored().same_as(shape),
+        )
         return table_of_beams(beams)
 
     def isometry_table(self) -> IsometryTable:
