@@ -49,8 +49,8 @@ MAX_BEAMS = 200_000
 STEPS_A_BEAM = 256
 # Number of beams from which a round is cut into parts.
 MANY, PARTS = 1024, 16
-# Factor between the thresholds of priority of two rounds, of few and of many beams, and next to the tolerance.
-STEP_OF_FEW, STEP_OF_MANY, LEAST_STEP = 4.0, 2.0, 1.1
+# Factor between the thresholds of priority of two rounds: next to the tolerance, and at most.
+LEAST_STEP, MOST_STEP = 1.1, 64.0
 # Stands for a tolerance of 0.
 TINY = float(np.finfo(np.float64).tiny)
 
@@ -270,7 +270,7 @@ def _divided(
         if complete or room <= 0 or spare <= 0 or best <= 0.0:
             break
         parts = PARTS if min(flux.size, room) >= MANY else 1
-        threshold = best / _step(float(flux.sum()) / max(tolerance * total, TINY), parts > 1)
+        threshold = best / _step(float(flux.sum()) / max(tolerance * total, TINY), 1.0 + room / (leaves + flux.size))
         store, limits = _together(heap.take(threshold)), (room // parts, max(spare // parts, 1))
         found: list[Any] = [None] * parts
 
@@ -290,12 +290,14 @@ def _divided(
     return _Division(_columns(rows, tags), found, rounding, complete)
 
 
-def _step(excess: float, many: bool) -> float:
-    """Return the factor by which the threshold falls, from the flux that is left as a multiple of the wanted flux.
+def _step(excess: float, growth: float) -> float:
+    """Return the factor by which the threshold falls.
 
-    In the end the n-th sliver between parallel sides has a flux of the order n^-3, and those after it n^-2.
+    The flux that is left falls at most in proportion to the threshold, and the number of beams grows at most in inverse
+    proportion. ``excess`` is the flux that is left as a multiple of the wanted flux, ``growth`` the factor by which the
+    number of beams may still grow.
     """
-    return min(max(excess**1.5, LEAST_STEP), STEP_OF_MANY) if many else STEP_OF_FEW
+    return min(MOST_STEP, max(excess, LEAST_STEP), max(0.5 * growth, 2.0))
 
 
 def _hollow(triangulation: Triangulation) -> Hollow:
