@@ -286,8 +286,8 @@ def _divided(
             leaves, steps, rounding = leaves + counts[LEAVES], steps + counts[STEPS], rounding + part_rounding
         heap.put([part[0] for part in found])
     rest = [pieces_of(store, hollow.width) for store in heap.take(-np.inf)]
-    found = _columns([row for row, _ in rest], [tag for _, tag in rest])
-    return _Division(_columns(rows, tags), found, rounding, complete)
+    left = _columns([row for row, _ in rest], [tag for _, tag in rest])
+    return _Division(_columns(rows, tags), left, rounding, complete)
 
 
 def _step(excess: float, growth: float) -> float:
@@ -307,7 +307,7 @@ def _hollow(triangulation: Triangulation) -> Hollow:
     (x, y), corners, beyond = triangulation.vertices.T, triangulation.corners, triangulation.beyond
     edge = np.arange(beyond.size)
     apex = corners[edge // 3, (edge + 2) % 3]
-    exits = (3 * (edge // 3)[:, None] + (edge[:, None] + [1, 2]) % 3).ravel()
+    exits = (3 * (edge // 3)[:, None] + (edge[:, None] + np.array([1, 2])) % 3).ravel()
     size = np.abs(x) + np.abs(y)
     near = np.arange(size.size - 1) + (size[:-1] > size[1:])
     turns = triangulation.turn_high.tolist()
