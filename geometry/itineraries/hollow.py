@@ -130,15 +130,15 @@ class HollowConditionals:
         """Note an entry point in a piece that is missing at this angle."""
         self._missed.setdefault(angle, []).append(x)
 
-    def trace(self, entries: Floats, angles: Floats) -> tuple[Floats, NDArray[np.uint64]]:
-        """The outgoing angles and labels of rays."""
+    def trace(self, entries: Floats, angles: Floats) -> tuple[Floats, Floats, NDArray[np.uint64]]:
+        """The outgoing angles, exit points and labels of rays."""
         from .compiled.patches import trace_points
 
-        outs, labels = np.empty(len(entries)), np.empty(len(entries), np.uint64)
+        outs, exits, labels = np.empty(len(entries)), np.empty(len(entries)), np.empty(len(entries), np.uint64)
         segments = np.zeros(1, np.int64)
-        compiled_result(lambda: trace_points(entries, angles, self._setting, outs, labels, segments))
+        compiled_result(lambda: trace_points(entries, angles, self._setting, outs, exits, labels, segments))
         self.rays, self.segments = self.rays + len(entries), self.segments + int(segments[0])
-        return outs, labels
+        return outs, exits, labels
 
     def _march_once(self, theta: Floats, tolerances: Floats) -> dict[float, Conditional]:
         from .compiled.march import marched_angles

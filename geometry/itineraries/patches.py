@@ -146,7 +146,7 @@ def _traced(hollow: HollowConditionals, strips: Strips, place: Floats) -> tuple[
     low, high = strips.ends[..., 1, None], strips.ends[..., 2, None]
     entries = low + (high - low) * (place * place * (3.0 - 2.0 * place))
     angles = np.broadcast_to(strips.angle[..., None], entries.shape)
-    outs, labels = hollow.trace(entries.ravel(), angles.ravel())
+    outs, _, labels = hollow.trace(entries.ravel(), angles.ravel())
     wrong = labels.reshape(entries.shape) != strips.label[:, None, None]
     for angle, x in zip(angles[wrong].tolist(), entries[wrong].tolist(), strict=True):
         hollow.miss(angle, x)

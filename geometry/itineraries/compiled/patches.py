@@ -89,8 +89,8 @@ def room_for(cells: int, nodes: int, positions: int) -> Room:
 
 
 @compiled
-def trace_points(entries, angles, setting, outs, labels, segments):
-    """Trace rays with incoming angles of their own; set their outgoing angles and labels."""
+def trace_points(entries, angles, setting, outs, exits, labels, segments):
+    """Trace rays with incoming angles of their own; set their outgoing angles, exit points and labels."""
     task = task_of(setting, 0.0, np.int64(0), segments)
     for first in range(0, entries.shape[0], BLOCK):
         last = min(first + BLOCK, entries.shape[0])
@@ -99,6 +99,7 @@ def trace_points(entries, angles, setting, outs, labels, segments):
         trace_block(entries[first:last], task)
         for n in range(first, last):
             outs[n], labels[n] = outcome(n - first, entries[n], task)
+            exits[n] = setting.tracer.results.x[n - first]
 
 
 @linked
