@@ -126,3 +126,17 @@ def test_trial_functions_are_orthonormal_and_of_one_parity():
     here = found.basis.evaluate(0.5 * np.pi + 0.5 * NODES[NODES != 0.0]) @ found.vectors
     sign = np.array([1.0, -1.0, -1.0])
     assert np.allclose(here[::-1], sign * here, atol=1e-12)
+
+
+@pytest.mark.parametrize("basis", [ker.Legendre(8), ker.Bins(32), ker.Bins([0.0, 1.0, np.pi])], ids=repr)
+@pytest.mark.parametrize("half_angle", [0.3, 1.0, np.pi / 2])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+def test_arcs_follow_no_more_hits_than_the_tolerance_needs(half_angle, tolerance, basis):
+    fine, rounding = arc_matrix(half_angle, basis)
+    rough, error = arc_matrix(half_angle, basis, tolerance)
+    assert np.linalg.norm(rough - fine) <= error + rounding <= 1e-3 * tolerance
+
+
+def test_a_rough_matrix_of_arcs_leaves_many_hits_out():
+    fine, rough = (arc_matrix(1.2, ker.Legendre(2), tolerance) for tolerance in (0.0, 1e-2))
+    assert 1e-11 < np.linalg.norm(rough[0] - fine[0]) <= rough[1]

@@ -22,9 +22,10 @@ from ..matrices.matrix import KernelMatrix
 from ..walls.circular_arc import CircularArcLaw
 from .method import Budget, MethodName, computed, rounding
 
-# A fraction of about xi^3 / (6 MOST_HITS^3 sin xi), 5e-13, of the rays has more hits than this. These rays enter at xi
-# and leave at pi - xi, both within 2 xi / MOST_HITS, and are counted at these angles.
-MOST_HITS = 8192
+# A fraction of about xi^3 / (6 N^3 sin xi) of the rays has more than N hits, 5e-13 for MOST_HITS. They enter at xi and
+# leave at pi - xi, both within 2 xi / N, and are counted at these angles. N is FEWEST_HITS times a power of 2, so that
+# the error of this is at most REST_FRACTION of the tolerance, or MOST_HITS.
+FEWEST_HITS, MOST_HITS, REST_FRACTION = 32, 8192, 1e-5
 # Gauss nodes on pieces so short that the basis functions are as smooth there as sin(delta), and on longer pieces in
 # partitions.
 NODES_SHORT, NODES_CELL = 5, 14
@@ -45,13 +46,15 @@ class Arcs:
         return isinstance(law, CircularArcLaw)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
-        symmetric, error = arc_matrix(cast(CircularArcLaw, law).half_angle, basis)
+        symmetric, error = arc_matrix(cast(CircularArcLaw, law).half_angle, basis, budget.tolerance)
         how = "Gauss rules on the polygons of each number of hits, plus what the remaining hits can do"
         return computed(symmetric, basis, self.name, error + rounding(basis), how)
 
 
-def arc_matrix(half_angle: float, basis: Basis) -> tuple[Floats, float]:
+def arc_matrix(half_angle: float, basis: Basis, tolerance: float = 0.0) -> tuple[Floats, float]:
     r"""<e_i, P e_j> for focusing circular arcs of half angle xi, and an estimate of its Frobenius error.
+
+    The error is far below the tolerance, or due to rounding and to the rays of more than MOST_HITS hits.
 
     Let delta be the chord's angle. S_ij is the integral of e_i(theta) e_j(theta') sin(delta) / (4 sin xi) over
     |theta - xi| < delta < min(xi + theta, 2 pi - xi - theta). Here theta' = pi + theta - 2 N delta for
@@ -63,11 +66,14 @@ def arc_matrix(half_angle: float, basis: Basis) -> tuple[Floats, float]:
     total = np.zeros((basis.size, basis.size))
     error = ROUNDING * float(np.sqrt(basis.size)) / np.sin(half_angle)
     sides = (False,) if is_mirror_symmetric(basis) else (False, True)
+    most_hits = _enough_hits(half_angle, basis, tolerance)
     for mirrored in sides:
         edges = np.pi - basis.edges[::-1] if mirrored else basis.edges
-        strips = _strips(half_angle, edges)
+        strips = _strips(half_angle, edges, most_hits)
         counted = _add_strips(total, basis, edges, strips, half_angle, mirrored)
-        error += _add_rest(total, basis, half_angle, 0.5 - counted, mirrored)
+        centre, spread = _rest(basis, half_angle, most_hits, mirrored)
+        total += (0.5 - counted) * centre
+        error += abs(0.5 - counted) * spread
     if len(sides) == 1:
         flip = reflection_matrix(basis)
         return total + flip @ total @ flip, 2.0 * error
@@ -90,8 +96,20 @@ class _Strips:
         )
 
 
-def _strips(half_angle: float, edges: Floats) -> _Strips:
-    whole = _polygons(half_angle)
+def _enough_hits(half_angle: float, basis: Basis, tolerance: float) -> int:
+    """A number of hits such that the other rays change the matrix by much less than the tolerance, or MOST_HITS."""
+    hits = FEWEST_HITS
+    while hits < MOST_HITS:
+        left = (half_angle / hits) ** 3 / (6.0 * np.sin(half_angle))
+        spread = max(_rest(basis, half_angle, hits, mirrored)[1] for mirrored in (False, True))
+        if left * spread <= REST_FRACTION * tolerance:
+            break
+        hits *= 2
+    return hits
+
+
+def _strips(half_angle: float, edges: Floats, most_hits: int) -> _Strips:
+    whole = _polygons(half_angle, most_hits)
     owners, angles = [np.arange(whole.hits.size)] * 2, [whole.low, whole.high]
     # Cuts at the edges in theta, and where the outgoing angle on a side of the polygon meets an edge.
     level = np.zeros((2, whole.hits.size))
@@ -111,9 +129,9 @@ def _strips(half_angle: float, edges: Floats) -> _Strips:
     return _Strips(strips.hits, low, high, strips.lower, strips.upper)
 
 
-def _polygons(half_angle: float) -> _Strips:
+def _polygons(half_angle: float, most_hits: int) -> _Strips:
     """The polygons of all numbers of hits, cut into strips at their corners."""
-    hits = np.arange(1.0, MOST_HITS + 1.0)
+    hits = np.arange(1.0, most_hits + 1.0)
     one, xi = np.ones(hits.size), half_angle
     lower = np.array([[one, -one, one / (2 * hits + 1)], [-xi * one, xi * one, xi / (2 * hits + 1)]])
     upper = np.array(
@@ -221,13 +239,12 @@ def _add_cut_strips(
     return float(mass.sum())
 
 
-def _add_rest(total: Floats, basis: Basis, half_angle: float, rest: float, mirrored: bool) -> float:
-    """Add the rays with more than MOST_HITS hits at their limiting angles; returns a bound on the error of this."""
-    spread = half_angle / MOST_HITS * np.linspace(-1.0, 1.0, NOISE_PROBES)
+def _rest(basis: Basis, half_angle: float, most_hits: int, mirrored: bool) -> tuple[Floats, float]:
+    """The matrix of a unit mass of rays with more hits at their limiting angles, and a bound on the error of this."""
+    spread = half_angle / most_hits * np.linspace(-1.0, 1.0, NOISE_PROBES)
     sign, origin = (-1.0, np.pi) if mirrored else (1.0, 0.0)
     incoming = basis.evaluate(origin + sign * (half_angle + spread))
     outgoing = basis.evaluate(origin + sign * (np.pi - half_angle + 2.0 * spread))
     middle = NOISE_PROBES // 2
     centre = np.outer(incoming[middle], outgoing[middle])
-    total += rest * centre
-    return abs(rest) * max(float(np.linalg.norm(np.outer(e, f) - centre)) for e in incoming for f in outgoing)
+    return centre, max(float(np.linalg.norm(np.outer(e, f) - centre)) for e in incoming for f in outgoing)
