@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from itertools import pairwise
 
 import mpmath
@@ -424,3 +425,13 @@ def test_displaced_nodes_change_a_matrix_by_at_most_the_derivative_norm(basis: B
     assert 0.1 * shift * basis.derivative_norm() < change <= shift * basis.derivative_norm()
     assert node_rounding(basis) == pytest.approx(2.0 * np.finfo(float).eps * basis.derivative_norm())
     assert rounding(basis) > node_rounding(basis)
+
+
+def test_blas_is_limited_to_one_thread_only_for_products_that_it_would_divide(monkeypatch):
+    limits = []
+    monkeypatch.setattr(products_module, "one_blas_thread", lambda: limits.append(1) or nullcontext())
+    for number, limited in ((2**10, 0), (2**17, 1)):
+        theta = np.linspace(0.1, 3.0, number)
+        total = np.zeros((2, 2))
+        add_products(total, Legendre(2), theta, theta, np.ones(number))
+        assert len(limits) == limited and total[0, 0] == number

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from typing import Any
 
@@ -16,6 +16,8 @@ from .panels import Panels
 
 # Limit on the values of basis functions in memory at a time.
 CHUNK = 2**21
+# OpenBLAS uses one thread for products of at most this many multiplications, and to limit it takes 30 us.
+SMALL_PRODUCT = 2**18
 
 
 def one_blas_thread() -> AbstractContextManager[Any]:
@@ -51,7 +53,7 @@ def add_products(total: Floats, basis: Basis, incoming: Floats, outgoing: Floats
     for start in range(0, incoming.size, step):
         part = slice(start, start + step)
         values, images = basis.evaluate(incoming[part]), weight[part, None] * basis.evaluate(outgoing[part])
-        with one_blas_thread():
+        with nullcontext() if values.size * basis.size <= SMALL_PRODUCT else one_blas_thread():
             total += values.T @ images
 
 

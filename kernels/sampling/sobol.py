@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -55,15 +55,12 @@ class SobolSequence:
     @staticmethod
     def of(rng: np.random.Generator) -> SobolSequence:
         """The sequence of a generator."""
-        from scipy.linalg import pascal
-
         own = rng.spawn(1)[0]
         bits = np.arange(SOBOL_BITS, dtype=np.uint64)
         shift = own.integers(2, size=(2, SOBOL_BITS), dtype=np.uint32) @ (np.uint64(1) << bits)
         scramble = np.tril(own.integers(2, size=(2, SOBOL_BITS, SOBOL_BITS), dtype=np.uint32), -1).astype(np.int64)
         scramble += np.eye(SOBOL_BITS, dtype=np.int64)
-        plain = np.stack([np.eye(SOBOL_BITS), pascal(SOBOL_BITS, kind="upper") % 2]).astype(np.int64)
-        digits = (scramble @ plain) % 2
+        digits = (scramble @ _plain_matrices()) % 2
         columns = np.swapaxes(digits, 1, 2).astype(np.uint64) @ (np.uint64(1) << bits[::-1])
         return SobolSequence(columns, shift)
 
@@ -77,6 +74,14 @@ class SobolSequence:
         for bit in range(number.bit_length() - 1):
             found = np.concatenate([found, found ^ self.columns[:, bit]])
         return found
+
+
+@cache
+def _plain_matrices() -> NDArray[np.int64]:
+    """Sobol's matrices without scrambling, shape (2, SOBOL_BITS, SOBOL_BITS)."""
+    from scipy.linalg import pascal
+
+    return np.stack([np.eye(SOBOL_BITS), pascal(SOBOL_BITS, kind="upper") % 2]).astype(np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +149,24 @@ class SobolRays:
     def add_to(self, sums: RaySums, first: int, task: int) -> None:
         reflect = self.law.random_map()
         assert reflect is not None  # checked by the sampler
-        for start, number in _balanced(*self.range_of(task), self.chunk):
-            points = (self.sequence.block(start, number) ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS
+        for digits in self._blocks(*self.range_of(task)):
+            points = (digits ^ self.shifts[:, None]) * 2.0**-SOBOL_BITS
             x, u = np.moveaxis(points + self.beyond[:, None], -1, 0)
             theta: Floats = clipped_inside(SINE.quantile(0.5 * u if self.halved else u))
             outgoing, escaped = reflect(entry_inside(x), theta)
             sums.count_unresolved(escaped)
             for part in range(PARTS):
                 sums.add(first + part, theta[part], outgoing[part])
+
+    def _blocks(self, low: int, high: int) -> Iterator[Digits]:
+        """The points of a range, at most a chunk at a time."""
+        blocks: list[Digits] = []
+        for start, number in _balanced(low, high, self.chunk):
+            if sum(map(len, blocks)) + number > self.chunk:
+                yield np.concatenate(blocks)
+                blocks = []
+            blocks.append(self.sequence.block(start, number))
+        yield np.concatenate(blocks)
 
     def identity(self) -> dict[str, Any]:
         return {
@@ -166,6 +181,15 @@ def _balanced(low: int, high: int, most: int) -> Iterator[tuple[int, int]]:
         number = min(most, high - low, low or high)
         yield low, number
         low += number
+
+
+def whole_sequences(samples: int) -> int:
+    """At least ``samples`` rays: eight times a power of two.
+
+    >>> whole_sequences(8), whole_sequences(17)
+    (8, 32)
+    """
+    return PARTS << (max(-(-samples // PARTS), 1) - 1).bit_length()
 
 
 class SobolSampler:
@@ -215,7 +239,7 @@ class SobolSampler:
         InputError
             If the sequence has fewer points, or the checkpoint is of other rays or cannot be written.
         """
-        each = 1 << (max(-(-samples // PARTS), 1) - 1).bit_length()
+        each = whole_sequences(samples) // PARTS
         if each > 1 << SOBOL_BITS:
             most = PARTS << SOBOL_BITS
             raise InputError(
