@@ -8,6 +8,7 @@ from asperity import kernels as ker
 from asperity.bench.quantities.walls import wall_of
 from asperity.kernels.discretisation.method import QUICK_SEGMENTS, Budget
 from asperity.kernels.discretisation.traced import traced_matrix
+from asperity.kernels.sampling.sobol import SobolSampler
 from random_curved_walls import random_curved_wall
 
 # A rough profile of 200 pieces, whose beams resolve completely, and a curve whose beams never do.
@@ -33,6 +34,32 @@ def test_a_look_that_finds_rays_too_few_changes_no_result():
     asked = ker.discretise(law, basis, method="qmc", rng=generators[1])
     # but for the order of sums
     assert looked.method == "qmc" and np.allclose(looked.symmetric, asked.symmetric, rtol=0.0, atol=1e-15)
+
+
+def test_rays_do_not_end_where_their_spread_happens_to_be_small():
+    # a pilot run of 2^14 rays met this tolerance for 44 % of the seeds; their half widths of 95 % held for 91 % only
+    law, basis = ker.WallLaw(wall_of("random-15")), ker.Legendre(2)
+    samples = [ker.discretise(law, basis, tolerance=4e-3, rng=seed).samples for seed in range(24)]
+    assert sum(number == 2**14 for number in samples) <= 3 and min(samples) >= 2**14
+
+
+def test_rays_that_continue_a_run_are_traced_at_once(monkeypatch):
+    traced, reflect = [], ker.WallLaw.reflect_with_status
+
+    def counted(law, x, theta):
+        traced.append(np.size(x))
+        return reflect(law, x, theta)
+
+    monkeypatch.setattr(ker.WallLaw, "reflect_with_status", counted)
+    sampler = SobolSampler(MUSHROOMS, ker.Legendre(2), np.random.default_rng(0))
+    for number in (2**11, 2**14):
+        sampler.sampled(number, symmetrise=False)
+    assert traced == [2**11, 2**14 - 2**11]
+
+
+def test_isometries_of_many_pieces_come_before_all_rays():
+    found = ker.discretise(ker.WallLaw(wall_of("profile")), ker.Legendre(2), tolerance=1e-3)
+    assert found.method == "exact"
 
 
 def test_a_profile_of_many_pieces_takes_rays_for_a_rough_answer_and_isometries_for_an_exact_one():
@@ -81,6 +108,43 @@ def test_quadrature_whose_first_panels_would_take_too_long_leaves_its_work_to_ra
     _, error, rays = traced_matrix(wall, many, Budget(1e-8, segments=QUICK_SEGMENTS, fallback=1.0))
     assert np.isinf(error) and rays == 0
     assert ker.discretise(ker.WallLaw(wall), many, samples=2**12).method == "qmc"
+
+
+@pytest.mark.parametrize(("name", "bins"), [("cusps", 16), ("random-15", 64)])
+def test_quadrature_is_not_begun_where_few_of_its_panels_would_take_too_long(name, bins):
+    _, error, _ = traced_matrix(wall_of(name), ker.Bins(bins), Budget(1e-8, segments=QUICK_SEGMENTS, fallback=1.0))
+    assert np.isinf(error)
+
+
+@pytest.mark.parametrize("name", ["mushroom", "random-17"])
+def test_cells_are_not_judged_before_their_first_panels_are_divided(name):
+    law, basis = ker.WallLaw(wall_of(name)), ker.Bins(16)
+    chosen, rays = (ker.discretise(law, basis, method=how) for how in ("auto", "qmc"))
+    assert chosen.method == "quadrature" and float(chosen.error) <= 0.5 * float(rays.error)
+    assert np.linalg.norm(chosen.symmetric - rays.symmetric) <= 2.5 * float(rays.error)
+
+
+def test_pieces_that_only_the_asymmetry_shows_are_looked_for_without_dividing_all_panels():
+    wall = geo.Wall([geo.Bezier([(0, 0), (0.2, -1.6), (0.8, -1.6), (1, 0)])])
+    _, error, rays = traced_matrix(wall, ker.Bins(64), Budget(1.37e-4))
+    # 4 million rays if the panels are divided until one meets the piece
+    assert error <= 1.37e-4 and rays < 1.5e6
+
+
+def test_quadrature_ends_where_the_last_segments_would_gain_little():
+    wall, basis = wall_of("random-19"), ker.Legendre(2)
+    _, error, rays = traced_matrix(wall, basis, Budget(1e-8, segments=QUICK_SEGMENTS, fallback=2e-4))
+    # 1.3 million rays leave 2.0e-5
+    assert error <= 4e-5 and rays < 8e5
+
+
+@pytest.mark.parametrize("basis", [ker.Legendre(4), ker.Bins(16)], ids=repr)
+def test_a_wall_in_the_other_frame_has_the_error_that_it_has_in_its_own(basis):
+    law = ker.WallLaw(wall_of("cusps"))
+    own, other = (ker.discretise(one, basis) for one in (law, law.in_specular_frame()))
+    assert float(other.error) == float(own.error) and other.samples == own.samples == 2**20
+    assert np.array_equal(other.symmetric, own.in_specular_frame().symmetric)
+    assert np.allclose(np.array(other.replicates), np.array(own.in_specular_frame().replicates))
 
 
 def test_a_wall_of_different_hollows_takes_rays_of_the_whole_for_a_rough_answer():

@@ -98,8 +98,9 @@ def discretise(
     ``"auto"`` tries the methods in this order; every other value of ``method`` tries the methods of its kind.
 
     1. ``AutoWall`` (auto): a wall without closed form, by the method predicted to meet the tolerance first: isometries
-       of few pieces; rays, if the tolerance needs fewer than ``samples``; isometries of many pieces; adaptive
-       quadrature, unless a pilot run predicts too large an error; all rays. Of the last two, the more exact matrix.
+       of few pieces; rays, if the tolerance needs fewer than ``samples`` by a pilot run, which is no result itself;
+       isometries of many pieces; adaptive quadrature, unless its first panels take too long or predict too large an
+       error; all rays. Of the last two, the more exact matrix. The same for a wall in the other frame.
     2. ``IsometryTables`` (exact): isometries on intervals of angles, with probabilities, such as polygonal walls.
     3. ``Isometries`` (exact): any other law that lists its isometries and is not a composition.
     4. ``Diagonal`` (exact): Henyey-Greenstein scattering, in `Legendre`.
@@ -109,14 +110,13 @@ def discretise(
     8. ``Maps`` (quadrature): deterministic laws.
     9. ``Actions`` (quadrature): any other law that does not average over entry points; in `Legendre` also laws that do
        and define their own ``_apply``.
-    10. ``Traced`` (quadrature): walls of few pieces, as parts of other laws.
-    11. ``Sobol`` (qmc): laws driven by one uniform number.
-    12. ``Traced`` (quadrature): any wall.
-    13. ``EntryPoints`` (quadrature): any other law that averages over entry points; ``samples`` nodes.
-    14. ``MonteCarlo`` (monte-carlo): any law.
+    10. ``Sobol`` (qmc): laws driven by one uniform number.
+    11. ``Traced`` (quadrature): any wall.
+    12. ``EntryPoints`` (quadrature): any other law that averages over entry points; ``samples`` nodes.
+    13. ``MonteCarlo`` (monte-carlo): any law.
 
     Methods 1 to 9 are tried for the whole law, then for its parts: a sum is computed from its terms, a law in the other
-    frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 14 come last. A
+    frame from its inner law, a composition from its factors if none of them needs rays. Methods 10 to 13 come last. A
     wall with different hollows is a sum, unless up to 2^17 rays that enter anywhere meet the tolerance.
 
     For a composition the result is the Galerkin matrix of the product, not the product of Galerkin matrices, which

@@ -34,7 +34,7 @@ METHODS: tuple[Method, ...] = (
     AutoWall(), IsometryTables(), Isometries(), Diagonal(), Arcs(), Densities(), LeastResistance(), Maps(), Actions(),
 )  # fmt: skip
 # Methods with rays. They are tried if no method above accepts the law and its parts do not give its matrix.
-SAMPLED: tuple[Method, ...] = (Traced(), Sobol(), Traced(any_wall=True), EntryPoints(), MonteCarlo())
+SAMPLED: tuple[Method, ...] = (Sobol(), Traced(), EntryPoints(), MonteCarlo())
 # The kinds of methods of a compound law, in the order of the error message.
 NAMES: tuple[MethodName, ...] = get_args(MethodName)[1:]
 
@@ -160,7 +160,7 @@ class _Sum:
 
 
 class _Mirrored:
-    """The computation of a law in the other frame, by quadrature of the law in a mirror-symmetric basis."""
+    """The computation of a law in the other frame, from the law's matrix in a mirror-symmetric basis."""
 
     def __init__(self, inner: _Law) -> None:
         self.inner = inner
@@ -172,7 +172,7 @@ class _Mirrored:
     def has(self, wanted: MethodName, basis: Basis) -> bool:
         if wanted == "auto":
             # If rays are the best method of the law, rays of the law in the other frame are as good.
-            return _names(self.inner, basis)[0] in ("exact", "quadrature")
+            return self._has_choice(basis) or _names(self.inner, basis)[0] in ("exact", "quadrature")
         return wanted in ("exact", "quadrature") and self.inner.has(wanted, basis)
 
     def without_rays(self, basis: Basis) -> bool:
@@ -180,10 +180,23 @@ class _Mirrored:
 
     def matrix(self, wanted: MethodName, basis: Basis, budget: Budget) -> KernelMatrix:
         finer, restriction = mirror_refinement(basis)
-        inner = self.inner.matrix("exact" if wanted == "exact" else "quadrature", finer, budget)
-        flip = reflection_matrix(finer)
-        symmetric = restriction @ inner.symmetric @ flip @ restriction.T
-        return KernelMatrix(symmetric, basis, inner.error, method=inner.method)
+        if wanted == "auto" and not self._has_choice(finer):
+            wanted = "quadrature"
+        inner = self.inner.matrix(wanted, finer, budget)
+        flipped = reflection_matrix(finer) @ restriction.T
+        return KernelMatrix(
+            restriction @ inner.symmetric @ flipped,
+            basis,
+            inner.error,
+            method=inner.method,
+            replicates=tuple(restriction @ part @ flipped for part in inner.replicates),
+            samples=inner.samples,
+            unresolved=inner.unresolved,
+        )
+
+    def _has_choice(self, basis: Basis) -> bool:
+        """Whether the law has walls, for which a method is chosen by pilot runs."""
+        return any(AutoWall().accepts(term.law, basis) for _, term in self.inner.terms)
 
 
 def _chain(parts: Sequence[_Law]) -> Recipe:

@@ -33,9 +33,8 @@ if TYPE_CHECKING:
 ANGLE_FRACTION, FRACTION_WITH_FALLBACK, LEAST_SEGMENTS = 0.25, 0.02, 80_000
 # The same fraction for cells, where all nodes of a panel are computed together, and patches on their pieces sampled.
 CELL_FRACTION = 0.005
-# Guesses, not measurements, for the prediction of the cost, in ray segments, and the limit on it; walls differ by more
-# than a factor of ten.
-ANGLES_A_PIECE, SEGMENTS_A_CHANGE, AFFORDABLE = 100, 400, 40_000_000
+# On walls of more pieces quadrature does not begin.
+MOST_PIECES = 30
 # The asymmetry ||S - S^T|| shows the antisymmetric part of errors that the error estimates of panels and angles miss.
 # If the symmetric part has the same size, the whole error is sqrt(2)/2 times the asymmetry; the rest is a margin,
 # larger for few functions, whose pairs may agree by chance.
@@ -58,9 +57,13 @@ STAGE_RATIO, COARSEST_STAGE = 1e-2, 1e-3
 # The same for cells, but from COARSEST_CELLS on, and only if the first panels need more than a fraction of the limit on
 # segments at the wanted tolerance. This is predicted from some angles; patches cost a multiple of the rows.
 CELL_RATIO, COARSEST_CELLS, FIRST_FRACTION, PATCH_COST = 0.1, 1e-2, 0.1, 3.0
-# If another method can take over, the coarse panels of bases with edges may need this fraction of the limit: on cusps,
-# which need .7 of it in 32 bins, rays were four times as fast.
+# If another method can take over, the first panels of bases with edges may need this fraction of the limit, for cells
+# in the mean of both tolerances. In 16 and 64 bins of ten walls, rays were better at equal error for four of the six
+# matrices that need more and were computed nevertheless, and for one of the ten others.
 FRACTION_OF_PANELS = 0.5
+# This is predicted from some angles, which may be wrong by a factor of four, and then from one in PANELS_A_PROBE of the
+# panels, if these are at least two.
+PANELS_A_PROBE = 8
 # Fraction of the limit before which nothing is predicted: the first few panels of polynomials miss most changes.
 PATIENCE = 1.0 / 16.0
 # Factor of the tolerance of expectations, if their errors have more than this fraction of the tolerance together.
@@ -81,7 +84,9 @@ RATIO_MARGIN = 4.0
 NARROWEST = 1e-13
 # A stage begins only if its predicted error is below WORTHWHILE times the present error and tolerance, or the present
 # error below LARGEST_JUMP times the fallback error; it goes on only if its predicted error is below that multiple.
-WORTHWHILE, LARGEST_JUMP = 0.5, 4.0
+# In cells the first division reduces the error by a factor of 2 to 60 on seven walls; until then FIRST_JUMP counts.
+# A stage that follows an error below the fallback error needs at least LEAST_LEFT of the segments.
+WORTHWHILE, LARGEST_JUMP, FIRST_JUMP, LEAST_LEFT = 0.5, 4.0, 32.0, 0.25
 # Least distance of cuts from each other and from the ends of a panel, as a fraction of the panel.
 LEAST_CUT = 1e-7
 # Smaller Legendre bases are extended to this many functions, so that no symmetry hides an error. The error then belongs
@@ -95,21 +100,12 @@ MOST_MENDINGS = 8
 
 
 class Traced:
-    """Walls by adaptive quadrature in the entry point and in the incoming angle.
-
-    Parameters
-    ----------
-    any_wall : bool
-        Whether walls are accepted for which sampled rays are likely to be more accurate.
-    """
+    """Walls by adaptive quadrature in the entry point and in the incoming angle."""
 
     name: MethodName = "quadrature"
 
-    def __init__(self, any_wall: bool = False) -> None:
-        self.any_wall = any_wall
-
     def accepts(self, law: Law, basis: Basis) -> bool:
-        return isinstance(law, WallLaw) and (self.any_wall or is_affordable(law.wall, basis))
+        return isinstance(law, WallLaw)
 
     def matrix(self, law: Law, basis: Basis, budget: Budget) -> KernelMatrix:
         symmetric, error, rays = traced_matrix(cast(WallLaw, law).wall, basis, budget)
@@ -117,28 +113,14 @@ class Traced:
         return computed(symmetric, basis, self.name, error + rounding(basis), how)
 
 
-def is_affordable(wall: Wall, basis: Basis) -> bool:
-    """Whether adaptive quadrature is likely to beat the sampling of rays: few pieces, and few functions with edges.
-
-    Each incoming angle has several changes of itinerary per piece, each found by about 30 rays. An error of 1e-6 needs
-    about a thousand angles and one breakpoint in theta per piece, so the cost grows like the square of the pieces. At
-    each angle a change of cell costs as much as a change of itinerary, and each cell in theta is integrated separately.
-    In overhanging walls rays stay in cavities for long, with an unbounded number of changes.
-    """
-    cells = 1 if basis.is_polynomial else len(basis.edges) - 1
-    overhangs = bool(np.any(np.diff(wall.cell.vertices[:, 0]) < 0.0))
-    return may_be_affordable(wall, cells) and not overhangs
-
-
-def may_be_affordable(wall: Wall, cells: int = 1) -> bool:
+def may_be_affordable(wall: Wall) -> bool:
     """Whether adaptive quadrature beats the sampling of rays on some walls like this, which its first segments tell.
 
-    In walls that do not close, rays near grazing pass arbitrarily many cells; on three walls with islands sampled rays
+    Each incoming angle has several changes of itinerary per piece, and there is one breakpoint in theta per piece. In
+    walls that do not close, rays near grazing pass arbitrarily many cells; on three walls with islands sampled rays
     were better.
     """
-    pieces = len(wall.pieces) + sum(map(len, wall.islands))
-    predicted = ANGLES_A_PIECE * SEGMENTS_A_CHANGE * (1 + pieces) ** 2 * (1 + cells) ** 2 / 4.0
-    return bool(wall.closes) and predicted <= AFFORDABLE
+    return bool(wall.closes) and len(wall.pieces) + sum(map(len, wall.islands)) <= MOST_PIECES
 
 
 def traced_matrix(wall: Wall, basis: Basis, budget: Budget) -> tuple[Floats, float, int]:
@@ -203,14 +185,15 @@ class _Integrator:
             edges = np.append(edges[edges < 0.5 * np.pi - 1e-12], 0.5 * np.pi)
         stages = max(0, math.floor(math.log(self.tolerance / COARSEST_STAGE) / math.log(STAGE_RATIO)))
         self.first_tolerance = self.tolerance / STAGE_RATIO**stages
-        self.ratio, self.tightens = STAGE_RATIO, False
+        self.ratio, self.tightens, self.jump = STAGE_RATIO, False, LARGEST_JUMP
         least_segments = 0.0
         if self.cells is not None:
-            self.ratio = CELL_RATIO
+            self.ratio, self.jump = CELL_RATIO, FIRST_JUMP
             self.first_tolerance = max(self.tolerance, COARSEST_CELLS)
-            least_segments = self._predicted(edges, self.first_tolerance)
-            more = self._predicted(edges, self.tolerance)
-            self.tightens = least_segments + more <= FIRST_FRACTION * budget.segments
+            least_segments = 0.5 * (
+                self._predicted(edges, self.first_tolerance) + self._predicted(edges, self.tolerance)
+            )
+            self.tightens = 2.0 * least_segments <= FIRST_FRACTION * budget.segments
             if self.tightens:
                 self.first_tolerance = self.tolerance
         elif not basis.is_polynomial and math.isfinite(budget.fallback):
@@ -222,7 +205,7 @@ class _Integrator:
             edges = np.append(self.grazing.highest, edges[edges > self.grazing.highest])
         self.panels = AnglePanels.between(np.empty(0), np.empty(0), basis.size)
         if math.isinf(budget.fallback) or least_segments <= FRACTION_OF_PANELS * budget.segments:
-            self._add_panels(edges[:-1], edges[1:])
+            self._add_first_panels(edges[:-1], edges[1:])
 
     def run(self) -> tuple[Floats, float, int]:
         """Divide panels, in stages of decreasing tolerance, until the error is small enough or no segments are left.
@@ -245,10 +228,24 @@ class _Integrator:
             tolerance = following
             self._begin(tolerance)
 
+    def _add_first_panels(self, low: Floats, high: Floats) -> None:
+        """Add the first panels, or none if another method can take over and some of them need too many segments."""
+        number = len(low)
+        some = np.arange(PANELS_A_PROBE // 2, number, PANELS_A_PROBE)
+        if math.isinf(self.budget.fallback) or len(some) < 2:
+            self._add_panels(low, high)
+            return
+        before = self.segments
+        self._add_panels(low[some], high[some])
+        if (self.segments - before) * number > FRACTION_OF_PANELS * self.budget.segments * len(some):
+            self.panels = AnglePanels.between(np.empty(0), np.empty(0), self.basis.size)
+            return
+        self._add_panels(np.delete(low, some), np.delete(high, some))
+
     def _is_out_of_reach(self, error: float) -> bool:
         """Whether enough segments were spent to tell that another method is likely to be more exact."""
         enough = self.segments >= PATIENCE * self.budget.segments
-        return enough and self.budget.out_of_reach(error / LARGEST_JUMP, self.segments)
+        return enough and self.budget.out_of_reach(error / self.jump, self.segments)
 
     def _predicted(self, edges: Floats, tolerance: float) -> float:
         """The ray segments that the first panels need at a tolerance, beyond those already spent, from some angles."""
@@ -278,15 +275,21 @@ class _Integrator:
         hoped = min(WORTHWHILE * min(error, tolerance), most)
         if predicted < hoped:
             return max(wanted, predicted)
-        return wanted if error <= most else None
+        # with few segments left, a stage recomputes expectations and divides no panel
+        left = 1.0 - self.segments / self.budget.segments
+        return wanted if error <= most and (left >= LEAST_LEFT or error > self.budget.fallback) else None
 
     def _begin(self, tolerance: float) -> None:
         """Begin a stage: recompute the expectations on panels where their error is too large for its tolerance."""
         self._integrate_grazing(tolerance)
+        self._renew(tolerance, np.ones(len(self.panels.low), dtype=np.bool_))
+
+    def _renew(self, tolerance: float, among: NDArray[np.bool_]) -> None:
+        """Recompute the expectations on some of the panels, where their error is too large for this tolerance."""
         self.mean_tolerance = max(MEAN_FRACTION * tolerance, SMALLEST_MEAN_TOLERANCE)
         mass = np.maximum(self.panels.mass, FAIR_FRACTION)
         coarse = self.panels.mean_errors(self.basis) > 2.0 * self.mean_tolerance * mass
-        coarse &= self.panels.mean_squares() > (2.0 * self.mean_tolerance) ** 2 * mass
+        coarse &= among & (self.panels.mean_squares() > (2.0 * self.mean_tolerance) ** 2 * mass)
         step = len(coarse)
         if self.cells is not None:
             # a part of the remaining segments at a time
@@ -313,7 +316,7 @@ class _Integrator:
 
     def _meet(self, tolerance: float) -> None:
         """Divide panels until the error is below the tolerance, or no segments are left."""
-        goal = means = tolerance
+        goal = means = pieces = tolerance
         while True:
             error, panels, conditionals, hidden = self._measure()
             if error <= tolerance or self.segments >= self.budget.segments or self._is_out_of_reach(error):
@@ -323,12 +326,32 @@ class _Integrator:
                 means *= TIGHTENING
                 self._begin(means)
                 continue
+            if self.cells is not None and panels + conditionals <= tolerance and pieces > 0.01 * tolerance:
+                pieces *= TIGHTENING
+                self._find_pieces(pieces, tolerance)
+                continue
             # Errors that only the asymmetry shows lie in panels whose rules agree by chance.
             goal = min(goal, max(tolerance - hidden, 0.25 * (panels + conditionals)))
             chosen = self._worth_dividing(0.5 * goal if self.halved else goal)
             if not chosen.any():
                 return
             self._divide(chosen)
+
+    def _find_pieces(self, pieces: float, tolerance: float) -> None:
+        """Find missed pieces, which only the asymmetry shows: recompute the cells that have most of it."""
+        matrix, *_ = self._state()
+        asymmetry = np.sum((matrix - matrix.T) ** 2, axis=1)
+        order = np.argsort(asymmetry)
+        most = (0.5 * tolerance / self._asymmetry_factor) ** 2
+        cells = np.zeros(len(order), dtype=np.bool_)
+        cells[order[np.cumsum(asymmetry[order]) > most]] = True
+        before = self.mean_tolerance
+        self._renew(pieces, cells[self.basis.index(0.5 * (self.panels.low + self.panels.high))])
+        self.mean_tolerance = before
+
+    @property
+    def _asymmetry_factor(self) -> float:
+        return ASYMMETRY_FACTOR + FEW_PAIRS / self.basis.size
 
     def _measure(self) -> tuple[float, float, float, float]:
         """The present error and its parts: from the panels, from the expectations, and from the asymmetry."""
@@ -348,8 +371,7 @@ class _Integrator:
             # the halves share no row of the matrix if each basis function lives on one side
             both = math.sqrt(2.0) if self.sided else 2.0
             matrix, panels, conditionals = matrix + flip @ matrix @ flip.T, both * panels, both * conditionals
-        factor = ASYMMETRY_FACTOR + FEW_PAIRS / self.basis.size
-        return matrix, panels, conditionals, factor * float(np.linalg.norm(matrix - matrix.T))
+        return matrix, panels, conditionals, self._asymmetry_factor * float(np.linalg.norm(matrix - matrix.T))
 
     def _worth_dividing(self, goal: float) -> NDArray[np.bool_]:
         """The panels to divide: the worst ones, so many that the others have an error below goal / 2 together."""
@@ -369,6 +391,7 @@ class _Integrator:
         return np.asarray(chosen & worst)
 
     def _divide(self, chosen: NDArray[np.bool_]) -> None:
+        self.jump = LARGEST_JUMP
         parents = self.panels.selected(chosen)
         before, whole = parents.differences(self.basis, NULL_RULES), parents.values(self.basis)
         cuts = [self._cuts(low, high) for low, high in zip(parents.low.tolist(), parents.high.tolist(), strict=True)]
