@@ -29,7 +29,8 @@ class Channel(NamedTuple, Generic[AnyCell]):
 def channel_of(cell: AnyCell, hollow: Hollow) -> Channel[AnyCell] | None:
     """Return the channel of one hollow of a wall that is its own ``cell``; None if its sides are not vertical.
 
-    The channel ends above all other pieces of the hollow, also where these are higher than the lower end of a side.
+    None also for a rectangle, with only a level floor below the channel. The channel ends above all other pieces of the
+    hollow, also where these are higher than the lower end of a side.
 
     Examples
     --------
@@ -38,8 +39,8 @@ def channel_of(cell: AnyCell, hollow: Hollow) -> Channel[AnyCell] | None:
     >>> channel = channel_of(wall, wall.hollows[0])
     >>> channel.height_to_width, channel.below.depth, channel.below.hollows[0].width
     (2.0, 0.5, 0.25)
-    >>> channel_of(geo.triangular_teeth(0.7), geo.triangular_teeth(0.7).hollows[0]) is None
-    True
+    >>> [channel_of(wall, wall.hollows[0]) for wall in (geo.triangular_teeth(0.7), geo.rectangular_teeth(2.0))]
+    [None, None]
     """
     path = cell.pieces[hollow.first : hollow.last]
     rounding = SHAPE_TOLERANCE * cell.period
@@ -57,7 +58,8 @@ def channel_of(cell: AnyCell, hollow: Hollow) -> Channel[AnyCell] | None:
         inside = [*inside, Segment(path[-1].start, (hollow.right, -height))]
     if height <= rounding:
         return None
-    return Channel(height / hollow.width, _alone(cell, inside, hollow, height))
+    below = _alone(cell, inside, hollow, height)
+    return Channel(height / hollow.width, below) if below.hollows else None
 
 
 def _is_vertical(piece: Curve, rounding: float) -> bool:

@@ -29,9 +29,9 @@ from .below_channel import LOWEST, MOST_CROSSINGS, PLACES, TAILS, WEIGHTS, Below
 SHARPNESS, REACH = 7.0, 1.5
 # The first K, the ratio of consecutive ones, and the last.
 FIRST_DAMPED, DAMPING_RATIO, LAST_DAMPED = 5.0, math.sqrt(2.0), MOST_CROSSINGS / REACH
-# Boundaries of patches leave a fraction 1/d of the mass d^-3 dd: errors fall at least by this factor from one K to the
-# next.
-DAMPING_FALL = DAMPING_RATIO**6
+# The mass beyond d crossings is proportional to d^-2, and sums of signs oscillate: errors fall at least by this factor
+# from one K to the next, also where a step is small by chance.
+DAMPING_FALL = DAMPING_RATIO**3
 # Places per coefficient at which the phase is looked at for integers, and numbers of crossings per strip for the same.
 PLACES_PER_TERM, KINK_PLACES, MOST_KINKS = 2, 17, 1 << 16
 # Nodes of Gauss's rules between kinks and numbers of their null rules: the first rule up to MANY crossings, the second

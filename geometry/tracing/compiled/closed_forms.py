@@ -55,6 +55,8 @@ from .waves import cross_simple
 UNDECIDED = 255
 ESCAPED = 0
 RAYS = WAVE
+# Rows of `Room.numbers`: the left ends of the cells of rays, and the numbers of hollows before them.
+BASES, PLACES = 6, 4
 # Number of hollows up to which their left ends are compared with many rays at once, without a search for each ray.
 FEW_HOLLOWS = 16
 # Numbers in a line of the cache.
@@ -270,7 +272,7 @@ def put_into_hollows(starts, theta, hollows, cell, results, room):
     stored, and overwritten where a ray meets a hollow. Rays are spread, so the processor could not predict branches.
     """
     ends, gone, bounces, status = results
-    bases, others, met, heads = room.numbers[6], room.others, room.met, room.heads
+    bases, others, met, heads = room.numbers[BASES], room.others, room.met, room.heads
     count, flat, kinds = starts.shape[0], hollows.shape[0], 0
     for j in range(count):
         bases[j] = cell_of(starts[j], cell)
@@ -283,7 +285,7 @@ def put_into_hollows(starts, theta, hollows, cell, results, room):
     for j in range(count):
         status[j] = ESCAPED
     # of a few hollows the left ends before each ray are counted, for many rays at once
-    places, searched = room.numbers[4], flat > FEW_HOLLOWS
+    places, searched = room.numbers[PLACES], flat > FEW_HOLLOWS
     for k in range(1, 0 if searched else flat):
         for j in range(count):
             found = places[j] if k > 1 else 0.0
@@ -345,7 +347,7 @@ def trace_closed(x, theta, tables, closed, limit, results, room, crossings):
                 states[j] = ESCAPED if 0.0 < hits[j] <= limit else UNDECIDED
             continue
         kinds = put_into_hollows(starts, incoming, hollows, cell, (ends, gone, collisions, states), room)
-        bases = numbers[6]
+        bases = numbers[BASES]
         for k in range(kinds):
             h = met[k]
             j, count = heads[h], 0
