@@ -5,12 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
+import mpmath as mp
 import numpy as np
 import pytest
 
 from asperity import geometry as geo
 from asperity import kernels as ker
 from asperity.geometry.scene.columns import PARTNER, RUN_SINE, TREE_LEVELS
+from asperity.geometry.scene.scene import NO_TABLES
+from asperity.geometry.tracing.compiled.lines import is_ahead
+from asperity.geometry.tracing.refinement import REFINED_SEGMENTS, refined_trace
+from precise_tracer import trace_precisely
+from precise_wedge import unfold
 
 EPS = np.finfo(float).eps
 # Counts fit into int64 up to here.
@@ -133,6 +139,54 @@ def test_runs_change_nothing_but_the_time(name):
     assert np.array_equal(fast.status[stable], slow.status[stable])
     miss = np.abs(fast.theta - slow.theta) + np.abs(fast.x - slow.x)
     assert np.all(miss[stable] <= allowed[stable])
+
+
+@pytest.mark.parametrize("angle", [3e-9, 1e-7, 1e-5, 1e-3, 0.02, 0.29])
+@pytest.mark.parametrize("middle", [0.5, 0.83])
+def test_rays_that_pass_an_apex_at_any_distance_are_those_of_the_unfolded_wedge(angle, middle):
+    rng = np.random.default_rng(9)
+    depth = float(0.5 / np.tan(angle / 2))
+    vertices = [(0.0, 0.0), (middle, -depth), (1.0, 0.0)]
+    wall = geo.Wall.from_vertices(vertices)
+    slack = 16 * EPS * depth
+    # lines at 4 slacks to 1e-3 of the depth from the apex, on either side, and rays near the axis
+    x, far = rng.random(120), 10 ** rng.uniform(np.log10(4 * slack), np.log10(max(1e-3, 16 * slack)), 120)
+    theta = np.arctan2(depth, x - middle) + rng.choice([-1, 1], 120) * far / np.hypot(depth, x - middle)
+    theta[80:] = np.pi / 2 + rng.choice([-1, 1], 40) * 10 ** rng.uniform(-14, -1, 40)
+    traced = geo.trace(wall, x, theta, max_collisions=NO_LIMIT)
+    exact = [unfold(vertices, *ray) for ray in zip(x.tolist(), theta.tolist(), strict=True)]
+    # nearer to a joint, at the apex or at an end of the opening, a ray is a corner hit within rounding
+    clear = np.array([ray.from_joint for ray in exact]) > 8 * slack
+    assert clear.mean() > 0.7 and traced.escaped[clear].all()
+    for i in np.flatnonzero(clear):
+        assert traced.collisions[i] == exact[i].hits
+        assert abs(traced.theta[i] - exact[i].theta) <= 8 * EPS
+        # the line is moved by some rounding errors of the depth
+        assert abs(traced.x[i] - exact[i].x) * np.sin(traced.theta[i]) <= 16 * EPS * max(1.0, depth)
+
+
+def test_flagged_rays_with_long_runs_along_an_arc_are_traced_in_one_step_too():
+    rng = np.random.default_rng(10)
+    scene = geo.focusing_arcs(np.pi / 2).scene
+    x, theta = rng.uniform(1e-12, 2e-12, 40), np.pi / 2 - rng.uniform(0.5e-6, 1e-6, 40)
+    refined = refined_trace(scene, x, theta)
+    assert np.count_nonzero(refined.status == 0) >= 38 and refined.collisions.min() > 10 * REFINED_SEGMENTS
+    for i in np.flatnonzero(refined.status == 0):
+        ray = trace_precisely(scene, x[i], theta[i], 10**9)
+        assert ray.bounces == refined.collisions[i]
+        with mp.workdps(50):
+            miss = [abs(mp.fsum(found[i]) - true) for found, true in ((refined.x, ray.x), (refined.theta, ray.theta))]
+        assert max(miss) <= 2 * refined.rounding[i] < 1e-14
+
+
+def test_a_line_a_slack_away_is_met_without_a_second_test():
+    tables = NO_TABLES._replace(joints=np.zeros((2, 4)), lines=np.array([[1.0, 0.0, 0.0, 1.0, 2.0, 0.0, 0.0]]))
+
+    def ahead(t):
+        # the height t (c_before - c_after) / length, with close = 1 and slack = 1e-3
+        return is_ahead.py_func(tables, 0, (0.5, -0.5), t, 1.0, 1e-3)
+
+    assert [ahead(t) for t in (1.5, 0.5, 2.1e-3, 1.9e-3, -0.5)] == [True, True, True, False, False]
 
 
 def test_only_lines_that_face_each_other_freely_make_runs():

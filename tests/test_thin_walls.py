@@ -51,6 +51,13 @@ def test_rays_that_were_lost_or_wrong(kind, number, x, theta):
     assert verdict.lost == verdict.wrong == verdict.flagged == 0
 
 
+def test_the_segment_before_a_run_does_not_count_as_the_one_that_ends_it():
+    """Next to the apex of a wedge, after fourteen hits in one step, with the gap within rounding."""
+    wall = random_polygon("sharp peaks", np.random.default_rng([77, 7]))
+    verdict = judge(wall, np.array([0.9634121487192336]), np.array([1.4675613245704422]), brute_force)
+    assert verdict.lost == verdict.wrong == verdict.flagged == 0
+
+
 def test_a_line_that_is_met_at_its_end_is_not_met_at_its_start():
     joints, lines = np.array([[0.0, -1.0], [2.0, -1.0]]), np.array([[2.0, 0.0]])
     tables = NO_TABLES._replace(joints=joints, lines=lines)

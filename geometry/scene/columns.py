@@ -121,7 +121,9 @@ WIDE_CHORD = 14  # length of the chord
 WIDE_CHORD_LOW = 15
 IS_SHORT = 16  # 1 if the position along the chord decides whether a point is on the arc
 WIDE_STRETCH = 17  # a double
-WIDE_ARC_COLUMNS = 18
+WIDE_SPAN = 18  # angle of the arc, a double
+WIDE_RUN_SINE = 19  # RUN_SINE of the arc
+WIDE_ARC_COLUMNS = 20
 
 # closed: one row for each hollow, see `closed_forms`.
 FORM = 0  # NO_FORM, WEDGE or CIRCULAR

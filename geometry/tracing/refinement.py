@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
 
 # Limit on the ray segments of a flagged ray, above which its flag stays; a double-double step costs about twenty double
-# steps. A run between vertical sides counts as one segment; runs along arcs and in wedges do not.
+# steps. A long run between vertical sides or along an arc counts as one segment; runs in wedges do not.
 REFINED_SEGMENTS = 40_000
 _SETTLED, _CORNER, _GRAZING, _BOUNCE_LIMIT = 0, 1, 2, 3
 

@@ -15,6 +15,7 @@ from ...scene.columns import (
     IS_CORNER,
     JOINT_X,
     JOINT_Y,
+    LENGTH,
     SKY_LEFT,
     SKY_RIGHT,
     STARTS_LINE,
@@ -79,6 +80,13 @@ def line_time(tables, j, sides, px, py, vx, vy):
 
 
 @inlined
+def is_ahead(tables, j, sides, t, close, slack):
+    """-> bool: whether a line lies ahead of the start for any rounding: at a time above ``close``, or a slack away."""
+    c_before, c_after = sides
+    return t > close or t * (c_before - c_after) > slack * tables.lines[j, LENGTH]
+
+
+@inlined
 def joint_side(joints, j, own, px, py, vx, vy, slack):
     """-> (c, t): the number c of joint j, and the time to the joint if it is a corner that the ray meets, else inf."""
     dx, dy = joints[j, JOINT_X] - px, joints[j, JOINT_Y] - py
@@ -110,7 +118,7 @@ def nearest_line(scope, own, px, py, vx, vy, time):
             is_own = own.kind == LINE and own.number == j
             if not is_own:
                 t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
-                if t > close:
+                if is_ahead(tables, j, (c_before, c_after), t, close, slack):
                     if t < min(best, time):
                         best, found, best_fraction = t, j, fraction
                 elif t >= -close:
@@ -193,7 +201,7 @@ def nearest_line_in_boxes(scope, own, px, py, vx, vy, time):
             c_after = (joints[j + 1, JOINT_X] - px) * vy - (joints[j + 1, JOINT_Y] - py) * vx
             t, fraction = line_time(tables, j, (c_before, c_after), px, py, vx, vy)
             # of two lines at equal distance the first along the wall is hit, as without boxes
-            if t > close:
+            if is_ahead(tables, j, (c_before, c_after), t, close, slack):
                 if t < best or (t == best and j < found):
                     best, found, best_fraction = t, j, fraction
                     most = min(best, time) + 2.0 * slack

@@ -358,9 +358,12 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
         px, py, vx, vy, at_corner = reflect(scope, hit, own, px, py, vx, vy)
         if at_corner:
             return shift + px, vx, vy, bounces, CORNER, label
+        flown = hit.time
         if not with_path:
             px, py, vx, vy, hits = skip_run(scope, hit, own, px, py, vx, vy, limit - bounces - 1)
             bounces += hits
+            # no segment of a run passes a piece from behind
+            flown = 0.0 if hits > 0 else flown
             if labelled:
                 label = HASH_FACTOR * label + np.uint64(hits)
         # one Newton step on |v| = 1, so that rounding errors of speed and position do not amplify each other
@@ -369,7 +372,7 @@ def trace_ray(scope, entry, theta, limit, labelled, path):
         vy *= scale
         bounces += 1
         before = own.number if own.kind == LINE else -1
-        own = Own(hit.kind, hit.number, hit.s if hit.kind == BEZIER else -1.0, hit.time, before, bounces)
+        own = Own(hit.kind, hit.number, hit.s if hit.kind == BEZIER else -1.0, flown, before, bounces)
         if with_path:
             path[bounces, POINT_X], path[bounces, POINT_Y] = px + shift, py
 

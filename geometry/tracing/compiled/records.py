@@ -51,8 +51,8 @@ class Own(NamedTuple):
     """The start of a ray segment.
 
     The kind of the piece and its row in the table, -1 for the opening and the sides; the parameter on a Bezier piece,
-    else -1; the length of the last segment that ended on a piece; the row of the line that was hit before this piece,
-    or -1; and the number of collisions so far.
+    else -1; the length of the last segment that ended on a piece, 0 after a run; the row of the line that was hit
+    before this piece, or -1; and the number of collisions so far.
     """
 
     kind: int

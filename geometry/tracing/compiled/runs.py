@@ -99,14 +99,16 @@ def skip_crossings(pair, normal, px, py, vx, vy, slack, most):
             return px, py, vx, vy, 0
         count = room * away / step
     else:
-        if gap * away <= slack:
+        if gap <= slack:
             # next to the apex, where the gap is within rounding, double precision does not resolve the position
             return px, py, vx, vy, 0
         # the facing part ends on circles about the apex; curvature is that of the circle through the ray's position
         curvature = sine / gap
-        d = along * along - ahead * curvature * (2.0 - ahead * curvature)
-        if along > 0.0 and d >= 0.0:
-            t = ahead * (2.0 - ahead * curvature) / (along + math.sqrt(d))
+        # radius of the nearer circle relative to the ray's; the line meets it if its distance from the apex is less
+        narrow = (pair[GAP] + END_SLACKS * slack * sine) / gap
+        if along > 0.0 and narrow >= away:
+            root = math.sqrt((narrow - away) * (narrow + away))
+            t = ahead * (2.0 - ahead * curvature) / (along + root)
         else:
             root = math.sqrt(along * along + behind * curvature * (2.0 + behind * curvature))
             reach = behind * (2.0 + behind * curvature)

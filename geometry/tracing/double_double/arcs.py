@@ -10,6 +10,7 @@ from ...scene.columns import (
     END_X,
     END_Y,
     IS_SHORT,
+    RUN_SINE,
     SHORT_CHORD,
     SPAN,
     START_X,
@@ -28,6 +29,8 @@ from ...scene.columns import (
     WIDE_NORMAL_X_LOW,
     WIDE_NORMAL_Y,
     WIDE_NORMAL_Y_LOW,
+    WIDE_RUN_SINE,
+    WIDE_SPAN,
     WIDE_STRETCH,
 )
 from .arithmetic import (
@@ -77,6 +80,7 @@ def refined_arcs(arcs):
         row[WIDE_CHORD], row[WIDE_CHORD_LOW] = length
         row[IS_SHORT] = 1.0 if arcs[k, SHORT_CHORD] > 0.0 else 0.0
         row[WIDE_STRETCH] = stretch
+        row[WIDE_SPAN], row[WIDE_RUN_SINE] = arcs[k, SPAN], arcs[k, RUN_SINE]
         row[END_X], row[END_Y] = x1, y1
     return table
 

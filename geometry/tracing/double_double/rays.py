@@ -16,8 +16,8 @@ Three quantities are computed along a ray.
   corner exactly if one of these angles does. (Strictly, a ray of rational data meets no corner unless it is vertical,
   because the tangent of an algebraic angle is transcendental.)
 
-Long runs between two facing vertical sides are computed by a division, and so are the cells that a ray passes in bands
-of heights without pieces. All other hits are computed one by one.
+Long runs between two facing vertical sides and along circular arcs are computed in one step, see `runs`, and so are the
+cells that a ray passes in bands of heights without pieces. All other hits are computed one by one.
 """
 
 from __future__ import annotations
@@ -35,12 +35,10 @@ from ...scene.columns import (
     CIRCLES_END,
     CORNER_EDGE,
     ELLIPSES_END,
-    FAR_Y,
     FIRST_BEZIER,
     FIRST_CIRCLE,
     FIRST_ELLIPSE,
     FIRST_JOINT,
-    FIRST_PAIR,
     HIGH,
     IS_CORNER,
     JOINT_X,
@@ -50,10 +48,7 @@ from ...scene.columns import (
     LEFT_EDGE,
     LENGTH,
     LOW,
-    NEAR_Y,
     NO_EDGE,
-    PAIRS_END,
-    PARTNER,
     RIGHT,
     RIGHT_EDGE,
     SIZE,
@@ -80,6 +75,7 @@ from .arithmetic import (
 )
 from .beziers import bezier_hit, bezier_point
 from .records import Sizes, WideHit, WideOwn, WideScope
+from .runs import LAST_HITS, crossings, skip_chords
 from .sides import Arrival, Face, in_front, line_ends, orientation
 
 ESCAPED, CORNER, GRAZING, BOUNCE_LIMIT, UNRESOLVED, UNSETTLED = 0, 1, 2, 3, 4, 5
@@ -90,32 +86,7 @@ PI_REST = 1.2246467991473532e-16
 WIDTH_MARGIN = 1.0 + 2.0**-20
 # Accumulated rounding error, as a fraction of the scale, above which a ray remains unresolved.
 LARGEST_ERROR = 2.0**-50
-# Runs up to this number of hits are traced hit by hit, as a check of `compiled/runs`; so are the last hits of a run.
-LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
-
 _compile = jit(linked=True, _nrt=False)
-
-
-@_compile
-def crossings(tables, index, other, py, vx, vy, most):
-    """-> (hits, travel, flight): an even number of hits between two facing vertical sides, travel along y, and time."""
-    joints, lines, pairs = tables.joints, tables.lines, tables.pairs
-    travel, flight = (0.0, 0.0), 0.0
-    if joints[index, JOINT_X] != joints[index + 1, JOINT_X] or joints[other, JOINT_X] != joints[other + 1, JOINT_X]:
-        return 0, travel, flight
-    for row in range(int(lines[index, FIRST_PAIR]), int(lines[index, PAIRS_END])):
-        if pairs[row, PARTNER] == other:
-            gap = two_sum(joints[other, JOINT_X], -joints[index, JOINT_X])
-            time = divide(gap, vx)
-            step = multiply(time, vy)
-            low, high = min(pairs[row, NEAR_Y], pairs[row, FAR_Y]), max(pairs[row, NEAR_Y], pairs[row, FAR_Y])
-            room = high - py[0] if step[0] > 0.0 else py[0] - low
-            count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
-            if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
-                hits = 2 * np.int64(0.5 * count)
-                # beyond 2^53 hits is no double, and a double-double does not resolve the ray's position
-                return hits, multiply((float(hits), 0.0), step), float(hits) * time[0]
-    return 0, travel, flight
 
 
 @_compile
@@ -216,6 +187,28 @@ def with_new_error(sizes):
     """-> Sizes: the sizes with one more local error."""
     j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
     return Sizes(j1, a1, j2, a2, c_jj + 1.0, c_ja, c_aa + 1.0, errors + 1.0, half_ulp)
+
+
+@_compile
+def after_chords(sizes, chords, length):
+    """-> Sizes: the sizes after a run of equal chords on a circle, whose length is in units of the scale.
+
+    A chord and the reflection after it are the matrix M = -(1 + N) with N = ((-2, -length), (4 / length, 2)), whose
+    square is 0. So the power of M is 1 + chords N up to its sign, on which nothing depends.
+    """
+    j1, a1, j2, a2, c_jj, c_ja, c_aa, errors, half_ulp = sizes
+    jj, ja, aj, aa = 1.0 - 2.0 * chords, -chords * length, 4.0 * chords / length, 1.0 + 2.0 * chords
+    return Sizes(
+        jj * j1 + ja * a1,
+        aj * j1 + aa * a1,
+        jj * j2 + ja * a2,
+        aj * j2 + aa * a2,
+        jj * jj * c_jj + 2.0 * jj * ja * c_ja + ja * ja * c_aa,
+        jj * aj * c_jj + (jj * aa + ja * aj) * c_ja + ja * aa * c_aa,
+        aj * aj * c_jj + 2.0 * aj * aa * c_ja + aa * aa * c_aa,
+        errors,
+        half_ulp,
+    )
 
 
 @_compile
@@ -432,6 +425,11 @@ def refined_ray(scope, entry, theta, limit, most_segments):
                 bounces += hits
                 py = add(py, travel)
                 sizes = after_flight(sizes, flight / scale)
+            if hit.kind == ARC:
+                hits, px, py, vx, vy = skip_chords(tables.arcs[hit.number], px, py, vx, vy, limit - bounces)
+                if hits > 0:
+                    bounces += hits
+                    sizes = after_chords(with_new_error(sizes), float(hits), 2.0 * incidence / (bent * scale))
         norm = amplification_of(sizes)
         sizes = with_new_error(sizes)
         own = WideOwn(hit.kind, hit.number, hit.s if hit.kind == BEZIER else (-1.0, 0.0), flown)

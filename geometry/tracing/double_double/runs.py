@@ -1,0 +1,107 @@
+"""Long runs of hits in one step, in double-double arithmetic: between vertical sides, and along a circular arc.
+
+Loads numba. The last hits of a run are left to be traced hit by hit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ....core.compilation import jit
+from ...scene.columns import (
+    FAR_Y,
+    FIRST_PAIR,
+    JOINT_X,
+    NEAR_Y,
+    PAIRS_END,
+    PARTNER,
+    START_X,
+    START_Y,
+    WIDE_RUN_SINE,
+    WIDE_SPAN,
+)
+from .arcs import wide_arc
+from .arithmetic import (
+    add,
+    cross,
+    direction_angle,
+    divide,
+    dot,
+    multiply,
+    negate,
+    sine_cosine,
+    subtract,
+    two_sum,
+    wide,
+)
+
+# Runs up to this number of hits are traced hit by hit, as a check of `compiled/runs`; so are the last hits of a run.
+LONGEST_FOLLOWED, LAST_HITS = 4096.0, 4.0
+
+_compile = jit(linked=True, _nrt=False)
+
+
+@_compile
+def crossings(tables, index, other, py, vx, vy, most):
+    """-> (hits, travel, flight): an even number of hits between two facing vertical sides, travel along y, and time."""
+    joints, lines, pairs = tables.joints, tables.lines, tables.pairs
+    travel, flight = (0.0, 0.0), 0.0
+    if joints[index, JOINT_X] != joints[index + 1, JOINT_X] or joints[other, JOINT_X] != joints[other + 1, JOINT_X]:
+        return 0, travel, flight
+    for row in range(int(lines[index, FIRST_PAIR]), int(lines[index, PAIRS_END])):
+        if pairs[row, PARTNER] == other:
+            gap = two_sum(joints[other, JOINT_X], -joints[index, JOINT_X])
+            time = divide(gap, vx)
+            step = multiply(time, vy)
+            low, high = min(pairs[row, NEAR_Y], pairs[row, FAR_Y]), max(pairs[row, NEAR_Y], pairs[row, FAR_Y])
+            room = high - py[0] if step[0] > 0.0 else py[0] - low
+            count = room / abs(step[0]) - LAST_HITS if step[0] != 0.0 else 0.0
+            if count > LONGEST_FOLLOWED and count < most and time[0] > 0.0:
+                hits = 2 * np.int64(0.5 * count)
+                # beyond 2^53 hits is no double, and a double-double does not resolve the ray's position
+                return hits, multiply((float(hits), 0.0), step), float(hits) * time[0]
+    return 0, travel, flight
+
+
+@_compile
+def turned(x, y, sine, cosine):
+    """-> (x, y): a vector turned by an angle."""
+    return subtract(multiply(cosine, x), multiply(sine, y)), add(multiply(sine, x), multiply(cosine, y))
+
+
+@_compile
+def skip_chords(arc, px, py, vx, vy, most):
+    """-> (chords, px, py, vx, vy): move a ray along a circular arc by most chords of a long run.
+
+    As in `compiled/runs`. With n the normal at the ray, t the tangent and tau the angle of all chords about the centre,
+    the ray moves by (2 sin(tau/2) / kappa) (cos(tau/2) t + sin(tau/2) n).
+    """
+    n0x, n0y, curvature, _ = wide_arc(arc)
+    qx, qy = subtract(px, wide(arc[START_X])), subtract(py, wide(arc[START_Y]))
+    nx, ny = subtract(n0x, multiply(curvature, qx)), subtract(n0y, multiply(curvature, qy))
+    sine, cosine = dot(vx, vy, nx, ny), cross(vx, vy, nx, ny)
+    if sine[0] <= 0.0 or sine[0] > arc[WIDE_RUN_SINE]:
+        return 0, px, py, vx, vy
+    forward = cosine[0] > 0.0
+    half_chord = direction_angle(cosine if forward else negate(cosine), sine)
+    phi = 2.0 * math.atan2(dot(qx, qy, n0x, n0y)[0], cross(qx, qy, n0x, n0y)[0])
+    if phi < 0.0:
+        phi += 2.0 * math.pi
+    room = arc[WIDE_SPAN] - phi if forward else phi
+    count = 0.5 * room / half_chord[0] - LAST_HITS
+    if not LONGEST_FOLLOWED < count < most:
+        return 0, px, py, vx, vy
+    chords = np.int64(count)
+    half = multiply((float(chords), 0.0), half_chord)
+    high, low = sine_cosine(half[0])
+    # the low part of the angle is below an ulp of it, and its square below all errors
+    s = add(high, multiply((half[1], 0.0), low))
+    c = subtract(low, multiply((half[1], 0.0), high))
+    s = s if forward else negate(s)
+    dx, dy = turned(ny, negate(nx), s, c)
+    way = divide((2.0 * s[0], 2.0 * s[1]), curvature)
+    vx, vy = turned(vx, vy, s, c)
+    vx, vy = turned(vx, vy, s, c)
+    return chords, add(px, multiply(way, dx)), add(py, multiply(way, dy)), vx, vy
