@@ -220,7 +220,7 @@ class _Division(NamedTuple):
     complete: bool
 
 
-class _Heap:
+class _Waiting:
     """The beams that are not finished, in tables, and which of them have been taken."""
 
     def __init__(self, store: Store) -> None:
@@ -259,19 +259,19 @@ def _divided(
     from .compiled.splitting import LEAVES, STEPS, divide
 
     hollow = _hollow(triangulation)
-    heap = _Heap(_entrance(triangulation.entrance, hollow.width, entrances))
-    total, rounding, steps, leaves = float(heap.column(FLUX).sum()), 0.0, 0, 0
+    waiting = _Waiting(_entrance(triangulation.entrance, hollow.width, entrances))
+    total, rounding, steps, leaves = float(waiting.column(FLUX).sum()), 0.0, 0, 0
     rows: list[Floats] = []
     tags: list[NDArray[np.int64]] = []
     while True:
-        flux, best = heap.column(FLUX), heap.column(PRIORITY).max(initial=0.0)
+        flux, best = waiting.column(FLUX), waiting.column(PRIORITY).max(initial=0.0)
         room, spare = max_beams - leaves - flux.size, STEPS_A_BEAM * max_beams - steps
         complete = float(flux.sum()) <= tolerance * total
         if complete or room <= 0 or spare <= 0 or best <= 0.0:
             break
         parts = PARTS if min(flux.size, room) >= MANY else 1
         threshold = best / _step(float(flux.sum()) / max(tolerance * total, TINY), 1.0 + room / (leaves + flux.size))
-        store, limits = _together(heap.take(threshold)), (room // parts, max(spare // parts, 1))
+        store, limits = _together(waiting.take(threshold)), (room // parts, max(spare // parts, 1))
         found: list[Any] = [None] * parts
 
         def run(part: slice, store: Any = store, rule: Any = (threshold, *limits), found: list[Any] = found) -> None:
@@ -284,8 +284,8 @@ def _divided(
             rows.append(part_rows)
             tags.append(part_tags)
             leaves, steps, rounding = leaves + counts[LEAVES], steps + counts[STEPS], rounding + part_rounding
-        heap.put([part[0] for part in found])
-    rest = [pieces_of(store, hollow.width) for store in heap.take(-np.inf)]
+        waiting.put([part[0] for part in found])
+    rest = [pieces_of(store, hollow.width) for store in waiting.take(-np.inf)]
     left = _columns([row for row, _ in rest], [tag for _, tag in rest])
     return _Division(_columns(rows, tags), left, rounding, complete)
 

@@ -65,14 +65,14 @@ class AutoWall:
         if len(law.wall.pieces) <= FEW_PIECES and law.exact_law is not None:
             return IsometryTables().matrix(law.exact_law, basis, budget)
         sampler, affordable = SobolSampler(law, basis, budget.rng), may_be_affordable(law.wall)
-        look = _few_rays(law, sampler, basis, budget, affordable)
-        if look.found is not None:
-            return look.found
+        attempt = _few_rays(law, sampler, basis, budget, affordable)
+        if attempt.found is not None:
+            return attempt.found
         if law.exact_law is not None:
             return IsometryTables().matrix(law.exact_law, basis, budget)
         if not affordable:
             return sobol_matrix(sampler, basis, budget)
-        return _traced_or_all_rays(law, sampler, basis, budget, look.predicted)
+        return _traced_or_all_rays(law, sampler, basis, budget, attempt.predicted)
 
 
 def rays_of_whole(law: Law, basis: Basis, budget: Budget) -> KernelMatrix | None:
@@ -88,7 +88,7 @@ def rays_of_whole(law: Law, basis: Basis, budget: Budget) -> KernelMatrix | None
     return _enough_rays(sampler, basis, budget, SOBOL_ORDER, pilot, MANY_RAYS).found
 
 
-class _Look(NamedTuple):
+class _Attempt(NamedTuple):
     """The matrix within the tolerance, or None; the number of rays that it needs, and the predicted error of all rays.
 
     If it needs more than all, the number is at least that of all; if a few rays do not tell it, the error is inf.
@@ -99,57 +99,59 @@ class _Look(NamedTuple):
     predicted: float
 
 
-def _few_rays(law: WallLaw, sampler: SobolSampler, basis: Basis, budget: Budget, affordable: bool) -> _Look:
+def _few_rays(law: WallLaw, sampler: SobolSampler, basis: Basis, budget: Budget, affordable: bool) -> _Attempt:
     """The matrix by as many rays as the tolerance needs, or by quadrature with fewer segments, if it is affordable."""
     # Even an error of order 1 in the number of rays would miss the tolerance, so a pilot run is useless.
     if not affordable and budget.tolerance * budget.rays < 1.0:
-        return _Look(None, budget.rays, math.inf)
+        return _Attempt(None, budget.rays, math.inf)
     order = ROUGH_ORDER if len(law.wall.pieces) > ROUGH_PIECES else SOBOL_ORDER
-    look = _enough_rays(sampler, basis, budget, order, _pilot(sampler, basis, budget, order), MANY_RAYS)
-    if affordable and look.needed >= budget.rays > FIRST_RAYS:
+    attempt = _enough_rays(sampler, basis, budget, order, _pilot(sampler, basis, budget, order), MANY_RAYS)
+    if affordable and attempt.needed >= budget.rays > FIRST_RAYS:
         # more rays predict better the error that is compared with that of quadrature
-        look = _look(sampler, basis, budget, order, FIRST_RAYS)
-    if look.found is not None or look.needed >= budget.rays:
-        return look
+        attempt = _attempt(sampler, basis, budget, order, FIRST_RAYS)
+    if attempt.found is not None or attempt.needed >= budget.rays:
+        return attempt
     if affordable:
-        traced = Traced().matrix(law, basis, replace(budget, segments=look.needed, fallback=budget.tolerance))
+        traced = Traced().matrix(law, basis, replace(budget, segments=attempt.needed, fallback=budget.tolerance))
         if float(traced.error) <= budget.tolerance:
-            return _Look(traced, look.needed, float(traced.error))
-    elif whole_sequences(look.needed) >= budget.rays:
+            return _Attempt(traced, attempt.needed, float(traced.error))
+    elif whole_sequences(attempt.needed) >= budget.rays:
         # isometries of many pieces take no longer than all rays
-        return look
-    return _enough_rays(sampler, basis, budget, order, look, budget.rays)
+        return attempt
+    return _enough_rays(sampler, basis, budget, order, attempt, budget.rays)
 
 
-def _pilot(sampler: SobolSampler, basis: Basis, budget: Budget, order: float) -> _Look:
+def _pilot(sampler: SobolSampler, basis: Basis, budget: Budget, order: float) -> _Attempt:
     """What a pilot run predicts."""
     number = max(PILOT_RAYS, RAYS_A_FUNCTION * basis.size)
     if max(number, FIRST_RAYS) >= budget.rays:
-        return _Look(None, budget.rays, math.inf)
-    return _look(sampler, basis, budget, order, number)._replace(found=None)
+        return _Attempt(None, budget.rays, math.inf)
+    return _attempt(sampler, basis, budget, order, number)._replace(found=None)
 
 
-def _enough_rays(sampler: SobolSampler, basis: Basis, budget: Budget, order: float, look: _Look, most: int) -> _Look:
+def _enough_rays(
+    sampler: SobolSampler, basis: Basis, budget: Budget, order: float, attempt: _Attempt, most: int
+) -> _Attempt:
     """As many rays, fewer than ``most``, as are predicted to meet the tolerance, until they meet it."""
-    while look.found is None and look.needed < min(most, budget.rays):
-        look = _look(sampler, basis, budget, order, look.needed)
-    return look
+    while attempt.found is None and attempt.needed < min(most, budget.rays):
+        attempt = _attempt(sampler, basis, budget, order, attempt.needed)
+    return attempt
 
 
-def _look(sampler: SobolSampler, basis: Basis, budget: Budget, order: float, number: int) -> _Look:
+def _attempt(sampler: SobolSampler, basis: Basis, budget: Budget, order: float, number: int) -> _Attempt:
     """The matrix by a number of rays, if it meets the tolerance, and what the spread of these rays predicts."""
     try:
         found = sobol_matrix(sampler, basis, replace(budget, rays=number))
     except AccuracyError:
         # A bin has no rays, or too many rays do not escape, so this number of rays predicts nothing.
-        return _Look(None, budget.rays, math.inf)
+        return _Attempt(None, budget.rays, math.inf)
     error, number = float(found.error), found.samples
     predicted = error * (number / budget.rays) ** order
     within = found if error <= budget.tolerance else None
     if error > budget.tolerance * (budget.rays / (SOBOL_MARGIN * number)) ** order:
-        return _Look(within, budget.rays, predicted)
+        return _Attempt(within, budget.rays, predicted)
     needed = SOBOL_MARGIN * number * (error / budget.tolerance) ** (1.0 / order)
-    return _Look(within, max(FIRST_RAYS, 2 * number, int(needed)), predicted)
+    return _Attempt(within, max(FIRST_RAYS, 2 * number, int(needed)), predicted)
 
 
 def _traced_or_all_rays(

@@ -118,8 +118,8 @@ class PolygonLaw(BranchLaw):
             parts += [part.scaled(width) for part, width in zip(images, widths, strict=True) if width]
         return IsometryTable.joined(parts)
 
-    def _of_shape(self, shape: HollowShape, share: float) -> IsometryTable:
-        """The table of a hollow, scaled so that its opening is the whole period, with ``share`` times the tolerance.
+    def _of_shape(self, shape: HollowShape, fraction: float) -> IsometryTable:
+        """The table of a hollow, scaled so that its opening is the whole period, with ``fraction`` times the tolerance.
 
         Every hollow may leave a part of the tolerance unresolved, in proportion to its vertices.
         """
@@ -133,7 +133,7 @@ class PolygonLaw(BranchLaw):
 
         beams = beams_of(
             shape.vertices,
-            tolerance=min(share * self.tolerance, 1.0),
+            tolerance=min(fraction * self.tolerance, 1.0),
             max_beams=self.max_beams,
             mirror_symmetric=shape.mirrored().same_as(shape),
         )

@@ -128,6 +128,18 @@ def phase_on(line, crossings, strip, height):
     return series_at_row(t, strip.exits, strip.row) + height / math.tan(series_at_row(t, strip.outs, strip.row))
 
 
+@inlined
+def bracket_with(at, value, low, high, below, above, side):
+    """-> (low, high, below, above, side): a bracket of a root with one end moved to ``at``, by the Illinois rule.
+
+    ``below`` and ``above`` are the values at its ends. That of an end which stays for the second time in a row is
+    halved; ``side`` is 1 if the upper end was the last to move, -1 if the lower one was, else 0.
+    """
+    if (value > 0.0) == (above > 0.0):
+        return low, at, below * (0.5 if side == 1 else 1.0), value, 1
+    return at, high, value, above * (0.5 if side == -1 else 1.0), -1
+
+
 @linked
 def kink_between(low, high, below, above, level, line, strip, height):
     """Return the number of crossings at which the phase on a line is ``level``, by the Illinois rule."""
@@ -138,12 +150,7 @@ def kink_between(low, high, below, above, level, line, strip, height):
         value = phase_on(line, at, strip, height) - level
         if abs(value) < AT_INTEGER * (1.0 + abs(level)) or high - low < NARROW:
             break
-        if (value > 0.0) == (above > 0.0):
-            high, above = at, value
-            below, side = below * (0.5 if side == 1 else 1.0), 1
-        else:
-            low, below = at, value
-            above, side = above * (0.5 if side == -1 else 1.0), -1
+        low, high, below, above, side = bracket_with(at, value, low, high, below, above, side)
     return at
 
 
@@ -197,12 +204,7 @@ def crossing(low, high, below, above, level, outs, exits, height):
         value = phase_at(t, outs, exits, height) - level
         if abs(value) < AT_INTEGER * (1.0 + abs(level)) or high - low < NARROW:
             break
-        if (value > 0.0) == (above > 0.0):
-            high, above = t, value
-            below, side = below * (0.5 if side == 1 else 1.0), 1
-        else:
-            low, below = t, value
-            above, side = above * (0.5 if side == -1 else 1.0), -1
+        low, high, below, above, side = bracket_with(t, value, low, high, below, above, side)
     return t
 
 
