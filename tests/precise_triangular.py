@@ -1,24 +1,22 @@
-"""The matrix of triangular teeth on 512 equal bins in 40 digits: ``python tests/precise_triangular.py`` writes it.
+"""The matrix of triangular teeth on equal bins in 40 digits.
 
-Angle and edges of bins are the doubles that the library has, taken as exact; pi is pi. Where rays go is the closed form
-of Rudzis 2022, section 2.2.2, corrected: on the left of the bottom N - 1 or N hits with the probabilities below, on the
-right the mirror image. Between breakpoints, edges and the angles sent to edges every density is a sinusoid, whose
-integral is its value in the middle times 2 sin(width/2).
+Angle and edges of bins are the doubles that the library has, taken as exact; pi is pi. So the matrix is computed where
+it is used: numpy's arcsine rounds some edges differently on other processors, which changes the matrix by 1e-13. Where
+rays go is the closed form of Rudzis 2022, section 2.2.2, corrected: on the left of the bottom N - 1 or N hits with the
+probabilities below, on the right the mirror image. Between breakpoints, edges and the angles sent to edges every
+density is a sinusoid, whose integral is its value in the middle times 2 sin(width/2).
 """
 
 from __future__ import annotations
 
-import json
 from bisect import bisect_left, bisect_right
 from itertools import pairwise
-from pathlib import Path
 
 import mpmath as mp
 import numpy as np
 
 from asperity.kernels import Bins
 
-FILE = Path(__file__).with_suffix(".json")
 ANGLE, BINS = 0.7, 512
 DIGITS = 40
 NOTHING = mp.mpf(10) ** -30
@@ -65,9 +63,9 @@ def kinks_of(psi):
     return sorted({mp.mpf(0), mp.pi / 2, mp.pi, *(k for f in found for k in (f, mp.pi - f) if 0 < k < mp.pi)})
 
 
-def matrix(angle, size):
-    """The nonzero entries of W^(1/2) P W^(-1/2), as a dictionary."""
-    mp.mp.dps = DIGITS
+@mp.workdps(DIGITS)
+def reference(angle=ANGLE, size=BINS):
+    """W^(1/2) P W^(-1/2), each entry rounded once."""
     psi = mp.mpf(angle)
     edges = [mp.mpf(float(edge)) for edge in Bins(size).edges[:-1]] + [mp.pi]
     weight = [mp.sin((a + b) / 2) * mp.sin((b - a) / 2) for a, b in pairwise(edges)]
@@ -84,23 +82,7 @@ def matrix(angle, size):
                 place = bisect_right(edges, middle) - 1, bisect_right(edges, sign * middle + offset) - 1
                 flux[place] = flux.get(place, mp.mpf(0)) + mp.sin((b - a) / 2) * density(middle)
     assert abs(sum(flux.values()) - 1) < NOTHING
-    return {(i, j): mass / mp.sqrt(weight[i] * weight[j]) for (i, j), mass in flux.items()}
-
-
-def reference():
-    """What was written, as an array."""
-    found = np.zeros((BINS, BINS))
-    for i, j, value in json.loads(FILE.read_text(encoding="utf-8")):
-        found[i, j] = found[j, i] = float.fromhex(value)
+    found = np.zeros((size, size))
+    for (i, j), mass in flux.items():
+        found[i, j] = mass / mp.sqrt(weight[i] * weight[j])
     return found
-
-
-def main() -> None:
-    """Write the upper triangle."""
-    found = matrix(ANGLE, BINS)
-    entries = [[i, j, float(value).hex()] for (i, j), value in sorted(found.items()) if i <= j]
-    FILE.write_text(json.dumps(entries, separators=(",", ":")) + "\n", encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
